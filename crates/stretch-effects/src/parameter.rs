@@ -239,7 +239,7 @@ impl EffectParameter {
     }
 
     /// Values to screen at: a strength at a fiftieth and a fifth of its range, of both signs where it has both; a threshold, which is off
-    /// elsewhere than at 0, at a twentieth, a fifth and three fifths of the way from there; a shape, and a strength that is searched in equal
+    /// elsewhere than at 0, at a twentieth, a fifth, three fifths and nine tenths of the way from there, for it may reach the signal only near the other end; a shape, and a strength that is searched in equal
     /// ratios, at a sixth, a half and five sixths of its range; a form at its usual value.
     ///
     /// ```
@@ -264,7 +264,7 @@ impl EffectParameter {
         if off == 0.0 && self.is_log() && self.min > 0.0 {
             return [1.0, 3.0, 5.0].map(between).into();
         }
-        let shares: &[f64] = if off == 0.0 { &[0.02, 0.2] } else { &[0.05, 0.2, 0.6] };
+        let shares: &[f64] = if off == 0.0 { &[0.02, 0.2] } else { &[0.05, 0.2, 0.6, 0.9] };
         let ends = [self.min, self.max].into_iter().filter(|end| *end != off);
         ends.flat_map(|end| shares.iter().map(move |s| off + s * (end - off))).collect()
     }

@@ -17,20 +17,16 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import machines
 
 SHIFT_S = 0.08
-TIMES = ("skew", "delay", "lag", "second_order_lag", "clock_drift")
 FILES = [
     f"{movement}/S{2 * i + 1}_{2 * i + 2}_{end}.csv" for movement, end in (("HC_45", "HC45"), ("HC_90", "HC90")) for i in range(8)
 ]
 
 
 def late(answer: dict) -> tuple[list[str], float]:
-    """Effects of time in the most probable set, and the seconds by which they are late together, the mean of the sensors they
-    act on."""
+    """What is named of the time that all sensors share, and by how many seconds they are late; 0 where nothing is."""
     values = answer["candidates"][0]["parameter_values"] if answer["candidates"] else []
-    times = [v for v in values if v["effect"].rsplit(".", 1)[-1] in TIMES and v["name"] in ("skew_s", "delay_s", "tau_s", "m_s")]
-    shared = [v["value"] for v in times if "input" in v["effect"] or "angle_deg" in v["effect"]]
-    own = [v["value"] for v in times if v not in shared and "output" in v["effect"]]
-    return sorted({v["effect"] for v in times}), sum(shared) + (sum(own) / 5.0)
+    shared = [v for v in values if v["effect"] in answer["named"] and v["effect"].startswith("record.")]
+    return sorted({v["effect"] for v in shared}), sum(v["value"] for v in shared if v["name"] in ("skew_s", "delay_s"))
 
 
 def main() -> None:

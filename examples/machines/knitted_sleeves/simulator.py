@@ -1,12 +1,18 @@
-"""Five stretch sensors on a knee: each is a straight line over the angle."""
+"""Five stretch sensors on a knee: each a curve of third order over the angle, as calibrations of such sensors are."""
 
 SENSORS = ("s1", "s2", "s3", "s4", "s5")
+TURN_DEG = 90.0
 
 
 class Sleeve:
     def simulate(self, params, effects, inputs):
-        angle = inputs["angle_deg"]
-        return {name: params[f"{name}_per_deg"][:, None] * angle + params[f"{name}_zero"][:, None] for name in SENSORS}
+        x = inputs["angle_deg"] / TURN_DEG
+
+        def curve(name):
+            zero, one, two, three = (params[f"{name}_{term}"][:, None] for term in ("zero", "one", "two", "three"))
+            return zero + x * (one + x * (two + x * three))
+
+        return {name: curve(name) for name in SENSORS}
 
 
 sleeve = Sleeve()

@@ -53,6 +53,8 @@ pub(crate) struct Judged {
     /// Why the evidence carries no other verdict.
     pub(crate) overruled: Option<Overruled>,
     pub(crate) naming: Naming,
+    /// The names that would stand if nothing overruled the verdict.
+    pub(crate) seen_naming: Naming,
     /// What the catalogue lacks, where a gap is left.
     pub(crate) proposed: Option<Proposed>,
 }
@@ -74,27 +76,41 @@ pub(crate) fn judge(
 ) -> Result<Judged, GapError> {
     use VerdictKind::{Effect, Partial, Record, Unknown};
     if case.is_record {
-        let naming = Naming::default();
-        return Ok(Judged { kind: Record, seen: Record, overruled: None, naming, proposed: None });
+        let (naming, seen_naming) = Default::default();
+        return Ok(Judged {
+            kind: Record,
+            seen: Record,
+            overruled: None,
+            naming,
+            seen_naming,
+            proposed: None,
+        });
     }
     let seen = seen(case, thresholds);
     let would_name = matches!(seen, Effect | Partial);
     let too_little = case.too_little.filter(|_| would_name).map(Overruled::TooLittle);
     let overruled = at_bounds(case).or(too_little);
     let kind = if overruled.is_some() { Unknown } else { seen };
-    let mut naming = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
-    if kind != seen || kind == Unknown {
-        naming = Naming::default();
-    } else if !would_name {
-        // What is certain and small is told below the headline.
-        let found = case.posterior.effects() > case.posterior.nothing();
-        let names =
-            if found { naming.named.drain(..).chain(naming.faint).collect() } else { Vec::new() };
-        naming = Naming { faint: names, ..Naming::default() };
-    }
+    let seen_naming = naming(case, seen, thresholds);
+    let naming = if overruled.is_some() { Naming::default() } else { seen_naming.clone() };
     let is_left = matches!(kind, Partial | Unknown);
     let proposed = if is_left { lacking(kind == Partial)? } else { None };
-    Ok(Judged { kind, seen, overruled, naming, proposed })
+    Ok(Judged { kind, seen, overruled, naming, seen_naming, proposed })
+}
+
+/// The names that go with a verdict.
+fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming {
+    let all = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
+    match seen {
+        VerdictKind::Effect | VerdictKind::Partial => all,
+        // What is certain and small is told below the headline.
+        VerdictKind::Parameters | VerdictKind::NoGap
+            if case.posterior.effects() > case.posterior.nothing() =>
+        {
+            Naming { faint: [all.named, all.faint].concat(), ..Naming::default() }
+        }
+        _ => Naming::default(),
+    }
 }
 
 /// The verdict that the posterior and the sizes make.
@@ -278,6 +294,8 @@ mod tests {
         let verdict = judged(gap, p, |case| case.too_little = Some(short));
         assert_eq!((verdict.kind, verdict.seen, verdict.naming.named.len()), (Unknown, Effect, 0));
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
+        // The note below the verdict says what was seen, by its name.
+        assert_eq!(verdict.seen_naming.named, ["play"]);
         // Without a name there is nothing that a short record could not carry.
         let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
         assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));

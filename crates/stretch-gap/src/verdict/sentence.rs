@@ -89,7 +89,7 @@ pub(crate) fn cut_short(not_looked_at: &[&str]) -> String {
 
 fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> String {
     let Answer { judged, gap, .. } = answer;
-    let naming = &judged.naming;
+    let naming = &judged.seen_naming;
     match (judged.seen, answer.first) {
         (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
             sentence(answer.gross)
@@ -205,7 +205,7 @@ fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
 
 /// Mostly this, and so much else.
 fn partial(answer: Answer<'_>) -> String {
-    let naming = &answer.judged.naming;
+    let naming = &answer.judged.seen_naming;
     let closes =
         |name: &String| answer.shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
     let in_words = |share: f64| match share < LEAST_SHARE_IN_WORDS {

@@ -38,14 +38,15 @@ pub(crate) struct Octaves {
 }
 
 impl Octaves {
-    /// Adds a stretch without a break: products of a residual r and of V^-1 r, its most likely nuisances taken out.
+    /// Adds a stretch without a break: the mean squares of what is `clean`, the residual r less its most likely nuisances N a. What these cost
+    /// themselves, r'V^-1 r = |r - N a|^2 + a'D^-1 a with their variances D, is seen once a stretch, in the last octave. Products of r and r - N a
+    /// octave by octave have the same sum and may be negative.
     pub(crate) fn add(&mut self, residual: &[f64], clean: &[f64]) {
-        let own = coefficients(residual);
-        let other = (residual != clean).then(|| coefficients(clean));
-        for (octave, (x, y)) in own.iter().zip(other.as_ref().unwrap_or(&own)).enumerate() {
-            self.sums[octave] += dot(x, y);
+        for (octave, x) in coefficients(clean).iter().enumerate() {
+            self.sums[octave] += dot(x, x);
             self.counts[octave] += x.len() as f64;
         }
+        self.sums[OCTAVES - 1] += (dot(residual, clean) - dot(clean, clean)).max(0.0);
     }
 
     /// At equal noise transmitted, as mean squares are: `own` is what the hypothesis lets through, `larger` what noise that it does not

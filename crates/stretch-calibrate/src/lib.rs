@@ -2,12 +2,15 @@
 
 mod acceptance;
 mod apply;
+mod array;
 mod auto;
 mod auto_words;
+mod bank;
 mod blocks;
 mod calibrate;
 mod calibration_file;
 mod cause;
+mod channels;
 mod choose;
 mod clusters;
 mod cost;
@@ -30,6 +33,7 @@ mod options;
 mod own_ranges;
 mod passes;
 mod prepared;
+mod prior;
 mod rated;
 mod reach;
 mod rest;
@@ -43,6 +47,10 @@ pub use acceptance::{
     worse_than_the_mean,
 };
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
+pub use array::{
+    AppliedArray, ArrayFit, ArrayOptions, Carried, ROOM, SleeveCalibration, apply_array,
+    calibrate_array,
+};
 pub use auto::{
     Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
 };
@@ -53,6 +61,7 @@ pub use calibration_file::{
     describe_record, read_calibration, seal_calibration, write_calibration,
 };
 pub use cause::Cause;
+pub use channels::MAX_CHANNELS;
 pub use choose::{Candidate, rank_signals};
 pub use cost::{m3_instructions, m3_instructions_fixed};
 pub use error::{CalibrateError, PACE_TOLERANCE};
@@ -63,5 +72,6 @@ pub use gross_errors::without_gross_errors;
 pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
+pub use prior::{Expected, Prior, Session, SessionOptions, UpdateOptions, UpdateSummary, Updated};
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;

@@ -1,0 +1,19 @@
+//! What earlier sessions say of the next one.
+//!
+//! [`Session`] sums a session with a reference up; [`Prior`] is learnt from sessions: mean and covariance of the
+//! coefficients of one linear model with a memory, for each sensor and wearer that was seen and for those that were
+//! not; [`Prior::update`] takes ten seconds to a minute of reference to it, or nothing at all.
+
+mod expected;
+mod learnt;
+mod record;
+mod session;
+mod tree;
+mod update;
+
+pub use expected::Expected;
+pub use learnt::Prior;
+pub use session::{Session, SessionOptions};
+pub(crate) use tree::cholesky;
+pub(crate) use update::term_correlation;
+pub use update::{UpdateOptions, UpdateSummary, Updated};

@@ -32,6 +32,7 @@ mod observer_model;
 mod options;
 mod own_ranges;
 mod passes;
+mod positive;
 mod prepared;
 mod prior;
 mod rated;

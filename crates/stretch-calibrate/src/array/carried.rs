@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::fit::Parted;
+use super::parted::Parted;
 
 /// What one channel says of the reference: errors on data left out, in the reference's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -10,15 +10,28 @@ use stretch_core::{
 use crate::{
     CalibrateError,
     bank::{BANK, Bank},
-    prior::term_correlation,
+    positive::{cholesky, term_correlation},
 };
-
-use super::watch::{FAST_STATES, Watched};
 
 /// Room for channels in the records that this program holds.
 pub const ROOM: usize = 16;
 /// Ridge of the regression of a lost channel on those that remain, as a share of a term's own power.
 const RIDGE: f64 = 1e-6;
+
+/// Memory states whose sum is the fast part: those up to 0.3 s.
+pub(crate) const FAST_STATES: u8 = 2;
+
+/// What is watched of each channel.
+pub(crate) struct Watched {
+    pub(crate) channels: Vec<WatchedChannel>,
+}
+
+pub(crate) struct WatchedChannel {
+    pub(crate) possible: Interval,
+    pub(crate) still_samples: u16,
+    pub(crate) follows: Vec<f64>,
+    pub(crate) largest_surprise: f64,
+}
 
 /// A record: of one gauge, or of several.
 #[derive(Debug, Clone, PartialEq)]
@@ -184,7 +197,7 @@ impl Linear {
         let cross = part(&r, &l);
         let lost = DVector::from_iterator(l.len(), l.iter().map(|&term| self.weights[term]));
         let said = &cross * &lost;
-        let moved = crate::prior::cholesky(&inner)?.solve(&said);
+        let moved = cholesky(&inner)?.solve(&said);
         r.iter().zip(moved.iter()).for_each(|(&term, m)| weights[term] += m);
         let missed = lost.dot(&(part(&l, &l) * &lost)) - said.dot(&moved);
         Some((weights, missed.max(0.0) / self.gram[(0, 0)]))

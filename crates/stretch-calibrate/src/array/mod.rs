@@ -8,6 +8,8 @@ mod apply;
 mod carried;
 mod fit;
 mod linear;
+mod parted;
+mod record;
 mod watch;
 
 pub use apply::{AppliedArray, apply_array};
@@ -16,4 +18,4 @@ pub use fit::{ArrayFit, ArrayOptions, calibrate_array};
 pub use linear::{ROOM, SleeveCalibration};
 
 pub(crate) use linear::Linear;
-pub(crate) use watch::Watched;
+pub(crate) use watch::watched;

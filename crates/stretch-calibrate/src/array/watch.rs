@@ -7,12 +7,10 @@
 use nalgebra::DVector;
 use stretch_core::Interval;
 
-use crate::{CalibrateError, channels::Channels, history_fit::SETTLE, prior::cholesky};
+use crate::{CalibrateError, channels::Channels, history_fit::SETTLE, positive::cholesky};
 
-use super::linear::Linear;
+use super::linear::{FAST_STATES, Linear, Watched, WatchedChannel};
 
-/// Memory states whose sum is the fast part: those up to 0.3 s.
-pub(crate) const FAST_STATES: u8 = 2;
 /// False alarms an hour, of all channels together.
 const ALARMS_AN_HOUR: f64 = 0.5;
 /// Fewest seconds that a quantile is taken from.
@@ -29,25 +27,15 @@ const MOST_STILL_S: f64 = 0.1;
 /// Ridge of the regression on the other channels, as a share of their power.
 const RIDGE: f64 = 1e-3;
 
-/// What is watched of each channel.
-pub(crate) struct Watched {
-    pub(crate) channels: Vec<WatchedChannel>,
-}
-
-pub(crate) struct WatchedChannel {
-    pub(crate) possible: Interval,
-    pub(crate) still_samples: u16,
-    pub(crate) follows: Vec<f64>,
-    pub(crate) largest_surprise: f64,
-}
-
-impl Watched {
-    pub(crate) fn of(linear: &Linear, channels: Option<&Channels>) -> Result<Self, CalibrateError> {
-        let count = linear.signals.len();
-        let found: Option<Vec<_>> = (0..count).map(|k| one(linear, channels, k)).collect();
-        let undetermined = || CalibrateError::Undetermined { model: "array".into() };
-        Ok(Self { channels: found.ok_or_else(undetermined)? })
-    }
+/// What is watched of each channel of a model; `channels` are what it was fitted to, where there is anything.
+pub(crate) fn watched(
+    linear: &Linear,
+    channels: Option<&Channels>,
+) -> Result<Watched, CalibrateError> {
+    let count = linear.signals.len();
+    let found: Option<Vec<_>> = (0..count).map(|k| one(linear, channels, k)).collect();
+    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
+    Ok(Watched { channels: found.ok_or_else(undetermined)? })
 }
 
 fn one(linear: &Linear, channels: Option<&Channels>, k: usize) -> Option<WatchedChannel> {

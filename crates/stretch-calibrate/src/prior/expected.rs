@@ -3,9 +3,11 @@
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
+use crate::positive::inverse;
+
 use super::{
     session::PARTS_S,
-    tree::{Leaf, Normal, inverse},
+    tree::{Leaf, Normal},
 };
 
 /// The error on sessions left out, after some seconds of reference. Each is judged on what comes after its first

@@ -1,7 +1,5 @@
 //! A prior: the distribution of a model's coefficients over sessions.
 
-use std::path::Path;
-
 use nalgebra::{DMatrix, DVector};
 use stretch_core::{Interval, Normalisation, Range, RangeSpec, Target};
 use stretch_data::{listed, unit_of};
@@ -168,22 +166,6 @@ impl Prior {
         let below = &self.levels[seen.len().min(self.levels.len())..];
         let covariance = below.iter().fold(normal.covariance.clone(), |sum, level| sum + level);
         (Normal { mean: normal.mean.clone(), covariance }, seen.len())
-    }
-
-    /// Reads a prior.
-    ///
-    /// # Errors
-    /// [`CalibrateError::Prior`] with the file and what is wrong with it.
-    pub fn read(path: &Path) -> Result<Self, CalibrateError> {
-        super::record::read(path)
-    }
-
-    /// The prior in JSON.
-    ///
-    /// # Errors
-    /// Never, because all of its numbers are finite.
-    pub fn to_json(&self) -> Result<String, CalibrateError> {
-        super::record::to_json(self)
     }
 }
 

@@ -8,12 +8,12 @@ mod expected;
 mod learnt;
 mod record;
 mod session;
+#[cfg(test)]
+mod tests;
 mod tree;
 mod update;
 
 pub use expected::Expected;
 pub use learnt::Prior;
 pub use session::{Session, SessionOptions};
-pub(crate) use tree::cholesky;
-pub(crate) use update::term_correlation;
 pub use update::{UpdateOptions, UpdateSummary, Updated};

@@ -51,7 +51,25 @@ fn problem(file: &str, problem: impl std::fmt::Display) -> CalibrateError {
     CalibrateError::Prior { file: file.to_owned(), problem }
 }
 
-pub(super) fn to_json(prior: &Prior) -> Result<String, CalibrateError> {
+impl Prior {
+    /// Reads a prior.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Prior`] with the file and what is wrong with it.
+    pub fn read(path: &Path) -> Result<Self, CalibrateError> {
+        read(path)
+    }
+
+    /// The prior in JSON.
+    ///
+    /// # Errors
+    /// Never, because all of its numbers are finite.
+    pub fn to_json(&self) -> Result<String, CalibrateError> {
+        to_json(self)
+    }
+}
+
+fn to_json(prior: &Prior) -> Result<String, CalibrateError> {
     let known = prior.known.iter().map(|(path, normal)| Known {
         path: path.clone(),
         mean: normal.mean.iter().copied().collect(),
@@ -120,7 +138,7 @@ impl Session {
     }
 }
 
-pub(super) fn read(path: &Path) -> Result<Prior, CalibrateError> {
+fn read(path: &Path) -> Result<Prior, CalibrateError> {
     let (record, file): (Record, _) = opened(path)?;
     if record.schema != SCHEMA {
         return Err(problem(&file, "it was written by another release"));

@@ -7,8 +7,10 @@
 //! inverse-Wishart prior with the diagonal of the estimate itself as its scale, by expectation and maximisation
 //! (Dempster, Laird and Rubin 1977; Gelman et al., Bayesian Data Analysis, 3rd ed., section 15.4).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+
+use crate::positive::{inverse, symmetric};
 
 /// Weight of the diagonal in a covariance, in nodes for each term: a term has few nodes to learn from.
 const SHRINKAGE: f64 = 0.3;
@@ -290,19 +292,6 @@ impl Leaf {
     pub(crate) fn variance(&self, normal: &Normal) -> f64 {
         normal.covariance.component_mul(&self.gram).sum()
     }
-}
-
-pub(crate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    cholesky(matrix).map(|factor| symmetric(factor.inverse()))
-}
-
-pub(crate) fn cholesky(matrix: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
-    Cholesky::new(symmetric(matrix.clone()))
-}
-
-fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
-    let transposed = matrix.transpose();
-    (matrix + transposed) * 0.5
 }
 
 #[cfg(test)]

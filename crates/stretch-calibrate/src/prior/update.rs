@@ -7,17 +7,19 @@ use stretch_data::{Trial, unit_of};
 
 use crate::{
     CalibrateError, SleeveCalibration,
-    array::{Linear, Watched},
+    array::{Linear, watched},
     bank::Bank,
     channels::{Channels, correlation},
     history_fit::SETTLE,
     least_squares::RowAccumulator,
+    positive::{cholesky, term_correlation},
     series::extent,
 };
 
 use super::{
+    expected::Expected,
     learnt::{Prior, correlated, paths_in_words},
-    tree::{Normal, cholesky},
+    tree::Normal,
 };
 
 /// Correlations above this have a sign that can be trusted.
@@ -131,7 +133,7 @@ impl Prior {
             still_samples: self.still_samples.clone(),
             samples: channels.as_ref().map_or(0, |c| c.reference().count() as u64),
         };
-        let watched = Watched::of(&linear, channels.as_ref())?;
+        let watched = watched(&linear, channels.as_ref())?;
         Ok(Updated {
             calibration: linear.record(&watched, provenance)?,
             summary: UpdateSummary {
@@ -190,7 +192,7 @@ impl Prior {
 
     /// By how much errors on sessions left out exceeded the predicted variance after so many seconds.
     fn widening(&self, seconds: f64, known: bool) -> f64 {
-        let of = |e: &super::Expected| if known { e.widening_known } else { e.widening_new };
+        let of = |e: &Expected| if known { e.widening_known } else { e.widening_new };
         let reached = self.expected.iter().rev().find(|e| e.seconds <= seconds);
         reached.or(self.expected.first()).map_or(1.0, of)
     }
@@ -308,14 +310,4 @@ impl Prior {
             }
         })
     }
-}
-
-/// Correlation of a term with the model's estimate, over the samples of a mean of `X'X`.
-pub(crate) fn term_correlation(gram: &DMatrix<f64>, w: &DVector<f64>, term: usize) -> f64 {
-    let moments = gram * w;
-    let mean = moments[0] / gram[(0, 0)];
-    let covariance = moments[term] / gram[(0, 0)] - mean * gram[(0, term)] / gram[(0, 0)];
-    let power = w.dot(&moments) / gram[(0, 0)] - mean * mean;
-    let own = gram[(term, term)] / gram[(0, 0)] - (gram[(0, term)] / gram[(0, 0)]).powi(2);
-    if power > 0.0 && own > 0.0 { covariance / (power * own).sqrt() } else { 0.0 }
 }

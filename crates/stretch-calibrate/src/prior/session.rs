@@ -160,7 +160,8 @@ impl Session {
         (scale, shift): (f64, f64),
     ) -> Option<Vec<(f64, LinearFactor)>> {
         let own = Bank::new(self.domains.clone());
-        let matrix = bank.from_other(&own);
+        // a row over the bank is this matrix times the row over the session's own domains
+        let matrix = own.from_other(bank).transpose();
         let terms = own.terms();
         let one = |part: &SessionPart| {
             let triangle = unpacked(&part.triangle, terms + 1)?;
@@ -243,4 +244,45 @@ pub(crate) fn unpacked(numbers: &[f64], columns: usize) -> Option<DMatrix<f64>> 
         }
     }
     Some(matrix)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+
+    #[test]
+    fn rows_of_a_session_are_rewritten_over_other_domains() {
+        let n = 1500;
+        let wave = |k: usize| (0.021 * k as f64).sin() + 0.4 * (0.0067 * k as f64).cos();
+        let channel = |name: &str, values| stretch_data::Channel { name: name.into(), values };
+        let trial = Trial {
+            name: "a".into(),
+            time_s: (0..n).map(|k| 0.02 * k as f64).collect(),
+            channels: vec![
+                channel("s1", (0..n).map(wave).collect()),
+                channel("angle_deg", (0..n).map(|k| 3.0 * wave(k)).collect()),
+            ],
+        };
+        let options = SessionOptions::new(["s1"], "angle_deg");
+        let session = Session::new("a", std::slice::from_ref(&trial), &options).unwrap().0;
+        let wider = session.domains[0].iter();
+        let wider = wider.map(|d| Interval { min: 1.5 * d.min - 0.3, max: 2.0 * d.max + 0.1 });
+        let bank = Bank::new(vec![wider.collect()]);
+        let weights = DVector::from_fn(bank.terms(), |k, _| 0.3 * (k as f64).cos());
+        // the squares of residuals of any weights say whether the rows are those over the wider domains
+        let channels = Channels::new(&[trial], &["s1".into()], "angle_deg").unwrap();
+        let (mut row, mut scratch, mut want) = (Vec::new(), (Vec::new(), Vec::new()), 0.0);
+        let stretch = &channels.stretches[0];
+        for sample in SETTLE..stretch.len() {
+            bank.fill(stretch.at(sample), &mut row, &mut scratch);
+            let told = DVector::from_column_slice(&row).dot(&weights);
+            want += (told - 2.0 * stretch.reference[sample] - 1.0).powi(2);
+        }
+        let parts = session.factors(&bank, (2.0, 1.0)).unwrap();
+        let with_value = weights.push(-1.0);
+        let got: f64 = parts.iter().map(|(_, f)| (&f.triangle * &with_value).norm_squared()).sum();
+        assert!((got / want - 1.0).abs() < 1e-9, "{got} beside {want}");
+    }
 }

@@ -15,7 +15,7 @@ use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError
 
 use commands::{
     apply, calibrate, completions, convert, demo, diagnose, effects, evaluate, export, fleet,
-    foretell, init, json, listen, man, page, prior, record, rig, simulate,
+    foretell, init, json, listen, man, page, prior, record, renew, rig, simulate,
 };
 use display::Volume;
 
@@ -62,6 +62,7 @@ Exit status:
 enum Command {
     Calibrate(calibrate::Args),
     Prior(prior::Args),
+    Renew(renew::Args),
     Apply(apply::Args),
     Evaluate(evaluate::Args),
     Convert(convert::Args),
@@ -100,6 +101,7 @@ fn main() -> ExitCode {
     let result = match cli.command {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Prior(args) => prior::run(args),
+        Command::Renew(args) => renew::run(args),
         Command::Apply(args) => apply::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Convert(args) => convert::run(args),

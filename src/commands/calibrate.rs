@@ -261,7 +261,7 @@ struct Output<'a> {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let files = [Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()];
-    args.json.share_stdout(files)?;
+    args.json.share_stdout(files.into_iter().chain(args.sleeve.files()))?;
     if args.sleeve.is_asked() {
         return args.sleeve.run(&Asked {
             trials: &args.trials,

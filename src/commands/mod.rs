@@ -31,6 +31,7 @@ pub(crate) mod paper;
 pub(crate) mod prior;
 mod reading;
 pub(crate) mod record;
+pub(crate) mod renew;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use serde::Serialize;
 use stretch_calibrate::{Expected, Prior, Session};
 use stretch_files::Outputs;
+use stretch_report::seconds_figure;
 
 use super::{
     json::Json,
@@ -30,6 +32,9 @@ pub(crate) struct Args {
     /// Where the prior goes
     #[arg(long, value_name = "prior.json")]
     out: PathBuf,
+    /// Where a figure goes: the error against seconds of reference
+    #[arg(long, value_name = "f.svg")]
+    figure: Option<PathBuf>,
     #[command(flatten)]
     json: Json,
 }
@@ -44,12 +49,17 @@ struct Output<'a> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    args.json.share_stdout([Some(args.out.as_path())])?;
+    args.json.share_stdout([Some(args.out.as_path()), args.figure.as_deref()])?;
     let sessions: Result<Vec<_>, _> =
         args.sessions.iter().map(|path| Session::read(path)).collect();
     let prior = Prior::learn(&sessions?)?;
     let mut outputs = Outputs::default();
     stage_text(&mut outputs, &args.out, &prior.to_json()?)?;
+    if let Some(path) = &args.figure {
+        let figure = seconds_figure(&prior.expected, &prior.unit());
+        let why = "every session is shorter than the minute after which errors are judged: there is nothing to draw";
+        stage_text(&mut outputs, path, &figure.with_context(|| why)?)?;
+    }
     let answer = Output {
         sessions: prior.sessions,
         signals: &prior.signals,
@@ -60,7 +70,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     outputs.keep()?;
     args.json.say(&answer, || {
         print(&prior)?;
-        tell(format!("wrote {}", args.out.display()))
+        tell(format!("wrote {}", args.out.display()))?;
+        args.figure.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
     })
 }
 

@@ -11,6 +11,7 @@ use stretch_calibrate::{
 use stretch_data::{Split, Trial, unit_of};
 use stretch_files::Outputs;
 use stretch_recording::ReadOptions;
+use stretch_report::channels_figure;
 
 use super::{
     json::Json,
@@ -26,17 +27,26 @@ use crate::{
 #[derive(clap::Args)]
 pub(crate) struct Sleeve {
     /// Columns of several gauges that are calibrated together, or `all`: every column but the reference
-    #[arg(long, value_name = "COL,COL", value_delimiter = ',', value_parser = column)]
+    #[arg(long, value_name = "COL,COL", value_delimiter = ',', value_parser = column,
+          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
+          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
     signals: Vec<String>,
     /// A prior (`stretch prior`) that these trials, ten seconds to a minute of reference, update; no trial: the prior
-    #[arg(long, value_name = "prior.json")]
+    #[arg(long, value_name = "prior.json",
+          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
+          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force", "rest_length"])]
     prior: Option<PathBuf>,
     /// Sensor, wearer, what was done: left/anna, as many steps as are known
     #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
     of: String,
     /// Where the sums of these trials go, for `stretch prior`
-    #[arg(long, value_name = "session.json")]
+    #[arg(long, value_name = "session.json",
+          conflicts_with_all = ["model", "normalise", "rate", "rate_source", "branch_by", "paper", "signal_zero",
+          "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
     session: Option<PathBuf>,
+    /// Where a figure goes: the error of each of --signals alone, and of all others
+    #[arg(long, value_name = "f.svg", requires = "signals", conflicts_with = "prior")]
+    figure: Option<PathBuf>,
 }
 
 /// What the command takes beside the options of this file.
@@ -79,11 +89,17 @@ impl Sleeve {
         !self.signals.is_empty() || self.prior.is_some() || self.session.is_some()
     }
 
+    /// Files beside the record.
+    pub(crate) fn files(&self) -> [Option<&Path>; 2] {
+        [self.session.as_deref(), self.figure.as_deref()]
+    }
+
     pub(crate) fn run(&self, asked: &Asked<'_>) -> anyhow::Result<()> {
         let prior = self.prior.as_deref().map(Prior::read).transpose()?;
         let reference = match &prior {
-            Some(prior) => prior.reference.clone(),
-            None => asked.reference.to_owned(),
+            // the name that is there unless another is given
+            Some(prior) if asked.reference == "length_mm" => prior.reference.clone(),
+            _ => asked.reference.to_owned(),
         };
         if asked.out.extension().is_some_and(|extension| extension == "postcard") {
             bail!(
@@ -108,6 +124,11 @@ impl Sleeve {
             let (session, _) = Session::new(&name, &trials, &options).map_err(named)?;
             stage_text(&mut outputs, path, &session.to_json()?)?;
         }
+        if let Some(path) = &self.figure {
+            let rmse = made.rmse.unwrap_or(f64::NAN);
+            let figure = channels_figure(&made.carried, rmse, &unit_of(&made.reference));
+            stage_text(&mut outputs, path, &figure)?;
+        }
         let answer = Output {
             signals: &made.signals,
             rmse: made.rmse,
@@ -119,7 +140,8 @@ impl Sleeve {
         outputs.keep()?;
         asked.json.say(&answer, || {
             print(&made)?;
-            tell(format!("wrote {}", asked.out.display()))
+            let mut written = [Some(asked.out)].into_iter().chain(self.files()).flatten();
+            written.try_for_each(|path| tell(format!("wrote {}", path.display())))
         })
     }
 

@@ -64,6 +64,14 @@ impl Channels {
         Ok(all)
     }
 
+    /// Signals alone; the first one stands where the reference would.
+    pub(crate) fn without_reference(
+        trials: &[Trial],
+        signals: &[String],
+    ) -> Result<Self, CalibrateError> {
+        Self::new(trials, signals, signals.first().map_or("", String::as_str))
+    }
+
     fn take(
         &mut self,
         index: usize,

@@ -73,6 +73,9 @@ pub use gross_errors::without_gross_errors;
 pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
-pub use prior::{Expected, Prior, Session, SessionOptions, UpdateOptions, UpdateSummary, Updated};
+pub use prior::{
+    Assumed, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
+    UpdateOptions, UpdateSummary, Updated,
+};
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;

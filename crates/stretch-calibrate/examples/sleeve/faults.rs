@@ -11,7 +11,7 @@ use crate::judge::{Judge, first_seconds};
 const AT_S: f64 = 75.0;
 const FAULTS: [&str; 5] = ["cut off", "missing", "sticks", "saturates", "slips"];
 
-pub(crate) fn print(judge: &Judge<'_>, every: usize) -> anyhow::Result<()> {
+pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
     let mut found = vec![(0, 0, 0, Vec::new()); FAULTS.len()];
     let (mut alarms, mut hours) = (0, 0.0);
     for wearer in judge.wearers() {

@@ -1,8 +1,8 @@
 //! Calibrations of each session, and their errors after its first minute.
 
 use stretch_calibrate::{
-    ArrayOptions, Options, Prior, Session, SessionOptions, SleeveCalibration, UpdateOptions, apply,
-    apply_array, calibrate, calibrate_array, choose_model, rank_signals,
+    ArrayOptions, Options, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration,
+    UpdateOptions, apply, apply_array, calibrate, calibrate_array, choose_model, rank_signals,
 };
 use stretch_data::Trial;
 
@@ -25,8 +25,8 @@ impl Row {
     }
 }
 
-pub(crate) struct Judge<'a> {
-    pub(crate) set: &'a Set,
+pub(crate) struct Judge {
+    pub(crate) set: Set,
     sessions: Vec<Session>,
     /// Seconds whose reference may be used.
     pub(crate) used_s: f64,
@@ -39,15 +39,24 @@ pub(crate) struct Priors {
     each: Vec<Prior>,
 }
 
-impl<'a> Judge<'a> {
-    pub(crate) fn new(set: &'a Set, used_s: f64, with_auto: bool) -> anyhow::Result<Self> {
-        let one = |worn: &Worn| -> anyhow::Result<Session> {
+impl Judge {
+    /// Sums the sessions up; those that the library refuses are named and left out.
+    pub(crate) fn new(mut set: Set, used_s: f64, with_auto: bool) -> Self {
+        let mut sessions = Vec::new();
+        let (signals, reference) = (set.signals.clone(), set.reference.clone());
+        set.worn.retain(|worn| {
             let path = format!("{}/{}", worn.wearer, worn.activity);
-            let options = SessionOptions::new(set.signals.clone(), &set.reference).of(&path);
-            Ok(Session::new(&worn.name, &worn.trials, &options)?.0)
-        };
-        let sessions = set.worn.iter().map(one).collect::<Result<_, _>>()?;
-        Ok(Self { set, sessions, used_s, with_auto })
+            let options = SessionOptions::new(signals.clone(), &reference).of(&path);
+            match Session::new(&worn.name, &worn.trials, &options) {
+                Ok((session, _)) => sessions.push(session),
+                Err(refusal) => {
+                    println!("left out: {}: {refusal}", worn.name);
+                    return false;
+                }
+            }
+            true
+        });
+        Self { set, sessions, used_s, with_auto }
     }
 
     /// The wearers, in order.
@@ -139,6 +148,16 @@ impl<'a> Judge<'a> {
             ];
             for (who, prior, options) in cases {
                 let Some(prior) = prior else { continue };
+                let renewing =
+                    RenewOptions { path: options.path.clone(), ..RenewOptions::default() };
+                let error = match prior.renew(&first_seconds(&worn.trials, 60.0), &renewing) {
+                    Ok(renewed) => self.error(&renewed.calibration, worn)?,
+                    Err(refusal) => {
+                        eprintln!("{}: {refusal}", worn.name);
+                        f64::NAN
+                    }
+                };
+                errors.push((format!("prior, {what}, {who}, 60 s without reference"), error));
                 for seconds in [0.0, 10.0, 30.0, 60.0] {
                     if seconds > self.used_s {
                         continue;

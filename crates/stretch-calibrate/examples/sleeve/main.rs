@@ -32,7 +32,7 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = value("--sleeves") {
         let set = data::sleeves(&PathBuf::from(folder))?;
         println!("{} sessions of knitted sleeves", set.worn.len());
-        let judge = Judge::new(&set, 60.0, with_auto)?;
+        let judge = Judge::new(set, 60.0, with_auto);
         let rows = judge.rows(every)?;
         print("sleeves", &rows);
         faults::print(&judge, every)?;
@@ -40,7 +40,7 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = value("--knees") {
         let set = data::knees(&PathBuf::from(folder))?;
         println!("{} wearers of a knee sensor", set.worn.len());
-        let judge = Judge::new(&set, 20.0, with_auto)?;
+        let judge = Judge::new(set, 20.0, with_auto);
         print("knees", &judge.rows(every)?);
     }
     Ok(())
@@ -51,9 +51,9 @@ fn print(title: &str, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("\n### {title}: {} sessions\n", rows.len());
     println!(
-        "| calibration | RMSE | to linear, 30 s | worst | above 1.05 | to the session's own |"
+        "| calibration | sessions | RMSE | to linear, 30 s | worst | above 1.05 | to the session's own |"
     );
-    println!("| --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let logs: Vec<f64> = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::ln).collect();
         (logs.iter().sum::<f64>() / logs.len() as f64).exp()
@@ -67,8 +67,9 @@ fn print(title: &str, rows: &[Row]) {
         let to_own = mean(&mut rows.iter().map(|row| of(row, name) / of(row, own)));
         let worst = ratios.iter().copied().fold(0.0, f64::max);
         let above = ratios.iter().filter(|r| **r > 1.05).count();
+        let judged = ratios.iter().filter(|r| r.is_finite()).count();
         println!(
-            "| {name} | {error:.2} | {:.3} | {worst:.2} | {above} | {to_own:.3} |",
+            "| {name} | {judged} | {error:.2} | {:.3} | {worst:.2} | {above} | {to_own:.3} |",
             mean(&mut ratios.iter().copied())
         );
     }

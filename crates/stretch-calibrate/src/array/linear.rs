@@ -72,6 +72,50 @@ impl Linear {
         }
     }
 
+    /// The coefficients of a record that was made over the domains of this model; `None` for any other record.
+    pub(crate) fn weights_of(&self, record: &SleeveCalibration) -> Option<Vec<f64>> {
+        let is_near = |a: &[f64], b: &[f64]| {
+            a.len() == b.len()
+                && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs()))
+        };
+        match record {
+            SleeveCalibration::One(own) => {
+                let same = self.one(own.provenance.clone()).ok()?;
+                let (Model::History(a), Model::History(b)) = (&own.model, &same.model) else {
+                    return None;
+                };
+                let is_same = own.signal_range == same.signal_range
+                    && own.target_range == same.target_range
+                    && is_near(&a.relaxations_s, &b.relaxations_s)
+                    && is_near(&a.state_min, &b.state_min)
+                    && is_near(&a.state_max, &b.state_max);
+                is_same.then(|| a.coefficients.to_vec())
+            }
+            SleeveCalibration::Many(own) => {
+                let mut ends = own.channels.iter().zip(&self.domains);
+                let is_same = own.channels.len() == self.domains.len()
+                    && ends.all(|(channel, domain)| {
+                        let list =
+                            |f: fn(&Interval) -> f64| domain.iter().map(f).collect::<Vec<_>>();
+                        is_near(&channel.state_min, &list(|d| d.min))
+                            && is_near(&channel.state_max, &list(|d| d.max))
+                    });
+                let (zero, gain) = self.zero_and_gain();
+                is_same.then(|| {
+                    let terms = own.all.terms.iter().flat_map(|own| own.iter());
+                    let constant = (own.all.constant - zero) / gain;
+                    [constant].into_iter().chain(terms.map(|term| term / gain)).collect()
+                })
+            }
+        }
+    }
+
+    /// `reference = zero + gain * normalised target`.
+    fn zero_and_gain(&self) -> (f64, f64) {
+        let gain = self.target_range.span() * self.target.reference_per_target();
+        (self.target.to_reference(self.target_range.offset()), gain)
+    }
+
     /// The terms of a channel among all terms.
     pub(crate) fn terms_of(&self, channel: usize) -> std::ops::Range<usize> {
         let own = Bank::terms_a_channel();
@@ -207,8 +251,7 @@ impl Linear {
     fn gains(&self, keep: &[usize]) -> Result<ArrayGains<ROOM>, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: "array".into() };
         let (weights, missed) = self.remaining(keep).ok_or_else(undetermined)?;
-        let gain = self.target_range.span() * self.target.reference_per_target();
-        let zero = self.target.to_reference(self.target_range.offset());
+        let (zero, gain) = self.zero_and_gain();
         let of = |k: usize| -> Result<_, CalibrateError> {
             if !keep.contains(&k) {
                 return Ok(Values::EMPTY);

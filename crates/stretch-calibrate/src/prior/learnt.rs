@@ -8,12 +8,15 @@ use crate::{CalibrateError, bank::Bank, channels::named, series::extent};
 
 use super::{
     expected::{Expected, expected},
+    landmarks::LANDMARKS,
     session::Session,
     tree::{Leaf, Normal, Spread, Tree},
 };
 
 /// Errors of sleeves are correlated over about so long, in seconds: samples within it count as one.
 const CORRELATED_S: f64 = 1.0;
+/// Correlations above this have a sign that can be trusted.
+pub(crate) const CLEAR: f64 = 0.5;
 /// Fewest sessions that a spread can be learnt from.
 const LEAST_SESSIONS: usize = 3;
 
@@ -49,6 +52,8 @@ pub struct Prior {
     pub(crate) gram: DMatrix<f64>,
     /// Of each channel the most equal samples in a row that were seen.
     pub(crate) still_samples: Vec<u32>,
+    /// Of each session its path and landmarks, in normalised target.
+    pub(crate) landmarks: Vec<(Vec<String>, [f64; LANDMARKS])>,
 }
 
 impl Prior {
@@ -118,6 +123,7 @@ impl Prior {
             noise,
             gram,
             still_samples: (0..channels).map(still).collect(),
+            landmarks: normalised_landmarks(sessions, (target, target_range)),
         })
     }
 
@@ -139,7 +145,8 @@ impl Prior {
         let paths: Vec<Vec<String>> = sessions.iter().map(|s| filled(s, depth)).collect();
         let spread = Spread { levels: self.levels.clone(), noise: self.noise };
         let known = Tree::new(&paths, &leaves).known(&spread).ok_or_else(undetermined)?;
-        Ok(Self { known, sessions: sessions.len(), ..self.clone() })
+        let landmarks = normalised_landmarks(sessions, (self.target, self.target_range));
+        Ok(Self { known, landmarks, sessions: sessions.len(), ..self.clone() })
     }
 
     /// The unit of the reference.
@@ -190,6 +197,20 @@ fn leaves(session: &Session, bank: &Bank, (target, range): (Target, Range)) -> O
         }
     };
     Some(session.factors(bank, (scale, zero))?.into_iter().map(one).collect())
+}
+
+/// The landmarks of sessions in normalised target.
+fn normalised_landmarks(
+    sessions: &[Session],
+    (target, range): (Target, Range),
+) -> Vec<(Vec<String>, [f64; LANDMARKS])> {
+    let normalised = |x: f64| range.normalise(target.from_reference(x));
+    let one = |s: &Session| {
+        let [low, high, rest] = s.landmarks.map(normalised);
+        // a target may fall where the reference rises
+        (s.path.clone(), [low.min(high), low.max(high), rest])
+    };
+    sessions.iter().map(one).collect()
 }
 
 /// The sums of all parts.
@@ -268,7 +289,22 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
             session.sample_rate_hz, first.name, first.sample_rate_hz, first.sample_rate_hz
         ));
     }
-    None
+    let (own, other) = (session.correlations(), first.correlations());
+    turned(own.into_iter().zip(other)).map(|opposite| {
+        format!(
+            "{opposite} of {} channels fall where those of {} rise: swap the wires of the bridge, or turn the signal's sign (leave one of the sessions out)",
+            session.signals.len(),
+            first.name
+        )
+    })
+}
+
+/// How many channels follow the reference the other way round, where they are more than those that follow it the same
+/// way; of pairs of correlations, found and expected.
+pub(crate) fn turned(pairs: impl Iterator<Item = (f64, f64)>) -> Option<usize> {
+    let clear = pairs.filter(|(a, b)| a.abs() > CLEAR && b.abs() > CLEAR);
+    let (same, opposite): (Vec<_>, Vec<_>) = clear.partition(|(a, b)| a * b > 0.0);
+    (opposite.len() > same.len()).then_some(opposite.len())
 }
 
 /// The names of paths in a sentence.

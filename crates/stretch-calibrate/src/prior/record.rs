@@ -11,6 +11,7 @@ use crate::{CalibrateError, bank::Bank, digest};
 
 use super::{
     expected::Expected,
+    landmarks::LANDMARKS,
     learnt::Prior,
     session::{SCHEMA, Session, packed, unpacked},
     tree::Normal,
@@ -34,6 +35,15 @@ struct Record {
     noise: f64,
     gram: Vec<f64>,
     still_samples: Vec<u32>,
+    landmarks: Vec<Landmarks>,
+}
+
+/// A session's path and its landmarks.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Landmarks {
+    path: Vec<String>,
+    at: [f64; LANDMARKS],
 }
 
 /// A path that was seen, with mean and covariance (upper triangle, row by row) of its coefficients.
@@ -91,6 +101,11 @@ fn to_json(prior: &Prior) -> Result<String, CalibrateError> {
         noise: prior.noise,
         gram: packed(&prior.gram),
         still_samples: prior.still_samples.clone(),
+        landmarks: prior
+            .landmarks
+            .iter()
+            .map(|(path, at)| Landmarks { path: path.clone(), at: *at })
+            .collect(),
     };
     sealed(&record, "prior")
 }
@@ -186,6 +201,7 @@ fn read(path: &Path) -> Result<Prior, CalibrateError> {
         domains: record.domains,
         noise: record.noise,
         still_samples: record.still_samples,
+        landmarks: record.landmarks.into_iter().map(|l| (l.path, l.at)).collect(),
     })
 }
 

@@ -14,6 +14,8 @@ use crate::{
     series::extent,
 };
 
+use super::landmarks::{LANDMARKS, at_landmarks};
+
 /// The schema of sessions and priors that this release writes and reads.
 pub(crate) const SCHEMA: u32 = 1;
 /// Ends of the parts of a session, in seconds from its beginning; the last part has no end.
@@ -75,6 +77,8 @@ pub struct Session {
     pub(crate) reference_range: Interval,
     /// Of each channel the most equal samples in a row.
     pub(crate) still_samples: Vec<u32>,
+    /// The reference at the [landmarks](super::landmarks).
+    pub(crate) landmarks: [f64; LANDMARKS],
     pub(crate) parts: Vec<SessionPart>,
 }
 
@@ -114,6 +118,7 @@ impl Session {
             domains: channels.bank().domains,
             reference_range,
             still_samples: channels.still_samples(),
+            landmarks: at_landmarks(&channels),
             parts: parts(&channels),
         };
         Ok((session, channels.notes))
@@ -146,6 +151,25 @@ impl Session {
             parts: parts.ok_or_else(wrong)?,
             ..self.clone()
         })
+    }
+
+    /// Correlation of each channel with the reference.
+    pub(crate) fn correlations(&self) -> Vec<f64> {
+        let own = Bank::terms_a_channel();
+        let value = 1 + self.signals.len() * own;
+        let mut gram = DMatrix::zeros(value + 1, value + 1);
+        for triangle in self.parts.iter().filter_map(|p| unpacked(&p.triangle, value + 1)) {
+            gram += triangle.tr_mul(&triangle);
+        }
+        let covariance = |a: usize, b: usize| {
+            let mean = |k: usize| gram[(0, k)] / gram[(0, 0)];
+            gram[(a, b)] / gram[(0, 0)] - mean(a) * mean(b)
+        };
+        let one = |term: usize| {
+            let power = covariance(term, term) * covariance(value, value);
+            if power > 0.0 { covariance(term, value) / power.sqrt() } else { 0.0 }
+        };
+        (0..self.signals.len()).map(|k| one(1 + k * own)).collect()
     }
 
     /// Seconds of all parts.

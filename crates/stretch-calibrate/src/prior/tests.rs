@@ -3,8 +3,8 @@
 use stretch_data::{Channel, Trial};
 
 use crate::{
-    ArrayOptions, Prior, Session, SessionOptions, SleeveCalibration, UpdateOptions, apply,
-    apply_array, calibrate_array,
+    ArrayOptions, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration, UpdateOptions,
+    apply, apply_array, calibrate_array,
 };
 
 const HZ: f64 = 50.0;
@@ -169,4 +169,67 @@ fn channels_together_err_less_than_the_best_and_a_lost_one_is_bearable() {
     };
     let error = calibrate_array(&[copied], &options).unwrap_err().to_string();
     assert!(error.contains("s1 and s2 are copies"), "{error}");
+}
+
+#[test]
+fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is_refused() {
+    let prior = prior(&["s1", "s2"]);
+    let without = |mut trial: Trial| {
+        trial.channels.truncate(2);
+        trial
+    };
+    let test = session(9, 0, 60.0);
+    let alone = prior.update(&[], &UpdateOptions::default()).unwrap().calibration;
+    let renewed = prior.renew(&[without(test.clone())], &RenewOptions::default()).unwrap();
+    let (before, after) = (rmse(&alone, &test), rmse(&renewed.calibration, &test));
+    assert!(after < 0.5 * before, "{after} beside {before}");
+    assert!(renewed.summary.assumed.len() == 3 && renewed.summary.distance < 16.0);
+    // from yesterday's calibration of the same wearer
+    let day = |number: usize| session(2, number, 30.0);
+    let yesterday = prior.update(&[day(0)], &UpdateOptions::of("w2")).unwrap().calibration;
+    let today = session(2, 3, 60.0);
+    let options = RenewOptions { calibration: Some(yesterday.clone()), ..RenewOptions::of("w2") };
+    let renewed = prior.renew(&[without(today.clone())], &options).unwrap();
+    let (before, after) = (rmse(&yesterday, &today), rmse(&renewed.calibration, &today));
+    assert!(after < 0.7 * before, "{after} beside {before}");
+    let refused = |trial: Trial, options: RenewOptions, says: &str| {
+        let error = prior.renew(&[without(trial)], &options).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    };
+    refused(session(9, 0, 1.0), RenewOptions::default(), "no whole movement");
+    let mut other = session(9, 0, 60.0);
+    other.channels[0].values.iter_mut().for_each(|x| *x = 0.3 * *x + 0.8);
+    refused(session(2, 9, 60.0), options, "one session in a thousand");
+    refused(other, RenewOptions::default(), "than one session in a thousand");
+    let fit = calibrate_array(
+        &[day(0), day(1), day(2)],
+        &ArrayOptions {
+            signals: vec!["s1".into(), "s2".into()],
+            reference: "angle_deg".into(),
+            ..ArrayOptions::default()
+        },
+    );
+    let foreign =
+        RenewOptions { calibration: Some(fit.unwrap().calibration), ..RenewOptions::of("w2") };
+    refused(today, foreign, "not made of this prior");
+}
+
+#[test]
+fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
+    let refused = |change: &dyn Fn(&mut Session), says: &str| {
+        let mut sessions: Vec<Session> = (0..3).map(|n| summed(1, n, &["s1"])).collect();
+        change(&mut sessions[2]);
+        let error = Prior::learn(&sessions).unwrap_err().to_string();
+        assert!(error.contains("w1_2") && error.contains(says), "{error}");
+    };
+    refused(&|s| *s = summed(1, 2, &["s1", "s2"]), "2 channels (s1 and s2)");
+    refused(&|s| s.reference = "angle_rad".into(), "stretch convert");
+    refused(&|s| s.sample_rate_hz = 100.0, "--grid 50");
+    let turned = |s: &mut Session| {
+        let mut trial = session(1, 2, 90.0);
+        trial.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
+        let options = SessionOptions::new(["s1"], "angle_deg").of("w1");
+        *s = Session::new("w1_2", &[trial], &options).unwrap().0;
+    };
+    refused(&turned, "swap the wires");
 }

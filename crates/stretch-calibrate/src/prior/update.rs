@@ -18,14 +18,12 @@ use crate::{
 
 use super::{
     expected::Expected,
-    learnt::{Prior, correlated, paths_in_words},
+    learnt::{Prior, correlated, paths_in_words, turned},
     tree::Normal,
 };
 
-/// Correlations above this have a sign that can be trusted.
-const CLEAR: f64 = 0.5;
 /// Share of the prior's range of the reference that a movement covers.
-const MOVEMENT: f64 = 0.2;
+pub(crate) const MOVEMENT: f64 = 0.2;
 
 /// Options of [`Prior::update`].
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -122,16 +120,8 @@ impl Prior {
         let linear = Linear {
             signals: signals.clone(),
             reference: reference.clone(),
-            sample_rate_hz: self.sample_rate_hz,
-            target: self.target,
-            target_range: self.target_range,
-            estimate: self.estimate,
-            domains: self.domains.clone(),
-            weights: posterior.mean.iter().copied().collect(),
-            gram,
-            variance,
-            still_samples: self.still_samples.clone(),
             samples: channels.as_ref().map_or(0, |c| c.reference().count() as u64),
+            ..self.linear(&posterior.mean, gram, variance)
         };
         let watched = watched(&linear, channels.as_ref())?;
         Ok(Updated {
@@ -144,6 +134,29 @@ impl Prior {
             },
             notes,
         })
+    }
+
+    /// The model of some coefficients.
+    pub(crate) fn linear(
+        &self,
+        weights: &DVector<f64>,
+        gram: DMatrix<f64>,
+        variance: f64,
+    ) -> Linear {
+        Linear {
+            signals: self.signals.clone(),
+            reference: self.reference.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            target: self.target,
+            target_range: self.target_range,
+            estimate: self.estimate,
+            domains: self.domains.clone(),
+            weights: weights.iter().copied().collect(),
+            gram,
+            variance,
+            still_samples: self.still_samples.clone(),
+            samples: 0,
+        }
     }
 
     /// The posterior of the coefficients, and the mean of `X'X` over a sample, of the prior's and the data.
@@ -191,13 +204,17 @@ impl Prior {
     }
 
     /// By how much errors on sessions left out exceeded the predicted variance after so many seconds.
-    fn widening(&self, seconds: f64, known: bool) -> f64 {
+    pub(crate) fn widening(&self, seconds: f64, known: bool) -> f64 {
         let of = |e: &Expected| if known { e.widening_known } else { e.widening_new };
         let reached = self.expected.iter().rev().find(|e| e.seconds <= seconds);
         reached.or(self.expected.first()).map_or(1.0, of)
     }
 
-    fn refuse_columns(&self, signals: &[String], reference: &str) -> Result<(), CalibrateError> {
+    pub(crate) fn refuse_columns(
+        &self,
+        signals: &[String],
+        reference: &str,
+    ) -> Result<(), CalibrateError> {
         let problem =
             |problem: String| Err(CalibrateError::Prior { file: "the prior".into(), problem });
         if signals.len() != self.signals.len() {
@@ -219,6 +236,26 @@ impl Prior {
 
     /// Refuses data of another rate, unit or polarity.
     fn refuse(&self, channels: &Channels) -> Result<(), CalibrateError> {
+        self.refuse_signals(channels)?;
+        let range = extent(
+            channels
+                .reference()
+                .map(|x| self.target_range.normalise(self.target.from_reference(x))),
+        );
+        if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
+            return Err(CalibrateError::Prior {
+                file: "the prior".into(),
+                problem: format!(
+                    "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
+                    self.reference
+                ),
+            });
+        }
+        self.refuse_polarity(channels)
+    }
+
+    /// Refuses signals of another rate or unit.
+    pub(crate) fn refuse_signals(&self, channels: &Channels) -> Result<(), CalibrateError> {
         let problem =
             |problem: String| Err(CalibrateError::Prior { file: "the prior".into(), problem });
         let hz = channels.sample_rate.hz();
@@ -242,34 +279,18 @@ impl Prior {
                 ));
             }
         }
-        let range = extent(
-            channels
-                .reference()
-                .map(|x| self.target_range.normalise(self.target.from_reference(x))),
-        );
-        if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
-            return problem(format!(
-                "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
-                self.reference
-            ));
-        }
-        self.refuse_polarity(channels)
+        Ok(())
     }
 
     /// Refuses data in which most channels that clearly follow the reference follow it the other way round.
     fn refuse_polarity(&self, channels: &Channels) -> Result<(), CalibrateError> {
         let mean = &self.known[0].1.mean;
         let sign = self.target.reference_per_target().signum();
-        let (mut same, mut opposite) = (0, 0);
-        for k in 0..self.signals.len() {
+        let pair = |k: usize| {
             let prior = sign * term_correlation(&self.gram, mean, 1 + k * Bank::terms_a_channel());
-            let found = correlation(channels.signal(k), channels.reference());
-            if prior.abs() > CLEAR && found.abs() > CLEAR {
-                same += usize::from(prior * found > 0.0);
-                opposite += usize::from(prior * found < 0.0);
-            }
-        }
-        if opposite > same {
+            (correlation(channels.signal(k), channels.reference()), prior)
+        };
+        if let Some(opposite) = turned((0..self.signals.len()).map(pair)) {
             return Err(CalibrateError::Prior {
                 file: "the prior".into(),
                 problem: format!(
@@ -295,7 +316,7 @@ impl Prior {
     }
 
     /// A sentence about what the prior knows of a path.
-    fn whom(&self, path: &[String], known: usize) -> Option<String> {
+    pub(crate) fn whom(&self, path: &[String], known: usize) -> Option<String> {
         if path.is_empty() || known == path.len() {
             return None;
         }

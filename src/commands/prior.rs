@@ -57,7 +57,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     stage_text(&mut outputs, &args.out, &prior.to_json()?)?;
     if let Some(path) = &args.figure {
         let figure = seconds_figure(&prior.expected, &prior.unit());
-        let why = "every session is shorter than the minute after which errors are judged: there is nothing to draw";
+        let why = "every session is too short to be judged: record at least half a minute each";
         stage_text(&mut outputs, path, &figure.with_context(|| why)?)?;
     }
     let answer = Output {
@@ -78,7 +78,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn print(prior: &Prior) -> anyhow::Result<()> {
     let unit = prior.unit();
     say(format!(
-        "{} sessions of {}. Errors on each of them when it is left out, after its first minute:",
+        "{} sessions of {}. Errors on the end of each of them when it is left out:",
         prior.sessions,
         prior.signals.join(", ")
     ))?;

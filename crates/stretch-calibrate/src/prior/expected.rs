@@ -10,8 +10,11 @@ use super::{
     tree::{Leaf, Normal},
 };
 
+/// Fewest samples that count, each a second, of a part that errors are judged on.
+const LEAST_COUNT: f64 = 5.0;
+
 /// The error on sessions left out, after some seconds of reference. Each is judged on what comes after its first
-/// minute.
+/// minute; one that is shorter, on its end (what comes after 30, 20 or 10 s), for the seconds before that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// Seconds of reference.
@@ -59,10 +62,12 @@ fn judged(
 ) -> Option<(f64, f64)> {
     let (mut squares, mut ratio, mut count) = (0.0, 0.0, 0.0);
     for (parts, left) in parts.iter().zip(left) {
-        let (Some(prior), Some(rest)) = (&left[which], parts.last().filter(|p| p.count > 0.0))
-        else {
+        // a short session is judged on its end, for as many seconds as lie before it
+        let judged = parts.iter().rposition(|part| part.count >= LEAST_COUNT);
+        let (Some(prior), Some(at)) = (&left[which], judged.filter(|at| *at >= used)) else {
             continue;
         };
+        let rest = &parts[at];
         let posterior = parts[..used]
             .iter()
             .try_fold(prior.clone(), |normal, part| after(&normal, part, noise))?;

@@ -15,7 +15,7 @@ use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError
 
 use commands::{
     apply, calibrate, completions, convert, demo, diagnose, effects, evaluate, export, fleet,
-    foretell, init, json, listen, man, page, record, rig, simulate,
+    foretell, init, json, listen, man, page, prior, record, renew, rig, simulate,
 };
 use display::Volume;
 
@@ -61,6 +61,8 @@ Exit status:
 #[derive(Subcommand)]
 enum Command {
     Calibrate(calibrate::Args),
+    Prior(prior::Args),
+    Renew(renew::Args),
     Apply(apply::Args),
     Evaluate(evaluate::Args),
     Convert(convert::Args),
@@ -98,6 +100,8 @@ fn main() -> ExitCode {
     let mut done = ExitCode::SUCCESS;
     let result = match cli.command {
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Prior(args) => prior::run(args),
+        Command::Renew(args) => renew::run(args),
         Command::Apply(args) => apply::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Convert(args) => convert::run(args),

@@ -26,6 +26,7 @@ mod problem;
 mod program;
 mod silence;
 mod simulate;
+mod sleeve;
 mod soak;
 mod streams;
 mod support;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use stretch_calibrate::{
-    Applied, LiveReceptor, Reach, apply, not_its_own, pressure_column, read_calibration,
+    Applied, LiveReceptor, Reach, SleeveCalibration, apply, not_its_own, pressure_column,
 };
 use stretch_core::{Calibration, Model};
 use stretch_data::{Trial, push_number, unit};
@@ -15,6 +15,7 @@ use stretch_receptor::{Domain, Reading, Withheld};
 use stretch_recording::{ReadOptions, Recording, RowReader};
 
 use super::{
+    apply_several::apply_several,
     pace::Pace,
     reading::{Recorded, read_recording, with_notes_printed},
     stop::RecordedInput,
@@ -51,7 +52,13 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let calibration = read_calibration(&args.calibration)?;
+    let calibration = match SleeveCalibration::read(&args.calibration)? {
+        SleeveCalibration::One(calibration) => *calibration,
+        SleeveCalibration::Many(several) => {
+            let options = args.recorded.options();
+            return apply_several(&several, &args.trial, args.out.as_deref(), options);
+        }
+    };
     let mut options = args.recorded.options().require(calibration.signal.as_str());
     if let Some(pressure) = pressure_column(&calibration) {
         options = options.require(pressure);

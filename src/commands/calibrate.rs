@@ -26,6 +26,7 @@ use super::{
     long::Long,
     reading::{Recorded, column, read_trials, with_columns_to_name},
     shared::{detail, of_files, stage_text, tell},
+    sleeve::{Asked, Sleeve},
 };
 
 /// Fit a calibration to logged trials
@@ -41,11 +42,13 @@ use super::{
 ///   stretch calibrate knee.csv --reference angle_deg --signal auto --out cal.json
 ///   stretch calibrate ramps/*.csv --paper --out published.json
 ///   stretch calibrate ramps/*.csv --model observer --out cal.json --fixed cal.fixed.postcard
+///   stretch calibrate knee.csv --reference angle_deg --signals s1,s2,s3 --out cal.json
+///   stretch calibrate --prior prior.json --of left/anna half_a_minute.csv --out cal.json
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Trials to fit, or a folder with a dataset.toml
-    #[arg(required = true, value_name = "TRIAL.csv")]
+    #[arg(required_unless_present = "prior", value_name = "TRIAL.csv")]
     trials: Vec<PathBuf>,
     /// What to fit: linear; polyIJ of degree I in the rate and J in the signal; blended (poly13
     /// without the jump at a reversal); hysteresis, relaxation, both, history or observer, which
@@ -114,6 +117,8 @@ pub(crate) struct Args {
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
           value_parser = parse_adc, requires = "fixed")]
     adc: Adc,
+    #[command(flatten)]
+    sleeve: Sleeve,
     /// Write a calibration that explains nothing, too
     #[arg(long)]
     force: bool,
@@ -256,7 +261,19 @@ struct Output<'a> {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let files = [Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()];
-    args.json.share_stdout(files)?;
+    args.json.share_stdout(files.into_iter().chain(args.sleeve.files()))?;
+    if args.sleeve.is_asked() {
+        return args.sleeve.run(&Asked {
+            trials: &args.trials,
+            signal: &args.signal,
+            reference: &args.reference,
+            rest_length: args.rest_length,
+            date: &args.date,
+            columns: args.recorded.options(),
+            out: &args.out,
+            json: &args.json,
+        });
+    }
     let mut options = args.options();
     let mut columns = args.recorded.options().require(&args.reference);
     if args.signal != "auto" {

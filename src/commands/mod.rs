@@ -1,6 +1,7 @@
 //! One file a subcommand, and what they share.
 
 pub(crate) mod apply;
+mod apply_several;
 mod by_trial;
 pub(crate) mod calibrate;
 mod calibration_text;
@@ -27,9 +28,12 @@ mod notation;
 mod pace;
 pub(crate) mod page;
 pub(crate) mod paper;
+pub(crate) mod prior;
 mod reading;
 pub(crate) mod record;
+pub(crate) mod renew;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;
+mod sleeve;
 pub(crate) mod stop;

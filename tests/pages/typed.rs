@@ -110,6 +110,12 @@ fn the_tutorial_of_the_laboratory_is_typed() {
 }
 
 #[test]
+#[ignore = "simulations and calibrations; ./ci.sh runs it"]
+fn the_tutorial_of_sensors_that_are_put_on_again_is_typed() {
+    type_page("book/src/tutorials/sleeve.md");
+}
+
+#[test]
 #[ignore = "calibrations; ./ci.sh runs it"]
 fn the_tutorial_of_firmware_is_typed() {
     type_page("book/src/tutorials/firmware.md");

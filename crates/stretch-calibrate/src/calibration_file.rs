@@ -145,6 +145,11 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
     let spec = parsed.map_err(|error| {
         let field = error.path().to_string();
         let cause = error.into_inner();
+        if object.contains("\"largest_surprise\"") {
+            return unusable(
+                "it is of several gauges, which stretch apply and stretch renew take alone".into(),
+            );
+        }
         unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
     })?;
     json.end().map_err(|error| unusable(error.to_string()))?;

@@ -145,6 +145,34 @@ pub enum CalibrateError {
         "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
     )]
     Fixed(#[source] DesignError),
+    /// More channels than a calibration can hold, or none.
+    #[error(
+        "{asked} signals were named; a calibration takes 1 to {most}: name the columns of the gauges with --signals s1,s2"
+    )]
+    Channels {
+        /// How many were named.
+        asked: usize,
+        /// The most that are possible.
+        most: usize,
+    },
+    /// Two channels are one and the same.
+    #[error(
+        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signals"
+    )]
+    Copies {
+        /// The first.
+        first: String,
+        /// The second.
+        second: String,
+    },
+    /// A prior, or a session for one, cannot be used for these data.
+    #[error("{file}: {problem}")]
+    Prior {
+        /// The file, or what it describes.
+        file: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
     /// A calibration file does not load.
     #[error("{file}: {problem}")]
     Record {

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Samples at the start of a piece that are not fitted, while the low-passes forget their initial values.
-const SETTLE: usize = 10;
+pub(crate) const SETTLE: usize = 10;
 /// Length of the blocks within which errors may be correlated, in seconds.
 const BLOCK_S: f64 = 0.5;
 /// Ridges that are tried, as shares of a term's own power.
@@ -26,10 +26,10 @@ const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 /// A choice of states and products.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Design {
-    relaxations_s: &'static [f64],
-    radii: &'static [f64],
-    degree: u8,
-    memory_degree: u8,
+    pub(crate) relaxations_s: &'static [f64],
+    pub(crate) radii: &'static [f64],
+    pub(crate) degree: u8,
+    pub(crate) memory_degree: u8,
 }
 
 const fn design(
@@ -89,7 +89,7 @@ struct Piece {
 }
 
 impl Design {
-    fn shape(&self) -> HistoryShape {
+    pub(crate) fn shape(&self) -> HistoryShape {
         HistoryShape {
             states: 1 + self.relaxations_s.len() + self.radii.len(),
             degree: self.degree,
@@ -98,7 +98,7 @@ impl Design {
     }
 
     /// The states of every sample, computed as in the receptor.
-    fn states(&self, x: &[f64], period_s: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn states(&self, x: &[f64], period_s: f64) -> Vec<Vec<f64>> {
         let first = x.first().copied().unwrap_or(0.0);
         let mut slow = vec![first; self.relaxations_s.len()];
         let mut played = vec![first; self.radii.len()];
@@ -132,7 +132,7 @@ impl Design {
         }
     }
 
-    fn term_names(&self) -> Vec<String> {
+    pub(crate) fn term_names(&self) -> Vec<String> {
         let mut names = vec!["1".to_owned()];
         self.shape().each_product(|parent, state| {
             let state = self.name(state);
@@ -144,14 +144,14 @@ impl Design {
 }
 
 /// Scales states and multiplies them out.
-struct Rows {
+pub(crate) struct Rows {
     products: Vec<(usize, usize)>,
     centre: Vec<f64>,
     half: Vec<f64>,
 }
 
 impl Rows {
-    fn new(shape: HistoryShape, domain: &[Interval]) -> Self {
+    pub(crate) fn new(shape: HistoryShape, domain: &[Interval]) -> Self {
         let mut products = Vec::new();
         shape.each_product(|parent, state| products.push((parent, state)));
         Self {
@@ -161,7 +161,7 @@ impl Rows {
         }
     }
 
-    fn fill(&self, states: &[f64], scaled: &mut Vec<f64>, row: &mut Vec<f64>) {
+    pub(crate) fn fill(&self, states: &[f64], scaled: &mut Vec<f64>, row: &mut Vec<f64>) {
         scaled.clear();
         let scale = states.iter().zip(&self.centre).zip(&self.half);
         scaled.extend(scale.map(|((s, c), h)| ((s - c) / h).clamp(-1.0, 1.0)));

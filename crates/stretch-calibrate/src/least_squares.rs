@@ -83,11 +83,11 @@ impl RowAccumulator {
 /// `rho^2` is the least sum of squared residuals.
 #[derive(Debug, Clone)]
 pub(crate) struct LinearFactor {
-    triangle: DMatrix<f64>,
+    pub(crate) triangle: DMatrix<f64>,
 }
 
 impl LinearFactor {
-    fn terms(&self) -> usize {
+    pub(crate) fn terms(&self) -> usize {
         self.triangle.ncols() - 1
     }
 
@@ -151,7 +151,7 @@ pub(crate) fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec
 /// Coefficients, and the triangle from which they were solved.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
-    r: DMatrix<f64>,
+    pub(crate) r: DMatrix<f64>,
     pub(crate) weights: Vec<f64>,
 }
 

@@ -2,12 +2,15 @@
 
 mod acceptance;
 mod apply;
+mod array;
 mod auto;
 mod auto_words;
+mod bank;
 mod blocks;
 mod calibrate;
 mod calibration_file;
 mod cause;
+mod channels;
 mod choose;
 mod clusters;
 mod cost;
@@ -29,7 +32,9 @@ mod observer_model;
 mod options;
 mod own_ranges;
 mod passes;
+mod positive;
 mod prepared;
+mod prior;
 mod rated;
 mod reach;
 mod rest;
@@ -43,6 +48,10 @@ pub use acceptance::{
     worse_than_the_mean,
 };
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
+pub use array::{
+    AppliedArray, ArrayFit, ArrayOptions, Carried, ROOM, SleeveCalibration, apply_array,
+    calibrate_array,
+};
 pub use auto::{
     Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
 };
@@ -53,6 +62,7 @@ pub use calibration_file::{
     describe_record, read_calibration, seal_calibration, write_calibration,
 };
 pub use cause::Cause;
+pub use channels::MAX_CHANNELS;
 pub use choose::{Candidate, rank_signals};
 pub use cost::{m3_instructions, m3_instructions_fixed};
 pub use error::{CalibrateError, PACE_TOLERANCE};
@@ -63,5 +73,9 @@ pub use gross_errors::without_gross_errors;
 pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
+pub use prior::{
+    Assumed, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
+    UpdateOptions, UpdateSummary, Updated,
+};
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
+mod array;
 mod branch;
 mod calibration;
 mod degree;
@@ -34,6 +35,10 @@ mod surface;
 mod unit;
 mod values;
 
+pub use array::{
+    ARRAY_RELAXATIONS, ARRAY_STATES, ARRAY_TERMS, ArrayCalibration, ArrayChannel, ArrayGains,
+    ArraySpec, MAX_CHANNELS,
+};
 pub use branch::Branch;
 pub use calibration::{
     CALIBRATION_SCHEMA, Calibration, CalibrationSpec, RateSource, Schema, Target,

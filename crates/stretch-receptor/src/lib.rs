@@ -2,6 +2,7 @@
 #![no_std]
 
 mod across;
+mod array;
 pub mod code;
 mod curve;
 mod defects;
@@ -20,9 +21,10 @@ mod receptor;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 
+pub use array::{ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld, Loss};
 pub use defects::{Defects, DefectsMemory};
 pub use diagnosed::DiagnosedReceptor;
-pub use example::{example_calibration, example_diagnosed, example_observer};
+pub use example::{example_array, example_calibration, example_diagnosed, example_observer};
 pub use front::{Front, MAX_BRIDGED, ReceptorMemory};
 pub use history::HistoryReceptor;
 pub use observer::ObserverReceptor;

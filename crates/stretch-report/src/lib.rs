@@ -25,6 +25,7 @@ mod multiple;
 mod page;
 mod plain;
 mod script;
+mod sleeve_figure;
 mod slice_figure;
 mod subject;
 mod surface_figure;
@@ -42,6 +43,7 @@ pub use markup::percent;
 pub use multiple::times;
 pub use page::Table;
 pub use plain::{number, transfer_in_words};
+pub use sleeve_figure::{channels_figure, seconds_figure};
 pub use subject::Subject;
 
 #[cfg(test)]

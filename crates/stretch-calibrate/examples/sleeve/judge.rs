@@ -1,0 +1,272 @@
+//! Calibrations of each session, and their errors after its first minute.
+
+use stretch_calibrate::{
+    ArrayOptions, Options, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration,
+    UpdateOptions, apply, apply_array, calibrate, calibrate_array, choose_model, rank_signals,
+};
+use stretch_data::Trial;
+
+use crate::data::{Set, Worn};
+
+pub(crate) const LINEAR: &str = "linear, 30 s";
+pub(crate) const OWN_ONE: &str = "own calibration, one";
+pub(crate) const OWN_ALL: &str = "own calibration, all";
+
+/// Errors of one session.
+pub(crate) struct Row {
+    pub(crate) errors: Vec<(String, f64)>,
+    /// Samples within the 95 % interval, of all.
+    pub(crate) inside: (f64, f64),
+}
+
+impl Row {
+    pub(crate) fn error(&self, name: &str) -> Option<f64> {
+        self.errors.iter().find(|(own, _)| own == name).map(|(_, error)| *error)
+    }
+}
+
+pub(crate) struct Judge {
+    pub(crate) set: Set,
+    sessions: Vec<Session>,
+    /// Seconds whose reference may be used.
+    pub(crate) used_s: f64,
+    with_auto: bool,
+}
+
+/// The priors of one wearer left out: of all channels, and of each.
+pub(crate) struct Priors {
+    pub(crate) all: Prior,
+    each: Vec<Prior>,
+}
+
+impl Judge {
+    /// Sums the sessions up; those that the library refuses are named and left out.
+    pub(crate) fn new(mut set: Set, used_s: f64, with_auto: bool) -> Self {
+        let mut sessions = Vec::new();
+        let (signals, reference) = (set.signals.clone(), set.reference.clone());
+        set.worn.retain(|worn| {
+            let path = format!("{}/{}", worn.wearer, worn.activity);
+            let options = SessionOptions::new(signals.clone(), &reference).of(&path);
+            match Session::new(&worn.name, &worn.trials, &options) {
+                Ok((session, _)) => sessions.push(session),
+                Err(refusal) => {
+                    println!("left out: {}: {refusal}", worn.name);
+                    return false;
+                }
+            }
+            true
+        });
+        Self { set, sessions, used_s, with_auto }
+    }
+
+    /// The wearers, in order.
+    pub(crate) fn wearers(&self) -> Vec<String> {
+        let mut wearers: Vec<String> = self.set.worn.iter().map(|w| w.wearer.clone()).collect();
+        wearers.sort();
+        wearers.dedup();
+        wearers
+    }
+
+    pub(crate) fn without(&self, wearer: &str) -> anyhow::Result<Priors> {
+        let kept: Vec<Session> =
+            self.sessions.iter().filter(|s| s.path[0] != wearer).cloned().collect();
+        let of = |k: usize| -> anyhow::Result<Prior> {
+            let own: Result<Vec<_>, _> = kept.iter().map(|s| s.of_channels(&[k])).collect();
+            Ok(Prior::learn(&own?)?)
+        };
+        let each = (0..self.set.signals.len()).map(of).collect::<Result<Vec<_>, _>>()?;
+        let all = if each.len() == 1 { each[0].clone() } else { Prior::learn(&kept)? };
+        Ok(Priors { all, each })
+    }
+
+    pub(crate) fn rows(&self, every: usize) -> anyhow::Result<Vec<Row>> {
+        let mut rows = Vec::new();
+        for wearer in self.wearers() {
+            let priors = self.without(&wearer)?;
+            for (index, worn) in self.set.worn.iter().enumerate() {
+                if worn.wearer == wearer && index % every == 0 {
+                    rows.push(self.row(index, worn, &priors)?);
+                    eprintln!("{}: {:?}", worn.name, rows.last().map(|r| &r.errors));
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn row(&self, index: usize, worn: &Worn, priors: &Priors) -> anyhow::Result<Row> {
+        let mut errors = Vec::new();
+        let half = self.used_s.min(30.0);
+        let short = first_seconds(&worn.trials, half);
+        let base = Options {
+            signal: self.set.signals[0].clone(),
+            reference: self.set.reference.clone(),
+            ..Options::default()
+        };
+        let ranking = rank_signals(&short, &self.set.signals, &base)?;
+        let signal = ranking[0].signal.clone();
+        let place = self.set.signals.iter().position(|s| *s == signal).unwrap_or(0);
+        let options = Options { signal: signal.clone(), ..base };
+        let mut classic = |name: &str, options: &Options| {
+            let error = calibrate(&short, options).map(|c| c.calibration);
+            let error = error
+                .ok()
+                .and_then(|c| self.error(&SleeveCalibration::One(Box::new(c)), worn).ok());
+            errors.push((name.to_owned(), error.unwrap_or(f64::NAN)));
+        };
+        let model = |name: &str| {
+            Ok::<_, anyhow::Error>(Options { model: name.parse()?, ..options.clone() })
+        };
+        classic(LINEAR, &model("linear")?);
+        classic("poly13, 30 s", &model("poly13")?);
+        if self.with_auto {
+            let choice = choose_model(&short, &options)?;
+            classic("auto, 30 s", &Options { model: choice.model, ..options.clone() });
+        }
+        let mut inside = (0.0, 0.0);
+        let many = self.set.signals.len() > 1;
+        let others: Vec<Session> = self
+            .sessions
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| *i != index)
+            .map(|(_, s)| s.clone())
+            .collect();
+        let has_others = others.iter().any(|s| s.path[0] == worn.wearer);
+        for (what, channels) in
+            [("one", vec![place]), ("all", (0..self.set.signals.len()).collect())]
+        {
+            if what == "all" && !many {
+                continue;
+            }
+            let prior = if what == "one" { &priors.each[place] } else { &priors.all };
+            let own: Result<Vec<_>, _> = others.iter().map(|s| s.of_channels(&channels)).collect();
+            let knowing = if has_others { Some(prior.knowing(&own?)?) } else { None };
+            let told = UpdateOptions::of(&format!("{}/{}", worn.wearer, worn.activity));
+            let cases = [
+                ("new wearer", Some(prior), UpdateOptions::default()),
+                ("next session", knowing.as_ref(), told),
+            ];
+            for (who, prior, options) in cases {
+                let Some(prior) = prior else { continue };
+                let renewing =
+                    RenewOptions { path: options.path.clone(), ..RenewOptions::default() };
+                let error = match prior.renew(&first_seconds(&worn.trials, 60.0), &renewing) {
+                    Ok(renewed) => self.error(&renewed.calibration, worn)?,
+                    Err(refusal) => {
+                        eprintln!("{}: {refusal}", worn.name);
+                        f64::NAN
+                    }
+                };
+                errors.push((format!("prior, {what}, {who}, 60 s without reference"), error));
+                for seconds in [0.0, 10.0, 30.0, 60.0] {
+                    if seconds > self.used_s {
+                        continue;
+                    }
+                    let trials = if seconds > 0.0 {
+                        first_seconds(&worn.trials, seconds)
+                    } else {
+                        Vec::new()
+                    };
+                    let updated = prior.update(&trials, &options);
+                    let error = match &updated {
+                        Ok(updated) => self.error(&updated.calibration, worn)?,
+                        Err(refusal) => {
+                            eprintln!("{}: {refusal}", worn.name);
+                            f64::NAN
+                        }
+                    };
+                    if let (Ok(updated), true) = (
+                        &updated,
+                        who == "new wearer" && seconds == half && (what == "all" || !many),
+                    ) {
+                        inside =
+                            self.inside(&updated.calibration, worn, updated.summary.half_width_95)?;
+                    }
+                    errors.push((format!("prior, {what}, {who}, {seconds} s"), error));
+                }
+            }
+        }
+        let own = ArrayOptions {
+            signals: self.set.signals.clone(),
+            reference: self.set.reference.clone(),
+            ..ArrayOptions::default()
+        };
+        let fit = calibrate_array(&worn.trials, &own)?;
+        errors.push((OWN_ONE.to_owned(), fit.carried[place].rmse_alone.unwrap_or(f64::NAN)));
+        let best = fit.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
+        errors.push(("own calibration, best one".to_owned(), best));
+        errors.push((OWN_ALL.to_owned(), fit.rmse));
+        Ok(Row { errors, inside })
+    }
+
+    /// Errors after the first minute, one for each sample that has an estimate.
+    fn differences(
+        &self,
+        calibration: &SleeveCalibration,
+        worn: &Worn,
+    ) -> anyhow::Result<Vec<f64>> {
+        let mut found = Vec::new();
+        let mut before_s = 0.0;
+        for trial in &worn.trials {
+            let reference = trial.require(&self.set.reference)?;
+            let estimates: Vec<Option<f64>> = match calibration {
+                SleeveCalibration::One(calibration) => apply(calibration, trial)?
+                    .readings
+                    .iter()
+                    .map(|r| r.ok().map(|r| r.estimate))
+                    .collect(),
+                SleeveCalibration::Many(calibration) => apply_array(calibration, trial)?
+                    .readings
+                    .iter()
+                    .map(|r| r.ok().map(|r| r.estimate))
+                    .collect(),
+            };
+            for (i, (estimate, truth)) in estimates.iter().zip(reference).enumerate() {
+                if let Some(estimate) = estimate
+                    && before_s + trial.time_s[i] >= self.used_s
+                {
+                    found.push(estimate - truth);
+                }
+            }
+            before_s += trial.duration_s();
+        }
+        Ok(found)
+    }
+
+    pub(crate) fn error(
+        &self,
+        calibration: &SleeveCalibration,
+        worn: &Worn,
+    ) -> anyhow::Result<f64> {
+        let found = self.differences(calibration, worn)?;
+        Ok((found.iter().map(|e| e * e).sum::<f64>() / found.len() as f64).sqrt())
+    }
+
+    fn inside(
+        &self,
+        calibration: &SleeveCalibration,
+        worn: &Worn,
+        half_width: f64,
+    ) -> anyhow::Result<(f64, f64)> {
+        let found = self.differences(calibration, worn)?;
+        Ok((found.iter().filter(|e| e.abs() <= half_width).count() as f64, found.len() as f64))
+    }
+}
+
+/// The first seconds of trials that follow one another.
+pub(crate) fn first_seconds(trials: &[Trial], seconds: f64) -> Vec<Trial> {
+    let mut left_s = seconds;
+    let mut cut = Vec::new();
+    for trial in trials {
+        let kept = trial.time_s.iter().take_while(|t| **t - trial.time_s[0] < left_s).count();
+        left_s -= trial.duration_s();
+        if kept < 50 {
+            break;
+        }
+        let mut own = trial.clone();
+        own.time_s.truncate(kept);
+        own.channels.iter_mut().for_each(|c| c.values.truncate(kept));
+        cut.push(own);
+    }
+    cut
+}

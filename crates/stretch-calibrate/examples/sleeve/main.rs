@@ -1,0 +1,82 @@
+//! Sleeves that are put on again or worn by another: priors and half a minute of reference, on published records.
+//!
+//! ```sh
+//! cargo run --release -p stretch-calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER [--auto] [--every N]
+//! ```
+//!
+//! The first folder is `data/Regression` of github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve (commit
+//! 47369aba, MIT), the second `datasets/Part VIII Knee Dataset/Part VIII Knee Data Preprocessed` of
+//! github.com/msstate-athlete-engineering/soft-sensors-research (commit 5f9b7fd3). The project holds neither.
+//!
+//! Every prior is learnt without the wearer that it is judged on, spreads included; "next session" then tells it the
+//! other sessions of the wearer. All errors are root mean squares over what follows the first minute, of which the
+//! reference is taken; the session's own calibration is judged by cross-validation over sixths. With `--auto` the
+//! choice of a model on the same half minute is judged too, which takes long.
+
+mod data;
+mod faults;
+mod judge;
+
+use std::path::PathBuf;
+
+use judge::{Judge, Row};
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let value = |name: &str| {
+        let at = arguments.iter().position(|a| a == name)?;
+        arguments.get(at + 1).cloned()
+    };
+    let with_auto = arguments.iter().any(|a| a == "--auto");
+    let every = value("--every").map_or(Ok(1), |n| n.parse::<usize>())?.max(1);
+    if let Some(folder) = value("--sleeves") {
+        let set = data::sleeves(&PathBuf::from(folder))?;
+        println!("{} sessions of knitted sleeves", set.worn.len());
+        let judge = Judge::new(set, 60.0, with_auto);
+        let rows = judge.rows(every)?;
+        print("sleeves", &rows);
+        faults::print(&judge, every)?;
+    }
+    if let Some(folder) = value("--knees") {
+        let set = data::knees(&PathBuf::from(folder))?;
+        println!("{} wearers of a knee sensor", set.worn.len());
+        let judge = Judge::new(set, 20.0, with_auto);
+        print("knees", &judge.rows(every)?);
+    }
+    Ok(())
+}
+
+/// Geometric means of errors, and of their ratios with the worst of each.
+fn print(title: &str, rows: &[Row]) {
+    let Some(first) = rows.first() else { return };
+    println!("\n### {title}: {} sessions\n", rows.len());
+    println!(
+        "| calibration | sessions | RMSE | to linear, 30 s | worst | above 1.05 | to the session's own |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let logs: Vec<f64> = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::ln).collect();
+        (logs.iter().sum::<f64>() / logs.len() as f64).exp()
+    };
+    for (name, _) in &first.errors {
+        let of = |row: &Row, name: &str| row.error(name).unwrap_or(f64::NAN);
+        let error = mean(&mut rows.iter().map(|row| of(row, name)));
+        let ratios: Vec<f64> =
+            rows.iter().map(|row| of(row, name) / of(row, judge::LINEAR)).collect();
+        let own = if name.contains("all") { judge::OWN_ALL } else { judge::OWN_ONE };
+        let to_own = mean(&mut rows.iter().map(|row| of(row, name) / of(row, own)));
+        let worst = ratios.iter().copied().fold(0.0, f64::max);
+        let above = ratios.iter().filter(|r| **r > 1.05).count();
+        let judged = ratios.iter().filter(|r| r.is_finite()).count();
+        println!(
+            "| {name} | {judged} | {error:.2} | {:.3} | {worst:.2} | {above} | {to_own:.3} |",
+            mean(&mut ratios.iter().copied())
+        );
+    }
+    let (inside, samples) =
+        rows.iter().fold((0.0, 0.0), |(a, b), r| (a + r.inside.0, b + r.inside.1));
+    println!(
+        "\nwithin the 95 % interval after 30 s, all channels, new wearer: {:.3}",
+        inside / samples
+    );
+}

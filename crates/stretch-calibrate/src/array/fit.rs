@@ -1,0 +1,107 @@
+//! One model of many channels, with a ridge a channel, chosen on data left out.
+
+use stretch_core::{Interval, Normalisation, Provenance, Range, RangeSpec, Target};
+use stretch_data::Trial;
+
+use crate::{CalibrateError, channels::Channels, series::extent};
+
+use super::{
+    carried::{Carried, carried},
+    linear::{Linear, SleeveCalibration},
+    parted::parted,
+    watch::watched,
+};
+
+/// Options of [`calibrate_array`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ArrayOptions {
+    /// Columns of the signals.
+    pub signals: Vec<String>,
+    /// Column of the reference.
+    pub reference: String,
+    /// Resting length, as [`Options::rest_length`](crate::Options::rest_length).
+    pub rest_length: Option<f64>,
+    /// Date of the calibration, as free text for the record.
+    pub date: String,
+}
+
+/// A calibration of several gauges with its judgement.
+#[derive(Debug, Clone)]
+pub struct ArrayFit {
+    /// The record.
+    pub calibration: SleeveCalibration,
+    /// What each channel carries.
+    pub carried: Vec<Carried>,
+    /// Root mean square error on data left out, in the reference's unit.
+    pub rmse: f64,
+    /// Sentences about the data.
+    pub notes: Vec<String>,
+}
+
+/// Fits one linear model of all channels and their memories.
+///
+/// Each channel has a ridge of its own; ridges are chosen by cross-validation, first one for all, then channel by
+/// channel. Each trial is left out in turn, of fewer than three trials each sixth, with two seconds next to it left
+/// out of the fit as well.
+///
+/// # Errors
+/// [`CalibrateError`], which names the trial and column.
+pub fn calibrate_array(
+    trials: &[Trial],
+    options: &ArrayOptions,
+) -> Result<ArrayFit, CalibrateError> {
+    let channels = Channels::new(trials, &options.signals, &options.reference)?;
+    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
+    let longest = extent(channels.reference()).max;
+    let target = match options.rest_length {
+        Some(rest_length) => Target::Contraction { rest_length },
+        None if options.reference.starts_with("length") => {
+            Target::Contraction { rest_length: longest }
+        }
+        None => Target::Direct,
+    };
+    let Interval { min, max } = extent(channels.reference().map(|x| target.from_reference(x)));
+    let spec = RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max };
+    let constant = || CalibrateError::Constant { column: options.reference.clone(), value: min };
+    let target_range = Range::new(spec).map_err(|_| constant())?;
+    let bank = channels.bank();
+    if bank.domains.iter().flatten().any(|d| d.min >= d.max) {
+        return Err(undetermined());
+    }
+    let normalised = |x: f64| target_range.normalise(target.from_reference(x));
+    let parted = parted(&channels, &bank, normalised, trials.len()).ok_or_else(undetermined)?;
+    let everything: Vec<usize> = (0..options.signals.len()).collect();
+    let held = parted.choose(&everything).ok_or_else(undetermined)?;
+    let weights = parted.fit(&parted.whole, &everything, &held.ridges).ok_or_else(undetermined)?;
+    let count: f64 = parted.parts.iter().map(|(rows, _)| rows).sum();
+    let triangle = &parted.whole.triangle;
+    let terms = parted.terms;
+    let gram = (triangle.tr_mul(triangle) / count).view((0, 0), (terms, terms)).into_owned();
+    let unit = target_range.span() * target.reference_per_target().abs();
+    let carried = carried(&parted, &options.signals, held.rmse, unit);
+    let linear = Linear {
+        signals: options.signals.clone(),
+        reference: options.reference.clone(),
+        sample_rate_hz: channels.sample_rate.hz(),
+        target,
+        target_range,
+        estimate: Interval { min: target_range.normalise(min), max: target_range.normalise(max) },
+        domains: bank.domains,
+        weights: weights.iter().copied().collect(),
+        gram,
+        variance: held.rmse * held.rmse,
+        samples: count as u64,
+        still_samples: channels.still_samples(),
+    };
+    let watched = watched(&linear, Some(&channels))?;
+    let mut columns: Vec<&str> = options.signals.iter().map(String::as_str).collect();
+    columns.push(&options.reference);
+    let provenance = Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str()))
+        .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
+    Ok(ArrayFit {
+        calibration: linear.record(&watched, provenance)?,
+        carried,
+        rmse: held.rmse * unit,
+        notes: channels.notes,
+    })
+}

@@ -1,0 +1,160 @@
+//! Several gauges: every kind of fault on every channel.
+
+use stretch_core::{
+    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, Design, Interval, Label, Provenance,
+    SampleRate, Schema, Stage, Values,
+};
+use stretch_receptor::{ArrayReceptor, ArrayWithheld, Loss};
+
+const CHANNELS: usize = 4;
+const HZ: f64 = 100.0;
+/// Sample at which a channel is lost.
+const AT: usize = 700;
+/// Samples within which a loss must be found.
+const SOON: usize = 10;
+
+/// Four gauges that follow one motion with gains of 1 to 4 V, so that each tells the whole.
+fn calibration() -> ArrayCalibration<CHANNELS> {
+    let gain = |k: usize| 1.0 + k as f64;
+    let channel = |k: usize| ArrayChannel {
+        signal: Label::new(&format!("s{k}")).unwrap(),
+        state_min: Values::new("state_min", &[0.0, -gain(k)]).unwrap(),
+        state_max: Values::new("state_max", &[gain(k), gain(k)]).unwrap(),
+        possible: Interval { min: -0.5 * gain(k), max: 1.5 * gain(k) },
+        still_samples: 8,
+        follows: Values::new(
+            "follows",
+            &std::array::from_fn::<f64, CHANNELS, _>(|c| {
+                if c == k { 0.0 } else { gain(k) / gain(c) / (CHANNELS - 1) as f64 }
+            }),
+        )
+        .unwrap(),
+        largest_surprise: 0.1 * gain(k),
+    };
+    // angle = 90 u with u from 0 to 1; a term is 2 u - 1, and the memory adds nothing
+    let gains = |keep: &[usize]| ArrayGains {
+        constant: 45.0,
+        terms: (0..CHANNELS)
+            .map(|k| match keep.contains(&k) {
+                true => Values::new("terms", &[45.0 / keep.len() as f64, 0.0]).unwrap(),
+                false => Values::EMPTY,
+            })
+            .collect(),
+        sd: 1.0 + 4.0 / keep.len() as f64,
+    };
+    let all: Vec<usize> = (0..CHANNELS).collect();
+    let without = |k: usize| all.iter().copied().filter(|&c| c != k).collect::<Vec<_>>();
+    ArrayCalibration::new(ArraySpec {
+        schema: Schema::CURRENT,
+        reference: Label::new("angle_deg").unwrap(),
+        sample_rate_hz: SampleRate::new(HZ).unwrap(),
+        relaxations_s: Values::new("relaxations_s", &[0.3]).unwrap(),
+        degree: 1,
+        memory_degree: 1,
+        estimate_domain: Interval { min: 0.0, max: 90.0 },
+        channels: (0..CHANNELS).map(channel).collect(),
+        all: gains(&all),
+        without: (0..CHANNELS).map(|k| gains(&without(k))).collect(),
+        alone: (0..CHANNELS).map(|k| gains(&[k])).collect(),
+        fast_states: 1,
+        provenance: Provenance::new("", ["simulated"]),
+    })
+    .unwrap()
+}
+
+/// The motion, 0 to 1: it never rests for a whole window.
+fn motion(n: usize) -> f64 {
+    0.5 + 0.4 * (2.0 * n as f64 / HZ).sin()
+}
+
+fn samples(n: usize) -> [f64; CHANNELS] {
+    // a little noise of a kind that never repeats
+    std::array::from_fn(|k| (1.0 + k as f64) * (motion(n) + 1e-3 * ((n * (7 + k)) as f64).sin()))
+}
+
+/// What a fault makes of a sample, the sample at which it began, and how it is called.
+type Fault = (fn(f64, f64) -> f64, Loss);
+
+const FAULTS: [(&str, Fault); 5] = [
+    ("cut off", (|_, _| 9.9, Loss::Outside)),
+    ("no sample", (|_, _| f64::NAN, Loss::Missing)),
+    ("sticks", (|_, began| began, Loss::Still)),
+    ("at the end of the converter", (|_, began| began, Loss::Still)),
+    ("slips", (|x, began| x + 0.4 * began.abs().max(0.5), Loss::Surprising)),
+];
+
+#[test]
+fn every_fault_of_every_channel_is_found_within_100_ms_and_left_out() {
+    let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration()).unwrap();
+    for (name, (fault, why)) in FAULTS {
+        for channel in 0..CHANNELS {
+            let mut memory = receptor.memory();
+            let began = samples(AT)[channel];
+            let mut found = None;
+            for n in 0..AT + 300 {
+                let mut now = samples(n);
+                if n >= AT {
+                    now[channel] = fault(now[channel], began);
+                }
+                let Ok(reading) = receptor.step(&mut memory, now) else { continue };
+                if reading.lost != 0 && found.is_none() {
+                    found = Some(n);
+                    assert!(reading.is_lost(channel), "{name}, {channel}: {:b}", reading.lost);
+                }
+                if n > AT + SOON {
+                    let off = (reading.estimate - 90.0 * motion(n)).abs();
+                    assert!(off < 1.0, "{name}, {channel}: off by {off} at {n}");
+                }
+            }
+            let at = found.unwrap_or_else(|| panic!("{name} of channel {channel} is not found"));
+            assert!((AT..=AT + SOON).contains(&at), "{name}, {channel}: found at {at}");
+            let loss = memory.loss(channel);
+            assert!(loss == Some(why) || loss == Some(Loss::Surprising), "{name}: {loss:?}");
+        }
+    }
+}
+
+#[test]
+fn an_hour_without_a_fault_has_no_alarm() {
+    let receptor = ArrayReceptor::<f32, CHANNELS>::new(&calibration()).unwrap();
+    let mut memory = receptor.memory();
+    for n in 0..360_000 {
+        let reading = receptor.step(&mut memory, samples(n).map(|x| x as f32));
+        assert_eq!(reading.map(|r| r.lost), Ok(0), "at {n}");
+    }
+}
+
+#[test]
+fn what_is_lost_says_so_in_the_deviation_and_comes_back_when_asked() {
+    let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration()).unwrap();
+    let mut memory = receptor.memory();
+    let step = |memory: &mut _, gone: &[usize], n: usize| {
+        let mut now = samples(n);
+        gone.iter().for_each(|&k| now[k] = f64::NAN);
+        receptor.step(memory, now)
+    };
+    let run = |memory: &mut _, gone: &[usize], from: usize| {
+        (from..from + 50).map(|n| step(memory, gone, n)).last().unwrap()
+    };
+    assert_eq!(run(&mut memory, &[], 0).unwrap().sd, 2.0);
+    assert_eq!(run(&mut memory, &[1], 50).unwrap().sd, 1.0 + 4.0 / 3.0);
+    let alone = run(&mut memory, &[1, 2], 100).unwrap();
+    assert_eq!((alone.sd, alone.lost), (5.0, 0b0110));
+    assert_eq!(run(&mut memory, &[0, 1, 2, 3], 150), Err(ArrayWithheld::AllLost));
+    (0..CHANNELS).for_each(|k| memory.readmit(k));
+    assert_eq!(run(&mut memory, &[], 200).map(|r| (r.lost, r.sd)), Ok((0, 2.0)));
+}
+
+#[test]
+fn a_short_gap_is_bridged() {
+    let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration()).unwrap();
+    let mut memory = receptor.memory();
+    for n in 0..400 {
+        let mut now = samples(n);
+        if n % 100 > 96 {
+            now[2] = f64::NAN;
+        }
+        let reading = receptor.step(&mut memory, now).unwrap();
+        assert_eq!(reading.lost, 0, "at {n}");
+    }
+}

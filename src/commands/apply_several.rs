@@ -1,0 +1,75 @@
+//! `stretch apply` with a calibration of several gauges.
+
+use std::{
+    io::{self, BufWriter, Write},
+    path::Path,
+};
+
+use stretch_calibrate::{AppliedArray, ROOM, apply_array};
+use stretch_core::ArrayCalibration;
+use stretch_data::{Trial, push_number, unit};
+use stretch_files::{is_standard_output, write_whole};
+use stretch_recording::ReadOptions;
+
+use super::reading::read_recording;
+use crate::display::{Output, warn};
+
+/// Writes time, estimate, standard deviation, the channels that are left out, and whether a state was clamped.
+pub(super) fn apply_several(
+    calibration: &ArrayCalibration<ROOM>,
+    trial: &Path,
+    out: Option<&Path>,
+    mut options: ReadOptions,
+) -> anyhow::Result<()> {
+    for channel in &calibration.channels {
+        options = options.require(channel.signal.as_str());
+    }
+    let trial = read_recording(trial, &options)?;
+    let applied = apply_array(calibration, &trial)?;
+    match out.filter(|path| !is_standard_output(path)) {
+        Some(path) => write_whole(path, |out| write_all(calibration, &trial, &applied, out))?,
+        None => {
+            let mut out = BufWriter::new(Output);
+            write_all(calibration, &trial, &applied, &mut out)?;
+            out.flush()?;
+        }
+    }
+    for (channel, time_s, loss) in &applied.losses {
+        let name = calibration.channels[*channel].signal.as_str();
+        warn(format!("stretch: {}: {name} is left out from {time_s:.2} s on: {loss}", trial.name));
+    }
+    let withheld = applied.readings.iter().filter(|reading| reading.is_err()).count();
+    warn(format!("{} samples: {withheld} without an estimate", applied.readings.len()));
+    Ok(())
+}
+
+fn write_all(
+    calibration: &ArrayCalibration<ROOM>,
+    trial: &Trial,
+    applied: &AppliedArray,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let unit =
+        unit(calibration.reference.as_str()).map_or(String::new(), |unit| format!("_{unit}"));
+    writeln!(out, "time_s,estimate{unit},sd{unit},lost,domain")?;
+    let mut line = Vec::with_capacity(64);
+    for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
+        line.clear();
+        push_number(&mut line, time_s);
+        match reading {
+            Ok(reading) => {
+                let lost: Vec<&str> = (calibration.channels.iter().enumerate())
+                    .filter(|(k, _)| reading.is_lost(*k))
+                    .map(|(_, channel)| channel.signal.as_str())
+                    .collect();
+                let domain = if reading.clamped { "signal_clamped" } else { "inside" };
+                let (estimate, sd, lost) = (reading.estimate, reading.sd, lost.join("+"));
+                write!(line, ",{estimate:.6},{sd:.6},{lost},{domain}")?;
+            }
+            Err(withheld) => write!(line, ",,,,{withheld}")?,
+        }
+        line.push(b'\n');
+        out.write_all(&line)?;
+    }
+    Ok(())
+}

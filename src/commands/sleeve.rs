@@ -1,0 +1,252 @@
+//! Calibrations of several gauges, and those that begin from a prior: `stretch calibrate --signals` and `--prior`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use serde::Serialize;
+use stretch_calibrate::{
+    ArrayOptions, Carried, Prior, Session, SessionOptions, SleeveCalibration, UpdateOptions,
+    UpdateSummary, calibrate_array,
+};
+use stretch_data::{Split, Trial, unit_of};
+use stretch_files::Outputs;
+use stretch_recording::ReadOptions;
+use stretch_report::channels_figure;
+
+use super::{
+    json::Json,
+    reading::{column, read_trials, with_columns_to_name},
+    shared::{of_files, say, stage_text, tell},
+};
+use crate::{
+    display::warn,
+    table::{maybe, number, table},
+};
+
+/// Options of a calibration of several gauges, or from a prior.
+#[derive(clap::Args)]
+pub(crate) struct Sleeve {
+    /// Columns of several gauges that are calibrated together, or `all`: every column but the reference
+    #[arg(long, value_name = "COL,COL", value_delimiter = ',', value_parser = column,
+          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
+          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
+    signals: Vec<String>,
+    /// A prior (`stretch prior`) that these trials, ten seconds to a minute of reference, update; no trial: the prior
+    #[arg(long, value_name = "prior.json",
+          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
+          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force", "rest_length"])]
+    prior: Option<PathBuf>,
+    /// Sensor, wearer, what was done: left/anna, as many steps as are known
+    #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
+    of: String,
+    /// Where the sums of these trials go, for `stretch prior`
+    #[arg(long, value_name = "session.json",
+          conflicts_with_all = ["model", "normalise", "rate", "rate_source", "branch_by", "paper", "signal_zero",
+          "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
+    session: Option<PathBuf>,
+    /// Where a figure goes: the error of each of --signals alone, and of all others
+    #[arg(long, value_name = "f.svg", requires = "signals", conflicts_with = "prior")]
+    figure: Option<PathBuf>,
+}
+
+/// What the command takes beside the options of this file.
+pub(crate) struct Asked<'a> {
+    pub(crate) trials: &'a [PathBuf],
+    pub(crate) signal: &'a str,
+    pub(crate) reference: &'a str,
+    pub(crate) rest_length: Option<f64>,
+    pub(crate) date: &'a str,
+    pub(crate) columns: ReadOptions,
+    pub(crate) out: &'a Path,
+    pub(crate) json: &'a Json,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Output<'a> {
+    signals: &'a [String],
+    /// Root mean square error on data left out.
+    rmse: Option<f64>,
+    carried: &'a [Carried],
+    update: Option<&'a UpdateSummary>,
+    notes: &'a [String],
+}
+
+/// What came of the trials.
+struct Made {
+    calibration: SleeveCalibration,
+    signals: Vec<String>,
+    reference: String,
+    rmse: Option<f64>,
+    carried: Vec<Carried>,
+    update: Option<UpdateSummary>,
+    notes: Vec<String>,
+}
+
+impl Sleeve {
+    /// Whether the calibration is one of this file's.
+    pub(crate) fn is_asked(&self) -> bool {
+        !self.signals.is_empty() || self.prior.is_some() || self.session.is_some()
+    }
+
+    /// Files beside the record.
+    pub(crate) fn files(&self) -> [Option<&Path>; 2] {
+        [self.session.as_deref(), self.figure.as_deref()]
+    }
+
+    pub(crate) fn run(&self, asked: &Asked<'_>) -> anyhow::Result<()> {
+        let prior = self.prior.as_deref().map(Prior::read).transpose()?;
+        let reference = match &prior {
+            // the name that is there unless another is given
+            Some(prior) if asked.reference == "length_mm" => prior.reference.clone(),
+            _ => asked.reference.to_owned(),
+        };
+        if asked.out.extension().is_some_and(|extension| extension == "postcard") {
+            bail!(
+                "{}: records of this kind are written in JSON; name a file in .json",
+                asked.out.display()
+            );
+        }
+        let trials = self.trials(asked, &reference)?;
+        let signals = self.columns(asked, prior.as_ref(), &trials, &reference);
+        let named = |error: stretch_calibrate::CalibrateError| of_files(error, asked.trials);
+        let made = match &prior {
+            Some(prior) => {
+                self.updated(prior, &trials, &signals, &reference, asked).map_err(named)?
+            }
+            None => fitted(&trials, &signals, &reference, asked).map_err(named)?,
+        };
+        let mut outputs = Outputs::default();
+        stage_text(&mut outputs, asked.out, &made.calibration.to_json()?)?;
+        if let Some(path) = &self.session {
+            let options = SessionOptions::new(signals.clone(), &reference).of(&self.of);
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let (session, _) = Session::new(&name, &trials, &options).map_err(named)?;
+            stage_text(&mut outputs, path, &session.to_json()?)?;
+        }
+        if let Some(path) = &self.figure {
+            let rmse = made.rmse.unwrap_or(f64::NAN);
+            let figure = channels_figure(&made.carried, rmse, &unit_of(&made.reference));
+            stage_text(&mut outputs, path, &figure)?;
+        }
+        let answer = Output {
+            signals: &made.signals,
+            rmse: made.rmse,
+            carried: &made.carried,
+            update: made.update.as_ref(),
+            notes: &made.notes,
+        };
+        asked.json.stage(&mut outputs, &answer)?;
+        outputs.keep()?;
+        asked.json.say(&answer, || {
+            print(&made)?;
+            let mut written = [Some(asked.out)].into_iter().chain(self.files()).flatten();
+            written.try_for_each(|path| tell(format!("wrote {}", path.display())))
+        })
+    }
+
+    fn trials(&self, asked: &Asked<'_>, reference: &str) -> anyhow::Result<Vec<Trial>> {
+        let mut columns = asked.columns.clone().require(reference);
+        for signal in self.signals.iter().filter(|signal| *signal != "all") {
+            columns = columns.require(signal);
+        }
+        let own = "name the columns of yours with --reference and --signals";
+        let trials = read_trials(asked.trials, Split::Fit, &columns);
+        trials.map_err(|error| with_columns_to_name(error, own))
+    }
+
+    fn columns(
+        &self,
+        asked: &Asked<'_>,
+        prior: Option<&Prior>,
+        trials: &[Trial],
+        reference: &str,
+    ) -> Vec<String> {
+        match (&self.signals[..], prior) {
+            ([all], _) if all == "all" => {
+                let channels = trials.first().map(|trial| trial.channels.as_slice()).unwrap_or(&[]);
+                let named = channels.iter().map(|channel| channel.name.clone());
+                named.filter(|name| name != reference).collect()
+            }
+            ([], Some(prior)) => prior.signals.clone(),
+            ([], None) => vec![asked.signal.to_owned()],
+            (signals, _) => signals.to_vec(),
+        }
+    }
+
+    fn updated(
+        &self,
+        prior: &Prior,
+        trials: &[Trial],
+        signals: &[String],
+        reference: &str,
+        asked: &Asked<'_>,
+    ) -> Result<Made, stretch_calibrate::CalibrateError> {
+        let options = UpdateOptions {
+            signals: signals.to_vec(),
+            reference: reference.to_owned(),
+            date: asked.date.to_owned(),
+            ..UpdateOptions::of(&self.of)
+        };
+        let updated = prior.update(trials, &options)?;
+        Ok(Made {
+            calibration: updated.calibration,
+            signals: signals.to_vec(),
+            reference: reference.to_owned(),
+            rmse: None,
+            carried: Vec::new(),
+            update: Some(updated.summary),
+            notes: updated.notes,
+        })
+    }
+}
+
+fn fitted(
+    trials: &[Trial],
+    signals: &[String],
+    reference: &str,
+    asked: &Asked<'_>,
+) -> Result<Made, stretch_calibrate::CalibrateError> {
+    let fit = calibrate_array(
+        trials,
+        &ArrayOptions {
+            signals: signals.to_vec(),
+            reference: reference.to_owned(),
+            rest_length: asked.rest_length,
+            date: asked.date.to_owned(),
+        },
+    )?;
+    Ok(Made {
+        calibration: fit.calibration,
+        signals: signals.to_vec(),
+        reference: reference.to_owned(),
+        rmse: Some(fit.rmse),
+        carried: fit.carried,
+        update: None,
+        notes: fit.notes,
+    })
+}
+
+fn print(made: &Made) -> anyhow::Result<()> {
+    let unit = unit_of(&made.reference);
+    if let Some(rmse) = made.rmse {
+        let joined = made.signals.join(", ");
+        say(format!("{joined}: RMSE {} {unit} on data left out of the fit", number(rmse)))?;
+        let header = ["channel", &format!("alone, RMSE {unit}"), "all others", "takes away"];
+        let row = |c: &Carried| {
+            let adds = c.adds.map_or("-".to_owned(), |adds| format!("{:.0} %", 100.0 * adds));
+            vec![c.signal.clone(), maybe(c.rmse_alone), maybe(c.rmse_without), adds]
+        };
+        say(table(&header, made.carried.iter().map(row)))?;
+    }
+    if let Some(update) = &made.update {
+        say(format!(
+            "{:.1} s of reference; expected RMSE {} {unit}, 95 % of estimates within {} {unit}",
+            update.seconds,
+            number(update.expected_rmse),
+            number(update.half_width_95)
+        ))?;
+    }
+    made.notes.iter().for_each(|note| warn(format!("note: {note}")));
+    Ok(())
+}

@@ -1,0 +1,276 @@
+//! Sensors that are put on again, by another, or broken: `stretch prior`, `calibrate --signals` and `--prior`, `renew`,
+//! and `apply` with several gauges.
+
+use std::{fmt::Write, path::PathBuf};
+
+use assert_cmd::Command;
+
+use crate::support::{Scratch, fails, one_line, prints, runs, stretch};
+
+/// What a session differs by from the usual one.
+#[derive(Clone, Copy)]
+struct Worn {
+    wearer: usize,
+    number: usize,
+    seconds: f64,
+    hz: f64,
+}
+
+const SHORT: Worn = Worn { wearer: 7, number: 0, seconds: 20.0, hz: 50.0 };
+
+impl Scratch {
+    /// A session of a wearer in CSV: two gauges with gain, zero and a memory, and an angle.
+    fn worn(&self, name: &str, worn: Worn, change: impl Fn(&mut [f64; 3])) -> PathBuf {
+        let Worn { wearer, number, seconds, hz } = worn;
+        let (w, n) = (wearer as f64, number as f64);
+        let (gain, zero) =
+            (1.0 + 0.2 * (2.3 * w).sin() + 0.02 * n, 0.1 * (1.7 * w).cos() + 0.02 * n);
+        let angle = |t: f64| {
+            let t = t + 3.0 * w + n;
+            45.0 + 30.0 * (1.3 * t).sin() + 10.0 * (0.37 * t).cos() + 3.0 * (4.1 * t).sin()
+        };
+        let (mut text, mut slow) = ("time_s,s1,s2,angle_deg\n".to_owned(), angle(0.0));
+        for k in 0..(seconds * hz) as u32 {
+            let t = f64::from(k) / hz;
+            slow += (angle(t) - slow) / (0.3 * hz);
+            let noise =
+                |k: u32| 3e-3 * (f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5);
+            let first = gain * (angle(t) + 0.2 * (angle(t) - slow)) / 90.0 + zero + noise(k);
+            let second = 1.5 * gain * angle(t) / 90.0 - zero + noise(k + 77);
+            let mut row = [first, second, angle(t)];
+            change(&mut row);
+            let cell = |x: f64| if x.is_finite() { format!("{x:.5}") } else { String::new() };
+            writeln!(text, "{t},{},{},{}", cell(row[0]), cell(row[1]), cell(row[2])).unwrap();
+        }
+        self.write(name, text)
+    }
+
+    /// A session's sums in a file.
+    fn summed(
+        &self,
+        name: &str,
+        worn: Worn,
+        signals: &str,
+        change: impl Fn(&mut [f64; 3]),
+    ) -> PathBuf {
+        let trial = self.worn(&format!("{name}.csv"), worn, change);
+        let session = self.path(&format!("{name}.json"));
+        let of = format!("w{}", worn.wearer);
+        runs(
+            self.sleeve(&[
+                "calibrate",
+                "--reference",
+                "angle_deg",
+                "--signals",
+                signals,
+                "--of",
+                &of,
+            ])
+            .arg("--session")
+            .arg(&session)
+            .arg("--out")
+            .arg(self.path("own.json"))
+            .arg(trial),
+        );
+        session
+    }
+
+    /// Two sessions of each of four wearers.
+    fn sessions(&self) -> Vec<PathBuf> {
+        let one = |k: usize| {
+            let worn = Worn { wearer: k / 2, number: k % 2, seconds: 75.0, hz: 50.0 };
+            self.summed(&format!("w{}_{}", k / 2, k % 2), worn, "s1,s2", |_| ())
+        };
+        (0..8).map(one).collect()
+    }
+
+    fn prior(&self) -> PathBuf {
+        let prior = self.path("prior.json");
+        let mut command = self.sleeve(&["prior", "--out", "prior.json", "--figure", "seconds.svg"]);
+        let said = runs(command.args(self.sessions()));
+        assert!(said.contains("8 sessions of s1, s2") && said.contains("seen before"), "{said}");
+        prior
+    }
+
+    fn sleeve(&self, arguments: &[&str]) -> Command {
+        let mut command = stretch();
+        command.current_dir(self.path("")).args(arguments);
+        command
+    }
+
+    /// Root mean square error of a record's estimates on a session, and what `apply` said on standard error.
+    fn error(&self, record: &str, trial: &str) -> (f64, String) {
+        let mut command = self.sleeve(&["apply", "--calibration", record, trial]);
+        let output = command.output().unwrap();
+        let said = one_line(&String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{said}");
+        let truth = std::fs::read_to_string(self.path(trial)).unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let errors: Vec<f64> = text
+            .lines()
+            .zip(truth.lines())
+            .skip(1)
+            .filter_map(|(told, row)| {
+                let told: f64 = told.split(',').nth(1)?.parse().ok()?;
+                Some(told - row.split(',').nth(3)?.parse::<f64>().ok()?)
+            })
+            .collect();
+        assert!(errors.len() > 100, "{said}");
+        ((errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt(), said)
+    }
+}
+
+#[test]
+fn a_prior_needs_seconds_of_reference_or_none() {
+    let scratch = Scratch::new();
+    scratch.prior();
+    let figure = std::fs::read_to_string(scratch.path("seconds.svg")).unwrap();
+    assert!(figure.starts_with("<svg") && figure.contains("RMSE, deg"));
+    let new = Worn { seconds: 60.0, ..SHORT };
+    scratch.worn("new.csv", new, |_| ());
+    scratch.worn("short.csv", Worn { seconds: 10.0, ..new }, |_| ());
+    let from = ["calibrate", "--prior", "prior.json", "--out"];
+    runs(scratch.sleeve(&from).arg("alone.json"));
+    let said = runs(scratch.sleeve(&from).args(["ten.json", "short.csv"]));
+    assert!(
+        said.contains("10.00 s of reference") || said.contains("10.0 s of reference"),
+        "{said}"
+    );
+    let (alone, ten) =
+        (scratch.error("alone.json", "new.csv").0, scratch.error("ten.json", "new.csv").0);
+    assert!(ten < 0.3 * alone, "{ten} beside {alone}");
+    // today has no reference at all
+    scratch.worn("today.csv", new, |row| row[2] = f64::NAN);
+    let renew = ["renew", "--prior", "prior.json", "--out"];
+    let said = runs(scratch.sleeve(&renew).args(["renewed.json", "today.csv"]));
+    assert!(said.contains("it is assumed") && said.contains("high end"), "{said}");
+    let renewed = scratch.error("renewed.json", "new.csv").0;
+    assert!(renewed < 0.6 * alone && renewed > ten, "{renewed} beside {alone}");
+    // the calibration of an earlier session of the same wearer, that is the prior's
+    runs(scratch.sleeve(&from).args(["w1.json", "--of", "w1", "w1_0.csv"]));
+    scratch.worn("w1_3.csv", Worn { wearer: 1, number: 2, seconds: 60.0, hz: 50.0 }, |_| ());
+    let again = ["--calibration", "w1.json", "--of", "w1", "w1_3.csv", "--json"];
+    let json = prints(scratch.sleeve(&renew).arg("w1_new.json").args(again));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["renewal"]["assumed"].as_array().unwrap().len(), 3);
+    let (before, after) =
+        (scratch.error("w1.json", "w1_3.csv").0, scratch.error("w1_new.json", "w1_3.csv").0);
+    assert!(after < before, "{after} beside {before}");
+}
+
+#[test]
+fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
+    let scratch = Scratch::new();
+    let worn = Worn { seconds: 80.0, ..SHORT };
+    scratch.worn("knee.csv", worn, |_| ());
+    let all = [
+        "calibrate",
+        "knee.csv",
+        "--reference",
+        "angle_deg",
+        "--signals",
+        "all",
+        "--out",
+        "cal.json",
+    ];
+    let json = prints(scratch.sleeve(&all).args(["--figure", "channels.svg", "--json"]));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let (rmse, alone) =
+        (json["rmse"].as_f64().unwrap(), json["carried"][0]["rmse_alone"].as_f64().unwrap());
+    assert!(json["signals"] == serde_json::json!(["s1", "s2"]) && rmse < 0.9 * alone, "{json}");
+    assert!(
+        std::fs::read_to_string(scratch.path("channels.svg")).unwrap().contains("all together")
+    );
+    let (whole, said) = scratch.error("cal.json", "knee.csv");
+    assert!(!said.contains("left out"), "{said}");
+    let k = std::cell::Cell::new(0);
+    scratch.worn("cut.csv", worn, |row| {
+        k.set(k.get() + 1);
+        row[0] = if k.get() > 2000 { 9.0 } else { row[0] };
+    });
+    let (cut, said) = scratch.error("cal.json", "cut.csv");
+    assert!(said.contains("s1 is left out from 40.00 s on: outside"), "{said}");
+    assert!(whole < cut && cut < 20.0 * whole, "{cut} beside {whole}");
+    // a command that takes one gauge says so
+    let evaluate = &mut scratch.sleeve(&["evaluate", "--calibration", "cal.json", "knee.csv"]);
+    fails(evaluate, &["cal.json", "several gauges", "stretch apply"]);
+}
+
+#[test]
+fn priors_refuse_what_they_have_not_seen() {
+    let scratch = Scratch::new();
+    scratch.prior();
+    let cases: [(&str, Worn, fn(&mut [f64; 3]), &[&str]); 4] = [
+        ("unit.csv", SHORT, |row| row[0] *= 1000.0, &["unit.csv", "s1", "another unit"]),
+        ("rate.csv", Worn { hz: 100.0, ..SHORT }, |_| (), &["rate.csv", "--grid 50"]),
+        (
+            "turned.csv",
+            SHORT,
+            |row| (row[0], row[1]) = (1.0 - row[0], 1.0 - row[1]),
+            &["swap the wires"],
+        ),
+        ("copies.csv", SHORT, |row| row[1] = row[0], &["copies", "--signals"]),
+    ];
+    for (name, worn, change, says) in cases {
+        scratch.worn(name, worn, change);
+        let from = ["calibrate", "--prior", "prior.json", "--out", "no.json", name];
+        fails(&mut scratch.sleeve(&from), says);
+    }
+    let worn = |name: &str, change: fn(&mut [f64; 3])| scratch.worn(name, SHORT, change);
+    worn("plain.csv", |_| ());
+    let with = |more: &[&str]| {
+        let mut command =
+            scratch.sleeve(&["calibrate", "--prior", "prior.json", "--out", "no.json"]);
+        command.args(more);
+        command
+    };
+    fails(
+        &mut with(&["--signals", "s1", "plain.csv"]),
+        &["2 channels", "1 were named", "--signals"],
+    );
+    let radian = scratch.path("radian.csv");
+    let text = std::fs::read_to_string(scratch.path("plain.csv")).unwrap();
+    std::fs::write(&radian, text.replace("angle_deg", "angle_rad")).unwrap();
+    fails(&mut with(&["radian.csv"]), &["angle_deg", "--reference"]);
+    let other = &mut with(&["--reference", "angle_rad", "radian.csv"]);
+    fails(other, &["angle_rad", "stretch convert"]);
+    // a model that is not asked is no option beside it
+    assert_eq!(with(&["--model", "linear", "plain.csv"]).output().unwrap().status.code(), Some(2));
+    let renew = |name: &str, says: &[&str]| {
+        let arguments = ["renew", "--prior", "prior.json", "--out", "no.json", name];
+        fails(&mut scratch.sleeve(&arguments), says);
+    };
+    scratch.worn("brief.csv", Worn { seconds: 1.0, ..SHORT }, |_| ());
+    renew("brief.csv", &["brief.csv", "no whole movement", "reference"]);
+    assert!(!scratch.path("no.json").exists());
+}
+
+#[test]
+fn sessions_of_different_kinds_make_no_prior() {
+    let scratch = Scratch::new();
+    let worn = |number| Worn { wearer: 1, number, seconds: 70.0, hz: 50.0 };
+    let of = |k: usize| scratch.summed(&format!("a{k}"), worn(k), "s1,s2", |_| ());
+    let good = [of(0), of(1)];
+    let refused = |third: PathBuf, says: &[&str]| {
+        let mut command = scratch.sleeve(&["prior", "--out", "no.json"]);
+        fails(command.args(&good).arg(third), says);
+    };
+    refused(scratch.summed("one", worn(2), "s1", |_| ()), &["one", "1 channels", "same channels"]);
+    let fast = Worn { hz: 100.0, ..worn(2) };
+    refused(scratch.summed("fast", fast, "s1,s2", |_| ()), &["fast", "--grid 50"]);
+    let turn = |row: &mut [f64; 3]| (row[0], row[1]) = (1.0 - row[0], 1.0 - row[1]);
+    refused(scratch.summed("turned", worn(2), "s1,s2", turn), &["turned", "swap the wires"]);
+    refused(scratch.path("own.json"), &["own.json", "stretch"]);
+    fails(scratch.sleeve(&["prior", "--out", "no.json"]).args(&good), &["at least 3"]);
+    let damaged = std::fs::read_to_string(&good[0]).unwrap().replacen("0.", "1.", 1);
+    refused(scratch.write("damaged.json", damaged), &["damaged.json", "edited or damaged"]);
+    // a reference that ends early is told with its row
+    let k = std::cell::Cell::new(0);
+    scratch.worn("early.csv", worn(2), |row| {
+        k.set(k.get() + 1);
+        row[2] = if k.get() > 3000 { f64::NAN } else { row[2] };
+    });
+    let fit = ["calibrate", "early.csv", "--reference", "angle_deg", "--signals", "s1,s2", "--out"];
+    let mut command = scratch.sleeve(&fit);
+    fails(command.arg("e.json"), &["early.csv", "row 3002", "angle_deg", "fill it in or remove"]);
+}

@@ -71,7 +71,7 @@ impl Bank {
     }
 
     /// The matrix `M` with `row of other = M (row of self)` for states inside both domains.
-    pub(crate) fn from_other(&self, other: &Self) -> DMatrix<f64> {
+    pub(crate) fn row_matrix_of(&self, other: &Self) -> DMatrix<f64> {
         let own = Self::terms_a_channel();
         let mut matrix = DMatrix::zeros(other.terms(), self.terms());
         matrix[(0, 0)] = 1.0;
@@ -159,7 +159,7 @@ mod tests {
             bank.fill(states.iter().map(|s| s.as_slice()), &mut row, &mut scratch);
             DVector::from_vec(row)
         };
-        let off = (mine.from_other(&theirs) * row(&mine) - row(&theirs)).amax();
+        let off = (mine.row_matrix_of(&theirs) * row(&mine) - row(&theirs)).amax();
         assert!(off < 1e-12, "off by {off:e}");
         assert!((row(&mine) - row(&theirs)).amax() > 0.1, "the two bases must differ");
     }

@@ -183,7 +183,10 @@ fn read(path: &Path) -> Result<Prior, CalibrateError> {
         })
         .collect();
     let known = known?;
-    if known.first().is_none_or(|(path, _)| !path.is_empty()) || !(record.noise > 0.0) {
+    if known.first().is_none_or(|(path, _)| !path.is_empty())
+        || record.noise.is_nan()
+        || record.noise <= 0.0
+    {
         return Err(wrong());
     }
     Ok(Prior {

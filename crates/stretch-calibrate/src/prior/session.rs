@@ -185,7 +185,7 @@ impl Session {
     ) -> Option<Vec<(f64, LinearFactor)>> {
         let own = Bank::new(self.domains.clone());
         // a row over the bank is this matrix times the row over the session's own domains
-        let matrix = own.from_other(bank).transpose();
+        let matrix = own.row_matrix_of(bank).transpose();
         let terms = own.terms();
         let one = |part: &SessionPart| {
             let triangle = unpacked(&part.triangle, terms + 1)?;

@@ -85,10 +85,13 @@ pub(crate) struct Tree<'a> {
     terms: usize,
 }
 
+/// The inverse of a node's own precision, given its parent, and the pull of what lies below.
+type Local = (DMatrix<f64>, DVector<f64>);
+
 /// What messages give: of each node what it was told from below, and its posterior.
 struct Passed {
     /// Of each node: the inverse of its level's precision plus what its subtree says, and the pull of its subtree.
-    local: Vec<(DMatrix<f64>, DVector<f64>)>,
+    local: Vec<Local>,
     messages: Vec<Message>,
     root: Message,
     posterior: Vec<Normal>,
@@ -175,7 +178,7 @@ impl<'a> Tree<'a> {
         below: &Message,
         inverse_level: &DMatrix<f64>,
         noise: f64,
-    ) -> Option<((DMatrix<f64>, DVector<f64>), Message)> {
+    ) -> Option<(Local, Message)> {
         let (precision, pull) = match self.nodes[node].leaf {
             Some(leaf) => (&self.leaves[leaf].gram / noise, &self.leaves[leaf].cross / noise),
             None => (below.precision.clone(), below.pull.clone()),

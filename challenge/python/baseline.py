@@ -5,6 +5,7 @@
 import sys
 
 import numpy as np
+
 from case import solve
 
 LEAST_GAIN = 0.02  # share of the held-out error that an effect must take away to be named

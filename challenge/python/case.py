@@ -2,12 +2,13 @@
 import importlib
 import json
 import time
-import tomllib
 from pathlib import Path
 
 import numpy as np
-import operators
+import tomllib
 from scipy.optimize import least_squares
+
+import operators
 
 # arguments of each kind: (off, start, most), as shares of the span of the channel where they are no time or share
 KINDS = {
@@ -127,12 +128,12 @@ def solve(folder, method, name, setup, out, limit=None):
     about, plant, names, places = load(folder)
     cases = {}
     for case in names[:limit]:
-        one, began = Case(Path(folder) / case, plant, places), time.perf_counter()
+        one, began = Case(Path(folder) / case, plant, places), time.process_time()
         believed, verdict, place, closed = method(one)
         total = sum(p for _, p in believed)
         cases[case] = {
             "probabilities": [{"effects": sorted(e), "probability": float(p / total)} for e, p in believed],
             "verdict": verdict, "place": place, "closed_share": float(min(1.0, closed)),
-            "seconds": time.perf_counter() - began, "simulations": one.runs}
+            "seconds": time.process_time() - began, "simulations": one.runs}
     answers = {"schema": 1, "method": name, "setup": setup, "set": about["set"], "cases": cases}
     Path(out).write_text(json.dumps(answers, indent=1) + "\n")

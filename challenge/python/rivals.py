@@ -2,12 +2,13 @@
 import sys
 
 import numpy as np
+
 from baseline import baseline
 from case import solve
 
 
-def named(case, believed, least=0.5):
-    """The answer that the greatest probability stands for; below `least` it is still the greatest that is named."""
+def named(case, believed):
+    """The answer that the greatest probability stands for."""
     names, _ = max(believed, key=lambda b: b[1])
     if names == ["unknown"]:
         return believed, "unknown", None, 0.0
@@ -110,13 +111,12 @@ def sindy(case):
         coefficients = np.ravel(optimizer.coef_)
         kept = [name for name, k in zip(names, keep, strict=True) if k]
         chosen += [n for n, c in zip(kept, coefficients, strict=True) if n and abs(c) > 0.0]
-        case.runs += 0
     return named(case, spread(case, chosen[:4]))
 
 
 def joint(case):
-    """All candidates of a stage free at once with the parameters, bounded least squares as mujoco.sysid does it; those count whose
-    first argument is more than 3 standard errors (Gauss-Newton) and 2 % of its range from off; nothing else is tuned."""
+    """All candidates of a stage free at once with the parameters, bounded least squares as mujoco.sysid does it; those
+    count whose first argument is more than 3 standard errors (Gauss-Newton) and 2 % of its range from off; nothing else is tuned."""
     chosen = []
     for stage in range(2):
         mine = [n for n in case.places if case.stage_of(n) == stage]
@@ -133,7 +133,8 @@ def joint(case):
 
 
 def cma(case):
-    """CMA-ES (pycma, its defaults, seed 1, sigma 0.3 of a tolerance or range) for nothing and each candidate, 300 runs each, then BIC."""
+    """CMA-ES (pycma, its defaults, seed 1, sigma 0.3 of a tolerance or range) for nothing and each candidate, 300 runs each;
+    then BIC."""
     import cma as pycma
 
     def least(stage, names):
@@ -169,7 +170,7 @@ METHODS = {"held_out": (baseline, "least held-out RMSE"), "bic": (bic, "BIC over
            "joint": (joint, "joint fit, all candidates free"), "cma": (cma, "CMA-ES per candidate, BIC")}
 
 if __name__ == "__main__":
-    if sys.argv[2] in ("abc", "ratio"):
+    if sys.argv[2] == "abc":
         import simulated
         METHODS |= simulated.METHODS
     method, name = METHODS[sys.argv[2]]

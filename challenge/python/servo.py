@@ -1,4 +1,4 @@
-"""The nominal simulator of the servo, as plain Python: NumPy, and numba where it is installed, which makes it 50 times as fast."""
+"""The nominal simulator of the servo, as plain Python: NumPy, and numba where it is installed, much faster."""
 import numpy as np
 
 try:

@@ -1,5 +1,6 @@
-"""Rivals that learn from simulations of a case: ABC by a random forest, and a neural ratio with a model indicator (sbi)."""
+"""A rival that learns from simulations of a case: ABC by a random forest."""
 import numpy as np
+
 from rivals import named, signatures
 
 DRAWS = 150  # simulations of each hypothesis and case
@@ -13,7 +14,7 @@ def hypotheses(case):
 
 
 def drawn(case, hypothesis, random):
-    """Both outputs of the fit trials with parameters from their tolerances, arguments uniform in the square root of their range, noise."""
+    """Both outputs of the fit trials: parameters from their tolerances, arguments at the square of a uniform share of their range."""
     p = case.p0 + case.tolerance * random.normal(0.0, 0.7, len(case.p0))
     effects = {}
     for name in hypothesis:
@@ -29,7 +30,7 @@ def drawn(case, hypothesis, random):
 
 
 class Summary:
-    """Numbers of a recording: the residual of each stage, parameters taken out to first order, its size and its likeness with every signature."""
+    """Numbers of a recording: of the residual of each stage, parameters taken out, its size and its likeness with every signature."""
 
     def __init__(self, case):
         self.case, self.tools = case, []
@@ -67,8 +68,8 @@ def table(case, random, draws, pairs):
 
 
 def abc(case):
-    """ABC by random forest (Pudlo 2016; scikit-learn, 300 trees, leaves of 3) trained on simulations of this case's inputs: 150 of
-    nothing and of each single effect, 450 of pairs; summaries fixed before any sealed set was made."""
+    """ABC by random forest (Pudlo 2016; scikit-learn, 300 trees, leaves of 3) trained on simulations of this case's inputs: 150
+    of nothing and of each single effect, 450 of pairs; summaries fixed before any sealed set was made."""
     from sklearn.ensemble import RandomForestClassifier
     random = np.random.default_rng(1)
     rows, labels, all_of, seen = table(case, random, DRAWS, PAIRS)
@@ -77,50 +78,4 @@ def abc(case):
     return named(case, [(all_of[i], q) for i, q in zip(forest.classes_, p, strict=True) if q > 0.0])
 
 
-class Ratio:
-    """Neural ratio estimation (sbi NRE_A, its default network and training) with the hypothesis as a one-hot parameter, trained once
-    a plant on simulations of the inputs of the first eight cases, 40 of each hypothesis of at most one effect and 200 pairs a case;
-    nothing is tuned. Its training's time and runs are shared out over the cases."""
-
-    def __init__(self):
-        self.network = None
-
-    def train(self, case):
-        import torch
-        from case import Case
-        from sbi.inference import NRE_A
-        torch.manual_seed(1)
-        torch.set_num_threads(1)
-        random, rows, labels = np.random.default_rng(1), [], []
-        folders = sorted(case.folder.parent.glob("case-*"))
-        for folder in folders[:8]:
-            other = Case(folder, case.plant, case.places)
-            x, y, self.all_of, _ = table(other, random, 40, 200)
-            case.runs += other.runs
-            rows.append(x)
-            labels.append(y)
-        rows = np.concatenate(rows)
-        self.middle, self.scale = rows.mean(0), rows.std(0) + 1e-9
-        x = torch.tensor((rows - self.middle) / self.scale, dtype=torch.float32)
-        self.eye = torch.eye(len(self.all_of))
-        inference = NRE_A(prior=None, show_progress_bars=False)
-        labels = np.concatenate(labels)
-        self.network = inference.append_simulations(self.eye[labels], x).train()
-        counts = np.bincount(labels, minlength=len(self.all_of))
-        self.prior = np.log(np.maximum(counts, 0.5) / counts.sum())
-
-    def __call__(self, case):
-        import torch
-        if self.network is None:
-            self.train(case)
-        seen = Summary(case).of([case.measured(stage, case.fit) for stage in range(2)])
-        x = torch.tensor((seen - self.middle) / self.scale, dtype=torch.float32)
-        with torch.no_grad():
-            log = self.network(self.eye, x.expand(len(self.eye), -1)).numpy().ravel() + self.prior
-        p = np.exp(log - log.max())
-        p /= p.sum()
-        kept = [(h, float(q)) for h, q in zip(self.all_of, p, strict=True) if q > 1e-5]
-        return named(case, kept)
-
-
-METHODS = {"abc": (abc, "ABC random forest"), "ratio": (Ratio(), "neural ratio, sbi")}
+METHODS = {"abc": (abc, "ABC random forest")}

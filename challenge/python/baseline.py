@@ -36,5 +36,5 @@ def baseline(case):
 
 
 if __name__ == "__main__":
-    setup = f"shipped with the challenge; nothing tuned: an effect is named from a gain of {LEAST_GAIN:.0%} of the held-out error on"
+    setup = f"shipped with the challenge; nothing tuned: named from a gain of {LEAST_GAIN:.0%} of the held-out error on"
     solve(sys.argv[1], baseline, "least held-out RMSE", setup, sys.argv[2])

@@ -1,4 +1,4 @@
-"""A case of the challenge as a method sees it: trials, candidates, a fit; and the file of answers that `challenge score` takes."""
+"""A case of the challenge as a method sees it: trials, candidates, a fit; and the answers that `challenge score` takes."""
 import importlib
 import json
 import time

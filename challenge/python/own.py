@@ -1,4 +1,7 @@
-"""The program's own row: `python3 own.py SET STRETCH submission.json [cases]` runs `stretch diagnose` on every problem.toml, as it ships."""
+"""The program's own row: `python3 own.py SET STRETCH submission.json [cases]`
+
+runs `stretch diagnose`, as it ships, on every problem.toml.
+"""
 import json
 import resource
 import subprocess
@@ -8,7 +11,8 @@ from pathlib import Path
 
 import tomllib
 
-VERDICTS = {"no_gap": "none", "parameters": "parameters", "record": "unknown", "effect": "effect", "partial": "effect", "unknown": "unknown"}
+VERDICTS = {"no_gap": "none", "parameters": "parameters", "record": "unknown", "effect": "effect", "partial": "effect",
+            "unknown": "unknown"}
 
 
 def used_s():
@@ -44,7 +48,8 @@ def converted(said, places, seconds):
         probabilities.sort(key=lambda b: b["effects"] != named)
     chosen = next((c for c in said["candidates"] if sorted(c["effects"]) == named), {"closed": 0.0})
     place = places.get(named[0]) if named else None
-    return {"probabilities": probabilities, "verdict": verdict, "place": place, "closed_share": min(1.0, max(0.0, chosen["closed"])),
+    closed = min(1.0, max(0.0, chosen["closed"]))
+    return {"probabilities": probabilities, "verdict": verdict, "place": place, "closed_share": closed,
             "seconds": seconds, "simulations": said.get("simulations") or 0}
 
 
@@ -55,7 +60,8 @@ def main():
     names = about["cases"][: int(sys.argv[4]) if len(sys.argv) > 4 else None]
     cases = {name: answer(folder / name, program, places) for name in names}
     setup = "as shipped, no option but one thread; its thresholds were calibrated on development seeds of the rig alone"
-    Path(out).write_text(json.dumps({"schema": 1, "method": "stretch", "setup": setup, "set": about["set"], "cases": cases}, indent=1) + "\n")
+    answers = {"schema": 1, "method": "stretch", "setup": setup, "set": about["set"], "cases": cases}
+    Path(out).write_text(json.dumps(answers, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ def bic(case):
 
 
 def forward(case):
-    """Forward selection by F tests at 0.01 over the number of candidates (Bonferroni), three effects at most; nothing is tuned."""
+    """Forward selection by F tests at 0.01 over the number of candidates (Bonferroni), three at most; nothing is tuned."""
     from scipy.stats import f as f_distribution
     chosen, plain = [], [case.retune(stage)[2] for stage in range(2)]
     samples = sum(len(case.measured(stage, case.fit)) for stage in range(2))
@@ -116,7 +116,7 @@ def sindy(case):
 
 def joint(case):
     """All candidates of a stage free at once with the parameters, bounded least squares as mujoco.sysid does it; those
-    count whose first argument is more than 3 standard errors (Gauss-Newton) and 2 % of its range from off; nothing else is tuned."""
+    count whose first argument is more than 3 standard errors and 2 % of its range from off; no more is tuned."""
     chosen = []
     for stage in range(2):
         mine = [n for n in case.places if case.stage_of(n) == stage]

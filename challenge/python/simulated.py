@@ -14,7 +14,7 @@ def hypotheses(case):
 
 
 def drawn(case, hypothesis, random):
-    """Both outputs of the fit trials: parameters from their tolerances, arguments at the square of a uniform share of their range."""
+    """Both outputs of the fit trials: parameters from their tolerances, arguments denser near off."""
     p = case.p0 + case.tolerance * random.normal(0.0, 0.7, len(case.p0))
     effects = {}
     for name in hypothesis:
@@ -30,7 +30,7 @@ def drawn(case, hypothesis, random):
 
 
 class Summary:
-    """Numbers of a recording: of the residual of each stage, parameters taken out, its size and its likeness with every signature."""
+    """Of the residual of each stage, parameters taken out: its size and its likeness with every signature."""
 
     def __init__(self, case):
         self.case, self.tools = case, []

@@ -139,7 +139,7 @@ fn problem(plant: &PlantSpec, name: &str) -> String {
     let wrap: Vec<&str> =
         plant.candidates.iter().map(|c| c.name).filter(|name| name.contains('.')).collect();
     let mut text = format!(
-        "name = {name:?}\nwrap = {wrap:?}\n\n[simulator]\ncommand = [\"python3\", \"../simulator/worker.py\", {:?}]\n\n\
+        "name = {name:?}\ntime_unit = \"s\"\nwrap = {wrap:?}\n\n[simulator]\ncommand = [\"python3\", \"../simulator/worker.py\", {:?}]\n\n\
          [[input]]\ncolumn = {:?}\nunit = {:?}\nnoise = 0.0\n",
         plant.name, plant.input, plant.input_unit
     );

@@ -4,8 +4,7 @@
 
 `truth.json` holds {"seed", "cases": {name: {"kind", "effects", "stages", "excess"}}}, REPORTS what
 `stretch diagnose --json-out` wrote for each case, RIG_SET any rig set of the challenge (for the names of candidates).
-Writes OUT, OUT-sealed and OUT.json, the submission. A kind is single, null, compound or out_of_catalogue. A declared
-tie stands in the submission as its first name, since a submission names one.
+Writes OUT, OUT-sealed and OUT.json, the submission. A kind is single, null, compound or out_of_catalogue. 
 """
 import hashlib
 import json

@@ -44,12 +44,11 @@ def converted(said, places, seconds):
     believed = believed or {(): 1.0}
     probabilities = [{"effects": list(k), "probability": p / total} for k, p in believed.items()]
     named = sorted(n for n in said["named"] if n in places)
-    if verdict == "effect" and named:  # what is named stands first among equals
-        probabilities.sort(key=lambda b: b["effects"] != named)
     chosen = next((c for c in said["candidates"] if sorted(c["effects"]) == named), {"closed": 0.0})
     place = places.get(named[0]) if named else None
     closed = min(1.0, max(0.0, chosen["closed"]))
-    return {"probabilities": probabilities, "verdict": verdict, "place": place, "closed_share": closed,
+    return {"probabilities": probabilities, "verdict": verdict, "named": named,
+            "tied": [n for n in said.get("tied") or [] if n in places], "place": place, "closed_share": closed,
             "seconds": seconds, "simulations": said.get("simulations") or 0}
 
 

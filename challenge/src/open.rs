@@ -62,9 +62,10 @@ pub fn score_open(submission: &Path, set: &Path, spent: &Path) -> anyhow::Result
 }
 
 /// Figures by their name in tables.
-pub(crate) fn figure_rows(f: &Figures) -> [(&'static str, Interval); 15] {
+pub(crate) fn figure_rows(f: &Figures) -> [(&'static str, Interval); 16] {
     [
         ("exact", f.exact),
+        ("exact or tied", f.exact_or_tied),
         ("one strong", f.strong),
         ("one faint", f.faint),
         ("two", f.two),

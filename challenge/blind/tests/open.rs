@@ -28,6 +28,8 @@ fn oracle(truth: &OpenTruth, hash: &str, p: f64) -> Submission {
         Answer {
             probabilities: vec![believed(effects, p), believed(other, 1.0 - p)],
             verdict,
+            named: None,
+            tied: Vec::new(),
             place: label.places.first().cloned(),
             closed_share: label.oracle_closed,
             seconds: 1.0,
@@ -166,6 +168,29 @@ fn an_answer_given_twice_is_refused() {
         first(s).probabilities[1] = again;
     });
     assert!(error.contains("probabilities[1].effects: they are there twice"), "{error}");
+}
+
+#[test]
+fn a_name_or_tie_that_the_set_does_not_have_is_refused() {
+    let error = refused(|s| first(s).named = Some(vec!["gremlin".to_owned()]));
+    assert!(error.starts_with("cases.case-000.named: \"gremlin\""), "{error}");
+    let error = refused(|s| first(s).tied = vec!["gremlin".to_owned()]);
+    assert!(error.starts_with("cases.case-000.tied: \"gremlin\""), "{error}");
+}
+
+#[test]
+fn a_declared_tie_counts_only_where_it_is_asked_for() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (truth, hash) = set(dir.path(), PlantName::Servo, 5);
+    let mut submission = oracle(&truth, &hash, 0.9);
+    let (name, label) = truth.cases.iter().find(|c| c.1.level == Level::Strong).expect("one");
+    let other = truth.candidates.keys().find(|n| **n != label.effects[0]).expect("another");
+    let answer = submission.cases.get_mut(name).expect("an answer");
+    answer.named = Some(vec![other.clone()]);
+    answer.tied = label.effects.clone();
+    let figures =
+        Figures::of(&OpenScore::of(&submission, &truth, &hash).expect("a score").outcomes);
+    assert_eq!((figures.exact.value, figures.exact_or_tied.value), (Some(0.9), Some(1.0)));
 }
 
 #[test]

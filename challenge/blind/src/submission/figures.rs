@@ -31,7 +31,9 @@ const BINS: usize = 10;
 pub struct Figures {
     /// Exactly what is missing, over all cases.
     pub exact: Interval,
-    /// The same over cases of one strong effect.
+    /// The same, a declared tie of two that holds the one effect counted right.
+    pub exact_or_tied: Interval,
+    /// Exactly what is missing, over cases of one strong effect.
     pub strong: Interval,
     /// Of one faint effect.
     pub faint: Interval,
@@ -78,6 +80,7 @@ impl Figures {
         let log = |o: &&Outcome| -o.probability_of_truth.max(LEAST_PROBABILITY).ln();
         Self {
             exact: share(all.clone(), |o| o.is_exact),
+            exact_or_tied: share(all.clone(), |o| o.is_exact_or_tied),
             strong: share(some(|o| o.level == Level::Strong), |o| o.is_exact),
             faint: share(some(|o| o.level == Level::Faint), |o| o.is_exact),
             two: share(some(|o| o.level == Level::Two), |o| o.is_exact),

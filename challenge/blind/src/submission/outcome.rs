@@ -1,5 +1,7 @@
 //! What came of each case.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::read::{Answer, Said, Submission, UNKNOWN};
@@ -28,6 +30,8 @@ pub struct Outcome {
     pub truth: Vec<String>,
     /// Whether exactly that was named, nothing where nothing was, `unknown` where it is no candidate.
     pub is_exact: bool,
+    /// Whether it is exact, or a declared tie of two holds the one effect that is at work.
+    pub is_exact_or_tied: bool,
     /// Greatest probability given.
     pub confidence: f64,
     /// Whether what had it is the truth.
@@ -110,6 +114,9 @@ impl Outcome {
         // of what is said to be an effect, the most probable one that is
         let effects = |e: &&(Vec<String>, f64)| !e.0.is_empty() && e.0 != [UNKNOWN];
         let named = match answer.verdict {
+            Said::Effect if answer.named.is_some() => {
+                sorted(answer.named.as_deref().unwrap_or_default())
+            }
             Said::Effect => believed.iter().find(effects).map(|e| e.0.clone()).unwrap_or_default(),
             _ => Vec::new(),
         };
@@ -118,6 +125,11 @@ impl Outcome {
             Said::Unknown => label.level == Level::Foreign,
             Said::Effect => named == truth,
         };
+        let is_tied = answer.verdict == Said::Effect
+            && named.len() == 1
+            && answer.tied.iter().chain(&named).collect::<BTreeSet<_>>().len() == 2
+            && truth.len() == 1
+            && answer.tied.contains(&truth[0]);
         let mut reached = 0.0;
         let covering = believed.iter().take_while(|(_, p)| {
             let is_needed = reached < COVERED - 1e-9;
@@ -133,6 +145,7 @@ impl Outcome {
             level: label.level,
             verdict: answer.verdict,
             is_exact,
+            is_exact_or_tied: is_exact || is_tied,
             confidence,
             is_first_right: first == truth,
             probability_of_truth: believed.iter().find(|b| b.0 == truth).map_or(0.0, |b| b.1),

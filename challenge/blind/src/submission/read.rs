@@ -38,6 +38,12 @@ pub struct Answer {
     pub probabilities: Vec<Believed>,
     /// What is said.
     pub verdict: Said,
+    /// Effects that an `effect` names; the most probable ones without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub named: Option<Vec<String>>,
+    /// Names that the data cannot tell from the one named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tied: Vec<String>,
     /// Stage of the gap; absent where there is none.
     #[serde(default)]
     pub place: Option<String>,
@@ -127,6 +133,14 @@ impl Answer {
             let is_new = !seen.contains(&names) && names.windows(2).all(|w| w[0] != w[1]);
             ensure(is_new, &format!("{place}.effects"), || "they are there twice".to_owned())?;
             seen.push(names);
+        }
+        let lists = [("named", self.named.as_ref()), ("tied", Some(&self.tied))];
+        for (list, name) in
+            lists.into_iter().flat_map(|(l, n)| n.into_iter().flatten().map(move |n| (l, n)))
+        {
+            ensure(truth.candidates.contains_key(name), &at(list), || {
+                format!("{name:?} is no candidate of the set")
+            })?;
         }
         let sum: f64 = self.probabilities.iter().map(|b| b.probability).sum();
         ensure((sum - 1.0).abs() <= SUM_TOLERANCE, &at("probabilities"), || {

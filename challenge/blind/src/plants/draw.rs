@@ -12,12 +12,15 @@ use crate::random::RandomGenerator;
 pub(super) const TRIALS: usize = 6;
 pub(super) const FIT_TRIALS: usize = 4;
 
+/// Both outputs of a trial.
+type Outputs = [Vec<f64>; 2];
+
 /// A case: its trials as recorded, and its label.
 #[derive(Debug)]
 pub(super) struct Drawn {
     pub(super) drives: Vec<Drive>,
     /// Both outputs of every trial.
-    pub(super) outputs: Vec<[Vec<f64>; 2]>,
+    pub(super) outputs: Vec<Outputs>,
     pub(super) label: OpenLabel,
 }
 
@@ -46,7 +49,7 @@ pub(super) fn draw(
         acts.push(at_excess(plant, &p, act, &drives, target));
     }
     let colour = random.between(family.colour.0, family.colour.1);
-    let clean: Vec<[Vec<f64>; 2]> = drives
+    let clean: Vec<Outputs> = drives
         .iter()
         .map(|drive| {
             let first = plant.stage(0, &p, &acts, drive);
@@ -72,7 +75,7 @@ fn label(
     p: &[f64],
     acts: &[Act],
     drives: &[Drive],
-    (clean, outputs): (&[[Vec<f64>; 2]], &[[Vec<f64>; 2]]),
+    (clean, outputs): (&[Outputs], &[Outputs]),
 ) -> OpenLabel {
     let excess = excess(plant, p, acts, &drives[..FIT_TRIALS]);
     let (mut square, mut samples) = (0.0, 0);

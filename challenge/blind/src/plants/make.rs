@@ -123,9 +123,9 @@ fn write_case(
     for (trial, (drive, outputs)) in case.drives.iter().zip(&case.outputs).enumerate() {
         let [first, second] = [0, 1].map(|s| plant.stages[s].output);
         let mut csv = format!("time_s,{},{first},{second}\n", plant.input);
-        for i in 0..drive.input.len() {
+        let rows = drive.input.iter().zip(&outputs[0]).zip(&outputs[1]);
+        for (i, ((u, a), b)) in rows.enumerate() {
             let time = plant.dt_s * i as f64;
-            let (u, a, b) = (drive.input[i], outputs[0][i], outputs[1][i]);
             let _ = writeln!(csv, "{time:.2},{u:.6},{a:.5},{b:.5}");
         }
         write(&folder.join(format!("trial_{trial}.csv")), &csv)?;

@@ -13,3 +13,4 @@ cargo test --quiet --locked --workspace --doc
 check="$CARGO_TARGET_DIR/challenge-check"
 rm -rf "$check"
 cargo run --quiet --locked -- --cases 4 --seed 3 --out "$check"
+./gate_sets.sh

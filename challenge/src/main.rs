@@ -3,10 +3,10 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Parser;
-use stretch_blind::{Disturbances, Family, Plan, Protocol};
+use stretch_blind::{Disturbances, Family, Plan, PlantName, Protocol};
 use stretch_challenge::{
-    Asked, RunOptions, aligned, make_cases, on_ctrl_c, run_cases, say, score_answers,
-    write_diagnosis,
+    Asked, RunOptions, aligned, board, make_cases, make_open, on_ctrl_c, read_scores, run_cases,
+    say, score_answers, score_open, write_diagnosis,
 };
 
 /// Check the diagnosis on cases whose causes are sealed until it has answered
@@ -47,14 +47,29 @@ enum Step {
         #[command(flatten)]
         options: RunOptions,
     },
-    /// Open the seal, score the answers, write score.json and report.html
+    /// Open the seal, score the answers, write score.json and report.html; or score a submission
     Score {
-        /// Folder with the cases and their answers
-        #[arg(value_name = "DIR")]
+        /// Folder with the cases and their answers, or a submission.json
+        #[arg(value_name = "DIR|submission.json")]
         folder: PathBuf,
+        /// Set that a submission answers; its labels lie in DIR-sealed
+        #[arg(long, value_name = "DIR", default_value = "set")]
+        set: PathBuf,
+        /// Record of the seeds whose labels were opened
+        #[arg(long, value_name = "FILE", default_value = SPENT)]
+        spent: PathBuf,
         /// Leave out the fits that know the labels
         #[arg(long)]
         no_oracle: bool,
+    },
+    /// Write the leaderboard of scores
+    Board {
+        /// What `challenge score submission.json` wrote
+        #[arg(value_name = "FILE.score.json", required = true)]
+        scores: Vec<PathBuf>,
+        /// The page
+        #[arg(long, value_name = "FILE.html", default_value = "leaderboard.html")]
+        out: PathBuf,
     },
     /// Diagnose one folder, as `run` has it done in a process of its own
     #[command(hide = true)]
@@ -83,7 +98,23 @@ struct Make {
     /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
     #[arg(long, value_name = "paper|paper+", default_value = "paper")]
     protocol: Protocol,
+    /// Make a set that strangers solve, of this plant: rig, servo or thermal; its labels go to
+    /// DIR-sealed
+    #[arg(long, value_name = "NAME")]
+    plant: Option<PlantName>,
+    /// Keep the labels of a set apart from it, in DIR-sealed; a set always does
+    #[arg(long, requires = "plant")]
+    seal: bool,
+    /// Family of forms and noise beside the published ones, a JSON file that is kept back
+    #[arg(long, value_name = "FILE.json", requires = "plant")]
+    private: Option<PathBuf>,
+    /// Record of the seeds whose labels were opened, none of which is made again
+    #[arg(long, value_name = "FILE", default_value = SPENT)]
+    spent: PathBuf,
 }
+
+/// Record of the seeds that are spent, in the folder that the program runs in.
+const SPENT: &str = "spent_seeds.csv";
 
 #[derive(clap::Args)]
 struct Diagnose {
@@ -141,7 +172,17 @@ fn run(args: Args) -> anyhow::Result<()> {
     match (args.step, args.make) {
         (Some(Step::Make(make)), _) => made(&make),
         (Some(Step::Run { folder, options }), _) => answered(&folder, &options),
-        (Some(Step::Score { folder, no_oracle }), _) => scored(&folder, !no_oracle),
+        (Some(Step::Score { folder, set, spent, .. }), _) if folder.is_file() => {
+            say(aligned(&score_open(&folder, &set, &spent)?));
+            Ok(())
+        }
+        (Some(Step::Score { folder, no_oracle, .. }), _) => scored(&folder, !no_oracle),
+        (Some(Step::Board { scores, out }), _) => {
+            let page = board(&read_scores(&scores)?)?;
+            stretch_files::write_whole(&out, |file| file.write_all(page.as_bytes()))?;
+            say(format!("wrote {}", out.display()));
+            Ok(())
+        }
         (Some(Step::Diagnose(asked)), _) => {
             let Diagnose { without, threads, baselines, .. } = asked;
             write_diagnosis(&asked.folder, &Asked { without, threads, baselines }, &asked.json_out)
@@ -156,6 +197,13 @@ fn run(args: Args) -> anyhow::Result<()> {
 }
 
 fn made(make: &Make) -> anyhow::Result<()> {
+    if let Some(plant) = make.plant {
+        let (size, private) = ((make.cases, make.seed), make.private.as_deref());
+        let hash = make_open(plant, &make.out, size, private, &make.spent)?;
+        let (cases, out) = (make.cases, make.out.display());
+        say(format!("made {cases} cases in {out}; labels sealed in {out}-sealed, SHA-256 {hash}"));
+        return Ok(());
+    }
     let Make { family: Families(family), disturbances, protocol, .. } = *make;
     let plan = Plan { family, disturbances, protocol, ..Plan::of(make.cases) };
     let seal = make_cases(&make.out, make.seed, &plan)?;

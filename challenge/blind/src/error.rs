@@ -56,6 +56,14 @@ pub enum BlindError {
         /// Name in the verdicts.
         case: String,
     },
+    /// A field of a submission or of a family of forms is not what it should be.
+    #[error("{field}: {reason}")]
+    Field {
+        /// The field, with its place: `cases.case-003.probabilities`.
+        field: String,
+        /// What is wrong with it, and what to do.
+        reason: String,
+    },
     /// A diagnosis lacks a field or holds a number that makes no sense.
     #[error("{case}: {reason}")]
     BadVerdict {

@@ -2,4 +2,5 @@
 
 mod cases;
 mod frozen;
+mod open;
 mod score;

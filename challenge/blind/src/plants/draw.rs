@@ -1,0 +1,214 @@
+//! One case of a plant, drawn: parameters, effects with strengths and forms, inputs, noise.
+
+use super::{
+    excess::excess,
+    family::FormFamily,
+    label::{Level, OpenLabel},
+    plant::{Act, Candidate, Drive, PlantSpec},
+};
+use crate::random::RandomGenerator;
+
+/// Trials of a case; the last two are tested on.
+pub(super) const TRIALS: usize = 6;
+pub(super) const FIT_TRIALS: usize = 4;
+
+/// Both outputs of a trial.
+type Outputs = [Vec<f64>; 2];
+
+/// A case: its trials as recorded, and its label.
+#[derive(Debug)]
+pub(super) struct Drawn {
+    pub(super) drives: Vec<Drive>,
+    /// Both outputs of every trial.
+    pub(super) outputs: Vec<Outputs>,
+    pub(super) label: OpenLabel,
+}
+
+/// What of a case its number decides: effects come in turn, levels in turn, families in turn.
+pub(super) fn draw(
+    plant: &'static PlantSpec,
+    seed: u64,
+    number: usize,
+    families: &[FormFamily],
+) -> Drawn {
+    let mut random = RandomGenerator::new(seed, 1000 + number as u64);
+    let level = Level::ALL[number % Level::ALL.len()];
+    let turn = RandomGenerator::new(seed, 2).below(100) + number / Level::ALL.len();
+    let family = &families[random.below(families.len())];
+    let drives = drives(plant, &mut random);
+    let p = parameters(plant, level, &mut random);
+    let chosen = chosen(plant, level, turn, &mut random);
+    let mut acts: Vec<Act> = Vec::new();
+    for candidate in chosen {
+        let (least, most): (f64, f64) =
+            if level == Level::Faint { (0.1, 1.0) } else { (3.0, 100.0) };
+        let form =
+            if level == Level::Foreign { Default::default() } else { family.form(&mut random) };
+        let target = random.log_between(least, most);
+        let act = Act { candidate, strength: 0.0, form };
+        acts.push(at_excess(plant, &p, act, &drives, target));
+    }
+    let colour = random.between(family.colour.0, family.colour.1);
+    let clean: Vec<Outputs> = drives
+        .iter()
+        .map(|drive| {
+            let first = plant.stage(0, &p, &acts, drive);
+            let second = Drive { input: first.clone(), ..drive.clone() };
+            let second = plant.stage(1, &p, &acts, &second);
+            [first, second]
+        })
+        .collect();
+    let mut outputs = clean.clone();
+    for trial in &mut outputs {
+        for (stage, out) in trial.iter_mut().enumerate() {
+            add_noise(out, plant.stages[stage].noise, colour, &mut random);
+        }
+    }
+    let label = label(plant, level, family, &p, &acts, &drives, (&clean, &outputs));
+    Drawn { drives, outputs, label }
+}
+
+fn label(
+    plant: &PlantSpec,
+    level: Level,
+    family: &FormFamily,
+    p: &[f64],
+    acts: &[Act],
+    drives: &[Drive],
+    (clean, outputs): (&[Outputs], &[Outputs]),
+) -> OpenLabel {
+    let excess = excess(plant, p, acts, &drives[..FIT_TRIALS]);
+    let (mut square, mut samples) = (0.0, 0);
+    for (trial, truth) in outputs.iter().zip(clean).skip(FIT_TRIALS) {
+        for stage in 0..2 {
+            let noise = plant.stages[stage].noise;
+            let pairs = trial[stage].iter().zip(&truth[stage]);
+            square += pairs.map(|(a, b)| ((a - b) / noise).powi(2)).sum::<f64>();
+            samples += trial[stage].len();
+        }
+    }
+    let rest = (2.0 * (square / samples as f64 - 1.0)).max(0.0);
+    let names = |f: fn(&Candidate) -> String| acts.iter().map(|a| f(a.candidate)).collect();
+    OpenLabel {
+        level,
+        effects: names(|c| c.name.to_owned()),
+        places: acts.iter().map(|a| plant.stages[a.candidate.stage].name.to_owned()).collect(),
+        excess,
+        oracle_closed: if excess > 0.0 { (1.0 - rest / excess).max(0.0) } else { 0.0 },
+        family: family.name.clone(),
+        strengths: acts.iter().map(|a| a.strength).collect(),
+        forms: acts.iter().map(|a| a.form).collect(),
+        parameters: plant
+            .parameters
+            .iter()
+            .map(|q| q.name.to_owned())
+            .zip(p.iter().copied())
+            .collect(),
+    }
+}
+
+fn chosen(
+    plant: &'static PlantSpec,
+    level: Level,
+    turn: usize,
+    random: &mut RandomGenerator,
+) -> Vec<&'static Candidate> {
+    let all = plant.candidates;
+    let first = turn % all.len();
+    match level {
+        Level::Strong | Level::Faint => vec![&all[first]],
+        Level::Two => {
+            let other = (first + 1 + random.below(all.len() - 1)) % all.len();
+            vec![&all[first.min(other)], &all[first.max(other)]]
+        }
+        Level::Nothing => Vec::new(),
+        Level::Foreign => vec![&plant.foreign[turn % plant.foreign.len()]],
+    }
+}
+
+/// Every second null has the parameters as shipped; all others move within their tolerances.
+fn parameters(plant: &PlantSpec, level: Level, random: &mut RandomGenerator) -> Vec<f64> {
+    let moves = level != Level::Nothing || random.below(2) == 1;
+    let scale = if moves { 0.7 } else { 0.0 };
+    let parameters = plant.parameters.iter();
+    parameters
+        .map(|p| p.value * (1.0 + scale * p.tolerance * random.gauss().clamp(-2.0, 2.0)))
+        .collect()
+}
+
+/// The strength at which the effect alone has this excess, by halving; the greatest strength where none has.
+fn at_excess(plant: &PlantSpec, p: &[f64], act: Act, drives: &[Drive], target: f64) -> Act {
+    let (off, most) = act.candidate.range;
+    let with = |share: f64| Act { strength: off + (most - off) * share, ..act };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..18 {
+        let middle = 0.5 * (low + high);
+        if excess(plant, p, &[with(middle)], &drives[..FIT_TRIALS]) < target {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    with(high)
+}
+
+/// Steps, stairs, a sum of sines and a triangle over the span of the input; trials of 70 % to 100 % of the greatest length.
+fn drives(plant: &PlantSpec, random: &mut RandomGenerator) -> Vec<Drive> {
+    let inputs: Vec<Vec<f64>> = (0..TRIALS).map(|trial| input(plant, trial, random)).collect();
+    let total: usize = inputs.iter().map(Vec::len).sum();
+    let mut before = 0;
+    inputs
+        .into_iter()
+        .map(|input| {
+            let (start, step) = (before as f64 / total as f64, 1.0 / total as f64);
+            before += input.len();
+            Drive { input, start, step }
+        })
+        .collect()
+}
+
+fn input(plant: &PlantSpec, trial: usize, random: &mut RandomGenerator) -> Vec<f64> {
+    let samples = (plant.samples as f64 * random.between(0.7, 1.0)) as usize;
+    let (low, high) = plant.span;
+    let at = |share: f64| low + (high - low) * share.clamp(0.0, 1.0);
+    let share = |random: &mut RandomGenerator| random.unit();
+    let tau = std::f64::consts::TAU;
+    match trial % 3 {
+        0 => {
+            let mut level = share(random);
+            (0..samples)
+                .map(|i| {
+                    if i % (samples / 12) == 0 {
+                        level = share(random);
+                    }
+                    at(level)
+                })
+                .collect()
+        }
+        1 => {
+            let waves: Vec<(f64, f64)> = (1..=4)
+                .map(|k| (f64::from(k) * random.between(0.6, 1.4), tau * share(random)))
+                .collect();
+            let value = |t: f64| waves.iter().map(|(f, o)| (tau * f * t + o).sin()).sum::<f64>();
+            (0..samples).map(|i| at(0.5 + 0.22 * value(i as f64 / samples as f64))).collect()
+        }
+        _ => {
+            let turns = 2 + random.below(3);
+            let top = random.between(0.7, 1.0);
+            let phase = |i: usize| (turns * i) as f64 / samples as f64;
+            (0..samples)
+                .map(|i| at(0.5 + top * ((phase(i).fract() - 0.5).abs() * 2.0 - 0.5)))
+                .collect()
+        }
+    }
+}
+
+/// Noise of a standard deviation, correlated from sample to sample by `colour`.
+fn add_noise(out: &mut [f64], noise: f64, colour: f64, random: &mut RandomGenerator) {
+    let fresh = (1.0 - colour * colour).sqrt();
+    let mut e = random.gauss();
+    for value in out {
+        *value += noise * e;
+        e = colour * e + fresh * random.gauss();
+    }
+}

@@ -1,0 +1,167 @@
+//! A set of cases of a plant, written: problem files, trials, simulators, and labels apart from them.
+
+use std::{collections::BTreeMap, fmt::Write as _, fs, path::Path};
+
+use rayon::prelude::*;
+
+use super::{
+    draw::{Drawn, FIT_TRIALS, draw},
+    family::FormFamily,
+    label::{OpenTruth, sealed_beside},
+    plant::PlantSpec,
+    rig,
+    servo::SERVO,
+    thermal::THERMAL,
+};
+use crate::{error::BlindError, words::worded};
+
+worded! {
+    /// What a set is of.
+    PlantName {
+        /// Valve, muscle and gauge: the rig of the project.
+        Rig "rig",
+        /// A motor with a gearbox and a load.
+        Servo "servo",
+        /// A heated block with a probe.
+        Thermal "thermal",
+    }
+}
+
+/// The simulators that are handed out, with their names.
+const SIMULATORS: [(&str, &str); 3] = [
+    ("worker.py", include_str!("../../../python/worker.py")),
+    ("servo.py", include_str!("../../../python/servo.py")),
+    ("thermal.py", include_str!("../../../python/thermal.py")),
+];
+
+/// Makes `cases` cases of a plant in a new folder `set`, with labels in `SET-sealed`; hands back the SHA-256 of the labels.
+///
+/// Levels come in turn, so that a fifth of the cases is of each. `private` is a family of forms and noise beside the
+/// published ones; the rig has five of its own and takes none.
+///
+/// # Errors
+/// A folder that holds something, a file that cannot be written, a private family for the rig.
+///
+/// ```
+/// let dir = tempfile::tempdir()?;
+/// let set = dir.path().join("set");
+/// let hash = stretch_blind::make_set(stretch_blind::PlantName::Servo, &set, 5, 7, None)?;
+/// assert_eq!(hash.len(), 64);
+/// assert!(set.join("case-004/problem.toml").is_file());
+/// assert!(dir.path().join("set-sealed/truth.json").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn make_set(
+    plant: PlantName,
+    set: &Path,
+    cases: usize,
+    seed: u64,
+    private: Option<FormFamily>,
+) -> Result<String, BlindError> {
+    let sealed = sealed_beside(set);
+    for path in [set, &sealed] {
+        if path.read_dir().is_ok_and(|mut inside| inside.next().is_some()) {
+            return Err(BlindError::Occupied { path: path.to_path_buf() });
+        }
+    }
+    fs::create_dir_all(set).map_err(BlindError::io(set))?;
+    let spec = match plant {
+        PlantName::Servo => &SERVO,
+        PlantName::Thermal => &THERMAL,
+        PlantName::Rig if private.is_some() => {
+            let reason = "the rig's forms have families of its own: leave it out".to_owned();
+            return Err(BlindError::Field { field: "private".to_owned(), reason });
+        }
+        PlantName::Rig => return finish(set, &rig::make_rig(set, cases, seed)?),
+    };
+    for (name, text) in SIMULATORS {
+        write(&set.join("simulator").join(name), text)?;
+    }
+    let families: Vec<FormFamily> = FormFamily::published().into_iter().chain(private).collect();
+    let labels: Result<BTreeMap<_, _>, BlindError> = (0..cases)
+        .into_par_iter()
+        .map(|number| {
+            let name = format!("case-{number:03}");
+            let case = draw(spec, seed, number, &families);
+            write_case(spec, &set.join(&name), &name, &case)?;
+            Ok((name, case.label))
+        })
+        .collect();
+    let place = |stage: usize| spec.stages[stage].name.to_owned();
+    let candidates = spec.candidates.iter().map(|c| (c.name.to_owned(), place(c.stage))).collect();
+    let plant = spec.name.to_owned();
+    finish(set, &OpenTruth { schema: 1, plant, seed, candidates, cases: labels? })
+}
+
+/// Seals the labels, and writes what a solver may know of the set: plant, hash, names.
+fn finish(set: &Path, truth: &OpenTruth) -> Result<String, BlindError> {
+    let hash = truth.seal(&sealed_beside(set))?;
+    write(&set.join("seal.sha256"), &format!("{hash}  truth.json\n"))?;
+    let mut text = format!("schema = 1\nplant = {:?}\nset = \"{hash}\"\n", truth.plant);
+    let _ = writeln!(text, "cases = {:?}", truth.cases.keys().collect::<Vec<_>>());
+    for (name, place) in &truth.candidates {
+        let _ = write!(text, "\n[[candidate]]\nname = {name:?}\nplace = {place:?}\n");
+    }
+    write(&set.join("set.toml"), &text)?;
+    Ok(hash)
+}
+
+pub(super) fn write(path: &Path, text: &str) -> Result<(), BlindError> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
+    }
+    fs::write(path, text).map_err(BlindError::io(path))
+}
+
+fn write_case(
+    plant: &PlantSpec,
+    folder: &Path,
+    name: &str,
+    case: &Drawn,
+) -> Result<(), BlindError> {
+    let mut text = problem(plant, name);
+    for (trial, (drive, outputs)) in case.drives.iter().zip(&case.outputs).enumerate() {
+        let [first, second] = [0, 1].map(|s| plant.stages[s].output);
+        let mut csv = format!("time_s,{},{first},{second}\n", plant.input);
+        let rows = drive.input.iter().zip(&outputs[0]).zip(&outputs[1]);
+        for (i, ((u, a), b)) in rows.enumerate() {
+            let time = plant.dt_s * i as f64;
+            let _ = writeln!(csv, "{time:.2},{u:.6},{a:.5},{b:.5}");
+        }
+        write(&folder.join(format!("trial_{trial}.csv")), &csv)?;
+        let split = if trial < FIT_TRIALS { "fit" } else { "test" };
+        let _ = write!(text, "\n[[trial]]\nfile = \"trial_{trial}.csv\"\nsplit = \"{split}\"\n");
+    }
+    write(&folder.join("problem.toml"), &text)
+}
+
+fn problem(plant: &PlantSpec, name: &str) -> String {
+    let wrap: Vec<&str> =
+        plant.candidates.iter().map(|c| c.name).filter(|name| name.contains('.')).collect();
+    let mut text = format!(
+        "name = {name:?}\ntime_unit = \"s\"\nwrap = {wrap:?}\n\n[simulator]\ncommand = [\"python3\", \"../simulator/worker.py\", {:?}]\n\n\
+         [[input]]\ncolumn = {:?}\nunit = {:?}\nnoise = 0.0\n",
+        plant.name, plant.input, plant.input_unit
+    );
+    let mut driver = plant.input;
+    for stage in &plant.stages {
+        let _ = write!(
+            text,
+            "\n[[stage]]\nname = {:?}\noutput = {:?}\nunit = {:?}\ninputs = [{driver:?}]\nnoise = {:?}\n",
+            stage.name, stage.output, stage.unit, stage.noise
+        );
+        driver = stage.output;
+    }
+    for p in plant.parameters {
+        let _ = write!(
+            text,
+            "\n[[parameter]]\nname = {:?}\nunit = {:?}\nvalue = {:?}\ntolerance = \"{} %\"\nstages = [{:?}]\n",
+            p.name,
+            p.unit,
+            p.value,
+            100.0 * p.tolerance,
+            plant.stages[p.stage].name
+        );
+    }
+    format!("{text}\n{}", plant.effects)
+}

@@ -1,0 +1,8 @@
+//! What methods say of a set: `read` checks a submission, `outcome` holds each answer against its label, `figures` sums them up.
+
+mod figures;
+mod outcome;
+mod read;
+pub use figures::{Figures, Interval};
+pub use outcome::{OpenScore, Outcome};
+pub use read::{Answer, Believed, Said, Submission};

@@ -1,0 +1,40 @@
+"""The baseline: re-tune the nominal simulator, add each candidate in turn, pick the least error on a trial that was held out.
+
+    python3 baseline.py SET submission.json
+"""
+import sys
+
+import numpy as np
+
+from case import solve
+
+LEAST_GAIN = 0.02  # share of the held-out error that an effect must take away to be named
+CONFIDENT = 0.9  # said of what is picked; the rest is spread evenly over all other answers
+
+
+def held_out_error(case, stage, names):
+    """Root mean square, in units of the noise, on the last trial that may be fitted, by a fit to those before it."""
+    p, effects, _ = case.retune(stage, names, trials=case.fit[:-1])
+    return float(np.sqrt(np.mean(case.residual(stage, p, effects, case.fit[-1:]) ** 2)))
+
+
+def baseline(case):
+    """Answers a case: what may be missing with its probability, a verdict, a place, the share that it closes."""
+    plain = [held_out_error(case, stage, []) for stage in range(2)]
+    gains = {}
+    for name, place in case.places.items():
+        stage = case.plant.STAGES.index(place)
+        gains[name] = 1.0 - held_out_error(case, stage, [name]) / plain[stage]
+    best = max(gains, key=gains.get)
+    is_named = gains[best] > LEAST_GAIN
+    picked = [best] if is_named else []
+    answers = [[], ["unknown"], *([name] for name in gains)]
+    others = (1.0 - CONFIDENT) / (len(answers) - 1)
+    believed = [(a, CONFIDENT if a == picked else others) for a in answers]
+    verdict = "effect" if is_named else "parameters"
+    return believed, verdict, case.places.get(best) if is_named else None, case.closed(picked) if is_named else 0.0
+
+
+if __name__ == "__main__":
+    setup = f"shipped with the challenge; nothing tuned: named from a gain of {LEAST_GAIN:.0%} of the held-out error on"
+    solve(sys.argv[1], baseline, "least held-out RMSE", setup, sys.argv[2])

@@ -1,0 +1,139 @@
+"""A case of the challenge as a method sees it: trials, candidates, a fit; and the answers that `challenge score` takes."""
+import importlib
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import tomllib
+from scipy.optimize import least_squares
+
+import operators
+
+# arguments of each kind: (off, start, most), as shares of the span of the channel where they are no time or share
+KINDS = {
+    "delay": [("time", 0.0, 2.0, 12.0)], "lag": [("time", 0.0, 3.0, 20.0)],
+    "dead_zone": [("span", 0.0, 0.04, 0.3)], "saturation": [("top", 1.02, 0.8, 0.2)],
+    "backlash": [("span", 0.0, 0.01, 0.2)], "drift": [("span", 0.0, 0.02, 0.3)],
+    "relaxation": [("share", 0.0, 0.05, 0.5), ("time", 30.0, 50.0, 300.0)],
+    "hysteresis": [("share", 0.0, 0.1, 0.8), ("span", 0.06, 0.08, 0.4)],
+}
+OWN = {"friction": (0.0, 4.0, 40.0), "drag": (0.0, 8.0, 80.0), "radiation": (0.0, 0.5, 4.0), "fan": (0.0, 0.1, 0.8)}
+
+
+class Case:
+    """A folder with problem.toml, read; `runs` counts the runs of the simulator, one for each stage of a model."""
+
+    def __init__(self, folder, plant, candidates):
+        self.folder, self.plant, self.places, self.runs = Path(folder), plant, candidates, 0
+        problem = tomllib.loads((self.folder / "problem.toml").read_text())
+        self.trials = [(trial["split"], np.genfromtxt(self.folder / trial["file"], delimiter=",", names=True))
+                       for trial in problem["trial"]]
+        self.columns = (plant.INPUT, *plant.OUTPUTS)
+        self.p0 = np.array(list(plant.PARAMETERS.values()))
+        self.tolerance = np.array(list(plant.TOLERANCES.values()))
+        total, before, self.starts = sum(len(rows) for _, rows in self.trials), 0, []
+        for _, rows in self.trials:
+            self.starts.append((before / total, 1.0 / total))
+            before += len(rows)
+        self.fit = [i for i, (split, _) in enumerate(self.trials) if split == "fit"]
+        self.test = [i for i, (split, _) in enumerate(self.trials) if split == "test"]
+
+    def stage_of(self, name):
+        return self.plant.STAGES.index(self.places[name])
+
+    def arguments(self, name):
+        """(off, start, most) of each argument of a candidate, in its unit."""
+        if name in OWN:
+            return [OWN[name]]
+        stage, (_, side, kind) = self.stage_of(name), name.split(".")
+        column = self.columns[stage if side == "input" else stage + 1]
+        values = np.concatenate([self.trials[i][1][column] for i in self.fit])
+        unit = {"time": self.plant.DT_S, "share": 1.0, "span": np.ptp(values), "top": np.abs(values).max()}
+        return [tuple(unit[scale] * x for x in triple) for scale, *triple in KINDS[kind]]
+
+    def simulate(self, stage, p, effects, trials):
+        """The outputs of a stage for some trials, driven by what was measured; `effects` are {name: arguments}."""
+        self.runs += 1
+        inside = np.array([effects[e][0] if e in effects else 0.0 for e in self.plant.EFFECTS])
+        around = [(*name.split("."), values) for name, values in effects.items() if name not in OWN]
+        out = []
+        for i in trials:
+            x = np.ascontiguousarray(self.trials[i][1][self.columns[stage]])
+            for place, side, kind, values in around:
+                if side == "input" and place == self.plant.STAGES[stage]:
+                    x = getattr(operators, kind)(x, self.plant.DT_S, self.starts[i], *values)
+            y = self.plant.SIMULATE[stage](x, np.asarray(p, dtype=float), inside)
+            for place, side, kind, values in around:
+                if side == "output" and place == self.plant.STAGES[stage]:
+                    y = getattr(operators, kind)(y, self.plant.DT_S, self.starts[i], *values)
+            out.append(y)
+        return np.concatenate(out)
+
+    def measured(self, stage, trials):
+        return np.concatenate([self.trials[i][1][self.columns[stage + 1]] for i in trials])
+
+    def residual(self, stage, p, effects, trials):
+        """Measured less simulated, in units of the noise."""
+        gap = self.measured(stage, trials) - self.simulate(stage, p, effects, trials)
+        return gap / self.plant.NOISE[stage]
+
+    def retune(self, stage, names=(), trials=None, start=None):
+        """Parameters and arguments that fit best, the parameters held by their tolerances: (p, effects, sum of squares)."""
+        trials, names = self.fit if trials is None else trials, list(names)
+        triples = [triple for name in names for triple in self.arguments(name)]
+        off, begin, most = (np.array([t[k] for t in triples]) for k in range(3))
+        span, n = most - off, len(self.p0)
+
+        def effects_at(z):
+            values, at, out = off + span * z[n:], 0, {}
+            for name in names:
+                count = len(self.arguments(name))
+                out[name], at = values[at : at + count], at + count
+            return out
+
+        def cost(z):
+            gap = self.residual(stage, self.p0 + self.tolerance * z[:n], effects_at(z), trials)
+            return np.concatenate([gap, z[:n]])
+
+        z0 = np.concatenate([np.zeros(n), (begin - off) / span]) if start is None else start
+        bounds = (np.r_[-3.0 * np.ones(n), np.zeros(len(span))], np.r_[3.0 * np.ones(n), np.ones(len(span))])
+        found = least_squares(cost, np.clip(z0, bounds[0] + 1e-6, bounds[1] - 1e-6), bounds=bounds,
+                              diff_step=1e-3, x_scale=np.r_[np.ones(n), 0.1 * np.ones(len(span))], max_nfev=25)
+        self.last = found
+        return self.p0 + self.tolerance * found.x[:n], effects_at(found.x), float(2.0 * found.cost)
+
+    def closed(self, names):
+        """Share of the gap of the test trials that these effects close once re-tuned: excess of chi-square before and after."""
+        before = after = 0.0
+        for stage in range(2):
+            count = len(self.measured(stage, self.test))
+            for mine in ((), [n for n in names if self.stage_of(n) == stage]):
+                p, effects, _ = self.retune(stage, mine)
+                left = max(0.0, np.sum(self.residual(stage, p, effects, self.test) ** 2) / count - 1.0)
+                before, after = (before + left, after) if mine == () else (before, after + left)
+        return float(1.0 - after / before) if before > 0 else 0.0
+
+
+def load(folder):
+    """The cases of a set: (set.toml, plant, names of cases, places by candidate)."""
+    about = tomllib.loads((Path(folder) / "set.toml").read_text())
+    places = {c["name"]: c["place"] for c in about["candidate"]}
+    return about, importlib.import_module(about["plant"]), about["cases"], places
+
+
+def solve(folder, method, name, setup, out, limit=None):
+    """Asks a method of every case and writes the submission. A method takes a Case and gives
+    (list of (effects, probability), verdict, place or None, closed share)."""
+    about, plant, names, places = load(folder)
+    cases = {}
+    for case in names[:limit]:
+        one, began = Case(Path(folder) / case, plant, places), time.process_time()
+        believed, verdict, place, closed = method(one)
+        total = sum(p for _, p in believed)
+        cases[case] = {
+            "probabilities": [{"effects": sorted(e), "probability": float(p / total)} for e, p in believed],
+            "verdict": verdict, "place": place, "closed_share": float(min(1.0, closed)),
+            "seconds": time.process_time() - began, "simulations": one.runs}
+    answers = {"schema": 1, "method": name, "setup": setup, "set": about["set"], "cases": cases}
+    Path(out).write_text(json.dumps(answers, indent=1) + "\n")

@@ -60,7 +60,7 @@ Exit status:
 
 #[derive(Subcommand)]
 enum Command {
-    Calibrate(calibrate::Args),
+    Calibrate(Box<calibrate::Args>),
     Prior(prior::Args),
     Renew(renew::Args),
     Apply(apply::Args),
@@ -99,7 +99,7 @@ fn main() -> ExitCode {
     });
     let mut done = ExitCode::SUCCESS;
     let result = match cli.command {
-        Command::Calibrate(args) => calibrate::run(args),
+        Command::Calibrate(args) => calibrate::run(*args),
         Command::Prior(args) => prior::run(args),
         Command::Renew(args) => renew::run(args),
         Command::Apply(args) => apply::run(args),

@@ -200,7 +200,8 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
 fn priors_refuse_what_they_have_not_seen() {
     let scratch = Scratch::new();
     scratch.prior();
-    let cases: [(&str, Worn, fn(&mut [f64; 3]), &[&str]); 4] = [
+    type Case<'a> = (&'a str, Worn, fn(&mut [f64; 3]), &'a [&'a str]);
+    let cases: [Case<'_>; 4] = [
         ("unit.csv", SHORT, |row| row[0] *= 1000.0, &["unit.csv", "s1", "another unit"]),
         ("rate.csv", Worn { hz: 100.0, ..SHORT }, |_| (), &["rate.csv", "--grid 50"]),
         (

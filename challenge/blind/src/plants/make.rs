@@ -12,6 +12,7 @@ use super::{
     rig,
     servo::SERVO,
     thermal::THERMAL,
+    written::write,
 };
 use crate::{error::BlindError, words::worded};
 
@@ -104,13 +105,6 @@ fn finish(set: &Path, truth: &OpenTruth) -> Result<String, BlindError> {
     }
     write(&set.join("set.toml"), &text)?;
     Ok(hash)
-}
-
-pub(super) fn write(path: &Path, text: &str) -> Result<(), BlindError> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
-    }
-    fs::write(path, text).map_err(BlindError::io(path))
 }
 
 fn write_case(

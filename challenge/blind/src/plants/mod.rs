@@ -1,7 +1,8 @@
 //! Sets that strangers solve: a plant and a seed go in, folders of cases and sealed labels come out.
 //!
 //! `servo` and `thermal` are two plants of two stages; `plant` integrates them with `operators` around; `family` draws the forms of
-//! effects, `excess` says how visible one is, `draw` makes a case, `make` writes a set, `rig` gives the rig's cases the same layout.
+//! effects, `excess` says how visible one is, `draw` makes a case, `make` writes a set, `rig` gives the rig's cases the same layout,
+//! `written` puts files down.
 mod draw;
 mod excess;
 mod family;
@@ -12,6 +13,7 @@ mod plant;
 mod rig;
 mod servo;
 mod thermal;
+mod written;
 pub use family::{Form, FormFamily};
 pub use label::{Level, OpenLabel, OpenTruth, sealed_beside};
 pub use make::{PlantName, make_set};

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs, path::Path};
 
 use super::label::{Level, OpenLabel, OpenTruth};
-use super::make::write;
+use super::written::write;
 use crate::{
     effect::Kind, error::BlindError, make::make, plan::Plan, protocol::Protocol, truth::CaseKind,
 };

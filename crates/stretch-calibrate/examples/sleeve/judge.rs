@@ -1,8 +1,9 @@
 //! Calibrations of each session, and their errors after its first minute.
 
 use stretch_calibrate::{
-    ArrayOptions, Options, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration,
-    UpdateOptions, apply, apply_array, calibrate, calibrate_array, choose_model, rank_signals,
+    ArrayOptions, CalibrateError, Options, Prior, RenewOptions, Session, SessionOptions,
+    SleeveCalibration, UpdateOptions, apply, apply_array, calibrate, calibrate_array, choose_model,
+    rank_signals,
 };
 use stretch_data::Trial;
 
@@ -39,6 +40,18 @@ pub(crate) struct Priors {
     each: Vec<Prior>,
 }
 
+/// The prior of all sessions but those that it refuses beside the others, such as a sensor that falls where it rises elsewhere.
+fn learnt(mut sessions: Vec<Session>) -> anyhow::Result<Prior> {
+    loop {
+        match Prior::learn(&sessions) {
+            Err(CalibrateError::Prior { file, .. }) if sessions.iter().any(|s| s.name == file) => {
+                sessions.retain(|s| s.name != file);
+            }
+            done => return Ok(done?),
+        }
+    }
+}
+
 impl Judge {
     /// Sums the sessions up; those that the library refuses are named and left out.
     pub(crate) fn new(mut set: Set, used_s: f64, with_auto: bool) -> Self {
@@ -72,10 +85,10 @@ impl Judge {
             self.sessions.iter().filter(|s| s.path[0] != wearer).cloned().collect();
         let of = |k: usize| -> anyhow::Result<Prior> {
             let own: Result<Vec<_>, _> = kept.iter().map(|s| s.of_channels(&[k])).collect();
-            Ok(Prior::learn(&own?)?)
+            learnt(own?)
         };
         let each = (0..self.set.signals.len()).map(of).collect::<Result<Vec<_>, _>>()?;
-        let all = if each.len() == 1 { each[0].clone() } else { Prior::learn(&kept)? };
+        let all = if each.len() == 1 { each[0].clone() } else { learnt(kept.clone())? };
         Ok(Priors { all, each })
     }
 
@@ -85,8 +98,13 @@ impl Judge {
             let priors = self.without(&wearer)?;
             for (index, worn) in self.set.worn.iter().enumerate() {
                 if worn.wearer == wearer && index % every == 0 {
-                    rows.push(self.row(index, worn, &priors)?);
-                    eprintln!("{}: {:?}", worn.name, rows.last().map(|r| &r.errors));
+                    match self.row(index, worn, &priors) {
+                        Ok(row) => {
+                            eprintln!("{}: {:?}", worn.name, row.errors);
+                            rows.push(row);
+                        }
+                        Err(refusal) => println!("not judged: {}: {refusal}", worn.name),
+                    }
                 }
             }
         }

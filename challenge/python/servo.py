@@ -1,11 +1,7 @@
 """The nominal simulator of the servo, as plain Python: NumPy, and numba where it is installed, much faster."""
 import numpy as np
 
-try:
-    from numba import njit
-except ImportError:
-    def njit(**_):
-        return lambda function: function
+from plant import njit
 
 NAME, DT_S, INPUT, OUTPUTS = "servo", 0.01, "command_V", ("speed_rad_s", "load_rad")
 STAGES = ("motor", "gear")

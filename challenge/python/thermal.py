@@ -1,11 +1,7 @@
 """The nominal simulator of the heated block, as plain Python: NumPy, and numba where it is installed."""
 import numpy as np
 
-try:
-    from numba import njit
-except ImportError:
-    def njit(**_):
-        return lambda function: function
+from plant import njit
 
 NAME, DT_S, INPUT, OUTPUTS = "thermal", 2.0, "heater_W", ("block_degC", "probe_degC")
 STAGES = ("block", "probe")

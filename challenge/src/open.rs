@@ -107,7 +107,10 @@ const HEADER: &str = "plant,seed,sha256,first_opened_for\n";
 
 /// Plants and seeds whose labels have been opened.
 fn spent_seeds(path: &Path) -> anyhow::Result<Vec<(String, u64)>> {
-    let Ok(text) = fs::read_to_string(path) else { return Ok(Vec::new()) };
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let mut spent = Vec::new();
     for (row, line) in text.lines().enumerate().skip(1) {
         let mut cells = line.split(',');

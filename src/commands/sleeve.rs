@@ -23,26 +23,40 @@ use crate::{
     table::{maybe, number, table},
 };
 
+/// Options that only a calibration of one gauge without a prior has.
+const ONE_GAUGE: [&str; 14] = [
+    "model",
+    "normalise",
+    "rate",
+    "rate_source",
+    "branch_by",
+    "paper",
+    "signal_zero",
+    "dead_band",
+    "robust",
+    "test",
+    "from",
+    "fixed",
+    "report",
+    "force",
+];
+
 /// Options of a calibration of several gauges, or from a prior.
 #[derive(clap::Args)]
 pub(crate) struct Sleeve {
     /// Columns of several gauges that are calibrated together, or `all`: every column but the reference
     #[arg(long, value_name = "COL,COL", value_delimiter = ',', value_parser = column,
-          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
-          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
+          conflicts_with_all = ONE_GAUGE, conflicts_with = "signal")]
     signals: Vec<String>,
     /// A prior (`stretch prior`) that these trials, ten seconds to a minute of reference, update; no trial: the prior
     #[arg(long, value_name = "prior.json",
-          conflicts_with_all = ["signal", "model", "normalise", "rate", "rate_source", "branch_by", "paper",
-          "signal_zero", "dead_band", "robust", "test", "from", "fixed", "report", "force", "rest_length"])]
+          conflicts_with_all = ONE_GAUGE, conflicts_with_all = ["signal", "rest_length"])]
     prior: Option<PathBuf>,
     /// Sensor, wearer, what was done: left/anna, as many steps as are known
     #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
     of: String,
     /// Where the sums of these trials go, for `stretch prior`
-    #[arg(long, value_name = "session.json",
-          conflicts_with_all = ["model", "normalise", "rate", "rate_source", "branch_by", "paper", "signal_zero",
-          "dead_band", "robust", "test", "from", "fixed", "report", "force"])]
+    #[arg(long, value_name = "session.json", conflicts_with_all = ONE_GAUGE)]
     session: Option<PathBuf>,
     /// Where a figure goes: the error of each of --signals alone, and of all others
     #[arg(long, value_name = "f.svg", requires = "signals", conflicts_with = "prior")]

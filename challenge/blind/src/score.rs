@@ -475,7 +475,7 @@ fn in_stage(label: &Label, verdict: &Verdict) -> bool {
 
 /// Quantile by the nearest rank of the finite values (the mean of the middle two for an even
 /// median); `None` without one.
-fn quantile(values: &mut Vec<f64>, q: f64) -> Option<f64> {
+pub(crate) fn quantile(values: &mut Vec<f64>, q: f64) -> Option<f64> {
     values.retain(|v| v.is_finite());
     values.sort_by(f64::total_cmp);
     let n = values.len();

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 
 use crate::error::BlindError;
@@ -23,13 +24,8 @@ impl Seal {
     /// # Errors
     /// [`BlindError::Io`] when a file cannot be written.
     pub fn close(dir: &Path, truth: &Truth) -> Result<Self, BlindError> {
-        let folder = dir.join("sealed");
-        let path = folder.join("truth.json");
-        let mut text = serde_json::to_string_pretty(truth).map_err(BlindError::json(&path))?;
-        text.push('\n');
-        fs::create_dir_all(&folder).map_err(BlindError::io(&folder))?;
-        fs::write(&path, &text).map_err(BlindError::io(&path))?;
-        let sha256 = sha256_hex(text.as_bytes());
+        let path = dir.join("sealed").join("truth.json");
+        let sha256 = close(&path, truth)?;
         let mark = dir.join("seal.sha256");
         // The layout of `sha256sum -c`.
         fs::write(&mark, format!("{sha256}  sealed/truth.json\n"))
@@ -56,17 +52,34 @@ impl Seal {
     /// file is missing or not what it should be.
     pub fn open(dir: &Path) -> Result<(Self, Truth), BlindError> {
         let path = dir.join("sealed").join("truth.json");
-        let bytes = fs::read(&path).map_err(BlindError::io(&path))?;
-        let mark = dir.join("seal.sha256");
-        let sealed = fs::read_to_string(&mark).map_err(BlindError::io(&mark))?;
-        let sealed = sealed.split_whitespace().next().unwrap_or_default().to_owned();
-        let found = sha256_hex(&bytes);
-        if found != sealed {
-            return Err(BlindError::SealBroken { sealed, found });
-        }
-        let truth = serde_json::from_slice(&bytes).map_err(BlindError::json(&path))?;
-        Ok((Self { path, sha256: found }, truth))
+        let (truth, sha256) = open(&path, &dir.join("seal.sha256"))?;
+        Ok((Self { path, sha256 }, truth))
     }
+}
+
+/// Writes labels to a file; hands back their SHA-256.
+pub(crate) fn close(path: &Path, labels: &impl Serialize) -> Result<String, BlindError> {
+    let text = serde_json::to_string_pretty(labels).map_err(BlindError::json(path))? + "\n";
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
+    }
+    fs::write(path, &text).map_err(BlindError::io(path))?;
+    Ok(sha256_hex(text.as_bytes()))
+}
+
+/// Labels, if their SHA-256 is still the one that `mark` holds; hands it back, too.
+pub(crate) fn open<T: DeserializeOwned>(
+    path: &Path,
+    mark: &Path,
+) -> Result<(T, String), BlindError> {
+    let bytes = fs::read(path).map_err(BlindError::io(path))?;
+    let sealed = fs::read_to_string(mark).map_err(BlindError::io(mark))?;
+    let sealed = sealed.split_whitespace().next().unwrap_or_default().to_owned();
+    let found = sha256_hex(&bytes);
+    if found != sealed {
+        return Err(BlindError::SealBroken { sealed, found });
+    }
+    Ok((serde_json::from_slice(&bytes).map_err(BlindError::json(path))?, found))
 }
 
 pub(crate) fn sha256_hex(bytes: &[u8]) -> String {

@@ -3,7 +3,7 @@
 //! Of each channel `x` the states are those of a [`HistoryMap`](stretch_core::HistoryMap) with the time constants of
 //! [`BANK`]; the terms of a channel are its products of states, and a constant stands before all of them. A polynomial
 //! of a moved and scaled state is a polynomial of the same degree of the state itself, so that rows of any two banks
-//! span the same functions: [`Bank::from_other`] is the matrix between them.
+//! span the same functions: [`Bank::row_matrix_of`] is the matrix between them.
 
 use std::collections::HashMap;
 

@@ -1,11 +1,12 @@
 //! Several signals beside a reference, even in time: what calibrations of many channels and priors are fitted to.
 
 use stretch_core::SampleRate;
-use stretch_data::{EvenSpec, Trial, listed};
+use stretch_data::{EvenSpec, Trial};
 
 use crate::{
     CalibrateError,
     bank::{Bank, States},
+    history_fit::SETTLE,
     prepared::SHORTEST,
     series::{extent, sample_rate_hz},
 };
@@ -31,6 +32,11 @@ impl Stretch {
     /// The states of each channel at a sample.
     pub(crate) fn at(&self, sample: usize) -> impl Iterator<Item = &[f64]> {
         self.states.iter().map(move |states| states[sample].as_slice())
+    }
+
+    /// The samples after the warm-up, in which the low-passes forget where they began.
+    pub(crate) fn warmed_up(&self) -> std::ops::Range<usize> {
+        SETTLE.min(self.len())..self.len()
     }
 }
 
@@ -195,9 +201,4 @@ pub(crate) fn correlation(
         bb += (y - mean_b) * (y - mean_b);
     }
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
-}
-
-/// The names of columns in a sentence.
-pub(crate) fn named(signals: &[String]) -> String {
-    listed(signals)
 }

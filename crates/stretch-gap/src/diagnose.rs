@@ -386,9 +386,10 @@ fn report(
         gross: cause.gross,
         null_band,
     };
+    let naming = judged.naming();
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(searched.problem.starts.note());
-    text.notes.extend(extrapolated(simulator, &evidence.roles, &judged.naming.named));
+    text.notes.extend(extrapolated(simulator, &evidence.roles, &naming.named));
     let model_runs = runs.counted();
     if let Some(note) = model_runs.and_then(|runs| runs.note()) {
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
@@ -397,7 +398,7 @@ fn report(
     let no_name = is_quiet.then(|| nothing_above(&detection_limits, simulator.effects()));
     text.notes.extend(no_name.flatten());
     let location = Where {
-        stages: with_causes(location.stages, &shares, &judged.naming.named, simulator),
+        stages: with_causes(location.stages, &shares, &naming.named, simulator),
         ..location
     };
     // What a page needs beside the answer counts as none of its cost.
@@ -410,9 +411,9 @@ fn report(
         schema: 1,
         verdict: judged.kind,
         sentence: text.sentence,
-        tied: judged.naming.tied(),
-        named: judged.naming.named,
-        faint: judged.naming.faint,
+        tied: naming.tied(),
+        named: naming.named,
+        faint: naming.faint,
         least_gap: thresholds.least_gap,
         unexplained,
         proposed: judged.proposed,

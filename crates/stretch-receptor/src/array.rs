@@ -8,8 +8,8 @@ use stretch_filter::LARGEST_SAMPLE;
 
 use crate::MAX_BRIDGED;
 
-/// Samples before channels are compared, while their memories settle.
-const SETTLE: u8 = 10;
+/// Samples of the warm-up, in which memories forget where they began: channels are compared from then on.
+const WARM_UP: u8 = 10;
 
 /// A receptor of up to `N` gauges that share a recorder.
 ///
@@ -83,8 +83,8 @@ struct Alone<T> {
 pub struct ArrayMemory<T, const N: usize> {
     of: [ChannelMemory<T>; N],
     lost: [Option<Loss>; N],
-    /// Samples since the memories were settled or since a loss, up to the settling time.
-    settled: u8,
+    /// Samples since the beginning or since a loss, up to the warm-up.
+    warmed: u8,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -271,7 +271,7 @@ impl<T: Real, const N: usize> ArrayMemory<T, N> {
         if let (Some(lost), Some(own)) = (self.lost.get_mut(channel), self.of.get_mut(channel)) {
             *lost = None;
             *own = ChannelMemory::new();
-            self.settled = 0;
+            self.warmed = 0;
         }
     }
 }
@@ -286,7 +286,7 @@ impl<T: Real, const N: usize> Design for ArrayReceptor<T, N> {
     type Memory = ArrayMemory<T, N>;
 
     fn memory(&self) -> Self::Memory {
-        ArrayMemory { of: [ChannelMemory::new(); N], lost: [None; N], settled: 0 }
+        ArrayMemory { of: [ChannelMemory::new(); N], lost: [None; N], warmed: 0 }
     }
 }
 
@@ -429,7 +429,7 @@ impl<T: Real, const N: usize> Stage<[T; N]> for ArrayReceptor<T, N> {
             }
             if let Some(loss) = self.take(k, &mut memory.of[k], samples[k]) {
                 memory.lost[k] = Some(loss);
-                memory.settled = 0;
+                memory.warmed = 0;
             }
             waiting |= memory.lost[k].is_none() && memory.of[k].last.is_nan();
         }
@@ -437,8 +437,8 @@ impl<T: Real, const N: usize> Stage<[T; N]> for ArrayReceptor<T, N> {
             return Err(ArrayWithheld::Warming);
         }
         let none_lost = (0..count).all(|k| memory.lost[k].is_none());
-        if memory.settled < SETTLE {
-            memory.settled += 1;
+        if memory.warmed < WARM_UP {
+            memory.warmed += 1;
         } else if none_lost
             && count > 1
             && let Some(k) = self.surprising(memory)

@@ -2,14 +2,13 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
 use super::family::Form;
-use crate::{error::BlindError, seal::sha256_hex, words::worded};
+use crate::{error::BlindError, seal, words::worded};
 
 worded! {
     /// How hard a case is.
@@ -82,11 +81,7 @@ impl OpenTruth {
     /// # Errors
     /// A file that cannot be written.
     pub fn seal(&self, folder: &Path) -> Result<String, BlindError> {
-        let path = folder.join("truth.json");
-        let text = serde_json::to_string_pretty(self).map_err(BlindError::json(&path))? + "\n";
-        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
-        fs::write(&path, &text).map_err(BlindError::io(&path))?;
-        Ok(sha256_hex(text.as_bytes()))
+        seal::close(&folder.join("truth.json"), self)
     }
 
     /// Opens the labels of a set, if they are those whose hash the set holds; hands the hash back, too.
@@ -94,15 +89,6 @@ impl OpenTruth {
     /// # Errors
     /// A broken seal, a file that is missing or not what it should be.
     pub fn open(set: &Path) -> Result<(Self, String), BlindError> {
-        let path = sealed_beside(set).join("truth.json");
-        let bytes = fs::read(&path).map_err(BlindError::io(&path))?;
-        let mark = set.join("seal.sha256");
-        let sealed = fs::read_to_string(&mark).map_err(BlindError::io(&mark))?;
-        let sealed = sealed.split_whitespace().next().unwrap_or_default().to_owned();
-        let found = sha256_hex(&bytes);
-        if found != sealed {
-            return Err(BlindError::SealBroken { sealed, found });
-        }
-        Ok((serde_json::from_slice(&bytes).map_err(BlindError::json(&path))?, found))
+        seal::open(&sealed_beside(set).join("truth.json"), &set.join("seal.sha256"))
     }
 }

@@ -29,8 +29,9 @@ worded! {
 }
 
 /// The simulators that are handed out, with their names.
-const SIMULATORS: [(&str, &str); 3] = [
+const SIMULATORS: [(&str, &str); 4] = [
     ("worker.py", include_str!("../../../python/worker.py")),
+    ("plant.py", include_str!("../../../python/plant.py")),
     ("servo.py", include_str!("../../../python/servo.py")),
     ("thermal.py", include_str!("../../../python/thermal.py")),
 ];

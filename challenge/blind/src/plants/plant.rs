@@ -24,6 +24,17 @@ pub(super) struct Candidate {
     pub(super) range: (f64, f64),
 }
 
+impl Candidate {
+    pub(super) const fn new(
+        name: &'static str,
+        stage: usize,
+        action: Action,
+        range: (f64, f64),
+    ) -> Self {
+        Self { name, stage, action, range }
+    }
+}
+
 /// What an effect does, with its constants.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Action {

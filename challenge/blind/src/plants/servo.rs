@@ -26,15 +26,6 @@ fn resonance(w: f64, c: f64, _: &Form, _: f64) -> f64 {
     c * (w / 9.0).sin()
 }
 
-const fn candidate(
-    name: &'static str,
-    stage: usize,
-    action: Action,
-    range: (f64, f64),
-) -> Candidate {
-    Candidate { name, stage, action, range }
-}
-
 pub(super) static SERVO: PlantSpec = PlantSpec {
     name: "servo",
     dt_s: 0.01,
@@ -71,19 +62,19 @@ pub(super) static SERVO: PlantSpec = PlantSpec {
         },
     ],
     candidates: &[
-        candidate("friction", 0, Action::Inside(friction), (0.0, 30.0)),
-        candidate("drag", 0, Action::Inside(drag), (0.0, 60.0)),
-        candidate("motor.input.delay", 0, Action::Delay, (0.0, 0.1)),
-        candidate("motor.input.dead_zone", 0, Action::DeadZone, (0.0, 1.5)),
-        candidate("motor.input.saturation", 0, Action::Saturation, (6.5, 2.0)),
-        candidate("gear.output.backlash", 1, Action::Backlash, (0.0, 0.3)),
-        candidate("gear.output.lag", 1, Action::Lag, (0.0, 0.15)),
-        candidate("gear.output.drift", 1, Action::Drift, (0.0, 0.4)),
-        candidate("gear.output.relaxation", 1, Action::Relaxation(0.6), (0.0, 0.4)),
+        Candidate::new("friction", 0, Action::Inside(friction), (0.0, 30.0)),
+        Candidate::new("drag", 0, Action::Inside(drag), (0.0, 60.0)),
+        Candidate::new("motor.input.delay", 0, Action::Delay, (0.0, 0.1)),
+        Candidate::new("motor.input.dead_zone", 0, Action::DeadZone, (0.0, 1.5)),
+        Candidate::new("motor.input.saturation", 0, Action::Saturation, (6.5, 2.0)),
+        Candidate::new("gear.output.backlash", 1, Action::Backlash, (0.0, 0.3)),
+        Candidate::new("gear.output.lag", 1, Action::Lag, (0.0, 0.15)),
+        Candidate::new("gear.output.drift", 1, Action::Drift, (0.0, 0.4)),
+        Candidate::new("gear.output.relaxation", 1, Action::Relaxation(0.6), (0.0, 0.4)),
     ],
     foreign: &[
-        candidate("supply_sag", 0, Action::Inside(sagging), (0.0, 0.5)),
-        candidate("speed_ripple", 0, Action::Inside(resonance), (0.0, 25.0)),
+        Candidate::new("supply_sag", 0, Action::Inside(sagging), (0.0, 0.5)),
+        Candidate::new("speed_ripple", 0, Action::Inside(resonance), (0.0, 25.0)),
     ],
     effects: "[[effect]]\nname = \"friction\"\nunit = \"rad/s\"\nrange = [0.0, 40.0]\noff = 0.0\nstages = [\"motor\"]\n\n\
               [[effect]]\nname = \"drag\"\nunit = \"rad/s\"\nrange = [0.0, 80.0]\noff = 0.0\nstages = [\"motor\"]\n",

@@ -26,15 +26,6 @@ fn heater(t: f64, c: f64, _: &Form, p: f64) -> f64 {
     c * p * ((t - 20.0) / 60.0).powi(2)
 }
 
-const fn candidate(
-    name: &'static str,
-    stage: usize,
-    action: Action,
-    range: (f64, f64),
-) -> Candidate {
-    Candidate { name, stage, action, range }
-}
-
 pub(super) static THERMAL: PlantSpec = PlantSpec {
     name: "thermal",
     dt_s: 2.0,
@@ -70,19 +61,19 @@ pub(super) static THERMAL: PlantSpec = PlantSpec {
         },
     ],
     candidates: &[
-        candidate("radiation", 0, Action::Inside(radiation), (0.0, 3.0)),
-        candidate("fan", 0, Action::Inside(fan), (0.0, 0.6)),
-        candidate("block.input.delay", 0, Action::Delay, (0.0, 20.0)),
-        candidate("block.input.dead_zone", 0, Action::DeadZone, (0.0, 15.0)),
-        candidate("block.input.saturation", 0, Action::Saturation, (62.0, 25.0)),
-        candidate("probe.output.hysteresis", 1, Action::Hysteresis(6.0), (0.0, 0.6)),
-        candidate("probe.output.lag", 1, Action::Lag, (0.0, 30.0)),
-        candidate("probe.output.drift", 1, Action::Drift, (0.0, 5.0)),
-        candidate("probe.output.relaxation", 1, Action::Relaxation(80.0), (0.0, 0.4)),
+        Candidate::new("radiation", 0, Action::Inside(radiation), (0.0, 3.0)),
+        Candidate::new("fan", 0, Action::Inside(fan), (0.0, 0.6)),
+        Candidate::new("block.input.delay", 0, Action::Delay, (0.0, 20.0)),
+        Candidate::new("block.input.dead_zone", 0, Action::DeadZone, (0.0, 15.0)),
+        Candidate::new("block.input.saturation", 0, Action::Saturation, (62.0, 25.0)),
+        Candidate::new("probe.output.hysteresis", 1, Action::Hysteresis(6.0), (0.0, 0.6)),
+        Candidate::new("probe.output.lag", 1, Action::Lag, (0.0, 30.0)),
+        Candidate::new("probe.output.drift", 1, Action::Drift, (0.0, 5.0)),
+        Candidate::new("probe.output.relaxation", 1, Action::Relaxation(80.0), (0.0, 0.4)),
     ],
     foreign: &[
-        candidate("melting", 0, Action::Inside(melting), (0.0, 0.8)),
-        candidate("heater_fade", 0, Action::Inside(heater), (0.0, 0.6)),
+        Candidate::new("melting", 0, Action::Inside(melting), (0.0, 0.8)),
+        Candidate::new("heater_fade", 0, Action::Inside(heater), (0.0, 0.6)),
     ],
     effects: "[[effect]]\nname = \"radiation\"\nunit = \"1e-9 W/K^4\"\nrange = [0.0, 4.0]\noff = 0.0\nstages = [\"block\"]\n\n\
               [[effect]]\nname = \"fan\"\nunit = \"W/K\"\nrange = [0.0, 0.8]\noff = 0.0\nstages = [\"block\"]\n",

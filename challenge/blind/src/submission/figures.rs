@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::outcome::{LEAST_PROBABILITY, Outcome};
 use super::read::Said;
-use crate::{plants::Level, random::RandomGenerator};
+use crate::{plants::Level, random::RandomGenerator, score::quantile};
 
 /// A figure, the 95 % interval of it when cases are drawn anew, and how many cases it is of.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -95,7 +95,9 @@ impl Figures {
             closed: drawn(&some(|o| o.closed_of_oracle.is_some()), |o| {
                 mean(o.iter().filter_map(|o| o.closed_of_oracle))
             }),
-            seconds: drawn(&all, |o| median(o.iter().map(|o| o.seconds).collect())),
+            seconds: drawn(&all, |o| {
+                quantile(&mut o.iter().map(|o| o.seconds).collect(), 0.5).unwrap_or(f64::NAN)
+            }),
             simulations: drawn(&all, |o| mean(o.iter().map(|o| o.simulations as f64))),
             reliability: bins(&all),
         }
@@ -105,12 +107,6 @@ impl Figures {
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (n, sum) = values.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
     sum / n
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
 fn bins(cases: &[&Outcome]) -> Vec<(usize, f64, f64)> {

@@ -17,5 +17,5 @@ pub use carried::Carried;
 pub use fit::{ArrayFit, ArrayOptions, calibrate_array};
 pub use linear::{ROOM, SleeveCalibration};
 
-pub(crate) use linear::Linear;
+pub(crate) use linear::{FAST_STATES, Linear};
 pub(crate) use watch::watched;

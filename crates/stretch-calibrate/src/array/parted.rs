@@ -5,7 +5,6 @@ use nalgebra::DVector;
 use crate::{
     bank::Bank,
     channels::Channels,
-    history_fit::SETTLE,
     least_squares::{LinearFactor, RowAccumulator, leave_one_out},
 };
 
@@ -50,7 +49,7 @@ pub(crate) fn parted(
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
     let mut before = 0;
     for stretch in &channels.stretches {
-        for sample in SETTLE.min(stretch.len())..stretch.len() {
+        for sample in stretch.warmed_up() {
             let at = before + sample;
             let part = if trials >= 3 { stretch.trial } else { at * count / total };
             let (from, to) = (part * total / count, (part + 1) * total / count);

@@ -7,7 +7,7 @@
 use nalgebra::DVector;
 use stretch_core::Interval;
 
-use crate::{CalibrateError, channels::Channels, history_fit::SETTLE, positive::cholesky};
+use crate::{CalibrateError, channels::Channels, positive::cholesky};
 
 use super::linear::{FAST_STATES, Linear, Watched, WatchedChannel};
 
@@ -49,10 +49,10 @@ fn one(linear: &Linear, channels: Option<&Channels>, k: usize) -> Option<Watched
         false => UNSEEN_SD * sd,
     };
     let most_still = (MOST_STILL_S * linear.sample_rate_hz) as u32;
-    let still = (2 * linear.still_samples[k]).max(LEAST_STILL);
+    let still = linear.still_samples[k].saturating_mul(2).max(LEAST_STILL);
     Some(WatchedChannel {
         possible: Interval { min: domain.min - margin, max: domain.max + margin },
-        still_samples: if still <= most_still { still as u16 } else { 0 },
+        still_samples: u16::try_from(still).ok().filter(|_| still <= most_still).unwrap_or(0),
         follows,
         // a channel that follows the others exactly must still be able to be quiet
         largest_surprise: largest_surprise.max(1e-6 * (domain.max - domain.min)),
@@ -105,7 +105,7 @@ fn greatest_of_seconds(channels: &Channels, follows: &[f64], k: usize) -> Vec<f6
             let told: f64 = stretch.at(sample).zip(follows).map(|(s, g)| g * fast(s)).sum();
             (fast(&stretch.states[k][sample]) - told).abs()
         };
-        let samples: Vec<usize> = (SETTLE.min(stretch.len())..stretch.len()).collect();
+        let samples: Vec<usize> = stretch.warmed_up().collect();
         let whole = samples.chunks(second).filter(|block| block.len() == second);
         greatest.extend(whole.map(|block| block.iter().map(|&s| surprise(s)).fold(0.0, f64::max)));
     }

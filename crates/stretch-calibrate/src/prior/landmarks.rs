@@ -5,23 +5,21 @@
 
 use stretch_core::Interval;
 
-use crate::{channels::Channels, history_fit::SETTLE};
+use crate::{array::FAST_STATES, channels::Channels};
 
 pub(crate) const LANDMARKS: usize = 3;
 /// Names, in their order.
 pub(crate) const NAMES: [&str; LANDMARKS] = ["low end", "high end", "rest"];
 const END_SHARE: f64 = 0.05;
 const STILL_SHARE: f64 = 0.1;
-/// States whose changes count as movement: what a signal changed over 0.05 s and 0.3 s.
-const FAST_STATES: usize = 2;
 
 /// A sample: stretch and place.
 pub(crate) type Place = (usize, usize);
 
-/// The samples after the memories have settled.
-pub(crate) fn settled(channels: &Channels) -> Vec<Place> {
+/// The samples after the warm-up.
+pub(crate) fn warmed_up(channels: &Channels) -> Vec<Place> {
     let stretches = channels.stretches.iter().enumerate();
-    stretches.flat_map(|(i, s)| (SETTLE.min(s.len())..s.len()).map(move |k| (i, k))).collect()
+    stretches.flat_map(|(i, s)| s.warmed_up().map(move |k| (i, k))).collect()
 }
 
 /// The reference at the landmarks of a session.
@@ -36,11 +34,13 @@ pub(crate) fn landmarks(
     channels: &Channels,
     level: impl Fn(&Place) -> f64,
 ) -> [Vec<Place>; LANDMARKS] {
-    let places = settled(channels);
+    let places = warmed_up(channels);
     let spans: Vec<f64> = channels.bank().domains.iter().map(|d| span(d[0])).collect();
     let motion = |&(i, k): &Place| -> f64 {
         let states = channels.stretches[i].at(k).zip(&spans);
-        states.map(|(s, span)| (s[1..=FAST_STATES].iter().sum::<f64>() / span).powi(2)).sum()
+        states
+            .map(|(s, span)| (s[1..=usize::from(FAST_STATES)].iter().sum::<f64>() / span).powi(2))
+            .sum()
     };
     [
         least(&places, END_SHARE, &level),

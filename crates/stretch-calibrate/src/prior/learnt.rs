@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use stretch_core::{Interval, Normalisation, Range, RangeSpec, Target};
 use stretch_data::{listed, unit_of};
 
-use crate::{CalibrateError, bank::Bank, channels::named, series::extent};
+use crate::{CalibrateError, bank::Bank, series::extent};
 
 use super::{
     expected::{Expected, expected},
@@ -57,6 +57,11 @@ pub struct Prior {
 }
 
 impl Prior {
+    /// The reference's unit over normalised target, without its sign.
+    pub(super) fn unit_of_target(&self) -> f64 {
+        self.target_range.span() * self.target.reference_per_target().abs()
+    }
+
     /// Learns a prior from sessions.
     ///
     /// # Errors
@@ -271,10 +276,10 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
         return Some(format!(
             "it has {} channels ({}) and {} has {} ({}): a prior takes sessions of the same channels",
             session.signals.len(),
-            named(&session.signals),
+            listed(&session.signals),
             first.name,
             first.signals.len(),
-            named(&first.signals)
+            listed(&first.signals)
         ));
     }
     if unit_of(&session.reference) != unit_of(&first.reference) {

@@ -5,6 +5,8 @@
 //! [`Prior::update`](super::Prior::update), with the values of earlier sessions and their spread as noise: so much of a
 //! shift and of a scale is believed as earlier sessions differed by, and no more.
 
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use stretch_core::Provenance;
@@ -19,7 +21,7 @@ use crate::{
 };
 
 use super::{
-    landmarks::{LANDMARKS, Landmark, NAMES, Place, expected, landmarks, passes, settled},
+    landmarks::{LANDMARKS, Landmark, NAMES, Place, expected, landmarks, passes, warmed_up},
     learnt::Prior,
     session::parse_path,
     tree::Normal,
@@ -170,13 +172,9 @@ impl Prior {
 
     /// The mean rows at the landmarks that some coefficients find.
     fn rows(&self, bank: &Bank, channels: &Channels, weights: &DVector<f64>) -> Rows {
-        let mut buffers = (Vec::new(), (Vec::new(), Vec::new()));
-        let mut row = |&(i, k): &Place| {
-            bank.fill(channels.stretches[i].at(k), &mut buffers.0, &mut buffers.1);
-            DVector::from_column_slice(&buffers.0)
-        };
-        let levels: std::collections::HashMap<Place, f64> =
-            settled(channels).iter().map(|place| (*place, row(place).dot(weights))).collect();
+        let mut row = rows_of(bank, channels);
+        let levels: HashMap<Place, f64> =
+            warmed_up(channels).iter().map(|place| (*place, row(place).dot(weights))).collect();
         let sets = landmarks(channels, |place| levels.get(place).copied().unwrap_or(0.0));
         sets.map(|set| {
             let sum = set.iter().map(&mut row).fold(DVector::zeros(weights.len()), |a, b| a + b);
@@ -192,14 +190,9 @@ impl Prior {
         normal: &Normal,
         values: &[Landmark],
     ) -> Result<(), CalibrateError> {
-        let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-        let levels: Vec<f64> = settled(channels)
-            .iter()
-            .map(|&(i, k)| {
-                bank.fill(channels.stretches[i].at(k), &mut row, &mut scratch);
-                DVector::from_column_slice(&row).dot(&normal.mean)
-            })
-            .collect();
+        let mut row = rows_of(bank, channels);
+        let levels: Vec<f64> =
+            warmed_up(channels).iter().map(|place| row(place).dot(&normal.mean)).collect();
         let extent = crate::series::extent(levels.iter().copied());
         let span = extent.max - extent.min;
         let usual = values[1].mean - values[0].mean;
@@ -238,11 +231,6 @@ impl Prior {
         })
     }
 
-    /// The reference's unit over normalised target, without its sign.
-    fn unit_of_target(&self) -> f64 {
-        self.target_range.span() * self.target.reference_per_target().abs()
-    }
-
     fn summary(
         &self,
         before: &DVector<f64>,
@@ -271,6 +259,15 @@ impl Prior {
             expected_rmse: variance.sqrt() * unit,
             assumed,
         }
+    }
+}
+
+/// The row of the bank at any sample.
+fn rows_of<'a>(bank: &'a Bank, channels: &'a Channels) -> impl FnMut(&Place) -> DVector<f64> + 'a {
+    let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
+    move |&(i, k)| {
+        bank.fill(channels.stretches[i].at(k), &mut row, &mut scratch);
+        DVector::from_column_slice(&row)
     }
 }
 

@@ -9,7 +9,6 @@ use crate::{
     CalibrateError,
     bank::Bank,
     channels::Channels,
-    history_fit::SETTLE,
     least_squares::{LinearFactor, RowAccumulator},
     series::extent,
 };
@@ -233,7 +232,7 @@ fn parts(channels: &Channels) -> Vec<SessionPart> {
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
     let mut before = 0;
     for stretch in &channels.stretches {
-        for sample in SETTLE.min(stretch.len())..stretch.len() {
+        for sample in stretch.warmed_up() {
             let time_s = (before + sample) as f64 / hz;
             let part = PARTS_S.iter().take_while(|&&end_s| time_s >= end_s).count();
             bank.fill(stretch.at(sample), &mut row, &mut scratch);
@@ -299,7 +298,7 @@ mod tests {
         let channels = Channels::new(&[trial], &["s1".into()], "angle_deg").unwrap();
         let (mut row, mut scratch, mut want) = (Vec::new(), (Vec::new(), Vec::new()), 0.0);
         let stretch = &channels.stretches[0];
-        for sample in SETTLE..stretch.len() {
+        for sample in stretch.warmed_up() {
             bank.fill(stretch.at(sample), &mut row, &mut scratch);
             let told = DVector::from_column_slice(&row).dot(&weights);
             want += (told - 2.0 * stretch.reference[sample] - 1.0).powi(2);

@@ -10,7 +10,6 @@ use crate::{
     array::{Linear, watched},
     bank::Bank,
     channels::{Channels, correlation},
-    history_fit::SETTLE,
     least_squares::RowAccumulator,
     positive::{cholesky, term_correlation},
     series::extent,
@@ -110,7 +109,7 @@ impl Prior {
             .map_or(0.0, |channels| channels.reference().count() as f64 / self.sample_rate_hz);
         let predicted = posterior.covariance.component_mul(&gram).sum() + self.noise;
         let variance = predicted * self.widening(seconds, known > 0);
-        let unit = self.target_range.span() * self.target.reference_per_target().abs();
+        let unit = self.unit_of_target();
         let expected_rmse = variance.sqrt() * unit;
         let names = trials.iter().map(|trial| trial.name.as_str());
         let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();
@@ -181,7 +180,7 @@ impl Prior {
         let mut own = RowAccumulator::new(terms);
         let mut count = 0.0;
         for stretch in &channels.stretches {
-            for sample in SETTLE.min(stretch.len())..stretch.len() {
+            for sample in stretch.warmed_up() {
                 bank.fill(stretch.at(sample), &mut row, &mut scratch);
                 let target = self.target.from_reference(stretch.reference[sample]);
                 let target = self.target_range.normalise(target);
@@ -305,7 +304,7 @@ impl Prior {
     /// A sentence where the reference hardly moves.
     fn too_little(&self, channels: &Channels) -> Option<String> {
         let moved = extent(channels.reference());
-        let all = self.target_range.span() * self.target.reference_per_target().abs();
+        let all = self.unit_of_target();
         let share = (moved.max - moved.min) / all;
         (share < MOVEMENT).then(|| {
             format!(

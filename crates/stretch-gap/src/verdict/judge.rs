@@ -52,11 +52,20 @@ pub(crate) struct Judged {
     pub(crate) seen: VerdictKind,
     /// Why the evidence carries no other verdict.
     pub(crate) overruled: Option<Overruled>,
-    pub(crate) naming: Naming,
     /// The names that would stand if nothing overruled the verdict.
     pub(crate) seen_naming: Naming,
     /// What the catalogue lacks, where a gap is left.
     pub(crate) proposed: Option<Proposed>,
+}
+
+impl Judged {
+    /// The names of the verdict: none where it is overruled.
+    pub(crate) fn naming(&self) -> Naming {
+        match self.overruled {
+            Some(_) => Naming::default(),
+            None => self.seen_naming.clone(),
+        }
+    }
 }
 
 /// Why the data cannot come from the simulator, or cannot say so.
@@ -76,13 +85,11 @@ pub(crate) fn judge(
 ) -> Result<Judged, GapError> {
     use VerdictKind::{Effect, Partial, Record, Unknown};
     if case.is_record {
-        let (naming, seen_naming) = Default::default();
         return Ok(Judged {
             kind: Record,
             seen: Record,
             overruled: None,
-            naming,
-            seen_naming,
+            seen_naming: Naming::default(),
             proposed: None,
         });
     }
@@ -92,10 +99,9 @@ pub(crate) fn judge(
     let overruled = at_bounds(case).or(too_little);
     let kind = if overruled.is_some() { Unknown } else { seen };
     let seen_naming = naming(case, seen, thresholds);
-    let naming = if overruled.is_some() { Naming::default() } else { seen_naming.clone() };
     let is_left = matches!(kind, Partial | Unknown);
     let proposed = if is_left { lacking(kind == Partial)? } else { None };
-    Ok(Judged { kind, seen, overruled, naming, seen_naming, proposed })
+    Ok(Judged { kind, seen, overruled, seen_naming, proposed })
 }
 
 /// The names that go with a verdict.
@@ -225,7 +231,7 @@ mod tests {
         ] {
             let verdict = judged(gap, probabilities, |_| ());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
-            assert_eq!(verdict.naming.named.is_empty(), !matches!(expected, Effect | Partial));
+            assert_eq!(verdict.naming().named.is_empty(), !matches!(expected, Effect | Partial));
         }
     }
 
@@ -257,12 +263,12 @@ mod tests {
     fn what_is_certain_and_small_is_told_below() {
         let small = judged([0.2, 0.04, 0.01], [0.99, 0.01, 0.0], |_| ());
         assert_eq!(
-            (small.kind, small.naming.faint.as_slice()),
+            (small.kind, small.naming().faint.as_slice()),
             (Parameters, &["play".to_owned()][..])
         );
-        assert!(small.naming.named.is_empty());
+        assert!(small.naming().named.is_empty());
         let chance = judged([0.2, 0.04, 0.01], [0.3, 0.7, 0.0], |_| ());
-        assert_eq!((chance.kind, chance.naming), (Parameters, Naming::default()));
+        assert_eq!((chance.kind, chance.naming()), (Parameters, Naming::default()));
     }
 
     #[test]
@@ -292,7 +298,10 @@ mod tests {
         assert_eq!(ended(Some((0.1, 4.0))), Effect);
         let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 };
         let verdict = judged(gap, p, |case| case.too_little = Some(short));
-        assert_eq!((verdict.kind, verdict.seen, verdict.naming.named.len()), (Unknown, Effect, 0));
+        assert_eq!(
+            (verdict.kind, verdict.seen, verdict.naming().named.len()),
+            (Unknown, Effect, 0)
+        );
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
         // The note below the verdict says what was seen, by its name.
         assert_eq!(verdict.seen_naming.named, ["play"]);

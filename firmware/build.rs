@@ -46,6 +46,7 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
         let object = out.join(format!("{symbol}.o"));
         let text = fs::read_to_string(&header)?;
         let is_float = text.contains("stretch_step(stretch_state *s, float");
+        let is_array = text.contains("#define STRETCH_CHANNELS");
         let tells_sd = text.contains("#define STRETCH_TELLS_SD");
         run(Command::new("arm-none-eabi-gcc")
             .args(core)
@@ -53,13 +54,18 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
             .args(["-ffreestanding", "-c", "src/c/step.c", "-o"])
             .arg(&object)
             .arg(format!("-DMODEL={symbol}"))
-            .arg(if is_float { "-DSAMPLE=float" } else { "-DSAMPLE=int32_t" })
+            .arg(match (is_array, is_float) {
+                (true, _) => "-DSAMPLE=const float *",
+                (_, true) => "-DSAMPLE=float",
+                _ => "-DSAMPLE=int32_t",
+            })
             .arg("-I")
             .arg(&folder))?;
         objects.push(object);
-        let kind = match (is_float, tells_sd) {
-            (_, true) => "float_sd",
-            (true, _) => "float",
+        let kind = match (is_array, is_float, tells_sd) {
+            (true, ..) => "gauges",
+            (_, _, true) => "float_sd",
+            (_, true, _) => "float",
             _ => "fixed",
         };
         writeln!(calls, "{kind}!({symbol}, {model:?});")?;

@@ -30,6 +30,7 @@ observer observer float
 observer+rest observer-rest float
 diagnosed diagnosed float
 diagnosed+rest diagnosed-rest float
+gauges gauges float
 MODELS
 
 for core in m3 m4f; do

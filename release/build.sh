@@ -13,8 +13,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# x86_64-pc-windows-gnu is not among them: whether zig links it has not been tried
-PROGRAMS="x86_64-unknown-linux-musl aarch64-unknown-linux-musl"
+PROGRAMS="x86_64-unknown-linux-musl aarch64-unknown-linux-musl x86_64-pc-windows-gnu"
 WHEELS="x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl"
 version=${STRETCH_VERSION:-$(awk -F '"' '/^version = / { print $2; exit }' Cargo.toml)}
 dist=$PWD/target/dist
@@ -51,14 +50,16 @@ tools() {
 page() { web/build.sh; }
 
 program() {
-    local target name folder
+    local target name folder ending
     for target in "$@"; do
         name=stretch-$version-$target
         folder=target/dist-folders/$name
         STRETCH_PAGE=$PWD/web/target/page RUSTFLAGS=$(remapped) \
             cargo zigbuild --release --locked -p stretch-cli --features page --target "$target"
+        ending=
+        [[ $target != *-windows-* ]] || ending=.exe
         rm -rf "$folder" && mkdir -p "$folder" "$dist"
-        cp "target/$target/release/stretch" release/README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
+        cp "target/$target/release/stretch$ending" release/README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
         tar -C target/dist-folders --owner=0 --group=0 --numeric-owner --sort=name -czf "$dist/$name.tar.gz" "$name"
     done
 }

@@ -16,6 +16,12 @@ fn holds_both_parts(out: &Path) {
     }
     assert!(page.contains(": simulator against rig</h1>") && !page.contains("NaN"));
     assert_eq!(page.matches("<!DOCTYPE html>").count(), 1);
+    // a picture first, in either part
+    let parts: Vec<&str> = page.split("<p class=\"verdict\">").skip(1).collect();
+    assert_eq!(parts.len(), 2);
+    for part in parts {
+        assert!(part.find("<figure>").unwrap() < part.find("<table").unwrap());
+    }
     let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!elsewhere.contains("http://") && !elsewhere.contains("https://"));
 }

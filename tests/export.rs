@@ -6,6 +6,9 @@ use std::{
     process::Command,
 };
 
+use stretch_calibrate::array_bytes;
+use stretch_receptor::example_array;
+
 use crate::support::{Scratch, calibrate, fails, runs, stdout, stretch};
 
 /// A calibration of that model, and the command that exports it to `c`.
@@ -57,15 +60,16 @@ fn a_header_of_every_model_passes_its_self_test() {
     }
 }
 
-/// What an Arduino core has, as far as the example needs it: a converter that gives a rising code, a
-/// clock, and a port that is standard output.
+/// What an Arduino core has, as far as the examples need it: a converter that gives a rising code or, of a gauge that is cut
+/// off, its last one, a clock, and a port that is standard output.
 const ARDUINO: &str = r#"
 #include <cstdint>
 #include <iostream>
-static int A0 = 0, code = 1600;
+static const uint8_t A0 = 0, A1 = 1;
+static int code = 1600, cut_off = -1;
 static uint32_t now_us = 4294000000u; // it wraps soon
 static uint32_t micros() { return now_us; }
-static int analogRead(int) { return code += 3; }
+static int analogRead(int pin) { return pin == cut_off ? 4095 : code += 3; }
 static void analogReadResolution(int bits) { if (bits != 12) { std::cout << "bits " << bits; } }
 struct Port {
     void begin(long) {}
@@ -103,6 +107,52 @@ fn with_gxx_an_arduino_library_reads_a_sample_every_period() {
         assert_eq!(lines.iter().filter(|line| **line == "warming").count(), 20, "{said}");
         assert_eq!(lines.len(), 151, "{said}");
         assert!(lines[60].contains("mm inflation"), "{said}");
+    }
+}
+
+#[test]
+#[ignore = "needs g++; ./ci.sh runs it"]
+fn with_gxx_the_arduino_example_of_two_gauges_names_the_one_that_is_cut_off() {
+    let scratch = Scratch::new();
+    let record = array_bytes(&example_array()).unwrap();
+    let calibration = scratch.path("gauges.postcard");
+    fs::write(&calibration, record).unwrap();
+    let library = scratch.path("library");
+    let said = runs(export(&calibration, &library).arg("--arduino"));
+    assert!(said.contains("2 gauges, float"), "{said}");
+    let example = library.join("examples/Live/Live.ino");
+    let main = format!(
+        "{ARDUINO}\n#include \"{}\"\nint main() {{ setup(); for (int n = 0; n < 300; n++) {{ loop(); \
+         cut_off = n < 200 ? -1 : A1; now_us += 5000; }} }}\n",
+        example.display()
+    );
+    let compiler = ["g++", "-x", "c++", "-std=gnu++11"];
+    let said = compiled(&compiler, &scratch.path("."), &main, &library.join("src"));
+    let lines: Vec<&str> = said.lines().collect();
+    assert_eq!(lines.len(), 150, "{said}");
+    assert!(lines.iter().all(|line| line.contains(" deg +/- 2")), "{said}");
+    let without = lines.iter().position(|line| line.ends_with(" without back_v"));
+    assert_eq!(without, Some(101), "{said}");
+    assert!(lines[101..].iter().all(|line| line.ends_with(" without back_v")), "{said}");
+}
+
+#[test]
+#[ignore = "needs g++; ./ci.sh runs it"]
+fn with_gxx_a_board_of_another_converter_is_refused_with_the_option_that_names_it() {
+    let scratch = Scratch::new();
+    let calibration = calibrated(&scratch, &["--model", "poly13"]);
+    for (adc, refused) in [("12,0,3.3", true), ("10,0,5", false)] {
+        let library = scratch.path(adc);
+        runs(export(&calibration, &library).args(["--arduino", "--adc", adc]));
+        let example = library.join("examples/Live/Live.ino");
+        let main = format!("#define __AVR__\n{ARDUINO}\n#include \"{}\"\n", example.display());
+        let source = scratch.write("avr.cpp", main);
+        let mut gxx = std::process::Command::new("g++");
+        gxx.args(["-std=gnu++11", "-fsyntax-only", "-I"]).arg(library.join("src")).arg(source);
+        let said = gxx.output().expect("g++");
+        let error = String::from_utf8_lossy(&said.stderr);
+        assert_eq!(said.status.success(), !refused, "{error}");
+        assert_eq!(error.contains("--adc 10,0,5"), refused, "{error}");
     }
 }
 

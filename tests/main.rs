@@ -24,6 +24,7 @@ mod page;
 mod pages;
 mod problem;
 mod program;
+mod shifts;
 mod silence;
 mod simulate;
 mod sleeve;

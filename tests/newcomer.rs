@@ -140,9 +140,12 @@ fn a_diagnosis_says_what_its_page_says() {
     let told =
         runs(command.arg("diagnose").arg(&bench).arg("--no-next").arg("--report").arg(&page));
     let html = std::fs::read_to_string(&page).unwrap().replace('\u{a0}', " ");
-    assert!(
-        !told.contains("floors") && one_line(&told).contains("\u{b1} is one standard deviation")
-    );
+    assert!(!told.contains("floors") && html.contains("\u{b1} one standard deviation"));
+    // what is left stands first, the numbers of every candidate behind a line that opens them
+    let at = |part: &str| html.find(part).unwrap_or_else(|| panic!("no {part}"));
+    assert!(at("measured \u{2212} simulated") < at("<table"));
+    assert!(at("<summary>Every candidate and its numbers") < at(">Stability<"));
+    assert!(!told.contains("Stability"), "the numbers of rivals are for -v: {told}");
     let rows: Vec<&str> = told.lines().filter(|l| l.starts_with("| sensing ")).collect();
     let cells = rows[0].split('|').map(str::trim).filter(|cell| cell.contains('\u{d7}'));
     let cells: Vec<&str> = cells.collect();

@@ -141,6 +141,8 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let value: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(value["by_trial"]["runs"][1]["values"][2]["name"], "brake.brake");
+    let (is_good, text) = said(&both, &["--by", "load_kg"]);
+    assert!(!is_good && text.contains("there is no column load_kg"), "{text}");
 
     // An object of a Python module, and one that is wrong.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";

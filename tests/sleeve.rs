@@ -191,6 +191,17 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
     let (cut, said) = scratch.error("cal.json", "cut.csv");
     assert!(said.contains("s1 is left out from 40.00 s on: outside"), "{said}");
     assert!(whole < cut && cut < 20.0 * whole, "{cut} beside {whole}");
+    let (k, stuck_at) = (std::cell::Cell::new(0), std::cell::Cell::new(0.0));
+    scratch.worn("stuck.csv", worn, |row| {
+        k.set(k.get() + 1);
+        if k.get() <= 2000 {
+            stuck_at.set(row[1]);
+        }
+        row[1] = stuck_at.get();
+    });
+    let (stuck, said) = scratch.error("cal.json", "stuck.csv");
+    assert!(said.contains("s2 is left out from 40.") && said.contains("s on: still"), "{said}");
+    assert!(stuck < 20.0 * whole, "{stuck} beside {whole}");
     // a command that takes one gauge says so
     let evaluate = &mut scratch.sleeve(&["evaluate", "--calibration", "cal.json", "knee.csv"]);
     fails(evaluate, &["cal.json", "several gauges", "stretch apply"]);
@@ -243,6 +254,11 @@ fn priors_refuse_what_they_have_not_seen() {
     };
     scratch.worn("brief.csv", Worn { seconds: 1.0, ..SHORT }, |_| ());
     renew("brief.csv", &["brief.csv", "no whole movement", "reference"]);
+    // wearer 1 differed by a gain of 0.02 from session to session, and this session by 0.18
+    let far = Worn { wearer: 1, number: 9, seconds: 60.0, hz: 50.0 };
+    scratch.worn("far.csv", far, |row| row[2] = f64::NAN);
+    let arguments = ["renew", "--prior", "prior.json", "--of", "w1", "--out", "no.json", "far.csv"];
+    fails(&mut scratch.sleeve(&arguments), &["far.csv", "one session in a thousand", "reference"]);
     assert!(!scratch.path("no.json").exists());
 }
 

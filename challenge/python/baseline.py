@@ -20,10 +20,10 @@ def held_out_error(case, stage, names):
 
 def baseline(case):
     """Answers a case: what may be missing with its probability, a verdict, a place, the share that it closes."""
-    plain = [held_out_error(case, stage, []) for stage in range(2)]
+    plain = [held_out_error(case, stage, []) for stage in case.stages]
     gains = {}
-    for name, place in case.places.items():
-        stage = case.plant.STAGES.index(place)
+    for name in case.places:
+        stage = case.stage_of(name)
         gains[name] = 1.0 - held_out_error(case, stage, [name]) / plain[stage]
     best = max(gains, key=gains.get)
     is_named = gains[best] > LEAST_GAIN

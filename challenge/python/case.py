@@ -1,6 +1,7 @@
 """A case of the challenge as a method sees it: trials, candidates, a fit; and the answers that `challenge score` takes."""
 import importlib
 import json
+import sys
 import time
 from pathlib import Path
 
@@ -24,6 +25,8 @@ OWN = {"friction": (0.0, 4.0, 40.0), "drag": (0.0, 8.0, 80.0), "radiation": (0.0
 class Case:
     """A folder with problem.toml, read; `runs` counts the runs of the simulator, one for each stage of a model."""
 
+    stages = range(2)
+
     def __init__(self, folder, plant, candidates):
         self.folder, self.plant, self.places, self.runs = Path(folder), plant, candidates, 0
         problem = tomllib.loads((self.folder / "problem.toml").read_text())
@@ -41,6 +44,34 @@ class Case:
 
     def stage_of(self, name):
         return self.plant.STAGES.index(self.places[name])
+
+    def nominal(self, stage):
+        """Parameters of a stage and their tolerances."""
+        return self.p0, self.tolerance
+
+    def centre(self, stage):
+        """Parameters that simulations are drawn around, and how far."""
+        return self.p0, 0.7 * self.tolerance
+
+    def is_signed(self, name):
+        """Whether the first argument of a candidate goes below its off as well."""
+        return False
+
+    def free(self, name):
+        """How many numbers a candidate brings into a fit."""
+        return len(self.arguments(name))
+
+    def in_noise(self, stage, gap, trials):
+        """A difference of outputs in units of the noise."""
+        return gap / self.plant.NOISE[stage]
+
+    def noisy(self, stage, values, random):
+        """Simulated outputs of the trials that may be fitted, with noise."""
+        return values + self.plant.NOISE[stage] * random.normal(size=len(values))
+
+    def trial_lengths(self, stage):
+        """How many residuals each trial has that may be fitted."""
+        return [len(self.trials[i][1]) for i in self.fit]
 
     def arguments(self, name):
         """(off, start, most) of each argument of a candidate, in its unit."""
@@ -76,37 +107,61 @@ class Case:
     def residual(self, stage, p, effects, trials):
         """Measured less simulated, in units of the noise."""
         gap = self.measured(stage, trials) - self.simulate(stage, p, effects, trials)
-        return gap / self.plant.NOISE[stage]
+        return self.in_noise(stage, gap, trials)
 
     def retune(self, stage, names=(), trials=None, start=None):
         """Parameters and arguments that fit best, the parameters held by their tolerances: (p, effects, sum of squares)."""
         trials, names = self.fit if trials is None else trials, list(names)
         triples = [triple for name in names for triple in self.arguments(name)]
         off, begin, most = (np.array([t[k] for t in triples]) for k in range(3))
-        span, n = most - off, len(self.p0)
+        p0, tolerance = self.nominal(stage)
+        span, n, least = most - off, len(p0), self.least(names)
 
         def effects_at(z):
-            values, at, out = off + span * z[n:], 0, {}
-            for name in names:
-                count = len(self.arguments(name))
-                out[name], at = values[at : at + count], at + count
-            return out
+            return self.shared_out(names, off + span * z[n:])
 
         def cost(z):
-            gap = self.residual(stage, self.p0 + self.tolerance * z[:n], effects_at(z), trials)
+            gap = self.residual(stage, p0 + tolerance * z[:n], effects_at(z), trials)
             return np.concatenate([gap, z[:n]])
 
         z0 = np.concatenate([np.zeros(n), (begin - off) / span]) if start is None else start
-        bounds = (np.r_[-3.0 * np.ones(n), np.zeros(len(span))], np.r_[3.0 * np.ones(n), np.ones(len(span))])
+        bounds = (np.r_[-3.0 * np.ones(n), least], np.r_[3.0 * np.ones(n), np.ones(len(span))])
         found = least_squares(cost, np.clip(z0, bounds[0] + 1e-6, bounds[1] - 1e-6), bounds=bounds,
                               diff_step=1e-3, x_scale=np.r_[np.ones(n), 0.1 * np.ones(len(span))], max_nfev=25)
         self.last = found
-        return self.p0 + self.tolerance * found.x[:n], effects_at(found.x), float(2.0 * found.cost)
+        return p0 + tolerance * found.x[:n], effects_at(found.x), float(2.0 * found.cost)
+
+    def shared_out(self, names, values):
+        """{name: arguments} of arguments in a row."""
+        at, out = 0, {}
+        for name in names:
+            count = len(self.arguments(name))
+            out[name], at = values[at : at + count], at + count
+        return out
+
+    def search(self, stage, names):
+        """What any optimiser may make least over parameters and arguments, where it begins, least and greatest."""
+        off, most = (np.array([t[k] for n in names for t in self.arguments(n)]) for k in (0, 2))
+        p0, tolerance = self.nominal(stage)
+        n = len(p0)
+
+        def cost(z):
+            z = np.asarray(z)
+            effects = self.shared_out(names, off + (most - off) * z[n:])
+            gap = self.residual(stage, p0 + tolerance * z[:n], effects, self.fit)
+            return float(gap @ gap + z[:n] @ z[:n])
+
+        begin = np.r_[np.zeros(n), 0.2 * np.ones(len(off))]
+        return cost, begin, np.r_[-3.0 * np.ones(n), self.least(names)], np.r_[3.0 * np.ones(n), np.ones(len(off))]
+
+    def least(self, names):
+        """Least share of the range of each argument: -1 for the first of what has either sign, else 0."""
+        return np.array([-1.0 if k == 0 and self.is_signed(n) else 0.0 for n in names for k in range(len(self.arguments(n)))])
 
     def closed(self, names):
         """Share of the gap of the test trials that these effects close once re-tuned: excess of chi-square before and after."""
         before = after = 0.0
-        for stage in range(2):
+        for stage in self.stages:
             count = len(self.measured(stage, self.test))
             for mine in ((), [n for n in names if self.stage_of(n) == stage]):
                 p, effects, _ = self.retune(stage, mine)
@@ -122,18 +177,33 @@ def load(folder):
     return about, importlib.import_module(about["plant"]), about["cases"], places
 
 
-def solve(folder, method, name, setup, out, limit=None):
-    """Asks a method of every case and writes the submission. A method takes a Case and gives
+def asked(folder, case, method, plant, places):
+    """One case of a set put to a method: the answer in the layout of a submission. A method takes a Case and gives
     (list of (effects, probability), verdict, place or None, closed share)."""
+    began, kind = time.process_time(), Case
+    if plant.NAME == "rig":
+        from rig_case import RigCase as kind
+    one = kind(Path(folder) / case, plant, places)
+    believed, verdict, place, closed = method(one)
+    total = sum(p for _, p in believed)
+    return {"probabilities": [{"effects": sorted(e), "probability": float(p / total)} for e, p in believed],
+            "verdict": verdict, "place": place, "closed_share": float(min(1.0, closed)),
+            "seconds": time.process_time() - began, "simulations": one.runs}
+
+
+def solve(folder, method, name, setup, out, limit=None):
+    """Asks a method of every case and writes the submission, anew after each case."""
     about, plant, names, places = load(folder)
     cases = {}
     for case in names[:limit]:
-        one, began = Case(Path(folder) / case, plant, places), time.process_time()
-        believed, verdict, place, closed = method(one)
-        total = sum(p for _, p in believed)
-        cases[case] = {
-            "probabilities": [{"effects": sorted(e), "probability": float(p / total)} for e, p in believed],
-            "verdict": verdict, "place": place, "closed_share": float(min(1.0, closed)),
-            "seconds": time.process_time() - began, "simulations": one.runs}
-    answers = {"schema": 1, "method": name, "setup": setup, "set": about["set"], "cases": cases}
-    Path(out).write_text(json.dumps(answers, indent=1) + "\n")
+        cases[case] = asked(folder, case, method, plant, places)
+        if sys.stderr.isatty():
+            print(f"{case}: {cases[case]['verdict']}, {cases[case]['seconds']:.1f} s", file=sys.stderr)
+        hand_in({"schema": 1, "method": name, "setup": setup, "set": about["set"], "cases": cases}, out)
+
+
+def hand_in(answers, out):
+    """Writes a submission whole or not at all, so that one that is stopped holds the cases that were answered."""
+    draft = Path(f"{out}.draft")
+    draft.write_text(json.dumps(answers, indent=1) + "\n")
+    draft.replace(out)

@@ -27,12 +27,12 @@ def spread(case, names, confidence=0.9):
 
 def singles(case):
     """Sum of squares of the fit, extra arguments and samples of nothing and of each single effect, over both stages."""
-    plain = [case.retune(stage)[2] for stage in range(2)]
-    samples = sum(len(case.measured(stage, case.fit)) for stage in range(2))
+    plain = [case.retune(stage)[2] for stage in case.stages]
+    samples = sum(len(case.measured(stage, case.fit)) for stage in case.stages)
     table = {(): (sum(plain), 0)}
     for name in case.places:
         stage = case.stage_of(name)
-        table[(name,)] = (sum(plain) - plain[stage] + case.retune(stage, [name])[2], len(case.arguments(name)))
+        table[(name,)] = (sum(plain) - plain[stage] + case.retune(stage, [name])[2], case.free(name))
     return table, samples
 
 
@@ -53,20 +53,20 @@ def bic(case):
 def forward(case):
     """Forward selection by F tests at 0.01 over the number of candidates (Bonferroni), three at most; nothing is tuned."""
     from scipy.stats import f as f_distribution
-    chosen, plain = [], [case.retune(stage)[2] for stage in range(2)]
-    samples = sum(len(case.measured(stage, case.fit)) for stage in range(2))
+    chosen, plain = [], [case.retune(stage)[2] for stage in case.stages]
+    samples = sum(len(case.measured(stage, case.fit)) for stage in case.stages)
     while len(chosen) < 3:
         tried = {}
         for name in case.places.keys() - set(chosen):
             stage = case.stage_of(name)
             mine = [n for n in chosen if case.stage_of(n) == stage] + [name]
-            tried[name] = (case.retune(stage, mine)[2], len(case.arguments(name)))
+            tried[name] = (case.retune(stage, mine)[2], case.free(name))
         if not tried:
             break
 
         def p_value(item):
             name, (chi, k) = item
-            freedom = samples - len(case.p0) - len(chosen) - k
+            freedom = samples - len(case.nominal(0)[0]) - len(chosen) - k
             rest = sum(plain) - plain[case.stage_of(name)] + chi
             return f_distribution.sf((sum(plain) - rest) / k / (rest / freedom), k, freedom), chi
 
@@ -87,12 +87,12 @@ def signatures(case, stage):
         if case.stage_of(name) == stage:
             triples = case.arguments(name)
             moved = case.simulate(stage, p, {name: [t[1] for t in triples]}, case.fit)
-            columns.append((moved - plain) / case.plant.NOISE[stage])
+            columns.append(case.in_noise(stage, moved - plain, case.fit))
             names.append(name)
-    for i, tolerance in enumerate(case.tolerance):
+    for i, tolerance in enumerate(case.nominal(stage)[1]):
         q = p.copy()
         q[i] += tolerance
-        columns.append((case.simulate(stage, q, {}, case.fit) - plain) / case.plant.NOISE[stage])
+        columns.append(case.in_noise(stage, case.simulate(stage, q, {}, case.fit) - plain, case.fit))
         names.append(None)
     return case.residual(stage, p, {}, case.fit), np.array(columns).T, names
 
@@ -102,7 +102,7 @@ def sindy(case):
     times the noise and alpha 0.05, its default; chosen by hand before any sealed set was made."""
     import pysindy
     chosen = []
-    for stage in range(2):
+    for stage in case.stages:
         gap, columns, names = signatures(case, stage)
         size = np.sqrt(np.mean(columns**2, axis=0))
         keep = size > 1e-9
@@ -118,50 +118,42 @@ def joint(case):
     """All candidates of a stage free at once with the parameters, bounded least squares as mujoco.sysid does it; those
     count whose first argument is more than 3 standard errors and 2 % of its range from off; no more is tuned."""
     chosen = []
-    for stage in range(2):
+    for stage in case.stages:
         mine = [n for n in case.places if case.stage_of(n) == stage]
         case.retune(stage, mine)
         found = case.last
         covariance = np.linalg.pinv(found.jac.T @ found.jac)
-        at = len(case.p0)
+        at = len(found.x) - sum(len(case.arguments(n)) for n in mine)
         for name in mine:
             error = np.sqrt(max(covariance[at, at], 1e-18))
-            if found.x[at] > max(3.0 * error, 0.02):
+            if abs(found.x[at]) > max(3.0 * error, 0.02):
                 chosen.append(name)
             at += len(case.arguments(name))
     return named(case, spread(case, chosen))
 
 
+CMA_RUNS = {"rig": 30}
+
+
 def cma(case):
-    """CMA-ES (pycma, its defaults, seed 1, sigma 0.3 of a tolerance or range) for nothing and each candidate, 300 runs each;
-    then BIC."""
+    """CMA-ES (pycma, its defaults, seed 1, sigma 0.3 of a tolerance or range) for nothing and each candidate, 300 runs each (rig:
+    30, over the arguments); then BIC."""
     import cma as pycma
 
     def least(stage, names):
-        triples = [t for n in names for t in case.arguments(n)]
-        off, most = (np.array([t[k] for t in triples]) for k in (0, 2))
-        n = len(case.p0)
-
-        def cost(z):
-            z = np.asarray(z)
-            x, at, effects = off + (most - off) * z[n:], 0, {}
-            for name in names:
-                count = len(case.arguments(name))
-                effects[name], at = x[at : at + count], at + count
-            gap = case.residual(stage, case.p0 + case.tolerance * z[:n], effects, case.fit)
-            return float(gap @ gap + z[:n] @ z[:n])
-
-        begin = np.r_[np.zeros(n), 0.2 * np.ones(len(off))]
-        bounds = [[-3.0] * n + [0.0] * len(off), [3.0] * n + [1.0] * len(off)]
-        options = {"seed": 1, "maxfevals": 300, "verbose": -9, "bounds": bounds}
+        cost, begin, lowest, highest = case.search(stage, names)
+        if not len(begin):
+            return cost(begin)
+        runs = CMA_RUNS.get(case.plant.NAME, 300)
+        options = {"seed": 1, "maxfevals": runs, "verbose": -9, "bounds": [list(lowest), list(highest)]}
         return pycma.fmin2(cost, begin, 0.3, options)[1].result.fbest
 
-    plain = [least(stage, []) for stage in range(2)]
-    samples = sum(len(case.measured(stage, case.fit)) for stage in range(2))
+    plain = [least(stage, []) for stage in case.stages]
+    samples = sum(len(case.measured(stage, case.fit)) for stage in case.stages)
     table = {(): (sum(plain), 0)}
     for name in case.places:
         stage = case.stage_of(name)
-        table[(name,)] = (sum(plain) - plain[stage] + least(stage, [name]), len(case.arguments(name)))
+        table[(name,)] = (sum(plain) - plain[stage] + least(stage, [name]), case.free(name))
     return named(case, weighed(table, samples))
 
 
@@ -170,9 +162,11 @@ METHODS = {"held_out": (baseline, "least held-out RMSE"), "bic": (bic, "BIC over
            "joint": (joint, "joint fit, all candidates free"), "cma": (cma, "CMA-ES per candidate, BIC")}
 
 if __name__ == "__main__":
-    if sys.argv[2] == "abc":
+    if sys.argv[2] in ("abc", "neural", "ratio"):
+        import neural
+        import ratio
         import simulated
-        METHODS |= simulated.METHODS
+        METHODS |= simulated.METHODS | neural.METHODS | ratio.METHODS
     method, name = METHODS[sys.argv[2]]
     limit = int(sys.argv[4]) if len(sys.argv) > 4 else None
     solve(sys.argv[1], method, name, " ".join(method.__doc__.split()), sys.argv[3], limit)

@@ -3,8 +3,8 @@ import numpy as np
 
 from rivals import named, signatures
 
-DRAWS = 150  # simulations of each hypothesis and case
-PAIRS = 450  # of pairs of effects
+DRAWS = {"rig": 15}  # simulations of nothing and of each single effect, for a case
+PAIRS = {"rig": 75}  # of pairs of effects
 
 
 def hypotheses(case):
@@ -15,17 +15,20 @@ def hypotheses(case):
 
 def drawn(case, hypothesis, random):
     """Both outputs of the fit trials: parameters from their tolerances, arguments denser near off."""
-    p = case.p0 + case.tolerance * random.normal(0.0, 0.7, len(case.p0))
     effects = {}
     for name in hypothesis:
         triples = case.arguments(name)
-        first = triples[0][0] + (triples[0][2] - triples[0][0]) * random.uniform(0.02, 1.0) ** 2
+        share = random.uniform(0.02, 1.0) ** 2
+        if case.is_signed(name):
+            share *= random.choice([-1.0, 1.0])
+        first = triples[0][0] + (triples[0][2] - triples[0][0]) * share
         effects[name] = [first, *(t[0] + (t[2] - t[0]) * random.uniform(0.05, 1.0) for t in triples[1:])]
     out = []
-    for stage in range(2):
+    for stage in case.stages:
         mine = {n: v for n, v in effects.items() if case.stage_of(n) == stage}
-        y = case.simulate(stage, p, mine, case.fit)
-        out.append(y + case.plant.NOISE[stage] * random.normal(size=len(y)))
+        p, spread = case.centre(stage)
+        y = case.simulate(stage, p + spread * random.normal(size=len(p)), mine, case.fit)
+        out.append(case.noisy(stage, y, random))
     return out
 
 
@@ -34,24 +37,24 @@ class Summary:
 
     def __init__(self, case):
         self.case, self.tools = case, []
-        for stage in range(2):
+        for stage in case.stages:
             _, columns, names = signatures(case, stage)
             tuned = columns[:, [i for i, n in enumerate(names) if n is None]]
             basis = np.linalg.qr(tuned[:, np.any(tuned != 0.0, axis=0)])[0]
             shapes = columns[:, [i for i, n in enumerate(names) if n]]
             shapes = shapes - basis @ (basis.T @ shapes)
             shapes = shapes / (np.linalg.norm(shapes, axis=0) + 1e-12)
-            self.tools.append((case.simulate(stage, case.p0, {}, case.fit), basis, shapes))
+            self.tools.append((case.simulate(stage, case.centre(stage)[0], {}, case.fit), basis, shapes))
 
     def of(self, outputs):
         numbers = []
         for stage, (plain, basis, shapes) in enumerate(self.tools):
-            gap = (outputs[stage] - plain) / self.case.plant.NOISE[stage]
+            gap = self.case.in_noise(stage, outputs[stage] - plain, self.case.fit)
             gap = gap - basis @ (basis.T @ gap)
             size = np.linalg.norm(gap)
             numbers += [np.log(np.mean(gap**2)), np.dot(gap[1:], gap[:-1]) / size**2, np.mean(np.abs(gap)) / size]
             numbers += list(shapes.T @ gap / size) + list(np.arcsinh(shapes.T @ gap))
-            parts = np.cumsum([len(self.case.trials[i][1]) for i in self.case.fit])[:-1]
+            parts = np.cumsum(self.case.trial_lengths(stage))[:-1]
             numbers += [np.log(np.mean(part**2) + 1e-9) for part in np.split(gap, parts)]
         return np.array(numbers)
 
@@ -63,16 +66,17 @@ def table(case, random, draws, pairs):
     two = [i for i, h in enumerate(all_of) if len(h) == 2]
     labels = np.r_[np.repeat(one, draws), random.choice(two, pairs)]
     rows = np.array([summary.of(drawn(case, all_of[i], random)) for i in labels])
-    seen = summary.of([case.measured(stage, case.fit) for stage in range(2)])
+    seen = summary.of([case.measured(stage, case.fit) for stage in case.stages])
     return rows, labels, all_of, seen
 
 
 def abc(case):
-    """ABC by random forest (Pudlo 2016; scikit-learn, 300 trees, leaves of 3) trained on simulations of this case's inputs: 150
-    of nothing and of each single effect, 450 of pairs; summaries fixed before any sealed set was made."""
+    """ABC by random forest (Pudlo 2016; scikit-learn, 300 trees, leaves of 3) trained on simulations of this case's inputs: 60
+    of nothing and of each single effect, 180 of pairs (rig: 15 and 75); summaries fixed before any sealed set was made."""
     from sklearn.ensemble import RandomForestClassifier
     random = np.random.default_rng(1)
-    rows, labels, all_of, seen = table(case, random, DRAWS, PAIRS)
+    plant = case.plant.NAME
+    rows, labels, all_of, seen = table(case, random, DRAWS.get(plant, 60), PAIRS.get(plant, 180))
     forest = RandomForestClassifier(300, min_samples_leaf=3, random_state=1).fit(rows, labels)
     p = forest.predict_proba(seen[None])[0]
     return named(case, [(all_of[i], q) for i, q in zip(forest.classes_, p, strict=True) if q > 0.0])

@@ -58,6 +58,9 @@ enum Step {
         /// Record of the seeds whose labels were opened
         #[arg(long, value_name = "FILE", default_value = SPENT)]
         spent: PathBuf,
+        /// Score the first N cases of a set alone, for a submission that was not finished
+        #[arg(long, value_name = "N")]
+        first: Option<usize>,
         /// Leave out the fits that know the labels
         #[arg(long)]
         no_oracle: bool,
@@ -172,8 +175,8 @@ fn run(args: Args) -> anyhow::Result<()> {
     match (args.step, args.make) {
         (Some(Step::Make(make)), _) => made(&make),
         (Some(Step::Run { folder, options }), _) => answered(&folder, &options),
-        (Some(Step::Score { folder, set, spent, .. }), _) if folder.is_file() => {
-            say(aligned(&score_open(&folder, &set, &spent)?));
+        (Some(Step::Score { folder, set, spent, first, .. }), _) if folder.is_file() => {
+            say(aligned(&score_open(&folder, &set, &spent, first)?));
             Ok(())
         }
         (Some(Step::Score { folder, no_oracle, .. }), _) => scored(&folder, !no_oracle),

@@ -1,18 +1,18 @@
 //! Sets that strangers solve: made, answered by a file, scored, and their seeds written down.
 
 use std::{
-    fs::{self, OpenOptions},
-    io::Write as _,
+    fs,
     path::{Path, PathBuf},
 };
 
 use anyhow::{Context, ensure};
 use stretch_blind::{
-    Figures, FormFamily, Interval, OpenScore, OpenTruth, PlantName, Submission, make_set,
+    Figures, FormFamily, Interval, OpenScore, OpenTruth, PlantName, Submission, make_set_apart,
+    sealed_beside,
 };
-use stretch_files::write_whole;
+use stretch_files::{recover, write_folder, write_whole};
 
-/// Makes a set of cases of a plant; refuses a seed that is spent.
+/// Makes a set of cases of a plant, whole or not at all; refuses a seed that is spent.
 ///
 /// # Errors
 /// A spent seed, a folder that holds something, a private family that cannot be read.
@@ -31,18 +31,47 @@ pub fn make_open(
         plant.name()
     );
     let private = private.map(FormFamily::read).transpose()?;
-    Ok(make_set(plant, set, cases, seed, private)?)
+    let (sealed, mut hash) = (sealed_beside(set), None);
+    for folder in [set, &sealed] {
+        recover(folder)?;
+    }
+    let made = write_folder(set, false, |cases_draft| {
+        write_folder(&sealed, false, |labels_draft| {
+            let folders = (cases_draft, labels_draft);
+            hash = Some(make_set_apart(plant, folders, cases, seed, private)?);
+            anyhow::Ok(())
+        })
+    });
+    if made.is_err() && hash.is_some() {
+        // labels have their name, their cases do not
+        let _ = fs::remove_dir_all(&sealed);
+    }
+    made?;
+    hash.context("no set was made")
 }
 
 /// Scores a submission against the set beside whose labels it was made, writes `SUBMISSION.score.json`, and records the seed.
+/// `first` leaves all but so many of the first cases out, of the set and of the submission.
 ///
 /// # Errors
 /// A submission that cannot be read or names what the set does not have, a broken seal.
-pub fn score_open(submission: &Path, set: &Path, spent: &Path) -> anyhow::Result<String> {
+pub fn score_open(
+    submission: &Path,
+    set: &Path,
+    spent: &Path,
+    first: Option<usize>,
+) -> anyhow::Result<String> {
     let text = fs::read_to_string(submission).with_context(|| submission.display().to_string())?;
-    let read: Submission =
+    let mut read: Submission =
         serde_json::from_str(&text).with_context(|| submission.display().to_string())?;
-    let (truth, hash) = OpenTruth::open(set)?;
+    let (mut truth, hash) = OpenTruth::open(set)?;
+    if let Some(count) = first {
+        ensure!(count > 0, "--first 0: there is nothing to score");
+        for case in truth.cases.keys().skip(count) {
+            read.cases.remove(case);
+        }
+        truth.cases = truth.cases.into_iter().take(count).collect();
+    }
     let score =
         OpenScore::of(&read, &truth, &hash).with_context(|| submission.display().to_string())?;
     let path = submission.with_extension("score.json");
@@ -128,10 +157,9 @@ fn record_spent(path: &Path, score: &OpenScore) -> anyhow::Result<()> {
     if known {
         return Ok(());
     }
-    let is_new = !path.is_file();
-    let mut file = OpenOptions::new().create(true).append(true).open(path)?;
+    let before = if path.is_file() { fs::read_to_string(path)? } else { HEADER.to_owned() };
     let method = score.method.replace([',', '\n'], " ");
     let row = format!("{},{},{},{method}\n", score.plant, score.seed, score.set);
-    file.write_all(if is_new { HEADER.to_owned() + &row } else { row }.as_bytes())?;
+    write_whole(path, |out| out.write_all((before + &row).as_bytes()))?;
     Ok(())
 }

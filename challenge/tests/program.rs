@@ -126,3 +126,48 @@ fn counts_that_nobody_means_are_refused() {
     fails(&mut challenge(scratch.path(), &[]), 2, "--cases");
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
 }
+
+/// Says of every case that nothing is missing.
+fn silent(set: &Path, cases: usize) -> Value {
+    let seal = fs::read_to_string(set.join("seal.sha256")).unwrap();
+    let answer = serde_json::json!({
+        "probabilities": [{"effects": [], "probability": 1.0}],
+        "verdict": "none", "place": null, "closed_share": 0.0, "seconds": 0.1, "simulations": 1
+    });
+    let answers: serde_json::Map<String, Value> =
+        (0..cases).map(|n| (format!("case-{n:03}"), answer.clone())).collect();
+    serde_json::json!({
+        "schema": 1, "method": "silent", "set": seal.split_whitespace().next(), "cases": answers
+    })
+}
+
+#[test]
+fn a_set_is_made_whole_or_not_at_all_and_may_be_scored_in_part() {
+    let scratch = tempdir().unwrap();
+    let here = scratch.path();
+    let make = ["make", "--plant", "thermal", "--cases", "5", "--seed", "11", "--out", "set"];
+    runs(&mut challenge(here, &make));
+    assert!(here.join("set-sealed/truth.json").is_file());
+    fs::create_dir(here.join("other-sealed")).unwrap();
+    fs::write(here.join("other-sealed/truth.json"), "{}").unwrap();
+    let other = ["make", "--plant", "thermal", "--cases", "5", "--seed", "12", "--out", "other"];
+    fails(&mut challenge(here, &other), 1, "other-sealed");
+    assert!(!here.join("other").exists(), "cases without labels");
+
+    let submission = here.join("silent.json");
+    fs::write(&submission, silent(&here.join("set"), 4).to_string()).unwrap();
+    let score = ["score", "silent.json", "--set", "set"];
+    fails(&mut challenge(here, &score), 1, "cases.case-004: it is missing");
+    assert!(!here.join("spent_seeds.csv").exists(), "nothing was opened");
+    let part = [&score[..], &["--first", "4"]].concat();
+    runs(&mut challenge(here, &part));
+    runs(&mut challenge(here, &part));
+    let scored = json(&here.join("silent.score.json"));
+    assert_eq!(scored["outcomes"].as_array().unwrap().len(), 4);
+    let spent = fs::read_to_string(here.join("spent_seeds.csv")).unwrap();
+    assert_eq!(spent.lines().count(), 2, "{spent}");
+    fails(&mut challenge(here, &[&make[..7], &["--out", "again"]].concat()), 1, "have been opened");
+    runs(&mut challenge(here, &["board", "silent.score.json", "--out", "board.html"]));
+    let page = fs::read_to_string(here.join("board.html")).unwrap();
+    assert!(page.contains("<td data-v=4>4</td>"), "{page}");
+}

@@ -4,6 +4,7 @@
 pub mod board;
 pub mod checksum;
 pub mod count;
+pub mod gauges;
 pub mod measure;
 pub mod stack;
 pub mod trial;

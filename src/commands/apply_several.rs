@@ -12,7 +12,10 @@ use stretch_files::{is_standard_output, write_whole};
 use stretch_recording::ReadOptions;
 
 use super::reading::read_recording;
-use crate::display::{Output, warn};
+use crate::{
+    display::{Output, warn},
+    table::number,
+};
 
 /// Writes time, estimate, standard deviation, the channels that are left out, and whether a state was clamped.
 pub(super) fn apply_several(
@@ -38,9 +41,35 @@ pub(super) fn apply_several(
         let name = calibration.channels[*channel].signal.as_str();
         warn(format!("stretch: {}: {name} is left out from {time_s:.2} s on: {loss}", trial.name));
     }
+    tell_shifts(calibration, &trial.name, &applied);
     let withheld = applied.readings.iter().filter(|reading| reading.is_err()).count();
     warn(format!("{} samples: {withheld} without an estimate", applied.readings.len()));
     Ok(())
+}
+
+/// A line for each time that a gauge begins to be off from what the others say.
+fn tell_shifts(calibration: &ArrayCalibration<ROOM>, trial: &str, applied: &AppliedArray) {
+    let Some(usual) = &calibration.shifts else { return };
+    let unit = unit(calibration.reference.as_str()).unwrap_or_default();
+    let mut before = 0;
+    for (time_s, shifts) in &applied.shifts {
+        if shifts.shifted != 0 && before == 0 {
+            let first = shifts.shifted.trailing_zeros() as usize;
+            let k = shifts.most.unwrap_or(first);
+            let name = calibration.channels[k].signal.as_str();
+            let others = match calibration.channels.len() {
+                2 => "the other gauge says (which of the two has moved cannot be told)",
+                _ => "the other gauges say",
+            };
+            warn(format!(
+                "stretch: {trial}: at {time_s:.2} s {name} is at least {} {unit} off from what {others}; usual is up to {} {unit}, with {} false alarms an hour. Put on again? Calibrate again",
+                number(shifts.off[k].abs()),
+                number(usual.limits[k]),
+                usual.false_alarms_an_hour
+            ));
+        }
+        before = shifts.shifted;
+    }
 }
 
 fn write_all(

@@ -1,4 +1,6 @@
-//! `stretch diagnose --by trial`: whether the runs agree.
+//! `stretch diagnose --by trial`, `--by COLUMN`: whether the runs agree.
+
+use std::str::FromStr;
 
 use stretch_problem::ByTrial;
 use stretch_report::{difference_table, run_table};
@@ -7,9 +9,32 @@ use super::{diagnosis_text::table_text, shared::say};
 use crate::display::is_quiet;
 
 /// By what runs are told apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum By {
     Trial,
+    Column(String),
+}
+
+impl By {
+    /// The column, where it is one.
+    pub(super) fn column(&self) -> Option<&str> {
+        match self {
+            Self::Trial => None,
+            Self::Column(name) => Some(name),
+        }
+    }
+}
+
+impl FromStr for By {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.trim() {
+            "" => Err("give trial, or the name of a column"),
+            "trial" => Ok(Self::Trial),
+            name => Ok(Self::Column(name.to_owned())),
+        }
+    }
 }
 
 /// Which runs disagree, and in what; every value unless the program is to be quiet.

@@ -6,10 +6,10 @@ use anyhow::{Context as _, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
-    Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
-    explains_little, explains_nothing, fixed_record, is_plain, parse_adc, parse_rate, rank_signals,
-    without_gross_errors,
+    CalibrateError, Calibrated, Candidate, FitReport, MODELS_IN_WORDS, Memory, ModelChoice,
+    ModelKind, ModelRow, Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes,
+    choose_model, evaluate, explains_little, explains_nothing, fixed_record, is_plain, parse_adc,
+    parse_rate, rank_signals, without_gross_errors,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{Split, Trial};
@@ -413,7 +413,7 @@ fn report(
         tested_on: names(&test),
         signal_choice: ranking.to_vec(),
         notes: choice
-            .map(|choice| choice.why.clone())
+            .map(|choice| format!("{}; {MODELS_IN_WORDS}", choice.why))
             .into_iter()
             .chain(calibrated.notes.clone())
             .collect(),

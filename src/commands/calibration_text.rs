@@ -1,6 +1,6 @@
 //! A calibration as text on a terminal.
 
-use stretch_calibrate::{Calibrated, Candidate, FitReport, ModelChoice, ModelRow};
+use stretch_calibrate::{Calibrated, Candidate, FitReport, MODELS_IN_WORDS, ModelChoice, ModelRow};
 use stretch_data::unit_of;
 
 use super::shared::{say, tell};
@@ -45,8 +45,10 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
         "",
     ];
     say(table(&header, choice.rows.iter().map(row)))?;
+    say(format!("Models: {}.", MODELS_IN_WORDS))?;
     say(
-        "M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as measured. \u{b1}: one standard error.",
+        "worst: the largest error. numbers: how many coefficients. M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as \
+         measured. over the best, squared: mean squared error less that of the best model. \u{b1}: one standard error.",
     )?;
     say(format!("Chosen: {}.", choice.why))
 }

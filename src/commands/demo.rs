@@ -7,7 +7,7 @@ mod sessions;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use stretch_calibrate::{apply, write_calibration};
+use stretch_calibrate::{MODELS_IN_WORDS, apply, write_calibration};
 use stretch_data::{Trial, TrialKind, listed};
 use stretch_files::write_folder;
 use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
@@ -178,7 +178,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
             sessions.fit.len()
         ));
     }
-    notes.push(calibrations.choice.why.clone());
+    notes.push(format!("{}; {}", calibrations.choice.why, MODELS_IN_WORDS));
     notes.extend(calibrations.surfaces.notes.iter().chain(&calibrations.choice.notes).cloned());
     let context = Context {
         title,

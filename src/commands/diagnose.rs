@@ -108,8 +108,9 @@ pub(crate) struct Args {
     /// Do not look for the experiment that would tell rivals apart
     #[arg(long, hide = true, conflicts_with = "experiment")]
     no_next: bool,
-    /// Fit every run by itself, too, and say which runs disagree, in what, and which values the data tell
-    #[arg(long, value_name = "trial", value_enum, hide_possible_values = true)]
+    /// Fit every run by itself, too, and say which runs disagree, in what, and which values the data tell; a run is a trial, or with
+    /// the name of a column all samples in which it has one value, such as a load
+    #[arg(long, value_name = "trial|COLUMN")]
     by: Option<By>,
     /// Say what simpler methods would have named, too
     #[arg(long)]
@@ -174,6 +175,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let reading = Reading {
         rig: args.rig.as_deref(),
         columns: args.reference.as_deref().zip(args.signal.as_deref()),
+        by: args.by.as_ref().and_then(By::column),
         without: &args.without,
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
@@ -198,14 +200,11 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let stop = &stretch_files::interrupted;
     let examined =
         problem.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
-    let by_trial = match args.by {
-        Some(By::Trial) => Some(
-            problem
-                .by_trial(&examined, &told_on(&bar), stop)
-                .with_context(|| format!("{}: --by trial", shown()))?,
-        ),
-        None => None,
-    };
+    let by_trial = args.by.as_ref().map(|by| match by {
+        By::Trial => problem.by_trial(&examined, &told_on(&bar), stop),
+        By::Column(name) => problem.by_column(name, &examined, &told_on(&bar), stop),
+    });
+    let by_trial = by_trial.transpose().with_context(|| format!("{}: --by", shown()))?;
     bar.finish_and_clear();
     conclude(&args, (&examined, by_trial.as_ref()), &problem)?;
     Ok(examined.diagnosis)

@@ -4,12 +4,13 @@ use std::fmt::Write;
 
 use stretch_data::listed;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
-use stretch_problem::{Implementation, effect_in_words};
+use stretch_problem::{Implementation, effect_in_words, notation};
 use stretch_report::{
-    Table, baseline_table, candidate_table, stage_table, times, transfer_in_words, transfer_table,
+    Table, baseline_table, candidate_numbers_table, candidate_table, stage_table, times,
+    transfer_in_words, transfer_table,
 };
 
-use super::{fail_on::is_faint, notation::notation};
+use super::fail_on::is_faint;
 use crate::table::{number, table};
 
 /// Most slices that are listed.
@@ -18,7 +19,7 @@ const SLICES: usize = 8;
 const CANDIDATES: usize = 6;
 
 /// Everything behind the sentence: where, which, how far, and what to do next; with every parameter that these data do not
-/// determine where `is_verbose` says so.
+/// determine, and the numbers of every candidate, where `is_verbose` says so.
 pub(crate) fn text(
     diagnosis: &Diagnosis,
     implementations: &[Implementation],
@@ -41,7 +42,7 @@ pub(crate) fn text(
     }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
-    candidates(&mut out, diagnosis);
+    candidates(&mut out, diagnosis, is_verbose);
     parameters(&mut out, diagnosis);
     identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations, diagnosis);
@@ -152,14 +153,17 @@ fn slices(out: &mut String, diagnosis: &Diagnosis) {
     }
 }
 
-fn candidates(out: &mut String, diagnosis: &Diagnosis) {
+fn candidates(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
     let shown: Vec<&Candidate> =
         diagnosis.candidates.iter().filter(|c| !c.effects.is_empty()).collect();
     if shown.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
         return;
     }
     let shown: Vec<Candidate> = shown.into_iter().take(CANDIDATES).cloned().collect();
-    put_table(out, &candidate_table(&shown, &diagnosis.stabilities));
+    put_table(out, &candidate_table(&shown));
+    if is_verbose {
+        put_table(out, &candidate_numbers_table(&shown, &diagnosis.stabilities));
+    }
     // effects of one set belong together, so that a rival is only an effect that may replace one of them
     let Diagnosis { named, ambiguous, .. } = diagnosis;
     let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();

@@ -7,12 +7,12 @@ use stretch_effects::{
     Effect, EffectParameter, Extent, Grid, KINDS, Kind, Language, Quantity, Role, Signals, Sketch,
     kind_named,
 };
+use stretch_problem::notation;
 use stretch_sim::{CATALOGUE, RATE_HZ, RigParams, SimError, effect_named};
 
 use super::{
     detectable,
     json::Json,
-    notation::notation,
     shared::{say, say_as_is},
 };
 

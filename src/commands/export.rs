@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow, ensure};
-use stretch_calibrate::{parse_adc, read_calibration};
+use stretch_calibrate::{SleeveCalibration, parse_adc};
 use stretch_export::{
-    File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, header,
+    File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header, header,
 };
 use stretch_files::{FileError, is_standard_output, write_folder, write_whole};
 use stretch_receptor::code::Adc;
@@ -20,7 +20,8 @@ use super::shared::tell;
 ///
 ///   stretch export --calibration cal.json --c StretchReceptor --arduino
 ///
-/// makes a folder for the libraries of the Arduino IDE, with an example that reads A0.
+/// makes a folder for the libraries of the Arduino IDE, with an example that reads A0. Of several gauges
+/// (`stretch calibrate --signals`) a step takes a sample of each, and the example reads A0, A1 and so on.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -44,11 +45,13 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let calibration = read_calibration(&args.calibration)?;
     let options = Options { form: args.form, adc: args.adc };
-    let made =
-        header(&calibration, &options).with_context(|| args.calibration.display().to_string())?;
-    let Header { text, form, model, pressure } = &made;
+    let made = match SleeveCalibration::read(&args.calibration)? {
+        SleeveCalibration::One(one) => header(&one, &options),
+        SleeveCalibration::Many(several) => array_header(&several, &options),
+    };
+    let made = made.with_context(|| args.calibration.display().to_string())?;
+    let Header { text, form, model, pressure, .. } = &made;
     if is_standard_output(&args.c) {
         ensure!(!args.arduino, "-: a library is several files; name a folder");
         return Ok(write_whole(&args.c, |out| out.write_all(text.as_bytes()))?);

@@ -24,7 +24,6 @@ pub(crate) mod json;
 pub(crate) mod listen;
 mod long;
 pub(crate) mod man;
-mod notation;
 mod pace;
 pub(crate) mod page;
 pub(crate) mod paper;

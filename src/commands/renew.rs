@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::bail;
 use serde::Serialize;
 use stretch_calibrate::{Assumed, Prior, RenewOptions, RenewSummary, Renewed, SleeveCalibration};
 use stretch_data::Split;
@@ -11,7 +10,7 @@ use stretch_files::Outputs;
 use super::{
     json::Json,
     reading::{Recorded, column, read_trials, with_columns_to_name},
-    shared::{of_files, say, stage_text, tell},
+    shared::{of_files, say, tell},
 };
 use crate::{
     display::warn,
@@ -67,9 +66,6 @@ struct Output<'a> {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     args.json.share_stdout([Some(args.out.as_path())])?;
-    if args.out.extension().is_some_and(|extension| extension == "postcard") {
-        bail!("{}: a renewed record is written in JSON; name a file in .json", args.out.display());
-    }
     let prior = Prior::read(&args.prior)?;
     let calibration = args.calibration.as_deref().map(SleeveCalibration::read).transpose()?;
     let signals = if args.signals.is_empty() { prior.signals.clone() } else { args.signals };
@@ -85,7 +81,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let renewed = prior.renew(&trials, &options).map_err(|e| of_files(e, &args.trials))?;
     let mut outputs = Outputs::default();
-    stage_text(&mut outputs, &args.out, &renewed.calibration.to_json()?)?;
+    let record = renewed.calibration.bytes(&args.out)?;
+    outputs.file(&args.out, |out| out.write_all(&record))?;
     let answer = Output { signals: &signals, renewal: &renewed.summary, notes: &renewed.notes };
     args.json.stage(&mut outputs, &answer)?;
     outputs.keep()?;

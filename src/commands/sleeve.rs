@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use serde::Serialize;
 use stretch_calibrate::{
     ArrayOptions, Carried, Prior, Session, SessionOptions, SleeveCalibration, UpdateOptions,
@@ -115,12 +114,6 @@ impl Sleeve {
             Some(prior) if asked.reference == "length_mm" => prior.reference.clone(),
             _ => asked.reference.to_owned(),
         };
-        if asked.out.extension().is_some_and(|extension| extension == "postcard") {
-            bail!(
-                "{}: records of this kind are written in JSON; name a file in .json",
-                asked.out.display()
-            );
-        }
         let trials = self.trials(asked, &reference)?;
         let signals = self.columns(asked, prior.as_ref(), &trials, &reference);
         let named = |error: stretch_calibrate::CalibrateError| of_files(error, asked.trials);
@@ -131,7 +124,8 @@ impl Sleeve {
             None => fitted(&trials, &signals, &reference, asked).map_err(named)?,
         };
         let mut outputs = Outputs::default();
-        stage_text(&mut outputs, asked.out, &made.calibration.to_json()?)?;
+        let record = made.calibration.bytes(asked.out)?;
+        outputs.file(asked.out, |out| out.write_all(&record))?;
         if let Some(path) = &self.session {
             let options = SessionOptions::new(signals.clone(), &reference).of(&self.of);
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -257,9 +257,11 @@ const dropped = {
   first.ready.then(async ({ version, models }) => {
     html("version").textContent = version;
     page.options("model", ["auto", ...models], "auto");
+    /** @type {Record<string, string>} What a name alone does not say; a model that is not here remembers what the signal did. */
+    const words = { auto: "the best on trials left out", linear: "a line", poly13: "as published", blended: "poly13 without a jump at a reversal" };
     for (const option of select("model").options) {
-      if (option.value === "auto") option.text = "auto: the best on trials left out";
-      if (option.value === "poly13") option.text = "poly13: as published";
+      const rest = option.value.endsWith("+rest") ? ", and follows a baseline that drifts" : "";
+      option.text = `${option.value}: ${words[option.value] ?? "with memory"}${rest}`;
     }
     html("bits").textContent = `${await first.call("sound")} receptors were just run here and answer bit by bit as on a desk and on boards`;
   }).catch(tell.wrong);

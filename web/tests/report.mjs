@@ -126,9 +126,21 @@ for (const report of named) {
     await page.goto(url);
     if (shots) await page.screenshot({ path: `${shots}/${name.replaceAll(" ", "-")}.png`, fullPage: true });
     check(await page.evaluate(() => document.documentElement.classList.contains("answers")), `${name}: the script runs`);
+    // the first picture of each part begins in the window that its headline begins, but where the tables are what was asked for: the paper's
+    // figures beside ours, and scores
+    const isOfTables = /paper|challenge/.test(report);
+    const begins = await page.evaluate(() => [...document.querySelectorAll("header")].map((header) => {
+      const after = [...document.querySelectorAll("figure svg")].filter((svg) => svg.getClientRects().length
+        && header.compareDocumentPosition(svg) & Node.DOCUMENT_POSITION_FOLLOWING);
+      return after.length ? after[0].getBoundingClientRect().top - header.getBoundingClientRect().top : Infinity;
+    }));
+    check(isOfTables || begins.every((down) => down < 844), `${name}: the first pictures begin ${begins.map(Math.round)} px below their headlines`);
     await touched(page, name);
     check(await page.evaluate(() => window.injected === undefined), `${name}: a name ran as a program`);
     for (const fault of await page.evaluate(faults)) check(false, `${name}: ${fault}`);
+    const cut = await page.evaluate(() => [...document.querySelectorAll(".scroll")].filter((frame) => frame.scrollWidth > frame.clientWidth + 1)
+      .map((frame) => `${frame.ariaLabel?.slice(0, 40)}: ${frame.scrollWidth} px in ${frame.clientWidth}`));
+    check(width < 1000 || !cut.length, `${name}: columns are cut: ${cut.join("; ")}`);
     await context.close();
   }
   const still = await browser.newContext({ javaScriptEnabled: false, viewport: { width: 390, height: 844 } });

@@ -42,7 +42,8 @@ pub use family::Family;
 pub use make::make;
 pub use plan::Plan;
 pub use plants::{
-    Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, sealed_beside,
+    Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, make_set_apart,
+    sealed_beside,
 };
 pub use protocol::{LOW_EXCITATION, Protocol};
 pub use rate::{Bin, Calibration, Rate};

@@ -6,7 +6,7 @@ use serde::Serialize;
 use stretch_core::{Calibration, CalibrationSpec, Schema, record};
 use stretch_files::{read_whole, write_whole};
 
-use crate::{CalibrateError, digest};
+use crate::{CalibrateError, SleeveCalibration, digest};
 
 /// Room for the largest record in postcard: two poly55 surfaces and sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
@@ -20,7 +20,7 @@ enum Seal {
     Ignored,
 }
 
-fn is_postcard(path: &Path) -> bool {
+pub(crate) fn is_postcard(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "postcard")
 }
 
@@ -132,7 +132,7 @@ fn read(path: &Path, seal: Seal) -> Result<Calibration, CalibrateError> {
     made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
 }
 
-const UNUSABLE: &str = "this is no calibration that can be used";
+pub(crate) const UNUSABLE: &str = "this is no calibration that can be used";
 
 fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, CalibrateError> {
     let unusable = |cause: String| {
@@ -145,9 +145,9 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
     let spec = parsed.map_err(|error| {
         let field = error.path().to_string();
         let cause = error.into_inner();
-        if object.contains("\"largest_surprise\"") {
+        if object.contains("\"largest_jump\"") {
             return unusable(
-                "it is of several gauges, which stretch apply and stretch renew take alone".into(),
+                "it is of several gauges, which stretch apply, renew and export take alone".into(),
             );
         }
         unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
@@ -200,13 +200,16 @@ pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
         let seal = found.unwrap_or_else(|| record::checksum(&bytes));
         return Ok(RecordSummary { kind, seal, is_sealed: found.is_some() });
     }
-    let calibration = read_calibration(path)?;
+    let calibration = SleeveCalibration::read(path)?;
     let is_sealed = if is_postcard(path) {
         read_whole(path).is_ok_and(|bytes| matches!(record::seal(&bytes), Ok(Some(_))))
     } else {
         read_whole(path)
             .is_ok_and(|bytes| digest::split(&String::from_utf8_lossy(&bytes)).1.is_some())
     };
-    let kind = format!("a calibration, {}", calibration.model.name());
-    Ok(RecordSummary { kind, seal: calibration_seal(&calibration)?, is_sealed })
+    let kind = match &calibration {
+        SleeveCalibration::One(one) => format!("a calibration, {}", one.model.name()),
+        SleeveCalibration::Many(many) => format!("a calibration of {} gauges", many.channels.len()),
+    };
+    Ok(RecordSummary { kind, seal: calibration.seal()?, is_sealed })
 }

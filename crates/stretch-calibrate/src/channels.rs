@@ -130,6 +130,16 @@ impl Channels {
         Ok(())
     }
 
+    /// Each stretch, and how many samples are in those before it.
+    pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &Stretch)> {
+        let mut before = 0;
+        self.stretches.iter().map(move |stretch| {
+            let at = before;
+            before += stretch.len();
+            (at, stretch)
+        })
+    }
+
     /// All samples of a channel.
     pub(crate) fn signal(&self, channel: usize) -> impl Iterator<Item = f64> + Clone {
         self.stretches.iter().flat_map(move |s| s.signals[channel].iter().copied())
@@ -138,21 +148,6 @@ impl Channels {
     /// All samples of the reference.
     pub(crate) fn reference(&self) -> impl Iterator<Item = f64> + Clone {
         self.stretches.iter().flat_map(|s| s.reference.iter().copied())
-    }
-
-    /// Of each channel the most equal samples in a row.
-    pub(crate) fn still_samples(&self) -> Vec<u32> {
-        let channels = self.stretches.first().map_or(0, |s| s.signals.len());
-        let longest = |k: usize| {
-            let (mut longest, mut run, mut before) = (1, 0, f64::NAN);
-            for x in self.signal(k) {
-                run = if x == before { run + 1 } else { 1 };
-                longest = longest.max(run);
-                before = x;
-            }
-            longest
-        };
-        (0..channels).map(longest).collect()
     }
 
     /// The bank over the states that were seen.

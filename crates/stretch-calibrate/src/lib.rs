@@ -25,6 +25,7 @@ mod gross_errors;
 mod history_fit;
 mod least_squares;
 mod long;
+mod model_words;
 mod observer_bounds;
 mod observer_curve;
 mod observer_fit;
@@ -50,7 +51,7 @@ pub use acceptance::{
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use array::{
     AppliedArray, ArrayFit, ArrayOptions, Carried, ROOM, SleeveCalibration, apply_array,
-    calibrate_array,
+    array_bytes, array_seal, calibrate_array,
 };
 pub use auto::{
     Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
@@ -71,11 +72,12 @@ pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
 pub use gross_errors::without_gross_errors;
 pub use long::{calibrate_long, is_plain};
+pub use model_words::MODELS_IN_WORDS;
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use prior::{
-    Assumed, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
-    UpdateOptions, UpdateSummary, Updated,
+    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
+    SessionOptions, UpdateOptions, UpdateSummary, Updated,
 };
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;

@@ -27,12 +27,13 @@ pub struct ArrayChannel<const N: usize> {
     pub state_max: Values<ARRAY_STATES>,
     /// A sample outside is none of this channel's: the channel is cut off or at the end of its converter.
     pub possible: Interval,
-    /// So many equal samples in a row are those of a channel that sticks; 0: equal samples are usual.
+    /// So many repetitions of one value, counted while another channel changes, are those of a channel that sticks; 0:
+    /// repetitions are usual.
     pub still_samples: u16,
-    /// What the fast part of each other channel makes of the fast part of this one; 0 for itself.
+    /// What a movement of each other channel makes of this one; 0 for itself.
     pub follows: Values<N>,
-    /// The largest difference of a fast part from what the others make of it, in the signal's unit.
-    pub largest_surprise: f64,
+    /// The largest jump of the difference from what the others make of it, in the signal's unit.
+    pub largest_jump: f64,
 }
 
 /// Gains of the terms of all channels, in the reference's unit; empty lists for channels that are not used.
@@ -46,6 +47,29 @@ pub struct ArrayGains<const N: usize> {
     pub terms: heapless::Vec<Values<ARRAY_TERMS>, N>,
     /// Standard deviation of the estimate.
     pub sd: f64,
+}
+
+/// How far each channel is off from what the others say, as the calibration's own recordings had it: what a shifted
+/// gauge is told from.
+///
+/// The difference of a channel is its estimate alone less that of all others, and what counts is its mean over blocks of
+/// `block_s`. Of the `n` blocks of the calibration with mean `m` and standard deviation `s`, each estimated without its
+/// own part of the data, a further block exceeds `m ± t s sqrt(1 + 1/n)` with probability `p`, where `t` is the two-sided
+/// quantile of Student's t for `n - 1` degrees of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6).
+/// `p` is shared by all channels: `p = false_alarms_an_hour block_s/(3600 s)/channels`.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ArrayShifts<const N: usize> {
+    /// Length of a block, in seconds.
+    pub block_s: f64,
+    /// The rate of false alarms that the limits are for, of all channels together, while movements are of the kind that
+    /// the calibration saw.
+    pub false_alarms_an_hour: f64,
+    /// The usual mean of each channel's difference, in the reference's unit.
+    pub usual: Values<N>,
+    /// How far a block's mean may be off from it, in the reference's unit.
+    pub limits: Values<N>,
 }
 
 /// The parts of an [`ArrayCalibration`], all public; [`ArrayCalibration::new`] checks them.
@@ -75,9 +99,9 @@ pub struct ArraySpec<const N: usize> {
     pub without: heapless::Vec<ArrayGains<N>, N>,
     /// Gains of each channel alone.
     pub alone: heapless::Vec<ArrayGains<N>, N>,
-    /// The fast part of a channel is the sum of so many of its first memory states: the signal less what a low-pass of
-    /// that time constant makes of it.
-    pub fast_states: u8,
+    /// When a channel is told to have shifted; `None` where too little was recorded to say.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub shifts: Option<ArrayShifts<N>>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
@@ -103,7 +127,7 @@ pub struct ArraySpec<const N: usize> {
 ///         possible: Interval { min: 0.5, max: 2.5 },
 ///         still_samples: 8,
 ///         follows: Values::new("follows", &other)?,
-///         largest_surprise: 0.1,
+///         largest_jump: 0.1,
 ///     })
 /// };
 /// let gains = |of: [&[f64]; 2]| {
@@ -122,7 +146,7 @@ pub struct ArraySpec<const N: usize> {
 ///     all: gains([&[25.0, 2.0], &[20.0, 1.0]])?,
 ///     without: [gains([&[], &[45.0, 1.0]])?, gains([&[45.0, 2.0], &[]])?].into_iter().collect(),
 ///     alone: [gains([&[45.0, 2.0], &[]])?, gains([&[], &[45.0, 1.0]])?].into_iter().collect(),
-///     fast_states: 1,
+///     shifts: None,
 ///     provenance: Provenance::new("", ["knee.csv"]),
 /// };
 /// let calibration = ArrayCalibration::new(spec)?;
@@ -175,12 +199,6 @@ impl<const N: usize> ArrayCalibration<N> {
         }
         let terms = spec.shape().terms() - 1;
         DesignError::check("terms", terms as f64, terms <= ARRAY_TERMS)?;
-        let fast = usize::from(spec.fast_states);
-        DesignError::check(
-            "fast_states",
-            fast as f64,
-            (1..=spec.relaxations_s.len()).contains(&fast),
-        )?;
         let domain = spec.estimate_domain.validate("estimate_domain")?;
         size("estimate_domain", domain.min)?;
         size("estimate_domain", domain.max)?;
@@ -195,6 +213,9 @@ impl<const N: usize> ArrayCalibration<N> {
         }
         for (only, gains) in spec.alone.iter().enumerate() {
             check_gains(gains, terms, |channel| channel == only, channels)?;
+        }
+        if let Some(shifts) = &spec.shifts {
+            check_shifts(shifts, channels)?;
         }
         Ok(Self(spec))
     }
@@ -225,7 +246,7 @@ fn check_channel<const N: usize>(
     size("possible", possible.max)?;
     count("length of follows", channel.follows.len(), channels)?;
     channel.follows.iter().try_for_each(|&gain| size("follows", gain).map(|_| ()))?;
-    extent("largest_surprise", channel.largest_surprise).map(|_| ())
+    extent("largest_jump", channel.largest_jump).map(|_| ())
 }
 
 fn check_gains<const N: usize>(
@@ -245,6 +266,21 @@ fn check_gains<const N: usize>(
         own.iter().try_for_each(|&gain| size("gains.terms", gain).map(|_| ()))?;
     }
     Ok(())
+}
+
+fn check_shifts<const N: usize>(
+    shifts: &ArrayShifts<N>,
+    channels: usize,
+) -> Result<(), DesignError> {
+    extent("shifts.block_s", shifts.block_s)?;
+    extent("shifts.false_alarms_an_hour", shifts.false_alarms_an_hour)?;
+    for (field, list) in
+        [("length of shifts.usual", &shifts.usual), ("length of shifts.limits", &shifts.limits)]
+    {
+        DesignError::check(field, list.len() as f64, list.len() == channels)?;
+    }
+    shifts.usual.iter().try_for_each(|&usual| size("shifts.usual", usual).map(|_| ()))?;
+    shifts.limits.iter().try_for_each(|&limit| extent("shifts.limits", limit).map(|_| ()))
 }
 
 impl<const N: usize> core::ops::Deref for ArrayCalibration<N> {

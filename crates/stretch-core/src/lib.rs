@@ -37,7 +37,7 @@ mod values;
 
 pub use array::{
     ARRAY_RELAXATIONS, ARRAY_STATES, ARRAY_TERMS, ArrayCalibration, ArrayChannel, ArrayGains,
-    ArraySpec, MAX_CHANNELS,
+    ArrayShifts, ArraySpec, MAX_CHANNELS,
 };
 pub use branch::Branch;
 pub use calibration::{

@@ -1,12 +1,14 @@
-//! A command that is followed with a greatest rate and a greatest acceleration.
+//! A command that is followed with a greatest rate and a greatest acceleration, and with a jerk that has an end.
 
-use alloc::{boxed::Box, format, vec};
+use alloc::{boxed::Box, format, string::String, vec};
 
 use crate::{
-    kind::{Kind, Side},
+    grid::Grid,
+    kind::{Kind, Side, Signals},
+    moving_mean::MovingMean,
     operator::{Operator, Span, Start},
     parameter::EffectParameter,
-    sketch::Sketch,
+    sketch::{Quantity, Sketch},
 };
 
 /// The trapezoid profile of a servo: y goes to x as quickly as |y'| <= rate and |y''| <= acceleration allow, and brakes in time to stop
@@ -66,12 +68,124 @@ impl Operator for Profile {
     }
 }
 
-/// A trapezoid profile of a command.
+/// The S profile of a servo: the [`MovingMean`] of a [`Profile`] over a time T. A move from rest to rest of a way d has seven segments and
+/// takes d/rate + rate/acceleration + T where it reaches the rate, 2 sqrt(d/acceleration) + T where it does not. Rate and acceleration have the
+/// limits of the profile; the jerk has the limit acceleration/T, twice that where the acceleration turns within T.
+///
+/// ```
+/// use stretch_effects::{Grid, Operator, Profile, SProfile, Span, Start};
+/// let grid = Grid::samples(0.01)?;
+/// let servo = SProfile::new(&grid, Profile { acceleration: 20.0, rate: 2.0 }, 0.05);
+/// let (mut cells, mut signal) = (vec![0.0; servo.cells()], [1.0; 80]);
+/// servo.begin(Start::Settled, 0.0, &mut cells);
+/// servo.run(&Span::whole(&grid), &mut cells, &mut signal);
+/// // 1/2 + 2/20 + 0.05 = 0.65 s.
+/// assert!(signal[62] < 1.0 && signal[65] == 1.0);
+/// # Ok::<(), stretch_effects::GridError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct SProfile {
+    profile: Profile,
+    mean: MovingMean,
+}
+
+impl SProfile {
+    /// Of a trapezoid and the time over which its corners are rounded, s; at 0 it is the trapezoid to the last bit.
+    pub fn new(grid: &Grid, profile: Profile, round_s: f64) -> Self {
+        Self { profile, mean: MovingMean::new(grid, round_s) }
+    }
+}
+
+impl Operator for SProfile {
+    fn cells(&self) -> usize {
+        self.profile.cells() + self.mean.cells()
+    }
+
+    fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
+        let (own, past) = cells.split_at_mut(self.profile.cells());
+        self.profile.begin(start, first, own);
+        self.mean.begin(start, first, past);
+    }
+
+    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
+        let (own, past) = cells.split_at_mut(self.profile.cells());
+        self.profile.run(span, own, signal);
+        self.mean.run(span, past, signal);
+    }
+}
+
+/// A step of a trapezoid profile towards a command, with the names of its place and its speed.
+fn follows(command: &str, at: &str, speed: &str, k: &str) -> String {
+    format!(
+        "let apart{k} = {command} - s.{at}
+            let d{k} = abs(apart{k})
+            let stops{k} = A * DT / 2 * (sqrt(1 + 8 * d{k} / (A * DT * DT)) - 1)
+            var wanted{k} = min(min(stops{k}, d{k} / DT), RATE)
+            if apart{k} < 0
+            wanted{k} = -wanted{k}
+            end
+            s.{speed} = min(max(wanted{k}, s.{speed} - A * DT), s.{speed} + A * DT)
+            s.{at} = s.{at} + s.{speed} * DT"
+    )
+}
+
+fn trapezoid(v: &[f64], signals: &Signals) -> Sketch {
+    let body = format!("{}\nlet y = s.at", follows("x", "at", "speed", ""));
+    let rate = format!("{}/s", signals.x.unit);
+    limits(
+        Sketch::of(signals.x.clone(), body).remembering(["at"]).cells(["speed"], rate, "0"),
+        v,
+        signals,
+    )
+}
+
+/// With a second trapezoid that follows the command of a time T ago, so that the mean over T goes on by what comes in less what leaves.
+fn rounded(v: &[f64], signals: &Signals) -> Sketch {
+    let (samples, unit) = (v[2] / signals.dt_s, &signals.x.unit);
+    let whole = libm::floor(samples);
+    let body = format!(
+        "if i < 1
+            s.at = v[0]
+            s.left = v[0]
+            s.earlier = v[0]
+            s.mean = v[0]
+            end
+            let a = s.earlier
+            let b = s.left
+            let was = s.at
+            {}
+            {}
+            s.earlier = b
+            let leaves = b - SHARE * SHARE * (b - a) / 2 + (1 - SHARE) * (1 - SHARE) * (s.left - b) / 2
+            s.mean = s.mean + ((was + s.at) / 2 - leaves) / (WHOLE + SHARE)
+            let y = s.mean",
+        follows("v[i]", "at", "speed", "1"),
+        follows("v[max(i - WHOLE, 0)]", "left", "slow", "2"),
+    );
+    let sketch = Sketch::of(signals.x.clone().named("v").record(), body)
+        .beside(Quantity::new("i", "1", "which sample is shown, from 0, each once and in turn"))
+        .cells(["at", "left", "earlier", "mean"], unit.clone(), "0")
+        .cells(["speed", "slow"], format!("{unit}/s"), "0");
+    limits(sketch, v, signals).with_all(&[("WHOLE", whole, "1"), ("SHARE", samples - whole, "1")])
+}
+
+/// The same with the limits and the sample time.
+fn limits(sketch: Sketch, v: &[f64], signals: &Signals) -> Sketch {
+    let unit = &signals.x.unit;
+    let units = [format!("{unit}/s^2"), format!("{unit}/s")];
+    sketch.with_all(&[("A", v[0], &*units[0]), ("RATE", v[1], &*units[1])]).with(
+        "DT",
+        signals.dt_s,
+        "s",
+    )
+}
+
+/// A trapezoid profile of a command, or an S profile.
 pub static PROFILE: Kind = Kind {
     name: "profile",
     title: "a limit of rate and acceleration",
-    words: "a servo follows its command with a greatest rate and a greatest acceleration (trapezoid profile)",
-    equation: "|y''| <= acceleration, |y'| <= rate, y goes to x and stops there",
+    words: "a servo follows its command with a greatest rate and a greatest acceleration (trapezoid profile, S profile where corners are rounded)",
+    equation: "y = mean of p over the last round_s; |p''| <= acceleration, |p'| <= rate, p goes to x and stops there",
     usual: &[Side::Input],
     // At an acceleration that turns the quickest possible change within a sample nothing is limited.
     parameters: |e, unit| {
@@ -83,37 +197,30 @@ pub static PROFILE: Kind = Kind {
                 .off_at(off)
                 .log(),
             EffectParameter::shaped("rate", &format!("{unit}/s"), span / slow..=span / dt),
+            // The jerk's limit is acceleration/round_s.
+            EffectParameter::formed("round_s", "s", 0.0..=e.late_s(), 0.0),
         ]
     },
     starts: Some(|e| {
         // So long a way from end to end takes, with and without a stretch at the greatest rate.
         let of = |takes: f64, share: f64| {
             let (a, v) = (4.0 * e.span() / (takes * takes), 2.0 * e.span() / takes);
-            vec![a / share, v * share]
+            vec![a / share, v * share, 0.0]
         };
         [(0.5, 1.0), (0.5, 0.5), (2.0, 1.0), (2.0, 0.5)]
             .map(|(late, share)| of(late * e.late_s(), share))
             .into()
     }),
-    operator: |v, _, _| Box::new(Profile { acceleration: v[0], rate: v[1] }),
-    sketch: Some(|v, _, signals| {
-        let body = "let apart = x - s.at
-            let d = abs(apart)
-            let stops = A * DT / 2 * (sqrt(1 + 8 * d / (A * DT * DT)) - 1)
-            var wanted = min(min(stops, d / DT), RATE)
-            if apart < 0
-            wanted = -wanted
-            end
-            s.speed = min(max(wanted, s.speed - A * DT), s.speed + A * DT)
-            s.at = s.at + s.speed * DT
-            let y = s.at";
-        let unit = &signals.x.unit;
-        let units = [format!("{unit}/s^2"), format!("{unit}/s")];
-        Sketch::of(signals.x.clone(), body)
-            .remembering(["at"])
-            .cells(["speed"], units[1].clone(), "0")
-            .with_all(&[("A", v[0], &*units[0]), ("RATE", v[1], &*units[1])])
-            .with("DT", signals.dt_s, "s")
+    operator: |v, _, grid| {
+        let profile = Profile { acceleration: v[0], rate: v[1] };
+        match v[2] > 0.0 {
+            true => Box::new(SProfile::new(grid, profile, v[2])),
+            false => Box::new(profile),
+        }
+    },
+    sketch: Some(|v, _, signals| match v[2] > 0.0 {
+        true => rounded(v, signals),
+        false => trapezoid(v, signals),
     }),
     twins: &["slew_limit", "second_order_lag", "lag", "delay"],
     ..Kind::PLAIN
@@ -121,3 +228,6 @@ pub static PROFILE: Kind = Kind {
 
 /// Longest way from end to end, in longest delays.
 const SLOWEST: f64 = 10.0;
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,6 @@
 //! A header as a library that the Arduino IDE takes.
 
-use crate::{Form, HEADER, Header};
+use crate::{Form, HEADER, Header, part::kept};
 
 /// A file of a library folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,8 +11,8 @@ pub struct File {
     pub text: String,
 }
 
-/// The library: its properties, the header in `src`, an example that reads A0 at the
-/// calibration's sample rate, and the words that the IDE colours.
+/// The library: its properties, the header in `src`, an example that reads A0 (of several gauges, A0 and the pins
+/// after it) at the calibration's sample rate, and the words that the IDE colours.
 ///
 /// The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
 /// revision 2.2 (format 1.5).
@@ -30,7 +30,7 @@ pub fn arduino_library(header: &Header) -> Vec<File> {
     let file = |path: &str, text: String| File { path: path.into(), text };
     vec![
         file("library.properties", properties(header)),
-        file("keywords.txt", keywords()),
+        file("keywords.txt", keywords(header)),
         file(&format!("src/{HEADER}"), header.text.clone()),
         file("examples/Live/Live.ino", live(header)),
     ]
@@ -47,7 +47,7 @@ fn properties(header: &Header) -> String {
     )
 }
 
-fn keywords() -> String {
+fn keywords(header: &Header) -> String {
     let kinds: [(&str, &[&str]); 3] = [
         ("KEYWORD1", &["stretch_state", "stretch_reading"]),
         (
@@ -58,6 +58,8 @@ fn keywords() -> String {
                 "stretch_lost",
                 "stretch_start_on",
                 "stretch_set_pressure",
+                "stretch_loss",
+                "stretch_readmit",
                 "stretch_self_test",
             ],
         ),
@@ -67,24 +69,33 @@ fn keywords() -> String {
                 "STRETCH_OK",
                 "STRETCH_WARMING",
                 "STRETCH_MISSING",
+                "STRETCH_ALL_LOST",
                 "STRETCH_INFLATION",
                 "STRETCH_DEFLATION",
                 "STRETCH_INSIDE",
                 "STRETCH_SIGNAL_CLAMPED",
                 "STRETCH_RATE_CLAMPED",
+                "STRETCH_CHANNELS",
+                "STRETCH_SIGNALS",
                 "STRETCH_PERIOD_US",
                 "STRETCH_UNIT",
             ],
         ),
     ];
-    // the IDE wants a tab between a word and its kind
+    // the IDE wants a tab between a word and its kind; a word that the header has not is none of the library's
     let lines = |(kind, words): (&str, &[&str])| {
-        words.iter().map(|word| format!("{word}\t{kind}\n")).collect::<String>()
+        let there = words.iter().filter(|word| header.text.contains(**word));
+        there.map(|word| format!("{word}\t{kind}\n")).collect::<String>()
     };
     kinds.into_iter().map(lines).collect()
 }
 
 fn live(header: &Header) -> String {
+    let example = include_str!("arduino/Live.ino");
+    if let Some(count) = header.array {
+        let pins: Vec<String> = (0..count).map(|k| format!("A{k}")).collect();
+        return kept(example, &["array"]).replace("@PINS@", &pins.join(", "));
+    }
     let pressure = if header.pressure {
         "  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw\n  \
          stretch_set_pressure(&state, pressure);\n"
@@ -104,5 +115,5 @@ fn live(header: &Header) -> String {
             "reading.estimate, 3",
         ),
     };
-    include_str!("arduino/Live.ino").replace("@STEP@", &step).replace("@ESTIMATE@", estimate)
+    kept(example, &["one"]).replace("@STEP@", &step).replace("@ESTIMATE@", estimate)
 }

@@ -15,6 +15,12 @@ impl Literal for i32 {
     }
 }
 
+impl Literal for u8 {
+    fn c(&self) -> String {
+        self.to_string()
+    }
+}
+
 impl Literal for u32 {
     fn c(&self) -> String {
         format!("{self}u")
@@ -66,17 +72,19 @@ impl Constants {
         self.line(&format!("static const {kind} stretch_{name}[{count}] = {};", braced(values)))
     }
 
-    /// The same with rows of `N`.
-    pub(crate) fn rows<L: Literal, const N: usize>(
+    /// The same with rows of one length.
+    pub(crate) fn rows<L: Literal>(
         &mut self,
         kind: &str,
         name: &str,
-        rows: &[[L; N]],
+        rows: &[impl AsRef<[L]>],
     ) -> &mut Self {
         let count = rows.len();
-        let inner: Vec<String> = rows.iter().map(|row| format!("    {}", braced(row))).collect();
+        let length = rows.first().map_or(0, |row| row.as_ref().len());
+        let inner: Vec<String> =
+            rows.iter().map(|row| format!("    {}", braced(row.as_ref()))).collect();
         self.line(&format!(
-            "static const {kind} stretch_{name}[{count}][{N}] = {{\n{}\n}};",
+            "static const {kind} stretch_{name}[{count}][{length}] = {{\n{}\n}};",
             inner.join(",\n")
         ))
     }
@@ -109,6 +117,11 @@ fn braced<L: Literal>(values: &[L]) -> String {
     }
     out.push('}');
     out
+}
+
+/// A label that cannot end a comment, a string or a line.
+pub(crate) fn comment_safe(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control() && !"*\\?\"".contains(*c)).collect()
 }
 
 #[cfg(test)]

@@ -20,6 +20,9 @@ pub enum ExportError {
     /// Integers were asked of a model that has none.
     #[error("{0}; or export in --form float, which needs no converter")]
     NoFixedForm(#[source] CalibrateError),
+    /// Integers were asked of several gauges.
+    #[error("several gauges have no form in integers: leave --form away, or give --form float")]
+    FixedArray,
     /// A rate that is written in C for no arithmetic.
     #[error(
         "the rate is {rate}, which has no form in C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"

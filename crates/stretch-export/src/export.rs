@@ -2,13 +2,18 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{CalibrateError, RecordNumbers, calibration_seal, fixed_record};
-use stretch_core::{Calibration, Model};
+use stretch_calibrate::{
+    CalibrateError, RecordNumbers, array_seal, calibration_seal, fixed_record,
+};
+use stretch_core::{ArrayCalibration, Calibration, Label, Model, Provenance, SampleRate};
 
 use crate::{
-    ExportError, Form, Options,
-    constants::Constants,
-    models::{diagnosed_float, observer_fixed, observer_float, surfaces_fixed, surfaces_float},
+    ExportError, Form, Options, array_test,
+    constants::{Constants, comment_safe},
+    models::{
+        array_float, diagnosed_float, observer_fixed, observer_float, surfaces_fixed,
+        surfaces_float,
+    },
     part::{Part, kept},
     self_test,
 };
@@ -30,6 +35,8 @@ pub struct Header {
     pub model: String,
     /// Whether the program has to set a pressure, by `stretch_set_pressure`.
     pub pressure: bool,
+    /// Gauges of an array, which are sampled together; none of a calibration of one.
+    pub array: Option<usize>,
 }
 
 /// A calibration as a C99 header that compiles as C++11 too.
@@ -74,7 +81,7 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
     let test = self_test::fixed(calibration, &options.adc, &record)?;
     // what was just stored has a seal
     let seal = stretch_core::record::seal(&record.bytes).ok().flatten().unwrap_or_default();
-    Ok(assembled(calibration, options, Form::Fixed, part, &test, seal))
+    Ok(assembled(&Source::of(calibration, seal), options, Form::Fixed, part, &test))
 }
 
 fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
@@ -93,51 +100,120 @@ fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
     };
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
-    Ok(assembled(calibration, options, Form::Float, part, &test, seal))
+    Ok(assembled(&Source::of(calibration, seal), options, Form::Float, part, &test))
+}
+
+/// A calibration of several gauges as a header like that of [`header`], in `float`: a step takes a sample of each.
+///
+/// # Errors
+/// [`ExportError::NoFixedForm`] for integers, which several gauges have no form in.
+///
+/// ```
+/// use stretch_calibrate::parse_adc;
+/// use stretch_export::{Options, array_header};
+/// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
+/// let header = array_header(&stretch_receptor::example_array(), &options)?;
+/// assert_eq!((header.array, header.model.as_str()), (Some(2), "2 gauges"));
+/// assert!(header.text.contains("stretch_step(stretch_state *s, const float *volts)"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn array_header<const N: usize>(
+    calibration: &ArrayCalibration<N>,
+    options: &Options,
+) -> Result<Header, ExportError> {
+    if options.form == Some(Form::Fixed) {
+        return Err(ExportError::FixedArray);
+    }
+    let names: Vec<&str> = calibration.channels.iter().map(|c| c.signal.as_str()).collect();
+    let source = Source {
+        signal: names.join(", "),
+        reference: &calibration.reference,
+        sample_rate: calibration.sample_rate_hz,
+        provenance: &calibration.provenance,
+        seal: array_seal(calibration).map_err(ExportError::NoRecord)?,
+    };
+    let made = assembled(
+        &source,
+        options,
+        Form::Float,
+        array_float(calibration),
+        &array_test::array(calibration),
+    );
+    Ok(Header { array: Some(names.len()), ..made })
+}
+
+/// What a header says of its calibration.
+struct Source<'a> {
+    signal: String,
+    reference: &'a Label,
+    sample_rate: SampleRate,
+    provenance: &'a Provenance,
+    seal: u32,
+}
+
+impl<'a> Source<'a> {
+    fn of(calibration: &'a Calibration, seal: u32) -> Self {
+        Self {
+            signal: calibration.signal.as_str().to_owned(),
+            reference: &calibration.reference,
+            sample_rate: calibration.sample_rate_hz,
+            provenance: &calibration.provenance,
+            seal,
+        }
+    }
 }
 
 /// The parts in order.
 fn assembled(
-    calibration: &Calibration,
+    source: &Source<'_>,
     options: &Options,
     form: Form,
     part: Part,
     self_test: &str,
-    seal: u32,
 ) -> Header {
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
-    let mut text = opening(calibration, form, &model, &has);
-    text.push_str(&frame(calibration, options, seal));
+    let branches = !has.contains(&"array");
+    let mut text = opening(source, form, &model, &has);
+    text.push_str(&frame(source, options));
     text.push_str("\n/* ---- the record ---- */\n\n");
     text.push_str(&constants);
     text.push('\n');
     text.push_str(include_str!("c/common.h"));
+    if branches {
+        text.push_str(include_str!("c/branches.h"));
+    }
     step.iter().for_each(|part| text.push_str(&kept(part, &has)));
-    text.push_str(include_str!("c/start_on.h"));
+    if branches {
+        text.push_str(include_str!("c/start_on.h"));
+    }
     text.push_str(self_test);
     text.push_str("\n#endif\n");
-    Header { text, form, model, pressure }
+    Header { text, form, model, pressure, array: None }
 }
 
 /// What the file is, for whoever opens it.
-fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> String {
-    let signal = comment_safe(calibration.signal.as_str());
-    let reference = comment_safe(calibration.reference.as_str());
+fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String {
+    let signal = comment_safe(&source.signal);
+    let reference = comment_safe(source.reference.as_str());
     let (taken, given) = match form {
         Form::Fixed => ("a code of the converter", format!("thousandths of {reference}'s unit")),
         Form::Float => (signal.as_str(), reference.clone()),
     };
-    let from =
-        match (calibration.provenance.trial_count(), comment_safe(calibration.provenance.date())) {
-            (1, date) if date.is_empty() => "1 trial".to_owned(),
-            (trials, date) if date.is_empty() => format!("{trials} trials"),
-            (trials, date) => format!("{trials} trials, {date}"),
-        };
+    let from = match (source.provenance.trial_count(), comment_safe(source.provenance.date())) {
+        (1, date) if date.is_empty() => "1 trial".to_owned(),
+        (trials, date) if date.is_empty() => format!("{trials} trials"),
+        (trials, date) => format!("{trials} trials, {date}"),
+    };
     let pressure = if has.contains(&"crosstalk") {
         " *     stretch_set_pressure(&state, pressure);\n"
     } else {
         ""
+    };
+    let (sample, each) = if has.contains(&"array") {
+        ("samples", "One state an array of gauges; samples is an array of STRETCH_CHANNELS.")
+    } else {
+        ("sample", "One state a channel.")
     };
     let libm = if has.contains(&"sd") { "of libm sqrtf alone (gcc wants -lm)" } else { "no libm" };
     let mut text = String::new();
@@ -147,33 +223,32 @@ fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> 
         "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
          {form}: {taken} in,\n * {given} out; the same bits as on the computer.\n * Written by stretch \
          {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
-         stretch_init(&state);\n *     then every period\n{pressure} *     reading = stretch_step(&state, sample); or \
-         stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, \
+         stretch_init(&state);\n *     then every period\n{pressure} *     reading = stretch_step(&state, {sample}); or \
+         stretch_lost(&state) where none came\n *\n * {each} C99 and C++11; no malloc, \
          {libm}.\n * stretch_self_test() is 0 where the board computes as the computer does.\n */\n\
          #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
-        period = calibration.sample_rate_hz.period_s(),
+        period = source.sample_rate.period_s(),
         version = env!("CARGO_PKG_VERSION"),
     );
     text
 }
 
 /// What a program around the step needs to know.
-fn frame(calibration: &Calibration, options: &Options, seal: u32) -> String {
+fn frame(source: &Source<'_>, options: &Options) -> String {
     let spec = options.adc.spec();
-    let unit = comment_safe(calibration.reference.unit());
-    let period_us = (1e6 * calibration.sample_rate_hz.period_s()).round() as i64;
+    let unit = comment_safe(source.reference.unit());
+    let period_us = (1e6 * source.sample_rate.period_s()).round() as i64;
     let mut constants = Constants::default();
     constants
-        .word("SEAL", format!("0x{seal:08x}u"), "of the record, as stretch record check says it")
+        .word(
+            "SEAL",
+            format!("0x{:08x}u", source.seal),
+            "of the record, as stretch record check says it",
+        )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .word("PERIOD_US", format!("{period_us}L"), "from a sample to the next")
         .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")
         .define("ADC_ZERO", spec.zero_v as f32, "the signal at code 0")
         .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "what a code adds to it");
     constants.into_text()
-}
-
-/// A label that cannot end a comment, a string or a line.
-fn comment_safe(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control() && !"*\\?\"".contains(*c)).collect()
 }

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod arduino;
+mod array_test;
 mod constants;
 mod error;
 mod export;
@@ -11,5 +12,5 @@ mod self_test;
 
 pub use arduino::{File, arduino_library};
 pub use error::ExportError;
-pub use export::{HEADER, Header, SELF_TEST_SAMPLES, header};
+pub use export::{HEADER, Header, SELF_TEST_SAMPLES, array_header, header};
 pub use options::{Form, Options};

@@ -14,7 +14,9 @@ use crate::{ExportError, Form, part::kept};
 /// How many.
 pub(crate) const SAMPLES: usize = 200;
 /// Larger than any sample: one that did not come (`STRETCH_NO_VOLTS`).
-const NO_VOLTS: f32 = 2e18;
+pub(crate) const NO_VOLTS: f32 = 2e18;
+/// What stands in the flags beside the status.
+const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Up and down once in this many samples.
 const PERIOD: usize = 70;
 
@@ -24,12 +26,16 @@ fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     let (min, max) = (calibration.signal_range.min(), calibration.signal_range.max());
     (0..SAMPLES).map(move |n| {
         let lost = n == 48 || (90..93).contains(&n) || (121..126).contains(&n);
-        // smooth at both ends, by products alone: the same numbers on every computer
-        let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
-        let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
-        let share = 1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1;
-        (!lost).then_some(min + share * (max - min))
+        (!lost).then_some(min + share(n) * (max - min))
     })
+}
+
+/// Where in the calibrated range a sample lies: from -0.1 to 1.1 and back.
+pub(crate) fn share(n: usize) -> f64 {
+    // smooth at both ends, by products alone: the same numbers on every computer
+    let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
+    let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
+    1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1
 }
 
 /// Status, branch and domain as the C packs them. Of a sample without a reading the branch is the last one.
@@ -61,7 +67,7 @@ pub(crate) fn fixed(
         rows.push(&format!("{{{}, {}, {flags}}}", code.0, answer.map_or(0, |(e, ..)| e)));
     }
     let fields = "int32_t code;\n    int32_t estimate;";
-    Ok(kept(&rows.text(fields, "code", "reading.estimate != samples[n].estimate"), &[]))
+    Ok(kept(&rows.text(fields, "code", BRANCH, "reading.estimate != samples[n].estimate"), &[]))
 }
 
 /// The self-test of a form in `float`.
@@ -91,28 +97,30 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         let row: Vec<String> = row.iter().map(|number| format!("{number:?}f")).collect();
         rows.push(&format!("{{{}, {flags}}}", row.join(", ")));
     }
-    let answers = ["estimate", "rate", "sd"];
-    let answers = &answers[..if map.is_some() { 3 } else { 2 }];
+    let answers = &["estimate", "rate", "sd"][..if map.is_some() { 3 } else { 2 }];
     let inputs = if crosstalk.is_some() { &["pressure", "volts"][..] } else { &["volts"] };
     let fields: Vec<String> =
         inputs.iter().chain(answers).map(|name| format!("float {name};")).collect();
-    let differs: Vec<String> = answers
-        .iter()
-        .map(|a| format!("reading.{a} < samples[n].{a} || reading.{a} > samples[n].{a}"))
-        .collect();
-    let text = rows.text(&fields.join("\n    "), "volts", &differs.join(" ||\n            "));
+    let differs: Vec<String> = answers.iter().map(|answer| differs(answer)).collect();
+    let differs = differs.join(" ||\n            ");
+    let text = rows.text(&fields.join("\n    "), "volts", BRANCH, &differs);
     Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
+}
+
+/// Whether a number of a reading is not that of a row.
+pub(crate) fn differs(number: &str) -> String {
+    format!("reading.{number} < samples[n].{number} || reading.{number} > samples[n].{number}")
 }
 
 /// Rows of the table, as many on a line as fit.
 #[derive(Default)]
-struct Rows {
+pub(crate) struct Rows {
     done: String,
     line: String,
 }
 
 impl Rows {
-    fn push(&mut self, row: &str) {
+    pub(crate) fn push(&mut self, row: &str) {
         if self.line.len() + row.len() > 90 {
             self.end_line();
         }
@@ -125,15 +133,18 @@ impl Rows {
         self.line.clear();
     }
 
-    fn text(mut self, fields: &str, input: &str, differs: &str) -> String {
+    /// The table and the test: the fields of a row, that which is the input, what of a reading stands in the flags
+    /// beside its status, and what must not hold.
+    pub(crate) fn text(mut self, fields: &str, input: &str, flags: &str, differs: &str) -> String {
         self.end_line();
         let sample = format!(
             "#define STRETCH_SELF_TEST {SAMPLES}\n\ntypedef struct stretch_sample {{\n    {fields}\n    \
-             uint8_t flags; /* status, branch << 2, domain << 3 */\n}} stretch_sample;\n\n"
+             uint8_t flags;\n}} stretch_sample;\n\n"
         );
         let test = include_str!("c/self_test.h")
             .replace("@ROWS@", self.done.trim_end())
             .replace("@INPUT@", input)
+            .replace("@FLAGS@", flags)
             .replace("@DIFFERS@", differs);
         sample + &test
     }

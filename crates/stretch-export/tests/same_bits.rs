@@ -1,12 +1,10 @@
 //! The C gives the bits of the Rust receptor, whatever compiles it and whatever comes in.
 
-use std::{
-    fmt::Write as _,
-    fs,
-    io::Write as _,
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+mod compilers;
+
+use std::{fmt::Write as _, fs, path::PathBuf};
+
+use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
 
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
@@ -17,49 +15,6 @@ use stretch_export::{Form, HEADER, Options, arduino_library, header};
 use stretch_receptor::{
     Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
 };
-
-const WARNINGS: [&str; 5] = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
-const SANITIZERS: [&str; 2] =
-    ["-fsanitize=undefined,float-cast-overflow,float-divide-by-zero", "-fno-sanitize-recover=all"];
-
-/// A compiler and how it is called.
-struct Compiler {
-    program: &'static str,
-    arguments: Vec<&'static str>,
-}
-
-fn compiler(program: &'static str, first: &[&'static str], then: &[&'static str]) -> Compiler {
-    Compiler { program, arguments: [first, &WARNINGS, then].concat() }
-}
-
-/// The compiler that Rust links with, strict and with sanitizers: it is there wherever these tests are built.
-fn strict_c() -> [Compiler; 1] {
-    [compiler("cc", &["-std=c99", "-O1"], &SANITIZERS)]
-}
-
-/// Strict C++11 with sanitizers; and as a board's build tool calls it, where the processor would offer to fuse products and sums.
-fn gcc_and_gxx() -> Vec<Compiler> {
-    let mut all = vec![
-        compiler("g++", &["-x", "c++", "-std=c++11", "-O1"], &SANITIZERS),
-        compiler("gcc", &["-std=gnu99", "-Os"], &[]),
-    ];
-    if fuses() {
-        let fused = ["-O3", "-mfma", "-ffp-contract=fast"];
-        all.push(compiler("gcc", &["-std=gnu99"], &fused));
-        all.push(compiler("g++", &["-x", "c++", "-std=gnu++11"], &fused));
-    }
-    all
-}
-
-#[cfg(target_arch = "x86_64")]
-fn fuses() -> bool {
-    std::arch::is_x86_feature_detected!("fma")
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn fuses() -> bool {
-    false
-}
 
 fn adc() -> Adc {
     parse_adc("12,0,3.3").unwrap()
@@ -180,46 +135,14 @@ fn input(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
     text
 }
 
-/// Compiles the harness around a header; the program.
-fn compiled(folder: &Path, form: Form, compiler: &Compiler) -> PathBuf {
-    let program = folder.join("harness");
-    let mut command = Command::new(compiler.program);
-    command.args(&compiler.arguments).arg("-I").arg(folder).arg("-o").arg(&program);
-    if form == Form::Float {
-        command.arg("-DFLOAT");
-    }
-    command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/harness.c")).arg("-lm");
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    program
-}
-
-fn run(program: &Path, input: &str) -> String {
-    let mut command = Command::new(program);
-    let mut child = command
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut stdin = child.stdin.take().unwrap();
-    let bytes = input.to_owned();
-    let writer = std::thread::spawn(move || stdin.write_all(bytes.as_bytes()));
-    let output = child.wait_with_output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}", text.lines().last().unwrap_or_default());
-    writer.join().unwrap().unwrap();
-    text
-}
-
 fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compiler]) {
     let folder = tempfile::tempdir().unwrap();
     let options = Options { form: Some(form), adc: adc() };
     let made = header(calibration, &options).unwrap();
     fs::write(folder.path().join(HEADER), made.text).unwrap();
     for compiler in compilers {
-        let program = compiled(folder.path(), form, compiler);
+        let defined: &[&str] = if form == Form::Float { &["-DFLOAT"] } else { &[] };
+        let program = compiled(folder.path(), "harness.c", defined, compiler);
         for codes in [trial(), erratic()] {
             let (found, expected) = (
                 run(&program, &input(calibration, form, &codes)),

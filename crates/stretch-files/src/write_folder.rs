@@ -263,7 +263,9 @@ fn sync_tree(folder: &Path, with_files: bool) -> io::Result<()> {
         if kind.is_dir() {
             sync_tree(&entry.path(), with_files)?;
         } else if kind.is_file() && with_files {
-            disk::sync(&File::open(entry.path())?)?;
+            // Windows flushes only what was opened to be written
+            let file = File::options().read(true).write(cfg!(windows)).open(entry.path())?;
+            disk::sync(&file)?;
         }
     }
     disk::sync_folder(folder);

@@ -26,4 +26,5 @@ pub use factor::{Factor, FactorSpec};
 pub use fit::Fit;
 pub use line::{LineAccumulator, LineFit};
 pub use order_table::{OrderEntry, OrderRow, OrderTable};
+pub use quantile::student_two_sided;
 pub use robust::{Loss, RobustFit, robust_fit};

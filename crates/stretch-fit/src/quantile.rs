@@ -14,9 +14,14 @@ const HALVINGS: u32 = 1100;
 
 /// The quantile `t` with `P(|x| <= t) = level` for Student's t of `dof`.
 ///
-/// Beyond [`MANY`] degrees of freedom by the expansion of Abramowitz and
+/// Beyond a thousand degrees of freedom by the expansion of Abramowitz and
 /// Stegun 26.7.5, whose next term is of order `dof^-5`.
-pub(crate) fn student_two_sided(level: f64, dof: u64) -> f64 {
+///
+/// ```
+/// let t = stretch_fit::student_two_sided(0.95, 10);
+/// assert!((t - 2.228).abs() < 1e-3);
+/// ```
+pub fn student_two_sided(level: f64, dof: u64) -> f64 {
     let n = dof as f64;
     if dof < MANY {
         // P(|x| > t) is the incomplete beta of a = n/2, b = 1/2 at n/(n + t^2).

@@ -10,6 +10,8 @@ const SAMPLES: usize = 4000;
 const DT_S: f64 = 0.01;
 /// Noise of the output, V.
 const NOISE_V: f64 = 0.002;
+/// Standard deviation of the time between a sample and its stamp, s: four times the noise where the rod moves half of its range a second.
+pub(crate) const JITTER_S: f64 = 0.016;
 
 /// What the rig has and the simulator lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +34,8 @@ pub(crate) enum Lack {
     Whisper,
     /// White noise above the floor.
     White,
+    /// Time stamps that jitter by [`JITTER_S`].
+    Jitter,
     /// A random walk that returns.
     SlowDrift,
 }
@@ -170,6 +174,8 @@ fn extra(lack: Lack, x: &[f64], random: &mut RandomGenerator) -> Vec<f64> {
         Lack::Curve => 0.04 * x[i] * (1.0 - x[i]),
         Lack::Nothing => 0.0,
         Lack::Whisper => NOISE_V / 3.0 * random.gauss(),
+        // The rate is in half ranges a second.
+        Lack::Jitter => GAIN * 0.5 * rate(i) * JITTER_S * random.gauss(),
         Lack::White => 0.01 * random.gauss(),
         Lack::SlowDrift => {
             held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * random.gauss() };

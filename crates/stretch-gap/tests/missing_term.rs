@@ -1,8 +1,8 @@
 //! A gauge that lacks something that no catalogue holds: is it found again, and is what is random called so?
 
-use crate::gauge::{Gauge, Lack, RANGE_MM};
+use crate::gauge::{Gauge, JITTER_S, Lack, RANGE_MM};
 use approx::assert_relative_eq;
-use stretch_gap::{Factor, Options, Passage, Proposed, RateForm, VerdictKind, diagnose};
+use stretch_gap::{Course, Factor, Options, Passage, Proposed, RateForm, VerdictKind, diagnose};
 use testkit::tolerance::{F64_ROUNDING, PLANTED_TERM, RESCALED};
 
 fn proposed(gauge: &Gauge) -> Proposed {
@@ -49,6 +49,25 @@ fn what_switches_jumps_or_wanders_on_its_own_is_random_in_time() {
         let found = proposed(&Gauge::lacking(lack, 2));
         assert!(found.random && found.terms.is_empty(), "{lack:?}: {}", found.equation);
         assert!(found.sentence.contains("periodic in time"), "{}", found.sentence);
+        assert!(
+            !matches!(found.course, Some(Course::Jitters { .. })),
+            "{lack:?}: {:?}",
+            found.course
+        );
+    }
+}
+
+#[test]
+fn time_stamps_that_jitter_are_told_with_their_size() {
+    for seed in 0..4 {
+        let found = proposed(&Gauge::lacking(Lack::Jitter, seed));
+        assert!(found.random && found.terms.is_empty(), "{seed}: {}", found.equation);
+        let Some(Course::Jitters { sd_s }) = found.course else {
+            panic!("{seed}: {:?}", found.course)
+        };
+        // Some thousands of samples tell a variance to a twentieth.
+        assert!((sd_s / JITTER_S - 1.0).abs() < 0.1, "{seed}: {sd_s} s");
+        assert!(found.sentence.contains("time stamps jitter by about"), "{}", found.sentence);
     }
 }
 

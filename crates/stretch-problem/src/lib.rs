@@ -12,6 +12,7 @@ mod foretell;
 mod gauge;
 mod implement;
 mod init;
+mod notation;
 mod problem;
 mod rig;
 mod sensors;
@@ -39,6 +40,7 @@ pub use foretell::{
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use implement::Implementation;
 pub use init::first_problem;
+pub use notation::notation;
 pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
 pub use sensors::sensors;

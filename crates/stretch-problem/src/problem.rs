@@ -37,6 +37,16 @@ pub trait Diagnosable: Simulator + Debug + Send {
         Vec::new()
     }
 
+    /// A recorded column by its name, all trials end to end.
+    fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let about = self.description();
+        let stage = about.stages.iter().position(|s| s.channel == name);
+        let record = about.record();
+        let columns = || record.columns.iter().find(|c| c.name == name).map(|c| c.values.to_vec());
+        let signals = || record.signals.iter().find(|s| s.name == name).map(|s| s.values.clone());
+        stage.map(|stage| self.measured(stage).to_vec()).or_else(columns).or_else(signals)
+    }
+
     /// The experiment that would tell the rivals of a diagnosis apart; none where no candidate does, or the simulator predicts none.
     ///
     /// # Errors
@@ -80,6 +90,8 @@ pub struct Reading<'a> {
     pub rig: Option<&'a Path>,
     /// Columns of reference and signal, of a gauge alone or of a stage that is a sensor.
     pub columns: Option<(&'a str, &'a str)>,
+    /// A column by which runs are told apart ([`Problem::by_column`]), which is read beside those of the problem.
+    pub by: Option<&'a str>,
     /// Effects that are not looked for.
     pub without: &'a [String],
     /// Number of workers at once, where the problem's file gives none.
@@ -164,6 +176,7 @@ impl Problem {
             return Err(no_option("--rig", "it is for the built-in simulators", hint));
         }
         file.spec.set_sensor(reading.columns);
+        file.spec.by = reading.by.map(str::to_owned);
         file.spec.without.extend(reading.without.iter().cloned());
         file.budget = reading.budget.or(file.budget);
         let workers = file.workers(reading.jobs)?;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Options, RandomGenerator, Simulator};
 use stretch_problem::{
-    Argument, Ask, BlackBox, ByTrial, Checked, OwnEffect, Parameter, Problem, ProblemSpec,
-    StageEntry, Standing, Tolerance, closure,
+    Argument, Ask, BlackBox, ByTrial, Checked, Examined, OwnEffect, Parameter, Problem,
+    ProblemSpec, StageEntry, Standing, Tolerance, closure,
 };
 
 const DT_S: f64 = 0.02;
@@ -38,7 +38,11 @@ fn recorded(servos: &[[f64; 3]], seed: u64) -> Vec<SessionTrial> {
         let u = command(run);
         let angle = servo(*values, &u).iter().map(|y| y + NOISE * random.gauss()).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
-        let channels = vec![channel("command_V", u), channel("angle_deg", angle)];
+        // The gain falls with the load, which is measured with noise.
+        let load = 100.0 / values[0];
+        let load = (0..SAMPLES).map(|i| load + 0.05 * (i as f64).sin()).collect();
+        let channels =
+            vec![channel("command_V", u), channel("angle_deg", angle), channel("load_kg", load)];
         let time_s = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
         let trial = Trial { name: format!("run {run}"), time_s, channels };
         let split = if run + 1 == servos.len() { Split::Test } else { Split::Fit };
@@ -52,8 +56,8 @@ fn parameter(name: &str, value: f64, share: f64) -> Parameter {
     Parameter { name: name.into(), unit: "1".into(), value, tolerance, ..Parameter::default() }
 }
 
-/// Every run fitted by itself; with a gear that acts as the gain does, where it is wanted.
-fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<String>) {
+/// An examined problem; with a gear that acts as the gain does, where it is wanted.
+fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examined) {
     let mut parameters = vec![parameter("gain", 10.0, 0.1), parameter("tau", 0.1, 0.2)];
     if has_gear {
         parameters.push(parameter("gear", 1.0, 0.1));
@@ -79,6 +83,7 @@ fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<Str
             }],
             ..OwnEffect::default()
         }],
+        by: Some("load_kg".into()),
         trials: recorded(servos, seed),
         ..ProblemSpec::default()
     })
@@ -95,6 +100,12 @@ fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<Str
     let problem = Problem::from(bench);
     let examined =
         problem.examine(&Options::default(), false, &|_| (), &|| false).expect("a diagnosis");
+    (problem, examined)
+}
+
+/// Every run fitted by itself, and what is named.
+fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<String>) {
+    let (problem, examined) = examined(servos, seed, has_gear);
     let by_trial = problem.by_trial(&examined, &|_| (), &|| false).expect("fits");
     (by_trial, examined.diagnosis.named)
 }
@@ -128,6 +139,27 @@ fn a_run_with_another_set_up_is_told_and_so_is_in_what() {
     assert_eq!((apart.run.as_str(), apart.values.as_slice()), ("run 2", &["gain".to_owned()][..]));
     assert!(apart.is_set_up && apart.deviations[0] < -5.0, "{apart:?}");
     assert!(found.sentences().iter().any(|s| s.contains("run 2 stands apart in gain")));
+}
+
+#[test]
+fn runs_of_one_load_are_fitted_together_and_a_value_that_goes_with_it_is_told() {
+    let servo = |gain: f64| [gain, 0.11, 0.0];
+    let (problem, examined) = examined(&[10.4, 9.6, 10.4, 9.6, 10.4].map(servo), 6, false);
+    let by = |column: &str| problem.by_column(column, &examined, &|_| (), &|| false);
+    let found = by("load_kg").expect("fits");
+    let runs: Vec<&str> = found.runs.iter().map(|run| run.run.as_str()).collect();
+    assert!(runs[0].starts_with("load_kg 9.5") && runs[1].starts_with("load_kg 10.3"), "{runs:?}");
+    for (run, gain) in found.runs.iter().zip([10.4, 9.6]) {
+        let told = &run.values[0];
+        assert!((told.value - gain).abs() < 4.0 * told.sd && told.sd < 0.1, "{told:?}");
+    }
+    let differ: Vec<&str> =
+        found.values.iter().filter(|v| v.differs).map(|v| v.name.as_str()).collect();
+    assert_eq!(differ, ["gain"], "{:?}", found.sentences());
+    // A column that moves within trials: the servo is the same in each quarter of it.
+    assert_eq!(by("command_V").expect("fits").runs.len(), 4);
+    let refused = by("payload_kg").unwrap_err().to_string();
+    assert!(refused.contains("there is no column payload_kg"), "{refused}");
 }
 
 #[test]

@@ -72,15 +72,14 @@ fn problem(spill: f64, wrap: &[&str]) -> ProblemSpec {
 
 const WRAP: [&str; 4] = ["state.all", "input.saturation", "output.curve", "output.lag"];
 
-fn states() -> Vec<State> {
-    let state =
-        |name: &str| State { name: name.into(), unit: "cm".into(), least: 0.0, greatest: 12.0 };
+fn states(greatest: f64) -> Vec<State> {
+    let state = |name: &str| State { name: name.into(), unit: "cm".into(), least: 0.0, greatest };
     vec![state("upper"), state("lower")]
 }
 
-/// Diagnoses with the tanks of this file as the simulator.
-fn diagnosed(spill: f64) -> Diagnosis {
-    let spec = problem(spill, &WRAP).with_states(&states()).expect("states");
+/// Diagnoses with the tanks of this file as the simulator, whose levels are said to reach a greatest one.
+fn diagnosed(spill: f64, greatest: f64) -> Diagnosis {
+    let spec = problem(spill, &WRAP).with_states(&states(greatest)).expect("states");
     let problem = Checked::new(spec).expect("a problem");
     let pump = problem.session().column("pump_V").expect("a column").to_vec();
     let names = problem.session().effects.clone();
@@ -114,28 +113,36 @@ fn diagnosed(spill: f64) -> Diagnosis {
     diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
-fn is_overflow(found: &Diagnosis) {
+fn is_overflow(found: &Diagnosis, spill: f64) {
     assert_eq!(found.named, ["state.upper.spill"], "{}", found.sentence);
     let level = &found.candidates[0].parameters[0];
-    assert!((level.value - 5.0).abs() < 0.2, "{level:?}");
+    assert!((level.value - spill).abs() < 0.2, "{level:?}");
 }
 
 #[test]
 fn an_overflow_is_named_with_its_level() {
-    is_overflow(&diagnosed(5.0));
+    is_overflow(&diagnosed(5.0, 12.0), 5.0);
+}
+
+/// A range that goes far beyond what the level reaches: of its starts, at 28.5, 24, 12 and 3 cm, three change nothing, and the last one does far too much.
+#[test]
+fn an_overflow_is_named_where_most_of_its_range_does_nothing() {
+    for spill in [5.0, 6.0, 7.0] {
+        is_overflow(&diagnosed(spill, 30.0), spill);
+    }
 }
 
 #[test]
 fn tanks_that_spill_nothing_are_agreed_with() {
-    let found = diagnosed(f64::INFINITY);
+    let found = diagnosed(f64::INFINITY, 30.0);
     assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
 }
 
 #[test]
 fn a_state_that_nobody_declares_is_refused_with_those_that_are() {
-    let error = problem(5.0, &["state.midle.spill"]).with_states(&states()).unwrap_err();
+    let error = problem(5.0, &["state.midle.spill"]).with_states(&states(12.0)).unwrap_err();
     assert!(error.to_string().contains("no effect on a state state.midle.spill"), "{error}");
-    let mut wrong = states();
+    let mut wrong = states(12.0);
     wrong[0].greatest = 0.0;
     let error = problem(5.0, &["state.all"]).with_states(&wrong).unwrap_err();
     assert!(error.to_string().starts_with("state upper: its range, 0 to 0, is empty"), "{error}");
@@ -149,5 +156,6 @@ fn with_python_a_worker_that_declares_its_states_has_its_overflow_named() {
     let (problem, source) = Workers::bound(problem(5.0, &WRAP), workers).expect("workers");
     assert_eq!(problem.session().effects.len(), 6);
     let bench = BlackBox::new(problem, Arc::new(source));
-    is_overflow(&diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0);
+    let found = diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
+    is_overflow(&found, 5.0);
 }

@@ -1,7 +1,7 @@
 //! The calibration that the documentation's examples run with.
 
 use stretch_core::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, BranchSurface, Calibration,
+    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, BranchSurface, Calibration,
     CalibrationSpec, DesignError, DiagnosedMap, Fading, FitSummary, Interval, Label, Model,
     Normalisation, ObserverMap, Plays, Polarity, Poly13, Provenance, Range, RangeSpec,
     RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
@@ -65,7 +65,7 @@ fn array() -> Result<ArrayCalibration<2>, DesignError> {
             possible: Interval { min: 0.5, max: 2.5 },
             still_samples: 0,
             follows: Values::new("follows", &follows)?,
-            largest_surprise: 0.1,
+            largest_jump: 0.1,
         })
     };
     let gains = |of: [&[f64]; 2]| {
@@ -87,7 +87,12 @@ fn array() -> Result<ArrayCalibration<2>, DesignError> {
         all: gains([half, half])?,
         without: [gains([&[], whole])?, gains([whole, &[]])?].into_iter().collect(),
         alone: [gains([whole, &[]])?, gains([&[], whole])?].into_iter().collect(),
-        fast_states: 1,
+        shifts: Some(ArrayShifts {
+            block_s: 5.0,
+            false_alarms_an_hour: 0.25,
+            usual: Values::new("usual", &[0.0, 0.0])?,
+            limits: Values::new("limits", &[6.0, 6.0])?,
+        }),
         provenance: Provenance::new("", ["example"]),
     })
 }

@@ -21,7 +21,10 @@ mod receptor;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 
-pub use array::{ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld, Loss};
+pub use array::{
+    ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld, JUMP_SAMPLES, Jump, Loss, Repeats,
+    ShiftMemory, ShiftWatch, Shifts, block_of, samples_a_tick,
+};
 pub use defects::{Defects, DefectsMemory};
 pub use diagnosed::DiagnosedReceptor;
 pub use example::{example_array, example_calibration, example_diagnosed, example_observer};

@@ -1,6 +1,7 @@
 //! The numbers of the steps, for an implementation of a step in another language.
 //!
-//! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts;
+//! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts,
+//! [`ArrayReceptor::numbers`](crate::ArrayReceptor::numbers) those of a receptor of several gauges;
 //! those of a receptor that takes codes are in [`code`](mod@crate::code) (`FixedNumbers`, `IntegerObserver`).
 //!
 //! ```
@@ -12,6 +13,7 @@
 //! ```
 
 pub use crate::{
+    array::{ArrayAloneNumbers, ArrayChannelNumbers, ArrayGainNumbers, ArrayNumbers},
     curve::Curve,
     defects::{Bound, Played, Relaxing, Wearing},
     diagnosed::{Diagnosed, LEAST_ANSWER, LEAST_RUN, SMOOTH},

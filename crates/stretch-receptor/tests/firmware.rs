@@ -6,13 +6,13 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use stretch_core::{
-    Calibration, CalibrationSpec, Design, DiagnosedMap, FitSummary, Hertz, HistoryMap,
-    HistoryShape, Interval, LinearMap, Model, ObserverMap, RateEstimator, RestTracker, SampleRate,
-    Stage, Values, Volts,
+    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, Calibration, CalibrationSpec, Design,
+    DiagnosedMap, FitSummary, Hertz, HistoryMap, HistoryShape, Interval, Label, LinearMap, Model,
+    ObserverMap, Provenance, RateEstimator, RestTracker, SampleRate, Schema, Stage, Values, Volts,
 };
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
-    BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
+    ArrayReceptor, BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
     StretchReceptor, Withheld,
     code::{
         Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReading, CodeReceptor, Fixed,
@@ -25,6 +25,10 @@ use stretch_receptor::{
 #[allow(missing_docs, missing_debug_implementations, unreachable_pub)]
 mod checksum;
 use checksum::{Bits, Checksum};
+
+#[path = "../../../firmware/src/gauges.rs"]
+#[allow(missing_docs, unreachable_pub)]
+mod gauges;
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware")
@@ -205,6 +209,63 @@ fn diagnosed() -> [(&'static str, &'static str, Calibration); 2] {
     [("diagnosed", "diagnosed", plain), ("diagnosed+rest", "diagnosed-rest", followed)]
 }
 
+/// Four gauges with two time constants each and products of two states.
+fn several() -> ArrayCalibration<{ gauges::GAUGES }> {
+    let count = gauges::GAUGES;
+    let gain = |k: usize| f64::from(gauges::gain(k));
+    let shape = HistoryShape { states: 3, degree: 2, memory_degree: 1 };
+    let own: Vec<f64> = (1..shape.terms()).map(|t| 2.0 / t as f64).collect();
+    let channel = |k: usize| {
+        let follows: Vec<f64> = (0..count)
+            .map(|j| if j == k { 0.0 } else { gain(k) / gain(j) / (count - 1) as f64 })
+            .collect();
+        ArrayChannel {
+            signal: Label::new(&format!("gauge_{k}_v")).unwrap(),
+            state_min: Values::new("state_min", &[1.1, -0.3, -0.3].map(|x| x * gain(k))).unwrap(),
+            state_max: Values::new("state_max", &[2.1, 0.3, 0.3].map(|x| x * gain(k))).unwrap(),
+            possible: Interval { min: 0.5 * gain(k), max: 3.0 * gain(k) },
+            still_samples: 12,
+            follows: Values::new("follows", &follows).unwrap(),
+            largest_jump: 0.2 * gain(k),
+        }
+    };
+    let gains = |uses: &dyn Fn(usize) -> bool| ArrayGains {
+        constant: 45.0,
+        terms: (0..count)
+            .map(|k| if uses(k) { Values::new("terms", &own).unwrap() } else { Values::EMPTY })
+            .collect(),
+        sd: 2.0,
+    };
+    ArrayCalibration::new(ArraySpec {
+        schema: Schema::CURRENT,
+        reference: Label::new("angle_deg").unwrap(),
+        sample_rate_hz: SampleRate::new(100.0).unwrap(),
+        relaxations_s: Values::new("relaxations_s", &[0.05, 0.5]).unwrap(),
+        degree: shape.degree,
+        memory_degree: shape.memory_degree,
+        estimate_domain: Interval { min: 0.0, max: 90.0 },
+        channels: (0..count).map(channel).collect(),
+        all: gains(&|_| true),
+        without: (0..count).map(|lost| gains(&|k| k != lost)).collect(),
+        alone: (0..count).map(|only| gains(&|k| k == only)).collect(),
+        shifts: None,
+        provenance: Provenance::new("", ["simulated"]),
+    })
+    .unwrap()
+}
+
+fn several_in_f32() -> String {
+    let receptor = ArrayReceptor::<f32, { gauges::GAUGES }>::new(&several());
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial() {
+        let volts = if code == u16::MAX { f32::NAN } else { f32::from(code) * (3.3 / 4095.0) };
+        let reading = receptor.step(&mut memory, gauges::samples(volts));
+        assert!(reading.is_ok_and(|r| r.lost == 0) || code == u16::MAX, "{reading:?}");
+        checksum.answer(gauges::answer(reading));
+    }
+    format!("{:08x}", checksum.0)
+}
+
 fn fixed_observer(calibration: &Calibration) -> String {
     let receptor = FixedObserver::new(calibration, &due()).unwrap();
     let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
@@ -238,6 +299,7 @@ fn the_trial_and_the_records_are_these() {
     for (_, name, calibration) in diagnosed() {
         record(name, &calibration);
     }
+    record("gauges", &several());
 }
 
 #[test]
@@ -275,6 +337,7 @@ fn the_golden_checksums_are_these() {
         let receptor = DiagnosedReceptor::<f32>::new(&calibration).unwrap();
         golden.push((model.to_owned(), volts_of(receptor)));
     }
+    golden.push(("gauges".to_owned(), several_in_f32()));
     for (model, checksum) in golden {
         writeln!(text, "model={model} checksum={checksum}").unwrap();
     }

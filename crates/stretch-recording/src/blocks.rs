@@ -8,7 +8,9 @@ use std::{
 
 use stretch_data::{Channel, Trial};
 
-use crate::{ReadOptions, Recording, RecordingError, clock, grid, sniff, sniff::Format, text};
+use crate::{
+    ReadOptions, Recording, RecordingError, clock, grid, read::episode, sniff, sniff::Format, text,
+};
 
 impl Recording {
     /// Reads a recording in blocks of at most `rows` rows, in the order of time, and gives the notes on all of it.
@@ -92,6 +94,10 @@ type Table = (Box<dyn Read>, String);
 
 /// A file that is a table of text; none of anything else.
 fn table(path: &Path) -> Result<Option<Table>, RecordingError> {
+    // an episode of a file is no file
+    if !path.exists() && episode(path).is_some() {
+        return Ok(None);
+    }
     let file = path.display().to_string();
     let mut reader = File::open(path).map_err(|e| RecordingError::io(&file, "open it", e))?;
     let (head, format) = sniff::head(&mut reader, &file)?;

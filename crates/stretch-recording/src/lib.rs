@@ -16,10 +16,14 @@ mod parquet;
 mod read;
 mod recording;
 mod room;
+#[cfg(feature = "rosbag")]
+mod rosbag;
 mod sniff;
 mod stamps;
 mod text;
-#[cfg(any(feature = "npz", feature = "mat", feature = "mcap"))]
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod topics;
+#[cfg(any(feature = "npz", feature = "mat", feature = "mcap", feature = "rosbag"))]
 mod whole;
 
 pub use error::RecordingError;

@@ -61,6 +61,7 @@ pub struct ReadOptions {
     pub(crate) columns: Option<Vec<String>>,
     pub(crate) sample_rate_hz: Option<f64>,
     pub(crate) grid_hz: Option<f64>,
+    pub(crate) episode: Option<u32>,
     pub(crate) max_line_bytes: usize,
 }
 
@@ -76,12 +77,18 @@ impl Default for ReadOptions {
             columns: None,
             sample_rate_hz: None,
             grid_hz: None,
+            episode: None,
             max_line_bytes: 64 * 1024,
         }
     }
 }
 
 impl ReadOptions {
+    /// The same, of one episode of a file that holds several.
+    pub(crate) fn of_episode(&self, episode: u32) -> Self {
+        Self { episode: Some(episode), ..self.clone() }
+    }
+
     /// Asks for `time_s` only, and for lines of at most 64 KiB.
     pub fn new() -> Self {
         Self::default()

@@ -24,7 +24,9 @@ impl Recording {
     ///   as ISO 8601; without a header line with [`ReadOptions::columns`].
     /// - Any of these in gzip (feature `gzip`).
     /// - NumPy's NPY and NPZ (`npz`), MATLAB's MAT of version 5 (`mat`), HDF5 and with it MAT 7.3 (`hdf5`), MCAP with
-    ///   messages in JSON or ROS 2's CDR (`mcap`), Parquet (`parquet`).
+    ///   messages in JSON, ROS 2's CDR, or protobuf (`mcap`), Parquet (`parquet`), ROS 2 bags in
+    ///   SQLite (`rosbag`). Of LeRobot's Parquet files with several
+    ///   episodes, `FILE#3` is episode 3.
     ///
     /// Channels on several clocks are brought to that of the fastest, or to [`ReadOptions::grid_hz`], within the time
     /// that all of them cover: by straight lines, the commands `inlet` and `outlet` held.
@@ -37,6 +39,9 @@ impl Recording {
         let path = path.as_ref();
         if path.as_os_str() == "-" {
             return Self::from_reader(io::stdin().lock(), "standard input", options);
+        }
+        if let (false, Some((path, episode))) = (path.exists(), episode(path)) {
+            return Self::read(path, &options.of_episode(episode));
         }
         let file = path.display().to_string();
         let reader = File::open(path).map_err(|e| RecordingError::io(&file, "open it", e))?;
@@ -75,6 +80,10 @@ impl Recording {
         if format == Format::Gzip {
             return Self::unpacked(reader, name, options);
         }
+        if options.episode.is_some() && format != Format::Parquet {
+            let problem = "it holds no episodes; leave the # and what follows out".to_owned();
+            return Err(RecordingError::Format { file: name.to_owned(), format: "file", problem });
+        }
         let (mut recording, time) = match format {
             Format::Text => text::read(reader, name, options, packed)?,
             other => {
@@ -110,4 +119,10 @@ impl Recording {
         let file = name.to_owned();
         Err(RecordingError::Feature { file, format: "a gzip file", feature: "gzip" })
     }
+}
+
+/// A file and the episode of it that is asked for: `file.parquet#3`.
+pub(crate) fn episode(path: &Path) -> Option<(&Path, u32)> {
+    let (file, episode) = path.to_str()?.rsplit_once('#')?;
+    Some((Path::new(file), episode.parse().ok()?))
 }

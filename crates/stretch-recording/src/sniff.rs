@@ -22,18 +22,14 @@ pub(crate) enum Format {
     Hdf5,
     Mcap,
     Parquet,
+    Rosbag,
     /// Known and not read: what it is, and what to do.
     Foreign(&'static str, &'static str),
 }
 
 /// Formats that are known to be none of those that are read.
-const FOREIGN: [(&[u8], &str, &str); 7] = [
+const FOREIGN: [(&[u8], &str, &str); 6] = [
     (b"#ROSBAG", "ROS 1 bag", "convert it with `mcap convert in.bag out.mcap`"),
-    (
-        b"SQLite format 3\0",
-        "SQLite",
-        "a ROS 2 bag of this kind becomes MCAP with `ros2 bag convert`",
-    ),
     (b"ARROW1", "Arrow", "write it as Parquet"),
     (b"\x28\xb5\x2f\xfd", "zstd", "unpack it with unzstd, or pack it with gzip"),
     (b"BZh", "bzip2", "unpack it with bunzip2, or pack it with gzip"),
@@ -54,6 +50,7 @@ impl Format {
             _ if is_hdf5(0) || is_hdf5(512) => Self::Hdf5,
             _ if head.starts_with(b"\x89MCAP0\r\n") => Self::Mcap,
             _ if head.starts_with(b"PAR1") => Self::Parquet,
+            _ if head.starts_with(b"SQLite format 3\0") => Self::Rosbag,
             _ if is_mat(head) => Self::Mat,
             _ if is_page(head) => {
                 Self::Foreign("HTML", "a server answered in place of the file; download it again")
@@ -100,6 +97,8 @@ impl Format {
             Self::Mcap => crate::mcap::read(whole()?, file),
             #[cfg(feature = "parquet")]
             Self::Parquet => crate::parquet::read(whole()?, file, options),
+            #[cfg(feature = "rosbag")]
+            Self::Rosbag => crate::rosbag::read(whole()?, file),
             #[cfg(not(feature = "npz"))]
             Self::Npy | Self::Npz => off("a NumPy file", "npz"),
             #[cfg(not(feature = "mat"))]
@@ -112,6 +111,8 @@ impl Format {
             Self::Mcap => off("an MCAP file", "mcap"),
             #[cfg(not(feature = "parquet"))]
             Self::Parquet => off("a Parquet file", "parquet"),
+            #[cfg(not(feature = "rosbag"))]
+            Self::Rosbag => off("a ROS 2 bag in SQLite", "rosbag"),
             Self::Foreign(format, todo) => {
                 let problem = format!("recordings of this kind are not read; {todo}");
                 Err(RecordingError::Format { file: file.to_owned(), format, problem })

@@ -1,6 +1,7 @@
 //! The tests of stretch-recording from outside, one program: linking takes longer than most of them.
 
 mod bad_input;
+mod bags;
 mod corpus;
 mod data_sets;
 mod dialects;

@@ -9,7 +9,8 @@
     feature = "mat",
     feature = "hdf5",
     feature = "mcap",
-    feature = "parquet"
+    feature = "parquet",
+    feature = "rosbag"
 ))]
 
 use std::{collections::BTreeMap, fs, io::Cursor, path::Path, process::Command, sync::Arc};
@@ -136,6 +137,28 @@ fn mcap(count: u32, last: &str) -> Vec<u8> {
     out.into_inner()
 }
 
+/// Lists of numbers of a byte.
+fn lists(count: usize) -> Vec<u8> {
+    use ::parquet::{
+        data_type::Int32Type, file::writer::SerializedFileWriter,
+        schema::parser::parse_message_type,
+    };
+    let schema =
+        "message m { REQUIRED GROUP a (LIST) { REPEATED GROUP list { REQUIRED INT32 element; } } }";
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let mut bytes = Vec::new();
+    let mut file = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+    let mut group = file.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    let begins: Vec<i16> = (0..count).map(|i| i16::from(i % 4 > 0)).collect();
+    let (values, levels) = (vec![1; count], vec![1; count]);
+    column.typed::<Int32Type>().write_batch(&values, Some(&levels), Some(&begins)).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    file.close().unwrap();
+    bytes
+}
+
 #[test]
 fn no_file_takes_more_than_four_times_its_size_and_256_mb() {
     let folder = tempfile::tempdir().unwrap();
@@ -156,6 +179,8 @@ fn no_file_takes_more_than_four_times_its_size_and_256_mb() {
         ("many.h5", hdf5(3 * MANY), false),
         ("a.parquet", parquet(MANY), true),
         ("many.parquet", parquet(3 * MANY), false),
+        ("lists.parquet", lists(1_000_000), true),
+        ("many_lists.parquet", lists(MANY), false),
         ("a.mcap", mcap(1_000_000, "1"), true),
         ("long.mcap", mcap(10, &format!("[1{}]", ",1".repeat(20_000_000))), false),
         ("wide.mcap", mcap(400_000, &wide), false),

@@ -195,3 +195,55 @@ fn a_grid_is_chosen_and_nothing_lies_beyond_the_samples() {
         epsilon = 1e-12
     );
 }
+
+#[test]
+#[cfg(feature = "parquet")]
+fn an_episode_of_lerobot_goes_by_the_names_of_its_description() {
+    let file = "lerobot/data/chunk-000/file-000.parquet";
+    let Recording { trial, notes } = read(file, &ReadOptions::new());
+    let table = plain();
+    assert_eq!(trial.time_s, table.time_s);
+    for name in ["length_mm", "bridge_v"] {
+        let wanted = table.require(name).expect("there");
+        assert_eq!(trial.channel(&format!("observation.state.{name}")), Some(wanted));
+        let sent: Vec<f64> = wanted.iter().map(|x| x + 1.0).collect();
+        assert_eq!(trial.channel(&format!("action.{name}")), Some(&sent[..]));
+    }
+    let said = notes.join("\n");
+    assert!(said.contains("episodes 0 to 1, and 0 is read"), "{said}");
+    assert!(said.contains("uneven.list.element (lists of several lengths)"), "{said}");
+
+    let other = read(&format!("{file}#1"), &ReadOptions::new()).trial;
+    let backwards: Vec<f64> =
+        table.require("bridge_v").expect("there").iter().rev().copied().collect();
+    assert_eq!(other.channel("observation.state.bridge_v"), Some(&backwards[..]));
+    assert_eq!(other.time_s, table.time_s);
+    let refused = Recording::read(path(&format!("{file}#7")), &ReadOptions::new());
+    assert!(
+        refused.unwrap_err().to_string().contains("there is no episode 7 in it; it holds 0 to 1")
+    );
+}
+
+#[test]
+fn a_table_has_no_episodes() {
+    let refused = Recording::read(path("plain.csv#2"), &ReadOptions::new());
+    assert!(refused.unwrap_err().to_string().contains("it holds no episodes"));
+}
+
+#[test]
+#[cfg(feature = "mcap")]
+fn protobuf_in_mcap() {
+    let Recording { trial, notes } = read("protobuf.mcap", &ReadOptions::new());
+    let (table, samples) = (plain(), 60);
+    let late = trial.time_s.iter().zip(&table.time_s).map(|(a, b)| (a - b).abs());
+    assert!(late.fold(0.0, f64::max) < 1e-9, "own stamps, not when it was logged");
+    assert_eq!(trial.channel("length_mm"), Some(table.require("length_mm").expect("there")));
+    let bridge_v = trial.require("bridge_v").expect("a message within");
+    let wanted = table.require("bridge_v").expect("there");
+    assert!(bridge_v.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 2e-7), "single precision");
+    assert_eq!(trial.require("rig.gauge.count").expect("zigzag")[samples - 1], -59.0);
+    assert_eq!(trial.require("rig.position.wrist").expect("by its name")[samples - 1], -59.0);
+    // what protobuf leaves out is 0
+    assert_eq!(trial.require("rig.is_moving").expect("true and false")[..2], [0.0, 1.0]);
+    assert!(notes.iter().any(|note| note.contains("own stamps")), "{notes:?}");
+}

@@ -2,7 +2,7 @@
 
 use stretch_data::listed;
 use stretch_gap::Diagnosis;
-use stretch_problem::{effect_in_words, in_words};
+use stretch_problem::{effect_in_words, in_words, notation};
 use stretch_sim::Language;
 
 use super::{
@@ -10,7 +10,8 @@ use super::{
     by_trial_tables::{difference_table, run_table},
     canvas::Ink,
     diagnosis_tables::{
-        baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
+        baseline_table, candidate_numbers_table, candidate_table, parameter_table, slice_table,
+        stage_table, transfer_table,
     },
     figure::Figure,
     first_seconds::{GIVEN, causes, facts, headline},
@@ -21,6 +22,7 @@ use super::{
     live::Pick,
     markup::{number, percent},
     multiple::multiple,
+    output_table::output_table,
     page::Page,
     subject::Subject,
     turn_figure::turn_figure,
@@ -114,6 +116,11 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
         );
         page.figure(&top, &caption);
         if let Some(turned) = turn_figure(subject, stage, &shown) {
+            page.text("The numbers of an effect can be moved here. They stand in its equation:");
+            page.list(&equations(subject, &spec.name));
+            if let Some(words) = notation(formulas(subject)) {
+                page.text(words);
+            }
             page.figures(&[(turned, TURNED.to_owned())]);
         }
     } else {
@@ -131,6 +138,18 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     page.text(
         "Dots are samples, the strong line is their median, the band holds four fifths of them.",
     );
+}
+
+/// The equations of the named effects, in the names of their parameters.
+fn formulas<'a>(subject: &'a Subject<'_>) -> impl Iterator<Item = &'a str> {
+    subject.implementations.iter().map(|one| one.formula.as_str())
+}
+
+/// The named effects of a stage with their equations.
+fn equations(subject: &Subject<'_>, stage: &str) -> Vec<String> {
+    let own = subject.implementations.iter().filter(|one| one.stage == stage);
+    let words = |name: &str| effect_in_words(name, subject.diagnosis);
+    own.map(|one| format!("{}: {}", words(&one.name), one.formula)).collect()
 }
 
 fn located(page: &mut Page, subject: &Subject<'_>) {
@@ -306,7 +325,10 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
             listed(&rivals)
         ));
     }
-    page.table(&candidate_table(&d.candidates, &d.stabilities));
+    page.folded("Every candidate and its numbers", |page| {
+        page.table(&candidate_table(&d.candidates));
+        page.table(&candidate_numbers_table(&d.candidates, &d.stabilities));
+    });
 }
 
 /// The named effects as code for a simulator.
@@ -324,12 +346,15 @@ fn implemented(page: &mut Page, subject: &Subject<'_>) {
         page.text(&format!("{words} ({}): {}. State: {}.", one.name, one.equation(), one.state()));
         for language in Language::ALL {
             if let Some(code) = one.code(language) {
-                let summary = format!("{} in {}", one.name, language.name());
+                let summary = format!("{words} in {}", language.name());
                 page.folded(&summary, |page| {
                     page.code(&code);
                 });
             }
         }
+    }
+    if let Some(words) = notation(formulas(subject)) {
+        page.text(words);
     }
 }
 
@@ -340,6 +365,10 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     page.text(
         "At 1\u{a0}\u{d7} nothing but noise is left; at 2\u{a0}\u{d7} the root mean square is twice that of the noise.",
     );
+    let called = |name: &str| effect_in_words(name, d);
+    if let Some(table) = output_table(d, subject.simulator, &called) {
+        page.table(&table);
+    }
     if let Some(transfer) = &d.transfer {
         page.table(&transfer_table(transfer));
         page.text(

@@ -1,10 +1,12 @@
 //! The tables of a diagnosis's report.
 
-use stretch_gap::{Baselines, Candidate, Diagnosis, EffectStability, SliceGap, StageGap, Transfer};
+use stretch_gap::{
+    Baselines, Candidate, Diagnosis, EffectStability, EffectValue, SliceGap, StageGap, Transfer,
+};
 
 use super::multiple::{both, times};
 use super::{
-    markup::{NONE, fixed, number, percent, with_unit},
+    markup::{NONE, fixed, number, percent, shown_unit, with_unit},
     page::Table,
 };
 use crate::plain::{LINE, SURFACE, methods};
@@ -31,65 +33,68 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     )
 }
 
-/// How firmly each effect of a set stands in the most probable one.
-fn stability(effects: &[String], all: &[EffectStability]) -> String {
-    let of = |name: &String| all.iter().find(|s| s.effect == *name);
-    let known: Vec<String> =
-        effects.iter().filter_map(|name| Some(fixed(of(name)?.stability, 2))).collect();
-    if known.is_empty() { NONE.to_owned() } else { known.join(", ") }
+/// The effects of a candidate.
+fn effects(candidate: &Candidate) -> String {
+    match candidate.effects.as_slice() {
+        [] => "none".to_owned(),
+        effects => effects.join(", "),
+    }
 }
 
-/// A table of every candidate, with the stability of its effects.
-pub fn candidate_table(candidates: &[Candidate], stabilities: &[EffectStability]) -> Table {
+/// A table of every candidate: how probable it is, and what it closes.
+pub fn candidate_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
-        let values: Vec<String> = c
-            .parameters
-            .iter()
-            .map(|p| {
-                let unit = if p.unit == "1" { "" } else { &p.unit };
-                format!(
-                    "{} = {} \u{b1} {}",
-                    p.name,
-                    number(p.value, 3),
-                    with_unit(&number(p.sd, 2), unit)
-                )
-            })
-            .collect();
-        let effects = if c.effects.is_empty() { "none".to_owned() } else { c.effects.join(", ") };
         vec![
-            effects,
+            effects(c),
             fixed(c.probability, 3),
             times(c.gap_before),
             times(c.gap_after),
             percent(c.closed),
             interval(c.closed_ci, percent),
-            stability(&c.effects, stabilities),
-            values.join("; "),
         ]
     };
     Table::new(
         "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before \
-         and after in multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted; \
-         stability, the share of resampled records in which the most probable set holds the effect; \u{b1} is one standard deviation",
-        &[
-            "Effects",
-            "Probability",
-            "Left before",
-            "Left after",
-            "Closes",
-            "95 % interval",
-            "Stability",
-            "Parameters",
-        ],
+         and after in multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted",
+        &["Effects", "Probability", "Left before", "Left after", "Closes", "95 % interval"],
         candidates.iter().map(row),
     )
     .highlight((!candidates.is_empty()).then_some(0))
 }
 
+/// A table of the numbers that were fitted, a row for each effect of each candidate, and of how firmly the effect stands. Sets are counted as in
+/// [`candidate_table`].
+pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectStability]) -> Table {
+    let value = |p: &EffectValue| {
+        let unit = shown_unit(&p.unit);
+        let sd = with_unit(&number(p.sd, 2), unit);
+        format!("{} = {} \u{b1} {sd}", p.name, number(p.value, 3))
+    };
+    let stability = |effect: &String| {
+        let known = stabilities.iter().find(|s| s.effect == *effect);
+        known.map_or_else(|| NONE.to_owned(), |s| fixed(s.stability, 2))
+    };
+    // nothing and unknown have no numbers
+    let own = (1..).zip(candidates).filter(|(_, c)| !c.parameters.is_empty());
+    let rows = own.flat_map(|(set, c)| {
+        c.effects.iter().map(move |effect| {
+            let own = c.parameters.iter().filter(|p| p.effect == *effect);
+            let values: Vec<String> = own.map(value).collect();
+            vec![effect.clone(), format!("{set}"), stability(effect), values.join("; ")]
+        })
+    });
+    Table::new(
+        "Numbers of every set, \u{b1} one standard deviation; stability, the share of resampled records in which the most probable set \
+         holds the effect",
+        &["Effect", "Set", "Stability", "Numbers"],
+        rows,
+    )
+}
+
 /// A table of the nominal parameters; `None` when there are none.
 pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
     let row = |p: &stretch_gap::ParameterShift| {
-        let unit = if p.unit == "1" { "" } else { &p.unit };
+        let unit = shown_unit(&p.unit);
         vec![
             format!("{}{}", p.name, if p.is_evidence { "" } else { " *" }),
             with_unit(&number(p.nominal, 4), unit),

@@ -6,7 +6,7 @@ use stretch_gap::{Diagnosis, Gross, VerdictKind};
 use stretch_problem::effect_in_words;
 
 use super::{
-    markup::{number, percent, with_unit},
+    markup::{number, percent, shown_unit, with_unit},
     multiple::multiple,
     subject::Subject,
 };
@@ -102,10 +102,14 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     let gain = best.map_or_else(String::new, |c| {
         let [low, high] = c.closed_ci.map(percent);
         let interval = if low == high { String::new() } else { format!(" ({low} to {high})") };
+        let fitted = match c.fits_worse() {
+            true => format!(", {} times on those that were", number(multiple(c.left), 3)),
+            false => String::new(),
+        };
         format!(
-            "{} of the gap closes on trials that were not fitted{interval}: {} times the noise is left.",
+            "{} of the gap closes on trials that were not fitted{interval}: {} times the noise is left{fitted}.",
             percent(c.closed),
-            number(multiple(d.gap.left), 3)
+            number(multiple(c.gap_after), 3)
         )
     });
     let place = d
@@ -201,8 +205,7 @@ pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
 }
 
 fn unit_number(x: f64, unit: &str) -> String {
-    let unit = if unit == "1" { "" } else { unit };
-    with_unit(&number(x, 3), unit)
+    with_unit(&number(x, 3), shown_unit(unit))
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ mod live;
 mod markup;
 mod memory_figure;
 mod multiple;
+mod output_table;
 mod page;
 mod plain;
 mod script;
@@ -36,11 +37,14 @@ pub use by_trial_tables::{difference_table, run_table};
 pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
 pub use demo_page::demo_page;
 pub use diagnosis_page::diagnosis_page;
-pub use diagnosis_tables::{baseline_table, candidate_table, stage_table, transfer_table};
+pub use diagnosis_tables::{
+    baseline_table, candidate_numbers_table, candidate_table, stage_table, transfer_table,
+};
 pub use foretell_page::{foretell_page, foretell_table};
 pub use limit_table::limit_table;
 pub use markup::percent;
 pub use multiple::times;
+pub use output_table::output_table;
 pub use page::Table;
 pub use plain::{number, transfer_in_words};
 pub use sleeve_figure::{channels_figure, seconds_figure};

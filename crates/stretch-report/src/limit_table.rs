@@ -3,7 +3,7 @@
 use stretch_gap::DetectionLimit;
 
 use super::{
-    markup::{number, with_unit},
+    markup::{number, shown_unit, with_unit},
     page::Table,
 };
 
@@ -18,8 +18,8 @@ use super::{
 /// ```
 pub fn limit_table(limits: &[DetectionLimit]) -> Table {
     let row = |limit: &DetectionLimit| {
-        let unit = if limit.unit == "1" { "" } else { &limit.unit };
-        let strength = limit.strength.map(|strength| with_unit(&number(strength, 3), unit));
+        let strength =
+            limit.strength.map(|strength| with_unit(&number(strength, 3), shown_unit(&limit.unit)));
         let none = || "none within its range".to_owned();
         vec![limit.effect.clone(), limit.parameter.clone(), strength.unwrap_or_else(none)]
     };

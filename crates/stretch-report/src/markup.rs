@@ -88,6 +88,11 @@ pub(crate) fn labelled(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
+/// A unit as it is shown: that of a number without unit, `1`, is empty.
+pub(crate) fn shown_unit(unit: &str) -> &str {
+    if unit == "1" { "" } else { unit }
+}
+
 /// A quantity with its unit, on one line; the unit may be empty.
 pub(crate) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() { text.to_owned() } else { format!("{text}\u{a0}{unit}") }

@@ -10,12 +10,23 @@ const ALIKE: f64 = 0.05;
 pub(crate) const LINE: &str = "linear";
 pub(crate) const SURFACE: &str = "non-linear";
 
-/// A sentence on calibrations that err more with the better simulator; `None` where no calibration does.
+/// What the effect costs a calibration where its table does not say it: that it is too small to matter to any, or why a calibration errs more with
+/// the better simulator; `None` where the table says it all.
 pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
-    let is_worse = |e: &TransferError| e.sim_with_effect > e.sim + ALIKE;
     let kinds = [(LINE, &transfer.linear), (SURFACE, &transfer.poly13)];
-    let worse: Vec<String> =
-        kinds.iter().filter(|(_, e)| is_worse(e)).map(|(name, _)| (*name).to_owned()).collect();
+    let gain = |e: &TransferError| e.sim - e.sim_with_effect;
+    if kinds.iter().all(|(_, e)| gain(e).abs() <= ALIKE) {
+        let most = kinds.iter().map(|(_, e)| gain(e).abs()).fold(0.0, f64::max);
+        return Some(format!(
+            "What was found is too small to matter to a calibration: trained with it or without, the errors differ by {most:.2} % \
+             of full scale at most."
+        ));
+    }
+    let worse: Vec<String> = kinds
+        .iter()
+        .filter(|(_, e)| gain(e) < -ALIKE)
+        .map(|(name, _)| (*name).to_owned())
+        .collect();
     (!worse.is_empty()).then(|| {
         format!(
             "Trained with the effect, the {} calibration does worse here although the simulator is closer to the rig: a \
@@ -60,6 +71,8 @@ mod tests {
             transfer_in_words(&Transfer { linear, poly13, unit: "percent_full_scale".into() })
         };
         assert_eq!(words(error(3.0, 1.1), error(2.0, 2.01)), None);
+        let small = words(error(1.42, 1.40), error(2.0, 2.01)).expect("neither changes");
+        assert!(small.contains("too small to matter") && small.contains("0.02 %"), "{small}");
         let said = words(error(3.0, 1.1), error(2.0, 2.2)).expect("poly13 got worse");
         assert!(said.contains("the non-linear calibration"), "not beside the linear one: {said}");
     }

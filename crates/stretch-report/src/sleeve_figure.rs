@@ -50,13 +50,13 @@ pub fn channels_figure(carried: &[Carried], together: f64, unit: &str) -> String
 /// What a prior errs by against seconds of reference, as an SVG file: for wearers that it has seen and for new ones.
 ///
 /// ```
-/// use stretch_calibrate::Expected;
+/// use stretch_calibrate::{ErrorSpread, Expected};
 /// let after = |seconds: f64, rmse: f64| Expected {
 ///     seconds,
 ///     rmse_known: Some(rmse),
 ///     rmse_new: Some(2.0 * rmse),
-///     widening_known: 1.0,
-///     widening_new: 1.0,
+///     spread_known: ErrorSpread::NORMAL,
+///     spread_new: ErrorSpread::NORMAL,
 /// };
 /// let svg = stretch_report::seconds_figure(&[after(0.0, 4.0), after(60.0, 2.0)], "deg").unwrap();
 /// assert!(svg.contains("seconds of reference") && svg.contains("RMSE, deg"));

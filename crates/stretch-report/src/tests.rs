@@ -211,6 +211,14 @@ fn the_first_sentence_says_what_the_numbers_say() {
 }
 
 #[test]
+fn a_picture_stands_before_the_first_table() {
+    let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
+    let html = made.page(&context("tuesday"));
+    let [picture, table] = ["<figure>", "<table"].map(|element| html.find(element).unwrap());
+    assert!(picture < table);
+}
+
+#[test]
 fn data_without_a_number_give_notes_and_no_panic() {
     let nan = MethodErrors {
         method: "raw".into(),

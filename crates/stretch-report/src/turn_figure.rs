@@ -14,7 +14,7 @@ use super::{
     figure::{Area, Axes, Drawn, Figure, FigureSize, plot, px, stroke},
     gap_figures::{AFTER, Shown},
     live::{Packed, Panel, change},
-    markup::labelled,
+    markup::{labelled, shown_unit},
     subject::Subject,
     thin::{extent, padded},
 };
@@ -58,7 +58,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
             };
             Turned {
                 name: named(one, subject),
-                unit: unit(one).to_owned(),
+                unit: shown_unit(&one.unit).to_owned(),
                 at: one.fitted,
                 values: one.answers.iter().map(|answer| answer.value).collect(),
                 out: packed(|answer| &answer.output),
@@ -99,7 +99,7 @@ fn draw(
     curve: &[(f64, f64)],
     [x, y]: [&Range<f64>; 2],
 ) -> Drawn {
-    let labels = [&*labelled(name, unit(one)), "left, multiples of the noise"];
+    let labels = [&*labelled(name, shown_unit(&one.unit)), "left, multiples of the noise"];
     let axes = Axes::new(x.clone(), y.clone(), labels);
     plot(area, &axes, |chart| {
         let floor = [(x.start, 1.0), (x.end, 1.0)];
@@ -132,9 +132,4 @@ fn curves(responses: &Responses) -> Vec<Vec<(f64, f64)>> {
 
 fn named(one: &Response, subject: &Subject<'_>) -> String {
     format!("{}: {}", effect_in_words(&one.effect, subject.diagnosis), one.name)
-}
-
-/// Unit of the plotted parameter; empty for a number without unit.
-fn unit(one: &Response) -> &str {
-    if one.unit == "1" { "" } else { &one.unit }
 }

@@ -5,6 +5,7 @@
 use cortex_m_rt::entry;
 use stretch_core::Branch;
 use stretch_firmware::{
+    gauges,
     measure::{Answer, Length, replay},
     trial,
 };
@@ -40,6 +41,16 @@ struct FloatSd {
     domain: u8,
 }
 
+/// `stretch_reading` of several gauges.
+#[repr(C)]
+struct Gauges {
+    estimate: f32,
+    sd: f32,
+    lost: u16,
+    status: u8,
+    clamped: u8,
+}
+
 /// Room for any `stretch_state`, in words, so that it is aligned.
 const WORDS: usize = 64;
 
@@ -62,7 +73,18 @@ fn answer<E: Length>(estimate: E, status: u8, branch: u8, domain: u8) -> Answer<
 
 /// Replays a header of this type of reading.
 macro_rules! model {
-    ($symbol:ident, $name:literal, $reading:ty, $sample:ty, $input:expr) => {{
+    ($symbol:ident, $name:literal, $reading:ty, $sample:ty, $input:expr) => {
+        model!(
+            $symbol,
+            $name,
+            $reading,
+            $sample,
+            $input,
+            |sample: &$sample| *sample,
+            |r: $reading| answer(r.estimate, r.status, r.branch, r.domain)
+        )
+    };
+    ($symbol:ident, $name:literal, $reading:ty, $sample:ty, $input:expr, $pass:expr, $answer:expr) => {{
         mod linked {
             use super::*;
             unsafe extern "C" {
@@ -94,8 +116,8 @@ macro_rules! model {
             state,
             $input,
             // SAFETY: as above, and it was initialised.
-            |_, state, sample| unsafe { step(state.as_mut_ptr(), sample) },
-            |r: $reading| answer(r.estimate, r.status, r.branch, r.domain),
+            |_, state, sample| unsafe { step(state.as_mut_ptr(), $pass(&sample)) },
+            $answer,
         );
     }};
 }
@@ -115,6 +137,20 @@ macro_rules! float {
 macro_rules! float_sd {
     ($symbol:ident, $name:literal) => {
         model!($symbol, $name, FloatSd, f32, trial::volts)
+    };
+}
+
+macro_rules! gauges {
+    ($symbol:ident, $name:literal) => {
+        model!(
+            $symbol,
+            $name,
+            Gauges,
+            *const f32,
+            |code| gauges::samples(trial::volts(code)),
+            |samples: &[f32; gauges::GAUGES]| samples.as_ptr(),
+            |r: Gauges| answer(r.estimate, r.status, u8::from(r.lost != 0), r.clamped)
+        )
     };
 }
 

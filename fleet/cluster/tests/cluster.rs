@@ -20,8 +20,8 @@ use datafusion::{
 use stretch_fleet_cluster::connect;
 use tempfile::TempDir;
 
-/// Seconds after which a silent executor is given up.
-const TIMEOUT_S: u64 = 4;
+/// Seconds after which a silent executor is given up: more than one is kept waiting where others use the machine.
+const TIMEOUT_S: u64 = 15;
 
 /// No test takes longer, however slow the machine: what hangs is found out.
 const PATIENCE: Duration = Duration::from_secs(180);

@@ -16,6 +16,7 @@ const NUMBERS: usize = 10;
 /// Rows around the plot: the estimate above; time, status and what ends it below.
 const AROUND: usize = 4;
 /// Another screen, without a cursor; and back.
+#[cfg(unix)]
 const ENTER: &str = "\x1b[?1049h\x1b[?25l";
 const LEAVE: &str = "\x1b[?25h\x1b[?1049l";
 

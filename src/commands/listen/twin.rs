@@ -12,7 +12,8 @@ pub(crate) struct Twin {
     pub signal: String,
     /// Unit of the estimate; empty where the record does not say.
     pub unit: String,
-    /// The estimates that were calibrated, from and to.
+    /// The estimates that were calibrated, from and to; shown on a screen, which only Unix has.
+    #[cfg_attr(not(unix), expect(dead_code))]
     pub span: Option<[f64; 2]>,
     /// Seconds a sample, where the record says so.
     pub period_s: Option<f64>,

@@ -3,10 +3,12 @@
 use std::fmt::Write;
 
 use serde::Deserialize;
-use stretch_core::{Calibration, Hertz, RateEstimator, Stage, Volts, record};
+use stretch_core::{
+    ArrayCalibration, Calibration, Design, Hertz, RateEstimator, Stage, Volts, record,
+};
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
-    BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
+    ArrayReceptor, BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
     StretchReceptor, Withheld,
     code::{AdcCode, CodeCalibration, CodeReading, CodeReceptor, Fixed, FixedObserver},
 };
@@ -16,6 +18,9 @@ use crate::said::Said;
 #[path = "../../../firmware/src/checksum.rs"]
 #[allow(missing_docs, missing_debug_implementations, unreachable_pub)]
 mod checksum;
+#[path = "../../../firmware/src/gauges.rs"]
+#[allow(missing_docs, unreachable_pub)]
+mod gauges;
 #[path = "../../../firmware/src/trial.rs"]
 #[allow(missing_docs, unreachable_pub)]
 mod trial;
@@ -96,6 +101,15 @@ pub(crate) fn checksums() -> Result<String, Said> {
     codes(&mut out, "observer+rest-fixed", fixed);
     volts(&mut out, "diagnosed", DiagnosedReceptor::<f32>::new(&record!("diagnosed"))?);
     volts(&mut out, "diagnosed+rest", DiagnosedReceptor::<f32>::new(&record!("diagnosed-rest"))?);
+
+    let several: ArrayCalibration<{ gauges::GAUGES }> = record!("gauges");
+    let receptor = ArrayReceptor::<f32, _>::new(&several);
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial::codes() {
+        let reading = receptor.step(&mut memory, gauges::samples(trial::volts(code)));
+        checksum.answer(gauges::answer(reading));
+    }
+    line(&mut out, "gauges", checksum);
     Ok(out)
 }
 

@@ -60,8 +60,29 @@ pub fn make_set(
     seed: u64,
     private: Option<FormFamily>,
 ) -> Result<String, BlindError> {
-    let sealed = sealed_beside(set);
-    for path in [set, &sealed] {
+    make_set_apart(plant, (set, &sealed_beside(set)), cases, seed, private)
+}
+
+/// As [`make_set`], with the labels in a folder that is named: both may be drafts that get their names later.
+///
+/// # Errors
+/// As [`make_set`].
+///
+/// ```
+/// let dir = tempfile::tempdir()?;
+/// let folders = (dir.path().join("draft"), dir.path().join("labels"));
+/// stretch_blind::make_set_apart(stretch_blind::PlantName::Servo, (&folders.0, &folders.1), 5, 7, None)?;
+/// assert!(folders.0.join("set.toml").is_file() && folders.1.join("truth.json").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn make_set_apart(
+    plant: PlantName,
+    (set, sealed): (&Path, &Path),
+    cases: usize,
+    seed: u64,
+    private: Option<FormFamily>,
+) -> Result<String, BlindError> {
+    for path in [set, sealed] {
         if path.read_dir().is_ok_and(|mut inside| inside.next().is_some()) {
             return Err(BlindError::Occupied { path: path.to_path_buf() });
         }
@@ -74,7 +95,7 @@ pub fn make_set(
             let reason = "the rig's forms have families of its own: leave it out".to_owned();
             return Err(BlindError::Field { field: "private".to_owned(), reason });
         }
-        PlantName::Rig => return finish(set, &rig::make_rig(set, cases, seed)?),
+        PlantName::Rig => return finish((set, sealed), &rig::make_rig(set, cases, seed)?),
     };
     for (name, text) in SIMULATORS {
         write(&set.join("simulator").join(name), text)?;
@@ -92,12 +113,12 @@ pub fn make_set(
     let place = |stage: usize| spec.stages[stage].name.to_owned();
     let candidates = spec.candidates.iter().map(|c| (c.name.to_owned(), place(c.stage))).collect();
     let plant = spec.name.to_owned();
-    finish(set, &OpenTruth { schema: 1, plant, seed, candidates, cases: labels? })
+    finish((set, sealed), &OpenTruth { schema: 1, plant, seed, candidates, cases: labels? })
 }
 
 /// Seals the labels, and writes what a solver may know of the set: plant, hash, names.
-fn finish(set: &Path, truth: &OpenTruth) -> Result<String, BlindError> {
-    let hash = truth.seal(&sealed_beside(set))?;
+fn finish((set, sealed): (&Path, &Path), truth: &OpenTruth) -> Result<String, BlindError> {
+    let hash = truth.seal(sealed)?;
     write(&set.join("seal.sha256"), &format!("{hash}  truth.json\n"))?;
     let mut text = format!("schema = 1\nplant = {:?}\nset = \"{hash}\"\n", truth.plant);
     let _ = writeln!(text, "cases = {:?}", truth.cases.keys().collect::<Vec<_>>());

@@ -16,4 +16,4 @@ mod thermal;
 mod written;
 pub use family::{Form, FormFamily};
 pub use label::{Level, OpenLabel, OpenTruth, sealed_beside};
-pub use make::{PlantName, make_set};
+pub use make::{PlantName, make_set, make_set_apart};

@@ -9,10 +9,27 @@ use crate::judge::{Judge, first_seconds};
 
 /// When a channel is lost, s.
 const AT_S: f64 = 75.0;
-const FAULTS: [&str; 5] = ["cut off", "missing", "sticks", "saturates", "slips"];
+/// How soon a loss is to be found, s.
+const SOON_S: f64 = 0.1;
+/// A fault matters once the channel is off by this share of its range.
+const MATTERS: f64 = 0.02;
+const FAULTS: [&str; 6] =
+    ["cut off", "missing", "sticks", "saturates", "slips", "slips by 0.3 of its session's range"];
+
+/// What became of the cases of a fault.
+#[derive(Default, Clone)]
+struct Found {
+    cases: usize,
+    soon: usize,
+    /// Cases in which the channel goes off, and of these the ones found in time, from that moment.
+    matter: usize,
+    soon_once_it_matters: usize,
+    another: usize,
+    ratios: Vec<f64>,
+}
 
 pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
-    let mut found = vec![(0, 0, 0, Vec::new()); FAULTS.len()];
+    let mut found = vec![Found::default(); FAULTS.len()];
     let (mut alarms, mut hours) = (0, 0.0);
     for wearer in judge.wearers() {
         let prior = judge.without(&wearer)?.all;
@@ -22,44 +39,85 @@ pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
             let SleeveCalibration::Many(calibration) = updated.calibration else { continue };
             let trial = &worn.trials[0];
             let applied = apply_array(&calibration, trial)?;
-            alarms += applied.losses.iter().filter(|(_, at_s, _)| *at_s >= 60.0).count();
+            for (channel, at_s, loss) in applied.losses.iter().filter(|l| l.1 >= 60.0) {
+                println!("false alarm: {}, channel {channel}, {at_s} s: {loss}", worn.name);
+                alarms += 1;
+            }
             hours += (trial.duration_s() - 60.0) / 3600.0;
             if applied.losses.iter().any(|(_, at_s, _)| *at_s < AT_S) {
                 continue;
             }
-            for (k, fault) in FAULTS.iter().enumerate() {
+            for (own, fault) in found.iter_mut().zip(FAULTS) {
                 for channel in 0..calibration.channels.len() {
-                    let broken = with_fault(trial, &calibration, channel, fault);
-                    let applied = apply_array(&calibration, &broken)?;
-                    let own = &mut found[k];
-                    own.0 += 1;
-                    match applied.losses.iter().find(|(_, at_s, _)| *at_s >= AT_S) {
-                        Some((lost, at_s, _)) if *lost == channel => {
-                            own.1 += usize::from(*at_s <= AT_S + 0.1);
-                        }
-                        Some(_) => own.2 += 1,
-                        None => {}
-                    }
-                    let error = rmse(&applied.readings, trial, &judge.set.reference)?;
-                    own.3.push(
-                        error / alone_without(&calibration, trial, channel, &judge.set.reference)?,
-                    );
+                    own.add(judge, &calibration, trial, (channel, fault))?;
                 }
             }
         }
     }
     println!(
-        "\n### Lost channels\n\n| fault | cases | found within 100 ms | another one blamed | error to that without the channel, median |"
+        "\n### Lost channels\n\n| fault | cases | found within 100 ms | cases in which it matters | found within 100 ms of that | another one blamed | error to that without the channel, median | 0.95 quantile |"
     );
-    println!("| --- | --- | --- | --- | --- |");
-    for (fault, (cases, soon, wrong, mut ratios)) in FAULTS.iter().zip(found) {
-        ratios.sort_by(f64::total_cmp);
-        let share = |n: usize| n as f64 / cases as f64;
-        let middle = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
-        println!("| {fault} | {cases} | {:.3} | {:.3} | {middle:.3} |", share(soon), share(wrong));
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+    for (fault, mut own) in FAULTS.iter().zip(found) {
+        own.ratios.sort_by(f64::total_cmp);
+        let share = |n: usize, of: usize| n as f64 / of as f64;
+        let at = |share: f64| own.ratios[((own.ratios.len() - 1) as f64 * share) as usize];
+        println!(
+            "| {fault} | {} | {:.3} | {} | {:.3} | {:.3} | {:.3} | {:.3} |",
+            own.cases,
+            share(own.soon, own.cases),
+            own.matter,
+            share(own.soon_once_it_matters, own.matter),
+            share(own.another, own.cases),
+            at(0.5),
+            at(0.95)
+        );
     }
     println!("\nfalse alarms: {alarms} in {hours:.2} hours of five channels");
     Ok(())
+}
+
+impl Found {
+    fn add(
+        &mut self,
+        judge: &Judge,
+        calibration: &ArrayCalibration<ROOM>,
+        trial: &Trial,
+        (channel, fault): (usize, &str),
+    ) -> anyhow::Result<()> {
+        let broken = with_fault(trial, calibration, channel, fault);
+        let matters_at_s = matters_at_s(calibration, trial, &broken, channel)?;
+        let applied = apply_array(calibration, &broken)?;
+        self.cases += 1;
+        self.matter += usize::from(matters_at_s.is_some());
+        match applied.losses.iter().find(|(_, at_s, _)| *at_s >= AT_S) {
+            Some((lost, at_s, _)) if *lost == channel => {
+                self.soon += usize::from(*at_s <= AT_S + SOON_S + 1e-9);
+                let in_time = matters_at_s.is_some_and(|m| *at_s <= m + SOON_S + 1e-9);
+                self.soon_once_it_matters += usize::from(in_time);
+            }
+            Some(_) => self.another += 1,
+            None => {}
+        }
+        let reference = &judge.set.reference;
+        let error = rmse(&applied.readings, trial, reference)?;
+        self.ratios.push(error / alone_without(calibration, trial, channel, reference)?);
+        Ok(())
+    }
+}
+
+/// When a broken channel is first off by [`MATTERS`], or missing.
+fn matters_at_s(
+    calibration: &ArrayCalibration<ROOM>,
+    trial: &Trial,
+    broken: &Trial,
+    channel: usize,
+) -> anyhow::Result<Option<f64>> {
+    let own = &calibration.channels[channel];
+    let least = MATTERS * (own.state_max[0] - own.state_min[0]);
+    let (is, was) = (broken.require(own.signal.as_str())?, trial.require(own.signal.as_str())?);
+    let at = is.iter().zip(was).position(|(is, was)| is.is_nan() || (is - was).abs() > least);
+    Ok(at.map(|at| trial.time_s[at]))
 }
 
 fn with_fault(
@@ -76,6 +134,9 @@ fn with_fault(
     };
     let at = trial.time_s.partition_point(|t| *t < AT_S);
     let last = values.values[at];
+    let (least, most) = values.values[..at]
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     for value in &mut values.values[at..] {
         *value = match fault {
             // a gauge that is cut off reads as an open divider: far above its range
@@ -84,6 +145,7 @@ fn with_fault(
             "sticks" => last,
             // the converter ends where the signal is now
             "saturates" => value.min(last),
+            "slips by 0.3 of its session's range" => *value + 0.3 * (most - least),
             _ => *value + 0.3 * (high - low),
         };
     }

@@ -16,8 +16,8 @@ pub(crate) const OWN_ALL: &str = "own calibration, all";
 /// Errors of one session.
 pub(crate) struct Row {
     pub(crate) errors: Vec<(String, f64)>,
-    /// Samples within the 95 % interval, of all.
-    pub(crate) inside: (f64, f64),
+    /// Share of samples within the 95 % interval.
+    pub(crate) inside: Vec<(String, f64)>,
 }
 
 impl Row {
@@ -140,7 +140,7 @@ impl Judge {
             let choice = choose_model(&short, &options)?;
             classic("auto, 30 s", &Options { model: choice.model, ..options.clone() });
         }
-        let mut inside = (0.0, 0.0);
+        let mut inside = Vec::new();
         let many = self.set.signals.len() > 1;
         let others: Vec<Session> = self
             .sessions
@@ -193,12 +193,10 @@ impl Judge {
                             f64::NAN
                         }
                     };
-                    if let (Ok(updated), true) = (
-                        &updated,
-                        who == "new wearer" && seconds == half && (what == "all" || !many),
-                    ) {
-                        inside =
-                            self.inside(&updated.calibration, worn, updated.summary.half_width_95)?;
+                    if let Ok(updated) = &updated {
+                        let half_width = updated.summary.half_width_95;
+                        let share = self.inside(&updated.calibration, worn, half_width)?;
+                        inside.push((format!("prior, {what}, {who}, {seconds} s"), share));
                     }
                     errors.push((format!("prior, {what}, {who}, {seconds} s"), error));
                 }
@@ -265,9 +263,9 @@ impl Judge {
         calibration: &SleeveCalibration,
         worn: &Worn,
         half_width: f64,
-    ) -> anyhow::Result<(f64, f64)> {
+    ) -> anyhow::Result<f64> {
         let found = self.differences(calibration, worn)?;
-        Ok((found.iter().filter(|e| e.abs() <= half_width).count() as f64, found.len() as f64))
+        Ok(found.iter().filter(|e| e.abs() <= half_width).count() as f64 / found.len() as f64)
     }
 }
 

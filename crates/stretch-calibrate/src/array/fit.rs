@@ -9,8 +9,13 @@ use super::{
     carried::{Carried, carried},
     linear::{Linear, SleeveCalibration},
     parted::parted,
+    shifts::shifts,
+    still::Still,
     watch::watched,
 };
+
+/// A sentence about data that do not say what difference between channels is usual.
+const TOO_SHORT: &str = "too little was recorded to say when a gauge has shifted against the others: that takes a minute or more";
 
 /// Options of [`calibrate_array`].
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,9 +96,14 @@ pub fn calibrate_array(
         gram,
         variance: held.rmse * held.rmse,
         samples: count as u64,
-        still_samples: channels.still_samples(),
+        still: Still::of(&channels),
     };
-    let watched = watched(&linear, Some(&channels))?;
+    let shifts = shifts(&parted, &channels, &linear, &held.ridges)?;
+    let mut notes = channels.notes.clone();
+    if shifts.is_none() && options.signals.len() > 1 {
+        notes.push(TOO_SHORT.into());
+    }
+    let watched = watched(&linear, Some(&channels), shifts)?;
     let mut columns: Vec<&str> = options.signals.iter().map(String::as_str).collect();
     columns.push(&options.reference);
     let provenance = Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str()))
@@ -102,6 +112,6 @@ pub fn calibrate_array(
         calibration: linear.record(&watched, provenance)?,
         carried,
         rmse: held.rmse * unit,
-        notes: channels.notes,
+        notes,
     })
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use stretch_core::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, Calibration, CalibrationSpec,
-    FitSummary, HistoryMap, Interval, Label, Model, Normalisation, Polarity, Provenance, Range,
-    RangeSpec, RateEstimator, RateSource, SampleRate, Schema, Target, Values,
+    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, Calibration,
+    CalibrationSpec, FitSummary, HistoryMap, Interval, Label, Model, Normalisation, Polarity,
+    Provenance, Range, RangeSpec, RateEstimator, RateSource, SampleRate, Schema, Target, Values,
 };
 
 use crate::{
@@ -13,24 +13,27 @@ use crate::{
     positive::{cholesky, term_correlation},
 };
 
+use super::still::Still;
+
 /// Room for channels in the records that this program holds.
 pub const ROOM: usize = 16;
 /// Ridge of the regression of a lost channel on those that remain, as a share of a term's own power.
 const RIDGE: f64 = 1e-6;
 
-/// Memory states whose sum is the fast part: those up to 0.3 s.
-pub(crate) const FAST_STATES: u8 = 2;
+/// Memory states whose sum is the fast part of a channel: what it changed over 0.05 s.
+pub(crate) const FAST_STATES: usize = 1;
 
 /// What is watched of each channel.
 pub(crate) struct Watched {
     pub(crate) channels: Vec<WatchedChannel>,
+    pub(crate) shifts: Option<ArrayShifts<ROOM>>,
 }
 
 pub(crate) struct WatchedChannel {
     pub(crate) possible: Interval,
     pub(crate) still_samples: u16,
     pub(crate) follows: Vec<f64>,
-    pub(crate) largest_surprise: f64,
+    pub(crate) largest_jump: f64,
 }
 
 /// A record: of one gauge, or of several.
@@ -43,6 +46,7 @@ pub enum SleeveCalibration {
 }
 
 /// Coefficients of the terms of a [`Bank`], in normalised target, and what they were fitted to.
+#[derive(Clone)]
 pub(crate) struct Linear {
     pub(crate) signals: Vec<String>,
     pub(crate) reference: String,
@@ -57,7 +61,7 @@ pub(crate) struct Linear {
     /// Mean squared error that is expected, in normalised target.
     pub(crate) variance: f64,
     pub(crate) samples: u64,
-    pub(crate) still_samples: Vec<u32>,
+    pub(crate) still: Still,
 }
 
 impl Linear {
@@ -111,7 +115,7 @@ impl Linear {
     }
 
     /// `reference = zero + gain * normalised target`.
-    fn zero_and_gain(&self) -> (f64, f64) {
+    pub(crate) fn zero_and_gain(&self) -> (f64, f64) {
         let gain = self.target_range.span() * self.target.reference_per_target();
         (self.target.to_reference(self.target_range.offset()), gain)
     }
@@ -193,7 +197,7 @@ impl Linear {
                 possible: own.possible,
                 still_samples: own.still_samples,
                 follows: Values::new("follows", &own.follows)?,
-                largest_surprise: own.largest_surprise,
+                largest_jump: own.largest_jump,
             })
         };
         let ends = [self.estimate.min, self.estimate.max];
@@ -212,7 +216,7 @@ impl Linear {
             all: self.gains(&everything)?,
             without: (0..count).map(|k| self.gains(&lost(k))).collect::<Result<_, _>>()?,
             alone: (0..count).map(|k| self.gains(&[k])).collect::<Result<_, _>>()?,
-            fast_states: FAST_STATES,
+            shifts: watched.shifts.clone(),
             provenance,
         })?)
     }

@@ -10,12 +10,16 @@ mod fit;
 mod linear;
 mod parted;
 mod record;
+mod shifts;
+mod still;
 mod watch;
 
 pub use apply::{AppliedArray, apply_array};
 pub use carried::Carried;
 pub use fit::{ArrayFit, ArrayOptions, calibrate_array};
 pub use linear::{ROOM, SleeveCalibration};
+pub use record::{array_bytes, array_seal};
 
-pub(crate) use linear::{FAST_STATES, Linear};
+pub(crate) use linear::Linear;
+pub(crate) use still::Still;
 pub(crate) use watch::watched;

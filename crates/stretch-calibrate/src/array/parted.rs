@@ -27,8 +27,24 @@ pub(crate) struct Parted {
     pub(crate) terms: usize,
     /// Factors of the parts' rows, and of each part's with the samples next to it.
     pub(crate) whole: LinearFactor,
-    others: Vec<LinearFactor>,
+    pub(crate) others: Vec<LinearFactor>,
+    pub(crate) places: Places,
     pub(crate) parts: Vec<(f64, LinearFactor)>,
+}
+
+/// Which part a sample is in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Places {
+    by_trial: bool,
+    count: usize,
+    total: usize,
+}
+
+impl Places {
+    /// The part of a sample of a trial, which is the `at`-th of all stretches.
+    pub(crate) fn of(&self, trial: usize, at: usize) -> usize {
+        if self.by_trial { trial } else { at * self.count / self.total }
+    }
 }
 
 /// The rows in parts; `None` where a part has fewer rows than terms.
@@ -47,11 +63,11 @@ pub(crate) fn parted(
         (0..count).map(|_| [0; 3].map(|_| RowAccumulator::new(terms))).collect();
     let mut rows = vec![0.0; count];
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-    let mut before = 0;
-    for stretch in &channels.stretches {
+    let places = Places { by_trial: trials >= 3, count, total };
+    for (before, stretch) in channels.placed() {
         for sample in stretch.warmed_up() {
             let at = before + sample;
-            let part = if trials >= 3 { stretch.trial } else { at * count / total };
+            let part = places.of(stretch.trial, at);
             let (from, to) = (part * total / count, (part + 1) * total / count);
             let place = match gap {
                 0 => 1,
@@ -63,7 +79,6 @@ pub(crate) fn parted(
             sums[part][place].push(&row, normalised(stretch.reference[sample]));
             rows[part] += 1.0;
         }
-        before += stretch.len();
     }
     let factors: Vec<[LinearFactor; 3]> =
         sums.into_iter().map(|own| own.map(RowAccumulator::factor)).collect();
@@ -74,7 +89,7 @@ pub(crate) fn parted(
         0 => leave_one_out(&parts.iter().map(|(_, f)| f.clone()).collect::<Vec<_>>())?.1,
         _ => (0..count).map(|left| without(&factors, left)).collect::<Option<_>>()?,
     };
-    Some(Parted { terms, whole, others, parts })
+    Some(Parted { terms, whole, others, places, parts })
 }
 
 /// The factor of all parts but one and the ends of its neighbours.

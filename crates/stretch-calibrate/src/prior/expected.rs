@@ -1,6 +1,6 @@
 //! What a prior errs by on sessions that were left out, by seconds of reference.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::positive::inverse;
@@ -23,44 +23,88 @@ pub struct Expected {
     pub rmse_known: Option<f64>,
     /// Root mean square error where the topmost of sensor and wearer was not seen.
     pub rmse_new: Option<f64>,
-    /// Mean squared error over the variance that the model predicts, as `rmse_known`.
-    pub widening_known: f64,
-    /// Mean squared error over the variance that the model predicts, as `rmse_new`.
-    pub widening_new: f64,
+    /// How errors were spread, as `rmse_known`.
+    pub spread_known: ErrorSpread,
+    /// How errors were spread, as `rmse_new`.
+    pub spread_new: ErrorSpread,
 }
 
-/// The table of a prior. `left` holds the prior of each session without it; `unit` is what a normalised target is in
-/// the reference's unit.
+/// How errors on sessions left out were spread about what the model predicts.
+///
+/// Of each session the ratio `r` of its mean squared error to the predicted variance is known; errors of a session count
+/// as normal. Half of the interval that holds 95 % of single estimates is the `c` predicted standard deviations for
+/// which the mean of `erf(c/sqrt(2 r))` over the sessions is 0.95.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ErrorSpread {
+    /// Mean ratio of the mean squared error to the predicted variance.
+    pub widening: f64,
+    /// Half of the 95 % interval, in predicted standard deviations.
+    pub multiple_95: f64,
+}
+
+impl ErrorSpread {
+    /// What holds where no session was left out: errors are as predicted, and normal.
+    pub const NORMAL: Self = Self { widening: 1.0, multiple_95: 1.96 };
+
+    /// The spread of sessions with these ratios.
+    fn of(ratios: &[f64]) -> Self {
+        if ratios.is_empty() {
+            return Self::NORMAL;
+        }
+        let mean = |f: &dyn Fn(f64) -> f64| {
+            ratios.iter().map(|r| f(r.max(f64::MIN_POSITIVE))).sum::<f64>() / ratios.len() as f64
+        };
+        let inside = |c: f64| mean(&|r| libm::erf(c / (2.0 * r).sqrt()));
+        // no session needs more than the worst one does
+        let worst = ratios.iter().copied().fold(0.0, f64::max).sqrt() * 1.96;
+        let (mut low, mut high) = (0.0, worst);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if inside(middle) < 0.95 { low = middle } else { high = middle }
+        }
+        Self { widening: mean(&|r| r), multiple_95: high }
+    }
+}
+
+/// The mean of `X'X` over a sample of a session that is to come: the prior's and that of some seconds of the session, of
+/// which a minute says as much of how its channels move together as the prior does.
+pub(crate) fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64) -> DMatrix<f64> {
+    let weight = seconds / 60.0;
+    (prior + own * weight) / (1.0 + weight)
+}
+
+/// The table of a prior. `left` holds the prior of each session without it; `gram` is the mean of `X'X` over a sample and
+/// `unit` what a normalised target is in the reference's unit.
 pub(crate) fn expected(
     parts: &[Vec<Leaf>],
     left: &[[Option<Normal>; 2]],
-    noise: f64,
+    (noise, gram): (f64, &DMatrix<f64>),
     unit: f64,
 ) -> Vec<Expected> {
     let seconds = [0.0].into_iter().chain(PARTS_S);
     let one = |(used, seconds): (usize, f64)| {
-        let judge = |which: usize| judged(parts, left, which, used, noise);
+        let judge = |which: usize| judged(parts, left, which, used, (noise, gram));
         let (known, new) = (judge(0), judge(1));
         Expected {
             seconds,
-            rmse_known: known.map(|(squares, _)| squares.sqrt() * unit),
-            rmse_new: new.map(|(squares, _)| squares.sqrt() * unit),
-            widening_known: known.map_or(1.0, |(_, ratio)| ratio.max(1.0)),
-            widening_new: new.map_or(1.0, |(_, ratio)| ratio.max(1.0)),
+            rmse_known: known.0.map(|squares| squares.sqrt() * unit),
+            rmse_new: new.0.map(|squares| squares.sqrt() * unit),
+            spread_known: ErrorSpread::of(&known.1),
+            spread_new: ErrorSpread::of(&new.1),
         }
     };
     seconds.enumerate().map(one).collect()
 }
 
-/// Mean squared error, and its mean ratio to the predicted variance, after the first `used` parts.
+/// Mean squared error, and its ratio to the predicted variance for each session, after the first `used` parts.
 fn judged(
     parts: &[Vec<Leaf>],
     left: &[[Option<Normal>; 2]],
     which: usize,
     used: usize,
-    noise: f64,
-) -> Option<(f64, f64)> {
-    let (mut squares, mut ratio, mut count) = (0.0, 0.0, 0.0);
+    (noise, gram): (f64, &DMatrix<f64>),
+) -> (Option<f64>, Vec<f64>) {
+    let (mut squares, mut ratios) = (0.0, Vec::new());
     for (parts, left) in parts.iter().zip(left) {
         // a short session is judged on its end, for as many seconds as lie before it
         let judged = parts.iter().rposition(|part| part.count >= LEAST_COUNT);
@@ -68,15 +112,20 @@ fn judged(
             continue;
         };
         let rest = &parts[at];
-        let posterior = parts[..used]
+        let seen = parts[..used]
             .iter()
-            .try_fold(prior.clone(), |normal, part| after(&normal, part, noise))?;
+            .try_fold(prior.clone(), |normal, part| after(&normal, part, noise));
+        let Some(posterior) = seen else { continue };
         let error = rest.squares_at(&posterior.mean) / rest.count;
         squares += error;
-        ratio += error / (rest.variance(&posterior) / rest.count + noise);
-        count += 1.0;
+        // what an update with these seconds would predict, for the ratio is what its prediction is multiplied by
+        let count: f64 = parts[..used].iter().map(|part| part.count).sum();
+        let sum = parts[..used].iter().fold(gram * 0.0, |sum, part| sum + &part.gram);
+        let gram = mixed_gram(gram, &(sum / count.max(1.0)), count);
+        ratios.push(error / (posterior.covariance.component_mul(&gram).sum() + noise));
     }
-    (count > 0.0).then(|| (squares / count, ratio / count))
+    let count = ratios.len() as f64;
+    ((count > 0.0).then(|| squares / count), ratios)
 }
 
 /// A distribution after the rows of a part.
@@ -85,4 +134,20 @@ fn after(normal: &Normal, part: &Leaf, noise: f64) -> Option<Normal> {
     let covariance = inverse(&(&precision + &part.gram / noise))?;
     let pull: DVector<f64> = &precision * &normal.mean + &part.cross / noise;
     Some(Normal { mean: &covariance * pull, covariance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_of_equal_sessions_is_normal_and_of_unequal_ones_holds_the_same_share() {
+        let equal = ErrorSpread::of(&[0.25; 7]);
+        assert!((equal.multiple_95 - 0.98).abs() < 1e-3 && equal.widening == 0.25, "{equal:?}");
+        let unequal = ErrorSpread::of(&[0.1, 0.1, 0.1, 1.7]);
+        let inside = |r: f64| libm::erf(unequal.multiple_95 / (2.0 * r).sqrt());
+        assert!(((3.0 * inside(0.1) + inside(1.7)) / 4.0 - 0.95).abs() < 1e-9);
+        assert!((unequal.widening - 0.5).abs() < 1e-12);
+        assert_eq!(ErrorSpread::of(&[]), ErrorSpread::NORMAL);
+    }
 }

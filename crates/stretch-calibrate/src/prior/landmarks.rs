@@ -5,13 +5,15 @@
 
 use stretch_core::Interval;
 
-use crate::{array::FAST_STATES, channels::Channels};
+use crate::channels::Channels;
 
 pub(crate) const LANDMARKS: usize = 3;
 /// Names, in their order.
 pub(crate) const NAMES: [&str; LANDMARKS] = ["low end", "high end", "rest"];
 const END_SHARE: f64 = 0.05;
 const STILL_SHARE: f64 = 0.1;
+/// Memory states whose sum is what a channel moved of late: those up to 0.3 s.
+const MOVED_STATES: usize = 2;
 
 /// A sample: stretch and place.
 pub(crate) type Place = (usize, usize);
@@ -38,9 +40,7 @@ pub(crate) fn landmarks(
     let spans: Vec<f64> = channels.bank().domains.iter().map(|d| span(d[0])).collect();
     let motion = |&(i, k): &Place| -> f64 {
         let states = channels.stretches[i].at(k).zip(&spans);
-        states
-            .map(|(s, span)| (s[1..=usize::from(FAST_STATES)].iter().sum::<f64>() / span).powi(2))
-            .sum()
+        states.map(|(s, span)| (s[1..=MOVED_STATES].iter().sum::<f64>() / span).powi(2)).sum()
     };
     [
         least(&places, END_SHARE, &level),

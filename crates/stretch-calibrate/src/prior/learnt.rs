@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use stretch_core::{Interval, Normalisation, Range, RangeSpec, Target};
 use stretch_data::{listed, unit_of};
 
-use crate::{CalibrateError, bank::Bank, series::extent};
+use crate::{CalibrateError, array::Still, bank::Bank, series::extent};
 
 use super::{
     expected::{Expected, expected},
@@ -50,8 +50,8 @@ pub struct Prior {
     pub(crate) noise: f64,
     /// Mean of `X'X` over a sample.
     pub(crate) gram: DMatrix<f64>,
-    /// Of each channel the most equal samples in a row that were seen.
-    pub(crate) still_samples: Vec<u32>,
+    /// The longest runs of equal samples that were seen.
+    pub(crate) still: Still,
     /// Of each session its path and landmarks, in normalised target.
     pub(crate) landmarks: Vec<(Vec<String>, [f64; LANDMARKS])>,
 }
@@ -104,7 +104,7 @@ impl Prior {
         let spread = Spread { levels, noise };
         let known = tree.known(&spread).ok_or_else(undetermined)?;
         let left = tree.left_out(&spread).ok_or_else(undetermined)?;
-        let still = |k: usize| sessions.iter().map(|s| s.still_samples[k]).max().unwrap_or(1);
+        let still = sessions.iter().map(Session::still).reduce(|all, one| all.and(&one));
         let count: f64 = leaves.iter().map(|leaf| leaf.count).sum();
         let gram = leaves
             .iter()
@@ -115,7 +115,7 @@ impl Prior {
             reference: first.reference.clone(),
             sample_rate_hz: first.sample_rate_hz,
             sessions: sessions.len(),
-            expected: expected(&parts, &left, noise, unit),
+            expected: expected(&parts, &left, (noise, &gram), unit),
             target,
             target_range,
             estimate: Interval {
@@ -127,7 +127,7 @@ impl Prior {
             levels: spread.levels,
             noise,
             gram,
-            still_samples: (0..channels).map(still).collect(),
+            still: still.ok_or_else(undetermined)?,
             landmarks: normalised_landmarks(sessions, (target, target_range)),
         })
     }

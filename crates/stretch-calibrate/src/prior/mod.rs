@@ -16,7 +16,7 @@ mod tests;
 mod tree;
 mod update;
 
-pub use expected::Expected;
+pub use expected::{ErrorSpread, Expected};
 pub use learnt::Prior;
 pub use renew::{Assumed, RenewOptions, RenewSummary, Renewed};
 pub use session::{Session, SessionOptions};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use stretch_core::{Interval, Range, Target};
 use stretch_files::read_whole;
 
-use crate::{CalibrateError, bank::Bank, digest};
+use crate::{CalibrateError, array::Still, bank::Bank, digest};
 
 use super::{
     expected::Expected,
@@ -35,6 +35,7 @@ struct Record {
     noise: f64,
     gram: Vec<f64>,
     still_samples: Vec<u32>,
+    still_seen: u64,
     landmarks: Vec<Landmarks>,
 }
 
@@ -100,7 +101,8 @@ fn to_json(prior: &Prior) -> Result<String, CalibrateError> {
         levels: prior.levels.iter().map(packed).collect(),
         noise: prior.noise,
         gram: packed(&prior.gram),
-        still_samples: prior.still_samples.clone(),
+        still_samples: prior.still.longest.clone(),
+        still_seen: prior.still.samples,
         landmarks: prior
             .landmarks
             .iter()
@@ -203,7 +205,7 @@ fn read(path: &Path) -> Result<Prior, CalibrateError> {
         estimate: record.estimate,
         domains: record.domains,
         noise: record.noise,
-        still_samples: record.still_samples,
+        still: Still { longest: record.still_samples, samples: record.still_seen },
         landmarks: record.landmarks.into_iter().map(|l| (l.path, l.at)).collect(),
     })
 }

@@ -139,10 +139,10 @@ impl Prior {
         let mut notes = channels.notes.clone();
         notes.extend(self.whom(&options.path, known));
         let predicted = after.covariance.component_mul(&self.gram).sum() + self.noise;
-        let variance = predicted * self.widening(0.0, known > 0);
+        let variance = predicted * self.spread(0.0, known > 0).widening;
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
         let linear = crate::array::Linear { signals: signals.clone(), ..linear };
-        let watched = watched(&linear, Some(&channels))?;
+        let watched = watched(&linear, Some(&channels), None)?;
         let names = trials.iter().map(|trial| trial.name.as_str());
         let columns: Vec<&str> = signals.iter().map(String::as_str).collect();
         let provenance = Provenance::new(&options.date, names)

@@ -7,6 +7,7 @@ use stretch_data::Trial;
 
 use crate::{
     CalibrateError,
+    array::Still,
     bank::Bank,
     channels::Channels,
     least_squares::{LinearFactor, RowAccumulator},
@@ -74,7 +75,7 @@ pub struct Session {
     pub sample_rate_hz: f64,
     pub(crate) domains: Vec<Vec<Interval>>,
     pub(crate) reference_range: Interval,
-    /// Of each channel the most equal samples in a row.
+    /// Of each channel the most equal samples in a row, counted while another one changes.
     pub(crate) still_samples: Vec<u32>,
     /// The reference at the [landmarks](super::landmarks).
     pub(crate) landmarks: [f64; LANDMARKS],
@@ -116,7 +117,7 @@ impl Session {
             sample_rate_hz: channels.sample_rate.hz(),
             domains: channels.bank().domains,
             reference_range,
-            still_samples: channels.still_samples(),
+            still_samples: Still::of(&channels).longest,
             landmarks: at_landmarks(&channels),
             parts: parts(&channels),
         };
@@ -150,6 +151,12 @@ impl Session {
             parts: parts.ok_or_else(wrong)?,
             ..self.clone()
         })
+    }
+
+    /// The longest runs of equal samples.
+    pub(crate) fn still(&self) -> Still {
+        let samples = self.parts.iter().map(|part| part.rows).sum();
+        Still { longest: self.still_samples.clone(), samples }
     }
 
     /// Correlation of each channel with the reference.

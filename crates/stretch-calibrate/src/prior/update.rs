@@ -7,7 +7,7 @@ use stretch_data::{Trial, unit_of};
 
 use crate::{
     CalibrateError, SleeveCalibration,
-    array::{Linear, watched},
+    array::{Linear, Still, watched},
     bank::Bank,
     channels::{Channels, correlation},
     least_squares::RowAccumulator,
@@ -16,7 +16,7 @@ use crate::{
 };
 
 use super::{
-    expected::Expected,
+    expected::{ErrorSpread, Expected, mixed_gram},
     learnt::{Prior, correlated, paths_in_words, turned},
     tree::Normal,
 };
@@ -65,7 +65,7 @@ pub struct UpdateSummary {
     /// Expected root mean square error, in the reference's unit: what the model predicts, widened by what it missed on
     /// sessions left out.
     pub expected_rmse: f64,
-    /// Half of the 95 % interval of a single estimate, in the reference's unit.
+    /// Half of the interval that held 95 % of single estimates on sessions left out, in the reference's unit.
     pub half_width_95: f64,
 }
 
@@ -108,7 +108,8 @@ impl Prior {
             .as_ref()
             .map_or(0.0, |channels| channels.reference().count() as f64 / self.sample_rate_hz);
         let predicted = posterior.covariance.component_mul(&gram).sum() + self.noise;
-        let variance = predicted * self.widening(seconds, known > 0);
+        let spread = self.spread(seconds, known > 0);
+        let variance = predicted * spread.widening;
         let unit = self.unit_of_target();
         let expected_rmse = variance.sqrt() * unit;
         let names = trials.iter().map(|trial| trial.name.as_str());
@@ -120,16 +121,17 @@ impl Prior {
             signals: signals.clone(),
             reference: reference.clone(),
             samples: channels.as_ref().map_or(0, |c| c.reference().count() as u64),
+            still: channels.iter().fold(self.still.clone(), |all, own| all.and(&Still::of(own))),
             ..self.linear(&posterior.mean, gram, variance)
         };
-        let watched = watched(&linear, channels.as_ref())?;
+        let watched = watched(&linear, channels.as_ref(), None)?;
         Ok(Updated {
             calibration: linear.record(&watched, provenance)?,
             summary: UpdateSummary {
                 seconds,
                 known,
                 expected_rmse,
-                half_width_95: 1.96 * expected_rmse,
+                half_width_95: spread.multiple_95 * predicted.sqrt() * unit,
             },
             notes,
         })
@@ -153,7 +155,7 @@ impl Prior {
             weights: weights.iter().copied().collect(),
             gram,
             variance,
-            still_samples: self.still_samples.clone(),
+            still: self.still.clone(),
             samples: 0,
         }
     }
@@ -196,17 +198,17 @@ impl Prior {
         let mean = DVector::from_vec(solution.weights);
         let triangle = own.factor().triangle;
         let all = triangle.tr_mul(&triangle);
-        // a minute of data says as much of how the channels move together as the prior does
-        let weight = count / self.sample_rate_hz / 60.0;
-        let mixed = &self.gram + all.view((0, 0), (terms, terms)) * (weight / f64::max(count, 1.0));
-        Ok((Normal { mean, covariance }, mixed / (1.0 + weight)))
+        let own = all.view((0, 0), (terms, terms)) / f64::max(count, 1.0);
+        let mixed = mixed_gram(&self.gram, &own, count / self.sample_rate_hz);
+        Ok((Normal { mean, covariance }, mixed))
     }
 
-    /// By how much errors on sessions left out exceeded the predicted variance after so many seconds.
-    pub(crate) fn widening(&self, seconds: f64, known: bool) -> f64 {
-        let of = |e: &Expected| if known { e.widening_known } else { e.widening_new };
-        let reached = self.expected.iter().rev().find(|e| e.seconds <= seconds);
-        reached.or(self.expected.first()).map_or(1.0, of)
+    /// How errors on sessions left out were spread after so many seconds.
+    pub(crate) fn spread(&self, seconds: f64, known: bool) -> ErrorSpread {
+        let of = |e: &Expected| if known { e.spread_known } else { e.spread_new };
+        // half a minute whose samples were counted at a measured rate is half a minute
+        let reached = self.expected.iter().rev().find(|e| e.seconds <= 1.01 * seconds);
+        reached.or(self.expected.first()).map_or(ErrorSpread::NORMAL, of)
     }
 
     pub(crate) fn refuse_columns(

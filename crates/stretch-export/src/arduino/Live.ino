@@ -1,6 +1,21 @@
+@if one
 // Length from the bridge's amplifier on A0, a line a sample, at 115200 baud.
+@end
+@if array
+// Several gauges, one amplifier each on A0 and the pins after it, a line a sample, at 115200 baud.
+@end
 #include <stretch.h>
 
+// analogRead of these boards gives 10 bits, whatever is asked of it
+#if defined(__AVR__) && STRETCH_ADC_BITS != 10
+#error "the converter of this board has 10 bits: stretch export --adc 10,0,5 (from 0 to 5 V)"
+#endif
+
+@if array
+const uint8_t pins[STRETCH_CHANNELS] = {@PINS@};
+const char *const signals[STRETCH_CHANNELS] = STRETCH_SIGNALS;
+
+@end
 stretch_state state;
 uint32_t due_us;
 
@@ -30,6 +45,7 @@ void loop() {
     due_us += STRETCH_PERIOD_US;
   }
   due_us += STRETCH_PERIOD_US;
+@if one
 @STEP@
   if (reading.status == STRETCH_WARMING) {
     Serial.println("warming");
@@ -39,4 +55,27 @@ void loop() {
   Serial.print(" " STRETCH_UNIT);
   Serial.print(reading.branch == STRETCH_INFLATION ? " inflation" : " deflation");
   Serial.println(reading.domain == STRETCH_INSIDE ? "" : " outside the calibrated domain");
+@end
+@if array
+  float volts[STRETCH_CHANNELS];
+  for (int k = 0; k < STRETCH_CHANNELS; k++) {
+    volts[k] = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(pins[k]);
+  }
+  stretch_reading reading = stretch_step(&state, volts);
+  if (reading.status != STRETCH_OK) {
+    Serial.println(reading.status == STRETCH_ALL_LOST ? "every gauge is lost" : "warming");
+    return;
+  }
+  Serial.print(reading.estimate, 3);
+  Serial.print(" " STRETCH_UNIT " +/- ");
+  Serial.print(reading.sd, 3);
+  // stretch_readmit(&state, k) takes gauge k back, once it was looked at
+  for (int k = 0; k < STRETCH_CHANNELS; k++) {
+    if (reading.lost & (1u << k)) {
+      Serial.print(" without ");
+      Serial.print(signals[k]);
+    }
+  }
+  Serial.println(reading.clamped ? " outside the calibrated domain" : "");
+@end
 }

@@ -3,15 +3,6 @@
 #define STRETCH_WARMING 1 /* the rate has not seen enough samples yet */
 #define STRETCH_MISSING 2 /* the sample did not come */
 
-/* Which way the target moves: stretch_reading.branch. */
-#define STRETCH_INFLATION 0
-#define STRETCH_DEFLATION 1
-
-/* Whether the inputs lay where the calibration was fitted: stretch_reading.domain. */
-#define STRETCH_INSIDE 0
-#define STRETCH_SIGNAL_CLAMPED 1 /* the signal was outside, and was clamped */
-#define STRETCH_RATE_CLAMPED 2   /* its rate was; 3: both */
-
 /* Missing samples in a row that are bridged; one more forgets the stream. */
 #define STRETCH_MAX_BRIDGED 3
 

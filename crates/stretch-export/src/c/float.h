@@ -23,32 +23,6 @@
 #define STRETCH_LARGEST 1e18f
 #define STRETCH_NO_VOLTS 2e18f
 
-typedef struct stretch_reading {
-    float estimate; /* in STRETCH_UNIT */
-    float rate;     /* of the estimate, a second */
-@if sd
-    float sd;       /* standard deviation of the estimate */
-@end
-    uint8_t status;
-    uint8_t branch;
-    uint8_t domain;
-} stretch_reading;
-
-STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
-                                             float estimate, float rate)
-{
-    stretch_reading reading;
-    reading.estimate = estimate;
-    reading.rate = rate;
-@if sd
-    reading.sd = 0.0f;
-@end
-    reading.status = status;
-    reading.branch = branch;
-    reading.domain = domain;
-    return reading;
-}
-
 /* false for what is not a number as well */
 STRETCH_INLINE int stretch_usable(float x)
 {

@@ -54,6 +54,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
         constants: constants.into_text(),
         step: vec![
             include_str!("../c/float.h"),
+            include_str!("../c/float_reading.h"),
             include_str!("../c/diagnosed_float.h"),
             include_str!("../c/float_end.h"),
         ],

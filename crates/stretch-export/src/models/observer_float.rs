@@ -51,6 +51,7 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         constants: constants.into_text(),
         step: vec![
             include_str!("../c/float.h"),
+            include_str!("../c/float_reading.h"),
             include_str!("../c/observer_float.h"),
             include_str!("../c/float_end.h"),
         ],

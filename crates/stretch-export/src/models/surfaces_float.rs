@@ -66,6 +66,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         constants: constants.into_text(),
         step: vec![
             include_str!("../c/float.h"),
+            include_str!("../c/float_reading.h"),
             RATE,
             surface,
             STEP,

@@ -56,6 +56,14 @@ pub struct Candidate {
     pub parameters: Vec<EffectValue>,
 }
 
+impl Candidate {
+    /// Whether much more than on the test trials is left on those that were fitted: the root mean square of [`left`](Self::left) is above 1.2 times
+    /// that of [`gap_after`](Self::gap_after).
+    pub fn fits_worse(&self) -> bool {
+        1.0 + self.left > 1.2 * 1.2 * (1.0 + self.gap_after)
+    }
+}
+
 /// A fitted parameter of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectValue {
@@ -336,6 +344,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_left_where_it_was_fitted_counts_where_it_is_much_more() {
+        let leaves =
+            |gap_after, left| Candidate { gap_after, left, ..candidate("play", 1.0) }.fits_worse();
+        // root mean squares of 2.0 and 4.4, 2.0 and 2.2, 1.0 and 1.3
+        assert_eq!([leaves(3.0, 18.4), leaves(3.0, 3.84), leaves(0.0, 0.69)], [true, false, true]);
     }
 
     /// A threshold that is off may stand outside of its range: it is its own end.

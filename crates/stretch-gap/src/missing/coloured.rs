@@ -61,7 +61,7 @@ fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
 }
 
 /// Weights of the last [`ORDER`] means and a constant, by least squares.
-fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
+pub(super) fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
     let n = ORDER + 1;
     let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
     for window in parts.iter().flat_map(|part| part.windows(ORDER + 1)) {
@@ -75,7 +75,10 @@ fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
 }
 
 /// Residual that the weights do not predict.
-fn innovations<'a>(part: &'a [f64], weights: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+pub(super) fn innovations<'a>(
+    part: &'a [f64],
+    weights: &'a [f64],
+) -> impl Iterator<Item = f64> + 'a {
     part.windows(ORDER + 1).map(move |window| {
         let told: f64 = window[..ORDER].iter().zip(weights).map(|(x, w)| x * w).sum();
         window[ORDER] - told - weights[ORDER]

@@ -1,9 +1,10 @@
-//! How something goes in time that no recorded signal explains: it swings, jumps or drifts.
+//! How something goes in time that no recorded signal explains: its time stamps jitter, it swings, jumps or drifts.
 //!
 //! With a residual r in multiples of the noise, over stretches without a break:
 //!
 //! | course | holds when | numbers |
 //! | --- | --- | --- |
+//! | jitters | noise that follows the rate is the likeliest, and takes half of what is above the noise: [`jitter`](super::jitter) | standard deviation of the time |
 //! | swings | sines of one frequency f, of any phase in each stretch, take half of what is above the noise: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 >= (sum r^2 - N)/2 | f, and the amplitude |
 //! | jumps | changes d_i = r_i+1 - r_i of more than six noises hold half of what is above theirs: sum d_i^2 >= (sum d^2 - 2 N)/2 | how many a second, and their root mean square |
 //! | drifts | else | root mean square, and the time after which it is forgotten: its autocorrelation has fallen to 1/e |
@@ -12,7 +13,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use crate::missing::digits::number;
+use crate::missing::{digits::number, jitter::jitter_sd_s};
 
 /// Share of what is above the noise that makes a course.
 const SHARE: f64 = 0.5;
@@ -27,6 +28,11 @@ const QUICKEST: f64 = 0.4;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Course {
+    /// Its time stamps jitter: the noise follows the rate of the channel.
+    Jitters {
+        /// Standard deviation of the time between a sample and its stamp, s.
+        sd_s: f64,
+    },
     /// It swings.
     Swings {
         /// Frequency, Hz.
@@ -51,14 +57,22 @@ pub enum Course {
 }
 
 impl Course {
-    /// The course of a residual in multiples of the noise, which has the standard deviation `noise`; `dt_s` is the sample time. None where there
-    /// is no more than noise.
-    pub(crate) fn of(stretches: &[&[f64]], noise: f64, dt_s: f64) -> Option<Self> {
+    /// The course of a residual in multiples of the noise, which has the standard deviation `noise`; `dt_s` is the sample time, and `shown` what the
+    /// simulator makes of the same samples, in multiples of the noise as well. None where there is no more than noise.
+    pub(crate) fn of(
+        stretches: &[&[f64]],
+        shown: &[Vec<f64>],
+        noise: f64,
+        dt_s: f64,
+    ) -> Option<Self> {
         let samples: usize = stretches.iter().map(|s| s.len()).sum();
         let squares: f64 = stretches.iter().copied().flatten().map(|r| r * r).sum();
         let above = squares - samples as f64;
         if above <= 0.0 {
             return None;
+        }
+        if let Some(sd_s) = jitter_sd_s(stretches, shown, dt_s, SHARE * above) {
+            return Some(Self::Jitters { sd_s });
         }
         let swings = || {
             let (turns, taken) = strongest(stretches)?;
@@ -77,6 +91,10 @@ impl Course {
     pub(crate) fn words(&self, unit: &str) -> String {
         let sized = |size: f64| format!("{} {unit}", number(size)).trim_end().to_owned();
         match *self {
+            Self::Jitters { sd_s } => format!(
+                "time stamps jitter by about {} ms, which is noise that follows the rate",
+                number(1e3 * sd_s)
+            ),
             Self::Swings { hertz, amplitude } => {
                 format!("it swings at {} Hz, {} to either side", number(hertz), sized(amplitude))
             }
@@ -161,7 +179,9 @@ mod tests {
 
     fn of(values: &[f64]) -> Option<Course> {
         let stretches: Vec<&[f64]> = values.chunks(6000).collect();
-        Course::of(&stretches, 0.002, DT_S)
+        // Nothing moves, so that no time stamp shows.
+        let still: Vec<Vec<f64>> = stretches.iter().map(|s| vec![0.0; s.len()]).collect();
+        Course::of(&stretches, &still, 0.002, DT_S)
     }
 
     #[test]
@@ -217,12 +237,15 @@ mod tests {
     fn noise_alone_has_no_course() {
         let quiet: Vec<f64> = beside_noise(|_| 0.0, 6).iter().map(|r| 0.9 * r).collect();
         assert_eq!(of(&quiet), None);
-        assert_eq!(Course::of(&[], 1.0, DT_S), None);
+        assert_eq!(Course::of(&[], &[], 1.0, DT_S), None);
     }
 
     #[test]
     fn words_have_units() {
         let swing = Course::Swings { hertz: 0.7, amplitude: 0.012 };
         assert_eq!(swing.words("V"), "it swings at 0.700 Hz, 0.0120 V to either side");
+        let jitter = Course::Jitters { sd_s: 0.0042 };
+        let told = "time stamps jitter by about 4.20 ms, which is noise that follows the rate";
+        assert_eq!(jitter.words("V"), told);
     }
 }

@@ -13,6 +13,7 @@ mod coloured;
 mod course;
 mod dense;
 mod digits;
+mod jitter;
 mod library;
 mod propose;
 mod proposed;

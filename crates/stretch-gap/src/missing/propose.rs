@@ -60,7 +60,7 @@ pub(crate) fn propose(
         && !residue.inputs.of_kind(true).is_empty();
     let sum = pursue(&residue, &choice, is_commanded);
     let estimated = estimate(&residue, &choice, &sum)?;
-    let weighed = weigh(&residue, &choice, &sum, &estimated);
+    let weighed = weigh(&residue, &choice, &sum, &estimated)?;
     let closes_test = match weighed.stands {
         true => tested(&residue, &sum.terms, &estimated)?,
         false => 0.0,
@@ -87,7 +87,12 @@ struct Weighed {
 
 /// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
 /// chosen few see alone was chosen by chance.
-fn weigh(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum, estimated: &Estimated) -> Weighed {
+fn weigh(
+    residue: &Residue<'_>,
+    choice: &SampleRoles,
+    sum: &Sum,
+    estimated: &Estimated,
+) -> Result<Weighed, GapError> {
     let metric = &residue.compare.metrics[residue.stage];
     let clean = |column: &Column| {
         let mut values = column.values.clone();
@@ -107,17 +112,22 @@ fn weigh(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum, estimated: &Est
     let samples = choice.count(Role::Held);
     let closes = closed(held(&residue.residual), held(&estimated.left), samples);
     let course = || {
-        let (roles, noise) = (residue.roles(), metric.noise.rms);
-        let stretches: Vec<&[f64]> = roles.looked_at().map(|s| &alone[s.from..s.to]).collect();
-        Course::of(&stretches, noise, residue.compare.simulator().dt_s())
+        let (compare, noise) = (residue.compare, &metric.noise);
+        let trials = compare.simulator().trials().len();
+        let own = compare.runs.output(residue.stage, &residue.model, trials)?;
+        let parts = || residue.roles().looked_at().map(|s| s.from..s.to);
+        let stretches: Vec<&[f64]> = parts().map(|part| &alone[part]).collect();
+        let shown = |i: usize| own[i] / noise.sd[i];
+        let shown: Vec<Vec<f64>> = parts().map(|part| part.map(shown).collect()).collect();
+        Ok::<_, GapError>(Course::of(&stretches, &shown, noise.rms, compare.simulator().dt_s()))
     };
-    Weighed {
-        course: if log_odds <= 0.0 { course() } else { None },
+    Ok(Weighed {
+        course: if log_odds <= 0.0 { course()? } else { None },
         log_odds,
         stands,
         closes: if stands { closes } else { 0.0 },
         foretold: closed(squares(&alone), squares(&sum.beside_many), samples),
-    }
+    })
 }
 
 /// A proposal as it is reported.

@@ -14,11 +14,14 @@ use stretch_effects::Grid;
 
 use stretch_data::ends;
 
-use crate::problem::{
-    error::GapError,
-    record_facts::Recorded,
-    sample_roles::{Role, SampleRoles},
-    simulator::Simulator,
+use crate::{
+    numerics::differences::central,
+    problem::{
+        error::GapError,
+        record_facts::Recorded,
+        sample_roles::{Role, SampleRoles},
+        simulator::Simulator,
+    },
 };
 
 /// A signal on its own scale.
@@ -188,13 +191,7 @@ fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
         }
     }
     for (_, _, range) in parts {
-        let last = range.end - 1;
-        for i in range.clone() {
-            let (a, b) = (i.saturating_sub(1).max(range.start), (i + 1).min(last));
-            if b > a {
-                out[i] = (x[b] - x[a]) / ((b - a) as f64 * dt_s);
-            }
-        }
+        out[range.clone()].copy_from_slice(&central(&x[range], dt_s));
     }
     out
 }

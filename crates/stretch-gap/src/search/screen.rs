@@ -10,10 +10,14 @@
 //! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
 //! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
 //! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
+//! A threshold changes nothing up to where the signal reaches it, and soon too much beyond: of a state inside a simulator nobody knows where that is. Where
+//! its starts were not chosen for the effect, and go from one that changes nothing to one that does more than twice too much, places between the two
+//! are screened as well.
 //! A kink bends the change, so gains only say what a fit may be spent on.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use stretch_effects::EffectParameter;
 
 use crate::{
     fit::{
@@ -21,13 +25,19 @@ use crate::{
         metric::Column,
     },
     numerics::linear::Cholesky,
-    problem::{error::GapError, simulator::Model},
+    problem::{error::GapError, simulator::Model, spec::EffectSpec},
 };
 
 /// Times by which the first start's strength may be scaled.
 const SCALED: f64 = 8.0;
 /// A change smaller than this, in variances of the noise over all samples, is none.
 const NO_CHANGE: f64 = 1e-9;
+
+/// Places between a threshold that nothing reaches and one that does too much.
+const BETWEEN: usize = 7;
+
+/// Values of an effect, and <d,d> and <d,r> of the change that they make.
+type Tried = (Vec<f64>, (f64, f64));
 
 /// What a screen says of one effect.
 #[derive(Debug, Clone)]
@@ -89,8 +99,17 @@ impl Comparison<'_> {
         let mut starts = Vec::new();
         let changes = self.changes(ground, effect, &spec.starts)?;
         let sizes = changes.iter().map(|change| change.map(|(own, _)| own)).collect();
-        for (values, change) in spec.starts.iter().zip(changes) {
-            let Some((own, with_residual)) = change else { continue };
+        let changed = |values: &[Vec<f64>], changes: Vec<Option<(f64, f64)>>| -> Vec<Tried> {
+            let pairs = values.iter().zip(changes);
+            pairs.filter_map(|(values, change)| Some((values.clone(), change?))).collect()
+        };
+        let mut tried = changed(&spec.starts, changes);
+        let between = jumped_over(spec, &tried);
+        if !between.is_empty() {
+            let changes = self.changes(ground, effect, &between)?;
+            tried.extend(changed(&between, changes));
+        }
+        for (values, (own, with_residual)) in &tried {
             // Strengths scale with the amplitude; thresholds do not scale at all.
             let scalable = spec.parameters[0].off() == Some(0.0);
             let (value, range) = (values[0], &spec.parameters[0]);
@@ -191,4 +210,33 @@ impl Comparison<'_> {
         }
         (own.max(0.0), mixed)
     }
+}
+
+/// Places between the last start of a threshold that changes nothing and the first that does too much, with every shape; none where a start does about
+/// as much as the residual asks for, or somebody chose the starts.
+fn jumped_over(spec: &EffectSpec, tried: &[Tried]) -> Vec<Vec<f64>> {
+    let threshold = spec.parameters[0].off().filter(|off| *off != 0.0);
+    let Some(off) = threshold else { return Vec::new() };
+    // As it is it lowers the cost.
+    let is_promising = tried.iter().any(|(_, (own, with_residual))| *with_residual > 0.5 * own);
+    if is_promising || spec.starts != EffectParameter::starts(&spec.parameters) {
+        return Vec::new();
+    }
+    let far = |x: &f64| (x - off).abs();
+    let acting = tried.iter().map(|(values, _)| values[0]);
+    let Some(acts) = acting.min_by(|a, b| far(a).total_cmp(&far(b))) else { return Vec::new() };
+    let nearer = spec.starts.iter().map(|values| values[0]);
+    let idle = nearer
+        .filter(|x| far(x) < far(&acts) && (x - off) * (acts - off) > 0.0)
+        .max_by(|a, b| far(a).total_cmp(&far(b)))
+        .unwrap_or(off);
+    let mut shapes: Vec<&[f64]> = Vec::new();
+    for values in &spec.starts {
+        if !shapes.contains(&&values[1..]) {
+            shapes.push(&values[1..]);
+        }
+    }
+    let place = |k: usize| acts + (idle - acts) * k as f64 / (BETWEEN + 1) as f64;
+    let at = |k: usize| shapes.iter().map(move |shape| [&[place(k)], *shape].concat());
+    (1..=BETWEEN).flat_map(at).collect()
 }

@@ -172,12 +172,14 @@ fn closed(candidate: &Candidate, left: f64) -> String {
     format!("{:.0} % ({low:.0} to {high:.0} %)", percent(candidate.closed))
 }
 
-/// What is left with a candidate, and how probable it is: never certain where more than noise is left.
+/// What is left with a candidate, and how probable it is: never certain where more than noise is left. Where most of it is left on trials that
+/// were fitted, that is said: tables tell what is left on the others.
 fn left_with(candidate: &Candidate, left: f64) -> String {
     let most = if multiple(left) > NOT_ALL { 0.99 } else { 1.0 };
     format!(
-        "{:.2} times the noise is left; probability {:.2}",
+        "{:.2} times the noise is left{}; probability {:.2}",
         multiple(left),
+        if candidate.fits_worse() { " on those that were" } else { "" },
         candidate.probability.min(most)
     )
 }

@@ -27,6 +27,8 @@ pub struct Checked {
     about: Description,
     session: RecordedSession,
     pub(crate) columns: Columns,
+    /// A column by which runs are told apart, which no effect looks at.
+    pub(crate) by: Option<(String, Vec<f64>)>,
     pub(crate) stages: Vec<StageEntry>,
     /// Noise of the inputs of each stage.
     pub(crate) input_noise: Vec<Vec<f64>>,
@@ -56,7 +58,10 @@ impl Checked {
         let trials = std::mem::take(&mut spec.trials);
         let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
         check_known(stages, parameters, effects)?;
-        let columns = Columns::read(&trials, used(&spec))?;
+        let names = used(&spec);
+        let apart = spec.by.clone().filter(|by| !names.contains(by));
+        let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
+        let by = apart.and_then(|_| columns.take_last());
         check_stated(stages, inputs, &columns)?;
         let sensor = spec.sensor.as_ref().map(|s| sensor_of(s, stages)).transpose()?;
         let mut notes = columns.notes.clone();
@@ -112,6 +117,7 @@ impl Checked {
             noise: noises.iter().map(Noise::sd).collect(),
             parts: parts(&columns),
             columns,
+            by,
             wrappers,
             acting,
             off,

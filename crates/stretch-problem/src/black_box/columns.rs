@@ -74,6 +74,11 @@ impl Columns {
         Some(&self.values[at])
     }
 
+    /// Takes the last column away: its name and values.
+    pub(crate) fn take_last(&mut self) -> Option<(String, Vec<f64>)> {
+        self.names.pop().zip(self.values.pop())
+    }
+
     /// Trials that are a recording from the index `first` on, or a part of one.
     pub(crate) fn sources_from(&self, first: usize) -> Vec<usize> {
         (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()

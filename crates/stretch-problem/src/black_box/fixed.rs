@@ -66,6 +66,11 @@ impl Diagnosable for BlackBox {
         self.problem.notes().to_vec()
     }
 
+    fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let apart = self.problem.by.as_ref().filter(|(by, _)| by == name).map(|(_, v)| v.clone());
+        apart.or_else(|| self.problem.columns.of(name).map(<[f64]>::to_vec))
+    }
+
     /// The notes of the source on its runs, and the number of runs that it refused.
     fn afterwards(&self) -> Vec<String> {
         let mut notes = self.runs.notes();

@@ -32,6 +32,9 @@ pub struct ProblemSpec {
     pub without: Vec<String>,
     /// Further columns that a wrapper may take: channels that may talk across to another channel.
     pub beside: Vec<String>,
+    /// A column by which runs are told apart, which no effect looks at.
+    #[serde(skip)]
+    pub by: Option<String>,
     /// The stage that is a sensor, where there is one, by the column of its output and the column that it measures: the diagnosis then
     /// reports what a calibration of the sensor loses by the gap, and slices go by the measured column.
     pub sensor: Option<Sensor>,

@@ -3,12 +3,10 @@
 //! Minimises sum r^2 + sum x^2 over the numbers x, with residuals r in multiples of the noise. The normal matrix N = J'J + I has the
 //! covariance N^-1; with errors that are left and that last, J'J counts 1/inflation of itself.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector};
 use stretch_gap::{GapError, Model, Run, Simulator};
 
-use super::unknowns::Unknowns;
+use super::{groups::Group, unknowns::Unknowns};
 
 /// Most steps of a fit.
 const STEPS: usize = 12;
@@ -23,29 +21,23 @@ pub(super) struct Target<'a> {
     pub(super) unknowns: &'a Unknowns,
     /// Noise by stage, one standard deviation.
     pub(super) noise: &'a [f64],
-    /// Runs that are fitted.
-    pub(super) trials: Range<usize>,
+    /// Samples that are fitted.
+    pub(super) group: &'a Group,
     pub(super) stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Target<'_> {
-    /// Samples of the runs among those of all runs end to end.
-    fn samples(&self) -> Range<usize> {
-        let trials = self.simulator.trials();
-        let until = |t: usize| trials[..t].iter().map(|t| t.samples).sum::<usize>();
-        until(self.trials.start)..until(self.trials.end)
-    }
-
     /// Residuals of some numbers in multiples of the noise, stage after stage; what was not measured counts for nothing.
-    fn residuals(&self, all: &[Vec<f64>]) -> Vec<Result<Vec<f64>, GapError>> {
-        let models: Vec<Model> = all.iter().map(|x| self.unknowns.model(x)).collect();
+    fn residuals(&self, asked: &[Vec<f64>]) -> Vec<Result<Vec<f64>, GapError>> {
+        let models: Vec<Model> = asked.iter().map(|x| self.unknowns.model(x)).collect();
         let stages = self.noise.len();
-        let samples = self.samples();
+        let Group { samples, trials, .. } = self.group;
+        let all: usize = self.simulator.trials()[..*trials].iter().map(|t| t.samples).sum();
         let runs: Vec<Run<'_>> = models
             .iter()
-            .flat_map(|model| (0..stages).map(|s| Run::exact(s, model, self.trials.end)))
+            .flat_map(|model| (0..stages).map(|s| Run::exact(s, model, *trials)))
             .collect();
-        let mut outs = vec![vec![0.0; samples.end]; runs.len()];
+        let mut outs = vec![vec![0.0; all]; runs.len()];
         let mut answers = self.simulated(&runs, &mut outs).into_iter();
         let is_lost = &self.simulator.record().is_lost;
         let mut outs = outs.into_iter();
@@ -56,7 +48,7 @@ impl Target<'_> {
                 let (answer, out) = (answers.next(), outs.next().unwrap_or_default());
                 failed = failed.or(answer.and_then(Result::err));
                 let measured = self.simulator.measured(stage);
-                residual.extend(samples.clone().map(|i| {
+                residual.extend(samples.iter().map(|&i| {
                     let counts = !is_lost.get(i).copied().unwrap_or(false);
                     if counts { (measured[i] - out[i]) / noise } else { 0.0 }
                 }));

@@ -1,6 +1,7 @@
-//! Do the runs agree: every run fitted by itself, and what differs from run to run.
+//! Do the runs agree: every run fitted by itself, a trial or all samples in which a column has one value, and what differs from run to run.
 
 mod fit;
+mod groups;
 mod heterogeneity;
 mod told;
 mod unknowns;
@@ -10,6 +11,7 @@ use stretch_gap::{GapError, Simulator};
 
 use crate::{error::ProblemError, examine::Examined, problem::Problem};
 use fit::{Fit, Target};
+use groups::Group;
 use unknowns::Unknowns;
 
 pub use heterogeneity::{Apart, Heterogeneity};
@@ -31,6 +33,8 @@ pub struct RunFit {
 /// Whether runs agree, by value and by run. Its serde form is the key `by_trial` of a diagnosis' JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ByTrial {
+    /// What a run is: `trial`, or the column of which each run has another value.
+    pub by: String,
     /// All runs fitted together.
     pub all: RunFit,
     /// Every run by itself.
@@ -85,21 +89,52 @@ impl Problem {
         progress: &(dyn Fn(&str) + Sync),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<ByTrial, GapError> {
-        by_trial(self.simulator(), examined, progress, stop)
+        let trials = self.simulator().trials();
+        if trials.len() < 2 {
+            return refused("there is one run");
+        }
+        compared(self.simulator(), ("trial", &groups::by_trial(trials)), examined, progress, stop)
+    }
+
+    /// As [`Problem::by_trial`], where a run is all samples in which a column has one value, from whatever trials these are: a load that was set, a
+    /// voltage, a tension that was measured.
+    ///
+    /// A column that is set (held from sample to sample, with twelve values at most) has a run for each value; one that is measured, and
+    /// differs from trial to trial, has one for the trials of each set-up; one that moves within trials has four, with as many samples each.
+    /// Samples of a run that do not follow one another count as if they did, which shortens what an error that lasts is seen to last.
+    ///
+    /// # Errors
+    /// As [`Problem::by_trial`]; a column that was not recorded, or never changes.
+    pub fn by_column(
+        &self,
+        column: &str,
+        examined: &Examined,
+        progress: &(dyn Fn(&str) + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<ByTrial, GapError> {
+        let simulator = self.simulator();
+        let Some(values) = self.source().column(column) else {
+            return refused(&format!("there is no column {column} in what was recorded"));
+        };
+        let groups = groups::by_column(column, &values, simulator.trials());
+        if groups.len() < 2 {
+            return refused(&format!("{column} never changes"));
+        }
+        compared(simulator, (column, &groups), examined, progress, stop)
     }
 }
 
-fn by_trial(
+fn refused<T>(why: &str) -> Result<T, GapError> {
+    Err(GapError::simulator(ProblemError::too_little(why, HINT)))
+}
+
+fn compared(
     simulator: &dyn Simulator,
+    (by, groups): (&str, &[Group]),
     examined: &Examined,
     progress: &(dyn Fn(&str) + Sync),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<ByTrial, GapError> {
-    let refused = |why: &str| Err(GapError::simulator(ProblemError::too_little(why, HINT)));
-    let trials = simulator.trials();
-    if trials.len() < 2 {
-        return refused("there is one run");
-    }
     let is_nuisance = |p: &stretch_gap::ParameterSpec| {
         p.drift.is_some() || p.per_trial_sd.is_some() || p.per_tick_sd.is_some()
     };
@@ -108,18 +143,17 @@ fn by_trial(
     }
     let unknowns = Unknowns::of(simulator, &examined.diagnosis, &examined.evidence);
     let noise: Vec<f64> = examined.evidence.stages.iter().map(|s| s.noise).collect();
-    let target = |trials| Target { simulator, unknowns: &unknowns, noise: &noise, trials, stop };
+    let target = |group| Target { simulator, unknowns: &unknowns, noise: &noise, group, stop };
     progress("all runs together");
-    let start = unknowns.start();
-    let whole = target(0..trials.len());
-    let all = Fit::of(&whole, &start)?;
+    let whole = groups::whole(simulator);
+    let all = Fit::of(&target(&whole), &unknowns.start())?;
     let mut runs = Vec::new();
-    for (i, trial) in trials.iter().enumerate() {
-        progress(&format!("run {} of {}", i + 1, trials.len()));
-        let own = target(i..i + 1);
+    for (i, group) in groups.iter().enumerate() {
+        progress(&format!("run {} of {}", i + 1, groups.len()));
+        let own = target(group);
         let fit = Fit::of(&own, &all.at)?;
         let of_all = own.times_noise(&all.at)?;
-        runs.push((trial.name.clone(), fit, of_all));
+        runs.push((group.name.clone(), fit, of_all));
     }
     let values = heterogeneity::values(&unknowns, &runs);
     let apart = heterogeneity::apart(&unknowns, &runs);
@@ -130,8 +164,9 @@ fn by_trial(
         values: told::values(&unknowns, fit),
     };
     let together = ("all".to_owned(), all.clone(), all.times_noise);
-    Ok(ByTrial { all: one(&together), runs: runs.iter().map(one).collect(), values, apart })
+    let runs = runs.iter().map(one).collect();
+    Ok(ByTrial { by: by.to_owned(), all: one(&together), runs, values, apart })
 }
 
 /// What to do where runs cannot be told apart.
-const HINT: &str = "runs are compared of a simulator of your own, or of a gauge alone, with two recordings or more";
+const HINT: &str = "runs are compared of a simulator of your own, or of a gauge alone, with two recordings or more, or by a column that was recorded and changes";

@@ -130,6 +130,7 @@ impl ProblemFile {
             wrapped: named(&top, "wrapped", wrapped)?,
             without: top.texts("without")?,
             beside: top.texts("beside")?,
+            by: None,
             sensor: sensor(&top)?,
             trials: Vec::new(),
         };

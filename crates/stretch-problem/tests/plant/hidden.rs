@@ -197,6 +197,8 @@ pub(crate) fn hidden() -> Vec<Hidden> {
             }),
         ),
         ("input.profile", Box::new(|u, _| plain(&trapezoid(u, 60.0, 8.0), 0.0))),
+        // The S profile is a `profile` with rounded corners.
+        ("input.profile", Box::new(|u, _| plain(&jerk_limited(u, [1000.0, 60.0, 8.0]), 0.0))),
         (
             "input.firmware_dead_band",
             Box::new(|u, _| {
@@ -266,4 +268,42 @@ fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
         shown
     };
     u.iter().map(follow).collect()
+}
+
+/// A command followed as quickly as jerk, acceleration and rate allow (Haschke, Weitnauer and Ritter, doi 10.1109/IROS.2008.4650924): at every
+/// moment with full jerk towards the greatest rate, unless braking now ends beyond the command, in steps of 1/50 of a sample.
+pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
+    let [jerk, acceleration, rate] = limits;
+    let h = DT_S / 50.0;
+    let (mut y, mut v, mut a) = (u[0], 0.0_f64, 0.0_f64);
+    let follow = |u: &f64| {
+        let shown = y;
+        for _ in 0..50 {
+            let side = (u - y - way_to_rest(v, a, limits)).signum();
+            let wanted = if side * v < 0.0 { 0.0 } else { side * rate };
+            // The speed at which the acceleration could be gone.
+            let comes_to = v + 0.5 * a * a.abs() / jerk;
+            let push = if side * (wanted - comes_to) > 0.0 { side } else { -side };
+            a = (a + push * jerk * h).clamp(-acceleration, acceleration);
+            v += a * h;
+            y += v * h;
+        }
+        shown
+    };
+    u.iter().map(follow).collect()
+}
+
+/// How far it goes until it rests, braking as hard as jerk and acceleration allow.
+fn way_to_rest(v: f64, a: f64, [jerk, acceleration, _]: [f64; 3]) -> f64 {
+    let side = (v + 0.5 * a * a.abs() / jerk).signum();
+    let (mut v, mut a) = (side * v, side * a);
+    let peak = (jerk * v + 0.5 * a * a).max(0.0).sqrt().min(acceleration);
+    let holds = ((v + 0.5 * a * a / jerk - peak * peak / jerk) / peak.max(1e-12)).max(0.0);
+    let mut way = 0.0;
+    for (j, t) in [(-jerk, (a + peak) / jerk), (0.0, holds), (jerk, peak / jerk)] {
+        way += t * (v + t * (a / 2.0 + t * j / 6.0));
+        v += t * (a + t * j / 2.0);
+        a += t * j;
+    }
+    side * way
 }

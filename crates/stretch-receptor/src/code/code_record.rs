@@ -6,7 +6,7 @@ use stretch_core::{DesignError, SampleRate};
 use super::{
     arithmetic::CodeArithmetic,
     calibration::{CODE_SCHEMA, CodeCalibration},
-    ranged_surface::RangedSurfaces,
+    ranged_surface::{RangedSurface, RangedSurfaces},
 };
 
 #[derive(Serialize, Deserialize)]
@@ -70,11 +70,11 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let spans = match &surfaces {
             RangedSurfaces::Line(ranged) => {
                 A::valid_line(&ranged.surface)?;
-                ranged.signal.holds()
+                ranged.holds()
             }
             RangedSurfaces::Poly13(both) => {
                 both.iter().try_for_each(|ranged| A::valid_surface(&ranged.surface))?;
-                both.iter().all(|ranged| ranged.signal.holds() && ranged.rate.holds())
+                both.iter().all(RangedSurface::holds)
             }
         };
         DesignError::check("domain", 0.0, spans)?;

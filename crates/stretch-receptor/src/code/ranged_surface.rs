@@ -30,7 +30,7 @@ impl Span {
 
     /// Whether both ends fit 32 bits when spread.
     #[cfg(feature = "serde")]
-    pub(super) fn holds(&self) -> bool {
+    fn holds(&self) -> bool {
         let max = i64::from(self.min) + i64::from(self.width);
         let fits = |end: i64| i32::try_from(end * i64::from(self.factor)).is_ok();
         self.factor > 0 && fits(self.min.into()) && fits(max)
@@ -70,6 +70,12 @@ pub struct RangedSurface<S> {
 }
 
 impl<S> RangedSurface<S> {
+    /// Whether both domains fit 32 bits when spread.
+    #[cfg(feature = "serde")]
+    pub(super) fn holds(&self) -> bool {
+        self.signal.holds() && self.rate.holds()
+    }
+
     /// Signal and rate inside the domain, not yet spread.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {

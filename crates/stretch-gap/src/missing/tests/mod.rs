@@ -7,6 +7,7 @@ mod words;
 
 use crate::{
     missing::term_inputs::{Signal, TermInputs},
+    numerics::differences::central,
     problem::sample_roles::{Role, SampleRoles, Segment},
 };
 use stretch_effects::Grid;
@@ -16,12 +17,7 @@ const DT_S: f64 = 0.01;
 
 /// A signal on its own scale whose rate is that of central differences.
 fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
-    let last = x.len() - 1;
-    let rate = |i: usize| {
-        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-        (x[b] - x[a]) / ((b - a) as f64 * DT_S)
-    };
-    let v = (0..x.len()).map(rate).collect();
+    let v = central(&x, DT_S);
     let (name, unit) = (name.to_owned(), "mm".to_owned());
     Signal { name, unit, offset: 40.0, scale: 25.0, rate: 1.0, is_command, x, v }
 }

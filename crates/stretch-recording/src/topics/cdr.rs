@@ -1,15 +1,16 @@
 //! Messages in CDR, the wire format of ROS 2: little or big end first, numbers aligned to their length.
 
 use crate::{
-    mcap::leaves::Leaves,
-    mcap::messages::{Count, Field, Kind, Schema},
+    topics::{
+        LONGEST,
+        definitions::{Count, Field, Kind, Schema},
+        leaves::Leaves,
+    },
     whole::{signed, word},
 };
 
 /// Messages within messages.
 const DEEPEST: usize = 16;
-/// Longest array whose numbers become channels; images and scans are longer.
-const LONGEST: usize = 64;
 
 /// Hands every number and text of a message to `leaves`, under its path.
 pub(crate) fn decode(data: &[u8], schema: &Schema, leaves: &mut Leaves<'_>) -> Result<(), String> {

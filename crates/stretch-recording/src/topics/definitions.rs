@@ -1,8 +1,8 @@
-//! Definitions of ROS 2 messages, as MCAP carries them beside the messages (`ros2msg`).
+//! Definitions of ROS 2 messages, as bags carry them beside the messages (`ros2msg`).
 
 /// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Bool,
     Signed(usize),
     Unsigned(usize),
@@ -15,7 +15,7 @@ pub(super) enum Kind {
 
 /// How many of it a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Count {
+pub(crate) enum Count {
     One,
     Fixed(usize),
     /// As many as the message says.
@@ -23,22 +23,22 @@ pub(super) enum Count {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Field {
-    pub(super) name: String,
-    pub(super) kind: Kind,
-    pub(super) count: Count,
+pub(crate) struct Field {
+    pub(crate) name: String,
+    pub(crate) kind: Kind,
+    pub(crate) count: Count,
 }
 
 /// Messages of a schema; the first is the schema's own.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Schema {
-    pub(super) messages: Vec<Vec<Field>>,
+pub(crate) struct Schema {
+    pub(crate) messages: Vec<Vec<Field>>,
 }
 
 impl Schema {
     /// Parses a schema `name` (`sensor_msgs/msg/JointState`): its fields, then those of the messages within it, each behind
     /// a line of `=` and a line `MSG: package/Name`.
-    pub(super) fn parse(name: &str, text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
         let mut parts: Vec<(String, Vec<&str>)> = vec![(short(name), Vec::new())];
         for line in text.lines() {
             let line = line.trim();

@@ -1,0 +1,165 @@
+//! When a gauge is told to have shifted against the others.
+//!
+//! Estimates of each part of the data come of a fit without that part, so that blocks of the calibration err as blocks
+//! of another day with the same sensor do.
+
+use nalgebra::{DMatrix, DVector};
+use stretch_core::{ArrayShifts, Values};
+use stretch_fit::student_two_sided;
+use stretch_receptor::block_of;
+
+use crate::{CalibrateError, bank::Bank, channels::Channels, least_squares::LinearFactor};
+
+use super::{
+    linear::{Linear, ROOM},
+    parted::Parted,
+};
+
+/// Length of a block: a few movements of a body or a muscle.
+const BLOCK_S: f64 = 5.0;
+/// False alarms an hour, of all channels together. With those of slips and of channels that stick that makes one.
+const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
+/// Fewest blocks, counted as independent ones: three degrees of freedom.
+const LEAST_BLOCKS: f64 = 4.0;
+
+/// What of each channel's difference from the others is usual; `None` of a single channel, or of too little data.
+pub(crate) fn shifts(
+    parted: &Parted,
+    channels: &Channels,
+    linear: &Linear,
+    ridges: &[f64],
+) -> Result<Option<ArrayShifts<ROOM>>, CalibrateError> {
+    let count = linear.signals.len();
+    if count < 2 {
+        return Ok(None);
+    }
+    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
+    let contrasts = contrasts(parted, linear, ridges).ok_or_else(undetermined)?;
+    let hz = linear.sample_rate_hz;
+    let (samples_a_value, values_a_block) = block_of(hz, BLOCK_S);
+    let gain = linear.zero_and_gain().1;
+    let bank = Bank::new(linear.domains.clone());
+    let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
+    // of each channel the means of blocks, stretch by stretch
+    let mut blocks: Vec<Vec<Vec<f64>>> = vec![Vec::new(); count];
+    for (before, stretch) in channels.placed() {
+        let samples: Vec<usize> = stretch.warmed_up().step_by(samples_a_value as usize).collect();
+        blocks.iter_mut().for_each(|own| own.push(Vec::new()));
+        for block in samples.chunks_exact(values_a_block as usize) {
+            let mut sums = vec![0.0; count];
+            for &sample in block {
+                bank.fill(stretch.at(sample), &mut row, &mut scratch);
+                let row = DVector::from_column_slice(&row);
+                let of = &contrasts[parted.places.of(stretch.trial, before + sample)];
+                for (sum, contrast) in sums.iter_mut().zip(of) {
+                    *sum += gain * contrast.dot(&row) / block.len() as f64;
+                }
+            }
+            for (own, mean) in blocks.iter_mut().zip(sums) {
+                own.last_mut().into_iter().for_each(|stretch| stretch.push(mean));
+            }
+        }
+    }
+    let share = FALSE_ALARMS_AN_HOUR * BLOCK_S / 3600.0 / count as f64;
+    let found: Option<Vec<(f64, f64)>> = blocks.iter().map(|own| limit(own, share)).collect();
+    let Some(found) = found else { return Ok(None) };
+    let (usual, limits): (Vec<f64>, Vec<f64>) = found.into_iter().unzip();
+    Ok(Some(ArrayShifts {
+        block_s: BLOCK_S,
+        false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
+        usual: Values::new("usual", &usual)?,
+        limits: Values::new("limits", &limits)?,
+    }))
+}
+
+/// Of each part, and of each channel, the coefficients of its estimate alone less those of all others, fitted without
+/// that part.
+fn contrasts(parted: &Parted, linear: &Linear, ridges: &[f64]) -> Option<Vec<Vec<DVector<f64>>>> {
+    let count = linear.signals.len();
+    let everything: Vec<usize> = (0..count).collect();
+    let of_part = |factor: &LinearFactor| {
+        let weights = parted.fit(factor, &everything, ridges)?;
+        let terms = parted.terms;
+        let gram: DMatrix<f64> =
+            factor.triangle.tr_mul(&factor.triangle).view((0, 0), (terms, terms)).into_owned();
+        let own = Linear { weights: weights.iter().copied().collect(), gram, ..linear.clone() };
+        let one = |k: usize| {
+            let others: Vec<usize> = everything.iter().copied().filter(|&c| c != k).collect();
+            Some(own.remaining(&[k])?.0 - own.remaining(&others)?.0)
+        };
+        (0..count).map(one).collect()
+    };
+    parted.others.iter().map(of_part).collect()
+}
+
+/// Mean of blocks, and how far a further one is off from it with a probability of `share`.
+///
+/// Blocks that follow one another are alike where their correlation `r` is above zero: `n` of them count as `n (1 -
+/// r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of first order).
+fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
+    let all: Vec<f64> = stretches.iter().flatten().copied().collect();
+    let n = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / n;
+    let squares: f64 = all.iter().map(|x| (x - mean).powi(2)).sum();
+    let products: f64 = stretches
+        .iter()
+        .flat_map(|own| own.windows(2))
+        .map(|pair| (pair[0] - mean) * (pair[1] - mean))
+        .sum();
+    let pairs: usize = stretches.iter().map(|own| own.len().saturating_sub(1)).sum();
+    let alike = match pairs {
+        0 => 0.0,
+        pairs => (products / pairs as f64 / (squares / n)).clamp(0.0, 0.99),
+    };
+    let independent = n * (1.0 - alike) / (1.0 + alike);
+    if !(independent >= LEAST_BLOCKS && squares > 0.0) {
+        return None;
+    }
+    let dof = independent - 1.0;
+    // the mean of n alike blocks is as near to the truth as that of so many independent ones, and so is their variance
+    let sd = (squares / n * independent / dof).sqrt();
+    let t = student_two_sided(1.0 - share, dof as u64);
+    Some((mean, t * sd * (1.0 + 1.0 / independent).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use testkit::random::Random;
+
+    use super::limit;
+
+    /// How often a further block exceeds the limits of so many, with a correlation of neighbours.
+    fn exceeds(blocks: usize, share: f64, alike: f64) -> f64 {
+        let mut random = Random(30);
+        let draws = 20_000;
+        let mut beyond = 0.0;
+        for _ in 0..draws {
+            let mut at = random.noise();
+            let own: Vec<f64> = (0..blocks)
+                .map(|_| {
+                    at = alike * at + (1.0 - alike * alike).sqrt() * random.noise();
+                    3.0 + 0.5 * at
+                })
+                .collect();
+            let Some((mean, limit)) = limit(&[own], share) else { continue };
+            let further = 3.0 + 0.5 * random.noise();
+            beyond += f64::from(u8::from((further - mean).abs() > limit));
+        }
+        beyond / f64::from(draws)
+    }
+
+    #[test]
+    fn a_further_block_exceeds_the_limit_as_often_as_is_said() {
+        // three binomial standard deviations of 20,000 draws
+        let room = |share: f64| 3.0 * (share * (1.0 - share) / 20_000.0).sqrt();
+        for blocks in [6, 12, 60] {
+            let share = exceeds(blocks, 0.05, 0.0);
+            // alike by chance only makes limits wider
+            assert!(share < 0.05 + room(0.05), "{blocks} blocks: {share}");
+            assert!(share > 0.02, "{blocks} blocks: {share}");
+        }
+        let share = exceeds(60, 0.05, 0.6);
+        assert!(share < 0.08, "alike: {share}");
+        assert_eq!(limit(&[vec![1.0, 2.0, 3.0]], 0.05), None);
+    }
+}

@@ -1,0 +1,136 @@
+//! The mean of a signal over the time before each sample.
+
+use alloc::{vec, vec::Vec};
+
+use crate::{
+    grid::Grid,
+    operator::{Operator, Span, Start},
+};
+
+/// The moving mean y(t) = (1/T) integral of x from t - T to t, of a signal that is linear between nodes: what drives call an S-curve or
+/// jerk filter when a trapezoid profile runs through it (Biagiotti and Melchiorri, doi 10.1016/j.conengprac.2012.08.005). Exact at every
+/// node; a signal at rest stays what it is to the last bit. Remembers the nodes of the time T.
+///
+/// ```
+/// use stretch_effects::{Grid, MovingMean, Operator, Span, Start};
+/// let grid = Grid::samples(0.01)?;
+/// let mean = MovingMean::new(&grid, 0.025);
+/// let (mut cells, mut signal) = (vec![0.0; mean.cells()], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+/// mean.begin(Start::Settled, 0.0, &mut cells);
+/// mean.run(&Span::whole(&grid), &mut cells, &mut signal);
+/// // A ramp is late by half of the time.
+/// assert!((signal[5] - 3.75).abs() < 1e-12);
+/// # Ok::<(), stretch_effects::GridError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovingMean {
+    /// For each piece that leads to a node: weights of the nodes before it, the latest first. That of the node itself is what is left to 1.
+    weights: Vec<Vec<f64>>,
+    reach: usize,
+}
+
+impl MovingMean {
+    /// Over `window_s`; of no time at all it changes nothing.
+    pub fn new(grid: &Grid, window_s: f64) -> Self {
+        let weights: Vec<Vec<f64>> =
+            (0..grid.pieces()).map(|piece| weights(grid.steps(), piece, window_s)).collect();
+        let reach = weights.iter().map(Vec::len).max().unwrap_or(0);
+        Self { weights, reach }
+    }
+}
+
+/// Weights of the nodes before one that a piece leads to, from the integrals of the lines between them.
+fn weights(steps: &[f64], piece: usize, window_s: f64) -> Vec<f64> {
+    let (mut found, mut left, mut at) = (Vec::new(), window_s, piece);
+    while left > 0.0 {
+        let h = steps[at];
+        let taken = h.min(left);
+        // Of the line back to the node before: integral of 1 - s/h and of s/h over the part that is taken.
+        let earlier = 0.5 * taken * taken / h;
+        if let Some(last) = found.last_mut() {
+            *last += taken - earlier;
+        }
+        found.push(earlier);
+        left -= taken;
+        at = if at == 0 { steps.len() - 1 } else { at - 1 };
+    }
+    found.iter_mut().for_each(|w| *w /= window_s);
+    found
+}
+
+impl Operator for MovingMean {
+    fn cells(&self) -> usize {
+        self.reach
+    }
+
+    fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
+        cells.fill(first);
+    }
+
+    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
+        // What came before, the earliest first, and the signal behind it.
+        let mut all = vec![0.0; self.reach + signal.len()];
+        all[..self.reach].copy_from_slice(cells);
+        all[self.reach..].copy_from_slice(signal);
+        let pieces = self.weights.len();
+        for (i, y) in signal.iter_mut().enumerate() {
+            let weights = &self.weights[(span.first_node + i + pieces - 1) % pieces];
+            let now = *y;
+            let before = all[..self.reach + i].iter().rev();
+            *y += weights.iter().zip(before).map(|(w, x)| w * (x - now)).sum::<f64>();
+        }
+        cells.copy_from_slice(&all[signal.len()..]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Rounding of some hundred products of values up to 10.
+    const ROUNDING: f64 = 1e-12;
+
+    fn mean(grid: &Grid, window_s: f64, signal: &[f64], parts: usize) -> Vec<f64> {
+        let mean = MovingMean::new(grid, window_s);
+        let (mut cells, mut out) = (vec![0.0; mean.cells()], signal.to_vec());
+        mean.begin(Start::Settled, signal[0], &mut cells);
+        let mut first_node = 0;
+        for part in out.chunks_mut(parts) {
+            let count = part.len();
+            mean.run(&Span { first_node, ..Span::whole(grid) }, &mut cells, part);
+            first_node += count;
+        }
+        out
+    }
+
+    proptest! {
+        /// A line is late by half of the window on any grid, once the window is full of it.
+        #[test]
+        fn a_line_is_half_a_window_late(window_s in 1e-4..0.05_f64, delay_s in 0.0..0.03_f64, slope in -9.0..9.0_f64) {
+            let grid = Grid::new(0.01, 0.004, delay_s).unwrap();
+            let line: Vec<f64> = (0..60).map(|node| slope * grid.time_s(node)).collect();
+            for (node, y) in mean(&grid, window_s, &line, 60).iter().enumerate() {
+                let t = grid.time_s(node);
+                if t > window_s {
+                    prop_assert!((y - slope * (t - 0.5 * window_s)).abs() < ROUNDING, "{y} at {t}");
+                }
+            }
+        }
+
+        /// Parts give what the whole gives, a constant stays, and nothing leaves the range of what went in.
+        #[test]
+        fn parts_give_the_whole(
+            signal in proptest::collection::vec(-10.0..10.0_f64, 1..80), window_s in 0.0..0.3_f64, parts in 1..80_usize
+        ) {
+            let grid = Grid::new(0.01, 0.006, 0.0).unwrap();
+            let whole = mean(&grid, window_s, &signal, signal.len());
+            prop_assert_eq!(&whole, &mean(&grid, window_s, &signal, parts));
+            let [low, high] = [f64::min, f64::max].map(|f| signal.iter().copied().fold(signal[0], f));
+            prop_assert!(whole.iter().all(|y| (low - ROUNDING..=high + ROUNDING).contains(y)));
+            let flat = vec![signal[0]; 30];
+            prop_assert_eq!(mean(&grid, window_s, &flat, 30), flat);
+        }
+    }
+}

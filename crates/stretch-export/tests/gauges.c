@@ -1,0 +1,50 @@
+/* Answers every row of standard input: one sample a gauge (32 bits in hexadecimal), or r and the number
+ * of a gauge that is taken back. */
+#include "stretch.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static unsigned long bits_of(float number)
+{
+    uint32_t bits;
+    memcpy(&bits, &number, sizeof bits);
+    return bits;
+}
+
+int main(void)
+{
+    char word[16];
+    stretch_state state;
+    const int wrong = stretch_self_test();
+    if (wrong != 0) {
+        printf("the self-test fails at sample %d\n", wrong);
+        return 1;
+    }
+    stretch_init(&state);
+    while (scanf("%15s", word) == 1) {
+        float volts[STRETCH_CHANNELS];
+        stretch_reading reading;
+        int k;
+        if (word[0] == 'r') {
+            stretch_readmit(&state, atoi(word + 1));
+            continue;
+        }
+        for (k = 0; k < STRETCH_CHANNELS; k++) {
+            const uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
+            memcpy(&volts[k], &bits, sizeof bits);
+            if (k + 1 < STRETCH_CHANNELS && scanf("%15s", word) != 1) {
+                return 1;
+            }
+        }
+        reading = stretch_step(&state, volts);
+        printf("%u %u %u %08lx %08lx", (unsigned)reading.status, (unsigned)reading.lost,
+               (unsigned)reading.clamped, bits_of(reading.estimate), bits_of(reading.sd));
+        for (k = 0; k < STRETCH_CHANNELS; k++) {
+            printf(" %u", (unsigned)stretch_loss(&state, k));
+        }
+        printf("\n");
+    }
+    return 0;
+}

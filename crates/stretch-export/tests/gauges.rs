@@ -1,0 +1,277 @@
+//! The C of several gauges gives the bits of the Rust receptor, whatever is lost.
+
+mod compilers;
+
+use std::{fmt::Write as _, fs};
+
+use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
+use proptest::{
+    prelude::*,
+    strategy::ValueTree,
+    test_runner::{Config, TestRunner},
+};
+use stretch_calibrate::parse_adc;
+use stretch_core::{
+    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, Design, HistoryShape, Interval, Label,
+    Provenance, SampleRate, Schema, Stage, Values,
+};
+use stretch_export::{Form, HEADER, Options, arduino_library, array_header};
+use stretch_receptor::{ArrayReceptor, ArrayWithheld, Loss, example_array};
+
+const ROOM: usize = 16;
+
+fn options(form: Option<Form>) -> Options {
+    Options { form, adc: parse_adc("12,0,3.3").unwrap() }
+}
+
+/// A calibration of so many gauges, with so many time constants, of this degree; gains and ranges drawn.
+fn drawn(
+    runner: &mut TestRunner,
+    channels: usize,
+    relaxations: usize,
+    degree: u8,
+    hz: f64,
+) -> ArrayCalibration<ROOM> {
+    let mut draw = |from: f64, to: f64| (from..to).new_tree(runner).unwrap().current();
+    let shape = HistoryShape { states: 1 + relaxations, degree, memory_degree: 1 };
+    let terms = shape.terms() - 1;
+    let mut of = Vec::new();
+    for k in 0..channels {
+        let (low, span) = (draw(-1.0, 1.0), draw(0.5, 2.0));
+        let mut state_min = vec![low];
+        let mut state_max = vec![low + span];
+        (0..relaxations).for_each(|_| {
+            state_min.push(-draw(0.1, 0.5));
+            state_max.push(draw(0.1, 0.5));
+        });
+        let follows: Vec<f64> = (0..channels)
+            .map(|j| if j == k { 0.0 } else { draw(-0.2, 1.0) / channels as f64 })
+            .collect();
+        of.push(ArrayChannel {
+            signal: Label::new(&format!("s{k}_v")).unwrap(),
+            state_min: Values::new("state_min", &state_min).unwrap(),
+            state_max: Values::new("state_max", &state_max).unwrap(),
+            possible: Interval { min: low - span, max: low + 2.0 * span },
+            still_samples: if k % 3 == 2 { 0 } else { 9 },
+            follows: Values::new("follows", &follows).unwrap(),
+            largest_jump: draw(0.2, 0.5) * span,
+        });
+    }
+    let mut gains = |keep: &dyn Fn(usize) -> bool| ArrayGains {
+        constant: draw(20.0, 70.0),
+        terms: (0..channels)
+            .map(|k| {
+                let own: Vec<f64> = (0..terms).map(|_| draw(-20.0, 20.0)).collect();
+                if keep(k) { Values::new("terms", &own).unwrap() } else { Values::EMPTY }
+            })
+            .collect(),
+        sd: draw(0.5, 5.0),
+    };
+    let all = gains(&|_| true);
+    let without = if channels > 1 { channels } else { 0 };
+    let without = (0..without).map(|lost| gains(&|k| k != lost)).collect();
+    let alone = (0..channels).map(|only| gains(&|k| k == only)).collect();
+    ArrayCalibration::new(ArraySpec {
+        schema: Schema::CURRENT,
+        reference: Label::new("angle_deg").unwrap(),
+        sample_rate_hz: SampleRate::new(hz).unwrap(),
+        relaxations_s: Values::new("relaxations_s", &[0.1, 0.4, 1.6][..relaxations]).unwrap(),
+        degree,
+        memory_degree: 1,
+        estimate_domain: Interval { min: 0.0, max: 90.0 },
+        channels: of.into_iter().collect(),
+        all,
+        without,
+        alone,
+        shifts: None,
+        provenance: Provenance::new("2026-11-24", ["drawn"]),
+    })
+    .unwrap()
+}
+
+/// What is done to the gauges.
+#[derive(Debug, Clone)]
+enum Row {
+    /// A sample of each, as a share of its range; NaN for one that did not come.
+    Samples(Vec<f64>),
+    /// This one is taken back.
+    Readmit(usize),
+}
+
+/// A motion that all share, with every fault now and then, gaps of one gauge and of the recorder, and gauges taken back.
+fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
+    let mut below = |n: usize| (0..n).new_tree(runner).unwrap().current();
+    let mut out = Vec::new();
+    let (mut offset, mut stuck, mut gone) =
+        (vec![0.0; channels], vec![None; channels], vec![0; channels]);
+    let mut silent = 0;
+    for n in 0..4000 {
+        let motion = 0.5 + 0.45 * (n as f64 / 40.0).sin();
+        let k = below(channels);
+        match below(400) {
+            0 => offset[k] += 1.0 + below(10) as f64 / 10.0,
+            1 => stuck[k] = Some(motion),
+            2 => gone[k] = 1 + below(8),
+            3 | 4 => silent = 1 + below(6),
+            5 => offset[k] = 4.0,
+            6..=9 => {
+                (offset[k], stuck[k], gone[k]) = (0.0, None, below(3));
+                out.push(Row::Readmit(k));
+            }
+            _ => (),
+        }
+        let mut samples = Vec::new();
+        for k in 0..channels {
+            let own = stuck[k].unwrap_or(motion + 1e-3 * below(100) as f64) + offset[k];
+            samples.push(if gone[k] > 0 || silent > 0 { f64::NAN } else { own });
+            gone[k] = gone[k].saturating_sub(1);
+        }
+        silent = silent.saturating_sub(1);
+        out.push(Row::Samples(samples));
+    }
+    out
+}
+
+/// What the harness reads, and what it should print.
+fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (String, String) {
+    let receptor = ArrayReceptor::<f32, N>::new(calibration);
+    let mut memory = receptor.memory();
+    let (mut input, mut expected) = (String::new(), String::new());
+    for row in rows {
+        let shares = match row {
+            Row::Samples(shares) => shares,
+            Row::Readmit(k) => {
+                memory.readmit(*k);
+                writeln!(input, "r{k}").unwrap();
+                continue;
+            }
+        };
+        let mut volts = [f32::NAN; N];
+        for ((place, share), channel) in volts.iter_mut().zip(shares).zip(&calibration.channels) {
+            let (min, max) = (channel.state_min[0], channel.state_max[0]);
+            *place = (min + share * (max - min)) as f32;
+            write!(input, "{:x} ", place.to_bits()).unwrap();
+        }
+        input.push('\n');
+        let reading = receptor.step(&mut memory, volts);
+        let status = match reading {
+            Ok(_) => 0,
+            Err(ArrayWithheld::Warming) => 1,
+            Err(ArrayWithheld::AllLost) => 3,
+            Err(_) => 2,
+        };
+        let (lost, clamped, estimate, sd) =
+            reading.map_or((0, false, 0.0, 0.0), |r| (r.lost, r.clamped, r.estimate, r.sd));
+        let clamped = u8::from(clamped);
+        write!(
+            expected,
+            "{status} {lost} {clamped} {:08x} {:08x}",
+            estimate.to_bits(),
+            sd.to_bits()
+        )
+        .unwrap();
+        for k in 0..calibration.channels.len() {
+            let loss = match memory.loss(k) {
+                None => 0,
+                Some(Loss::Missing) => 1,
+                Some(Loss::Outside) => 2,
+                Some(Loss::Still) => 3,
+                Some(_) => 4,
+            };
+            write!(expected, " {loss}").unwrap();
+        }
+        expected.push('\n');
+    }
+    (input, expected)
+}
+
+fn holds<const N: usize>(
+    name: &str,
+    calibration: &ArrayCalibration<N>,
+    rows: &[Row],
+    compilers: &[Compiler],
+) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let made = array_header(calibration, &options(None)).unwrap();
+    assert!(!made.text.contains('@'), "{name}: a mark was left");
+    fs::write(folder.path().join(HEADER), made.text).unwrap();
+    let (input, expected) = told(calibration, rows);
+    for compiler in compilers {
+        let program = compiled(folder.path(), "gauges.c", &[], compiler);
+        let found = run(&program, &input);
+        for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
+            assert_eq!(found, expected, "{name}, {}: row {n}", compiler.program);
+        }
+        assert_eq!(found.lines().count(), expected.lines().count(), "{name}");
+    }
+    expected
+}
+
+fn every_kind(compilers: &[Compiler]) {
+    let mut runner = TestRunner::new_with_rng(
+        Config::default(),
+        prop::test_runner::TestRng::deterministic_rng(prop::test_runner::RngAlgorithm::ChaCha),
+    );
+    let mut seen = String::new();
+    for (channels, relaxations, degree, hz) in [
+        (1, 0, 1, 100.0),
+        (1, 2, 2, 50.0),
+        (2, 0, 3, 100.0),
+        (4, 2, 1, 250.0),
+        (5, 3, 2, 100.0),
+        (16, 1, 2, 100.0),
+    ] {
+        let calibration = drawn(&mut runner, channels, relaxations, degree, hz);
+        let rows = rows(&mut runner, channels);
+        let name =
+            format!("{channels} gauges, {relaxations} time constants, degree {degree}, {hz} Hz");
+        seen += &holds(&name, &calibration, &rows, compilers);
+    }
+    let rows = rows(&mut runner, 2);
+    seen += &holds("the example", &example_array(), &rows, compilers);
+    // the rows are of no use if they do not bring about all that there is
+    for status in 0..4 {
+        let told = seen.lines().filter(|line| line.starts_with(&status.to_string())).count();
+        assert!(told > 5, "status {status}: {told}");
+    }
+    for loss in 0..5 {
+        let told = seen
+            .lines()
+            .flat_map(|line| line.split(' ').skip(5))
+            .filter(|l| *l == loss.to_string());
+        assert!(told.count() > 20, "loss {loss}");
+    }
+}
+
+#[test]
+fn gauges_of_every_kind_give_the_same_bits() {
+    every_kind(&strict_c());
+}
+
+#[test]
+#[ignore = "needs g++, takes half a minute; ./ci.sh runs it"]
+fn with_gxx_gauges_of_every_kind_give_the_same_bits() {
+    every_kind(&gcc_and_gxx());
+}
+
+#[test]
+#[ignore = "needs clang; ./ci.sh runs it"]
+fn with_clang_gauges_of_every_kind_give_the_same_bits() {
+    every_kind(&[compiler("clang", &["-std=c99", "-O2"], &[])]);
+}
+
+#[test]
+fn the_arduino_example_reads_a_pin_a_gauge() {
+    let made = array_header(&example_array(), &options(None)).unwrap();
+    let library = arduino_library(&made);
+    let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
+    assert!(live.text.contains("pins[STRETCH_CHANNELS] = {A0, A1};"), "{}", live.text);
+    let words = &library.iter().find(|file| file.path == "keywords.txt").unwrap().text;
+    assert!(words.contains("stretch_readmit\t") && !words.contains("STRETCH_INFLATION"), "{words}");
+}
+
+#[test]
+fn integers_are_refused_for_several_gauges() {
+    let error = array_header(&example_array(), &options(Some(Form::Fixed))).unwrap_err();
+    assert!(error.to_string().contains("--form float"), "{error}");
+}

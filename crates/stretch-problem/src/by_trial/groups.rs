@@ -1,0 +1,169 @@
+//! Which samples are a run: those of a trial, or those in which a column has one value.
+
+use std::ops::Range;
+
+use stretch_gap::{Simulator, TrialSpec};
+
+/// Samples that are fitted together, by the index of each in all trials end to end.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Group {
+    pub(super) name: String,
+    pub(super) samples: Vec<usize>,
+    /// How many trials are to be simulated, from the first on.
+    pub(super) trials: usize,
+}
+
+/// Most values of a column that is set; one with more is measured.
+const MOST_LEVELS: usize = 12;
+/// Share of its samples at which a column that is set has the value of the sample before.
+const HELD: f64 = 0.9;
+/// How far two values of a column are apart that are two set-ups, as a share of its range; those of a trial are nearer.
+const APART: f64 = 0.1;
+/// Parts of the samples by a column that moves within trials.
+const PARTS: usize = 4;
+/// Least samples of a group.
+const FEWEST: usize = 20;
+
+/// All samples.
+pub(super) fn whole(simulator: &dyn Simulator) -> Group {
+    let trials = simulator.trials();
+    let samples = (0..trials.iter().map(|t| t.samples).sum()).collect();
+    Group { name: "all".to_owned(), samples, trials: trials.len() }
+}
+
+/// A group a trial.
+pub(super) fn by_trial(trials: &[TrialSpec]) -> Vec<Group> {
+    let each = ranges(trials).into_iter().zip(trials).enumerate();
+    each.map(|(i, (samples, trial))| Group {
+        name: trial.name.clone(),
+        samples: samples.collect(),
+        trials: i + 1,
+    })
+    .collect()
+}
+
+/// A group a value of a column.
+///
+/// A column that is set (held nine samples of ten, with twelve values at most) has a group for each value. One that is measured, and moves less
+/// within trials than from trial to trial, has a group for the trials of each set-up. Any other is cut into four parts of as many samples.
+pub(super) fn by_column(name: &str, values: &[f64], trials: &[TrialSpec]) -> Vec<Group> {
+    let bounds =
+        levels(values).or_else(|| set_ups(values, trials)).unwrap_or_else(|| parts(values));
+    let mut samples = vec![Vec::new(); bounds.len() + 1];
+    for (i, value) in values.iter().enumerate() {
+        samples[bounds.partition_point(|bound| bound <= value)].push(i);
+    }
+    let ranges = ranges(trials);
+    let group = |samples: Vec<usize>| {
+        let last = samples.last().copied().unwrap_or(0);
+        let of = samples.iter().map(|i| values[*i]);
+        let [low, high] =
+            of.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        Group {
+            name: said(name, low, high),
+            trials: ranges.iter().position(|r| r.contains(&last)).map_or(trials.len(), |t| t + 1),
+            samples,
+        }
+    };
+    samples.into_iter().filter(|samples| samples.len() >= FEWEST).map(group).collect()
+}
+
+fn said(name: &str, low: f64, high: f64) -> String {
+    let [low, high] = [low, high]
+        .map(|x| format!("{:.4}", x).trim_end_matches('0').trim_end_matches('.').to_owned());
+    if low == high { format!("{name} {low}") } else { format!("{name} {low} to {high}") }
+}
+
+fn ranges(trials: &[TrialSpec]) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let one = |trial: &TrialSpec| {
+        end += trial.samples;
+        end - trial.samples..end
+    };
+    trials.iter().map(one).collect()
+}
+
+/// Bounds between the values of a column that is set.
+fn levels(values: &[f64]) -> Option<Vec<f64>> {
+    let mut held: Vec<f64> = values.windows(2).filter(|w| w[0] == w[1]).map(|w| w[1]).collect();
+    if (held.len() as f64) < HELD * values.len() as f64 {
+        return None;
+    }
+    held.sort_by(f64::total_cmp);
+    held.dedup();
+    let bounds: Vec<f64> = held.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    (bounds.len() < MOST_LEVELS).then_some(bounds)
+}
+
+/// Bounds between set-ups of a column that is measured: where the medians of trials lie further apart than trials are wide.
+fn set_ups(values: &[f64], trials: &[TrialSpec]) -> Option<Vec<f64>> {
+    let mut medians = Vec::new();
+    let mut widest = 0.0_f64;
+    for range in ranges(trials) {
+        let mut own = values[range].to_vec();
+        own.sort_by(f64::total_cmp);
+        let at = |share: f64| own.get((share * own.len() as f64) as usize).copied();
+        let (Some(low), Some(median), Some(high)) = (at(0.05), at(0.5), at(0.95)) else { continue };
+        widest = widest.max(high - low);
+        medians.push(median);
+    }
+    medians.sort_by(f64::total_cmp);
+    let span = medians.last()? - medians.first()?;
+    let least = (APART * span).max(widest);
+    let apart = medians.windows(2).filter(|w| w[1] - w[0] > least);
+    let bounds: Vec<f64> = apart.map(|w| 0.5 * (w[0] + w[1])).collect();
+    (!bounds.is_empty()).then_some(bounds)
+}
+
+/// Bounds between parts of as many samples.
+fn parts(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut bounds: Vec<f64> =
+        (1..PARTS).filter_map(|part| sorted.get(part * sorted.len() / PARTS).copied()).collect();
+    bounds.dedup();
+    bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trials(count: usize, samples: usize) -> Vec<TrialSpec> {
+        (0..count).map(|i| TrialSpec::new(&format!("t{i}"), samples, 0.0, false)).collect()
+    }
+
+    fn told(groups: &[Group]) -> Vec<(&str, usize, usize)> {
+        groups.iter().map(|g| (g.name.as_str(), g.samples.len(), g.trials)).collect()
+    }
+
+    #[test]
+    fn a_column_that_is_set_has_a_group_for_each_value() {
+        // Two values a trial, and one between them where a recording was brought to an even grid.
+        let one = [vec![0.5; 50], vec![1.0], vec![2.0; 49]].concat();
+        let groups = by_column("voltage_v", &[one.clone(), one].concat(), &trials(2, 100));
+        assert_eq!(told(&groups), [("voltage_v 0.5 to 1", 102, 2), ("voltage_v 2", 98, 2)]);
+    }
+
+    #[test]
+    fn trials_of_one_set_up_are_together_however_noisy_the_column_is() {
+        let noisy = |level: f64| (0..100).map(move |i| level + 0.01 * f64::from(i * 37 % 10));
+        let values: Vec<f64> = [3.0, 8.0, 3.1].into_iter().flat_map(noisy).collect();
+        let groups = by_column("pull_n", &values, &trials(3, 100));
+        assert_eq!(told(&groups), [("pull_n 3 to 3.19", 200, 3), ("pull_n 8 to 8.09", 100, 2)]);
+    }
+
+    #[test]
+    fn a_column_that_moves_is_cut_into_four() {
+        let values: Vec<f64> = (0..400).map(|i| f64::from(i * 7 % 400)).collect();
+        let groups = by_column("angle_deg", &values, &trials(2, 200));
+        assert_eq!(groups.len(), 4);
+        assert!(groups.iter().all(|g| g.samples.len() == 100), "{:?}", told(&groups));
+        assert_eq!(groups[3].name, "angle_deg 300 to 399");
+    }
+
+    #[test]
+    fn a_column_that_never_changes_is_one_group() {
+        assert_eq!(by_column("load_n", &[1.0; 100], &trials(1, 100)).len(), 1);
+    }
+}

@@ -1,0 +1,199 @@
+//! A column of a Parquet file: a number a row, or a list of numbers a row.
+
+use ::parquet::{
+    basic::{LogicalType, TimeUnit as Unit},
+    column::reader::{ColumnReader, ColumnReaderImpl},
+    data_type::DataType,
+    errors::ParquetError,
+    file::reader::{FileReader, RowGroupReader},
+    schema::types::ColumnDescriptor,
+};
+
+use stretch_data::Channel;
+
+use crate::room::Room;
+
+/// Rows that are taken at once.
+const PIECE: usize = 1 << 16;
+/// Longest list whose numbers become channels.
+const LONGEST: usize = 64;
+/// Memory of a number of a list while it is read, bytes: itself twice, its two levels, where its list begins, in lists that grow to twice their length.
+const LISTED: u64 = 48;
+
+/// Numbers of a column as they are read.
+#[derive(Debug, Default)]
+struct Values {
+    numbers: Vec<f64>,
+    /// Of a column of lists: where each row's list begins among the numbers.
+    begins: Vec<usize>,
+}
+
+/// Why a column gives no channels.
+pub(super) enum Refused {
+    /// It is none of numbers; the file can be read without it.
+    LeftOut(String),
+    /// The file cannot be read.
+    File(String),
+    /// What the library says of the file.
+    Damaged(ParquetError),
+}
+
+impl From<ParquetError> for Refused {
+    fn from(error: ParquetError) -> Self {
+        Self::Damaged(error)
+    }
+}
+
+/// Reads column `i` of a file with so many rows: a channel, or one an item where its rows hold lists of one length. What has no value is NaN.
+pub(super) fn read(
+    file: &dyn FileReader,
+    i: usize,
+    rows: usize,
+    room: &mut Room,
+) -> Result<Vec<Channel>, Refused> {
+    let column = file.metadata().file_metadata().schema_descr().column(i);
+    if column.max_rep_level() > 1 {
+        return Err(Refused::LeftOut("lists of lists".to_owned()));
+    }
+    let is_list = column.max_rep_level() > 0;
+    room.take_numbers(rows).map_err(Refused::File)?;
+    let mut values = Values::default();
+    if !is_list {
+        values.numbers.reserve_exact(rows);
+    }
+    for group in 0..file.num_row_groups() {
+        let group = file.get_row_group(group)?;
+        // more rows than the file says it has are no rows of it
+        let its_rows = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
+        let have = if is_list { values.begins.len() } else { values.numbers.len() };
+        if its_rows > rows - have.min(rows) {
+            let why = "its groups hold more rows than the file; write it again";
+            return Err(Refused::File(why.to_owned()));
+        }
+        // its pages are in memory while it is read
+        let pages = usize::try_from(group.metadata().column(i).uncompressed_size());
+        let pages = pages.unwrap_or(usize::MAX);
+        room.take(pages as u64).map_err(Refused::File)?;
+        if is_list {
+            let listed = levels(group.as_ref(), i)?;
+            room.take(LISTED.saturating_mul(listed)).map_err(Refused::File)?;
+        }
+        if !append_group(group.as_ref(), i, &column, &mut values)? {
+            return Err(Refused::LeftOut("no numbers".to_owned()));
+        }
+        room.give_back(pages);
+    }
+    match is_list {
+        true => values.items(&column.path().parts()[0], rows).map_err(Refused::LeftOut),
+        false if values.numbers.len() != rows => Err(Refused::LeftOut("no numbers".to_owned())),
+        false => Ok(vec![Channel { name: column.path().string(), values: values.numbers }]),
+    }
+}
+
+/// Counts in a second, where a column holds stamps.
+pub(super) fn stamp_counts(column: &ColumnDescriptor) -> Option<f64> {
+    let unit = match column.logical_type_ref()? {
+        LogicalType::Timestamp(stamp) => stamp.unit,
+        LogicalType::Time(time) => time.unit,
+        _ => return None,
+    };
+    Some(match unit {
+        Unit::MILLIS => 1e3,
+        Unit::MICROS => 1e6,
+        Unit::NANOS => 1e9,
+    })
+}
+
+impl Values {
+    /// A channel an item of lists of one length: `action.0`, `action.1` ...
+    fn items(&self, name: &str, rows: usize) -> Result<Vec<Channel>, String> {
+        let count = self.numbers.len().checked_div(rows).unwrap_or(0);
+        let begins = self.begins.iter().enumerate();
+        let is_even = self.begins.len() == rows
+            && self.numbers.len() == rows * count
+            && begins.into_iter().all(|(row, begin)| *begin == row * count);
+        match count {
+            _ if !is_even || count == 0 => Err("lists of several lengths".to_owned()),
+            _ if count > LONGEST => Err(format!("lists of {count}")),
+            _ => Ok((0..count)
+                .map(|item| Channel {
+                    name: format!("{name}.{item}"),
+                    values: self.numbers[item..].iter().step_by(count).copied().collect(),
+                })
+                .collect()),
+        }
+    }
+}
+
+/// How many values a group's column holds by the heads of its pages, empty lists among them.
+fn levels(group: &dyn RowGroupReader, i: usize) -> Result<u64, ParquetError> {
+    let (mut pages, mut all) = (group.get_column_page_reader(i)?, 0_u64);
+    while let Some(page) = pages.peek_next_page()? {
+        // of an older page its rows are all that is said, which are its values
+        let values = page.num_levels.or(page.num_rows).unwrap_or(0);
+        all = all.saturating_add(if page.is_dict { 0 } else { values as u64 });
+        pages.skip_next_page()?;
+    }
+    Ok(all)
+}
+
+/// Appends a row group's column; false where it holds no numbers.
+fn append_group(
+    group: &dyn RowGroupReader,
+    i: usize,
+    column: &ColumnDescriptor,
+    into: &mut Values,
+) -> Result<bool, ParquetError> {
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    if matches!(column.logical_type_ref(), Some(LogicalType::Decimal { .. })) {
+        return Ok(false);
+    }
+    let levels = (column.max_def_level(), column.max_rep_level());
+    match group.get_column_reader(i)? {
+        ColumnReader::BoolColumnReader(r) => {
+            append(r, rows, levels, into, |x| f64::from(u8::from(x)))?;
+        }
+        ColumnReader::Int32ColumnReader(r) => append(r, rows, levels, into, f64::from)?,
+        ColumnReader::Int64ColumnReader(r) => append(r, rows, levels, into, |x| x as f64)?,
+        ColumnReader::FloatColumnReader(r) => append(r, rows, levels, into, f64::from)?,
+        ColumnReader::DoubleColumnReader(r) => append(r, rows, levels, into, |x| x)?,
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+fn append<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    rows: usize,
+    (full, deep): (i16, i16),
+    into: &mut Values,
+    number: impl Fn(T::T) -> f64,
+) -> Result<(), ParquetError> {
+    let mut left = rows;
+    let (mut read, mut levels, mut lists) = (Vec::new(), Vec::new(), Vec::new());
+    while left > 0 {
+        read.clear();
+        levels.clear();
+        lists.clear();
+        let (asked, asked_lists) =
+            ((full > 0).then_some(&mut levels), (deep > 0).then_some(&mut lists));
+        let (records, ..) = reader.read_records(left.min(PIECE), asked, asked_lists, &mut read)?;
+        if records == 0 {
+            break;
+        }
+        // a level of 0 begins the list of another row
+        let first = into.numbers.len();
+        let begins = lists.iter().enumerate().filter(|(_, level)| **level == 0);
+        into.begins.extend(begins.map(|(i, _)| first + i));
+        let mut read = read.drain(..).map(&number);
+        if full == 0 {
+            into.numbers.extend(read);
+        } else {
+            // A level below the full one is a row without a value.
+            let whole = |level: i16| if level == full { read.next() } else { None };
+            into.numbers.extend(levels.drain(..).map(whole).map(|x| x.unwrap_or(f64::NAN)));
+        }
+        left -= records;
+    }
+    Ok(())
+}

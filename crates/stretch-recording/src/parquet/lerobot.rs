@@ -1,0 +1,82 @@
+//! LeRobot's data sets: Parquet tables of episodes, with what their columns mean in `meta/info.json` beside them.
+
+use std::{fs::File, io::Read, path::Path};
+
+use serde_json::Value;
+
+use stretch_data::Channel;
+
+use crate::grid::Track;
+
+/// The column that says of which episode a row is.
+const EPISODE: &str = "episode_index";
+/// The longest description that is read, bytes.
+const LONGEST: u64 = 16 << 20;
+
+/// Calls the items of lists as the data set's description does: `action.0` becomes `action.elbow.pos`. A file that is in no data set keeps
+/// its numbers.
+pub(crate) fn name(file: &Path, channels: &mut [Channel]) {
+    let Some(features) = features(file) else { return };
+    for channel in channels {
+        let Some((feature, item)) = channel.name.rsplit_once('.') else { continue };
+        let Some(names) = features.get(feature).and_then(|f| listed(f.get("names")?)) else {
+            continue;
+        };
+        let own = item.parse::<usize>().ok().and_then(|item| names.get(item)?.as_str());
+        if let Some(own) = own {
+            channel.name = format!("{feature}.{own}");
+        }
+    }
+}
+
+/// What the columns are, from `meta/info.json` above `data/chunk-000/file.parquet`.
+fn features(file: &Path) -> Option<Value> {
+    let root = file.ancestors().nth(3)?;
+    let mut text = String::new();
+    let info = File::open(root.join("meta").join("info.json")).ok()?;
+    info.take(LONGEST).read_to_string(&mut text).ok()?;
+    let mut info: Value = serde_json::from_str(&text).ok()?;
+    info.get_mut("features").map(Value::take)
+}
+
+/// Names of the items: a list, or a list under a word such as `motors`.
+fn listed(names: &Value) -> Option<&Vec<Value>> {
+    names.as_array().or_else(|| match names.as_object()?.values().next() {
+        Some(Value::Array(names)) => Some(names),
+        _ => None,
+    })
+}
+
+/// One episode of a table: the one that is asked for, else the first. A table of one episode stays as it is.
+pub(crate) fn episode(
+    mut track: Track,
+    asked: Option<u32>,
+    notes: &mut Vec<String>,
+) -> Result<Track, String> {
+    let Some(of) = track.channels.iter().find(|c| c.name == EPISODE).map(|c| c.values.clone())
+    else {
+        return match asked {
+            Some(_) => Err(format!("an episode is asked for, and there is no column {EPISODE}")),
+            None => Ok(track),
+        };
+    };
+    let finite = || of.iter().copied().filter(|e| e.is_finite());
+    let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
+    let wanted = asked.map_or(of[0], f64::from);
+    if !of.contains(&wanted) {
+        return Err(format!("there is no episode {wanted} in it; it holds {low} to {high}"));
+    }
+    if high > low && asked.is_none() {
+        notes.push(format!(
+            "it holds the episodes {low} to {high}, and {wanted} is read; FILE#{high} reads another"
+        ));
+    }
+    let kept = |values: &[f64]| -> Vec<f64> {
+        values.iter().zip(&of).filter(|(_, e)| **e == wanted).map(|(x, _)| *x).collect()
+    };
+    track.counts = kept(&track.counts);
+    for channel in &mut track.channels {
+        channel.values = kept(&channel.values);
+    }
+    Ok(track)
+}

@@ -1,0 +1,95 @@
+//! Parquet: a table whose columns are numbers, stamps, or lists of numbers of one length; LeRobot's data sets are such tables.
+
+mod column;
+mod lerobot;
+
+use std::path::Path;
+
+use ::parquet::{
+    errors::ParquetError,
+    file::reader::{FileReader, SerializedFileReader},
+};
+use bytes::Bytes;
+
+use stretch_data::Channel;
+
+use crate::{
+    ReadOptions, RecordingError,
+    clock::time_among,
+    grid::{Track, note},
+    options::TIME,
+    parquet::column::{Refused, stamp_counts},
+    room::Room,
+};
+
+/// Reads a file's columns, those without a value as NaN.
+pub(crate) fn read(
+    (bytes, mut room): (Vec<u8>, Room),
+    file: &str,
+    options: &ReadOptions,
+) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
+    let fail =
+        |problem| RecordingError::Format { file: file.to_owned(), format: "Parquet", problem };
+    let broken = |e: ParquetError| fail(format!("{e}; write it again, or export it as CSV"));
+    let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let rows = usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0);
+    room.take_time(rows).map_err(fail)?;
+    let (mut channels, mut stamps, mut other) = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..schema.num_columns() {
+        let descriptor = schema.column(i);
+        match column::read(&reader, i, rows, &mut room) {
+            Ok(own) => {
+                let is_one = own.len() == 1;
+                let counts = stamp_counts(&descriptor).filter(|_| is_one);
+                stamps.extend(own.iter().map(|_| counts));
+                channels.extend(own);
+            }
+            Err(Refused::LeftOut(why)) => {
+                other.push(format!("{} ({why})", descriptor.path().string()));
+            }
+            Err(Refused::File(why)) => return Err(fail(why)),
+            Err(Refused::Damaged(why)) => return Err(broken(why)),
+        }
+    }
+    let mut notes = Vec::new();
+    note(&mut notes, "left out", &other);
+    lerobot::name(Path::new(file), &mut channels);
+    let track = on_its_clock(file, channels, &stamps, options, &mut notes)?;
+    if track.counts.is_empty() {
+        return Err(RecordingError::HeaderOnly { file: file.to_owned() });
+    }
+    let track = lerobot::episode(track, options.episode, &mut notes).map_err(fail)?;
+    Ok((vec![track], notes))
+}
+
+/// The channels with the one among them that is their time.
+fn on_its_clock(
+    file: &str,
+    mut channels: Vec<Channel>,
+    stamps: &[Option<f64>],
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<Track, RecordingError> {
+    let names: Vec<String> = channels.iter().map(|c| c.name.clone()).collect();
+    match (time_among(&names, options), options.sample_rate_hz) {
+        (Some(time), _) => {
+            let Channel { name: clock, values: counts } = channels.remove(time);
+            if clock != options.time {
+                notes.push(format!("the time is column {clock}"));
+            }
+            let per_second = stamps[time].unwrap_or_else(|| options.divisor(&clock));
+            Ok(Track { clock, counts, per_second, channels })
+        }
+        (None, Some(rate_hz)) => {
+            notes.push(format!("there is no time: {rate_hz} samples a second, as was said"));
+            let rows = channels.first().map_or(0, |c| c.values.len());
+            let counts = (0..rows).map(|i| i as f64 / rate_hz).collect();
+            Ok(Track { clock: TIME.to_owned(), counts, per_second: 1.0, channels })
+        }
+        (None, None) => {
+            let names = names.iter().map(String::as_str);
+            Err(RecordingError::missing_column(file, &options.time, names))
+        }
+    }
+}

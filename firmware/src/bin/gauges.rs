@@ -1,0 +1,35 @@
+//! Four gauges in volts to a joint's angle, in `f32`: what a channel costs, and that it is watched.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use stretch_core::{ArrayCalibration, Design, Stage};
+use stretch_firmware::{
+    gauges::{GAUGES, answer, samples},
+    measure::{load, replay},
+    trial,
+};
+use stretch_receptor::{ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld};
+
+static RECORD: &[u8] = include_bytes!("../../data/gauges.postcard");
+
+type Receptor = ArrayReceptor<f32, GAUGES>;
+
+#[inline(never)]
+fn step(
+    receptor: &Receptor,
+    memory: &mut ArrayMemory<f32, GAUGES>,
+    samples: [f32; GAUGES],
+) -> Result<ArrayReading<f32>, ArrayWithheld> {
+    receptor.step(memory, samples)
+}
+
+#[entry]
+fn main() -> ! {
+    let calibration: ArrayCalibration<GAUGES> = load(RECORD);
+    let receptor = Receptor::new(&calibration);
+    let mut memory = receptor.memory();
+    let input = |code| samples(trial::volts(code));
+    replay("gauges", &receptor, &mut memory, input, step, answer);
+    semihosting::process::exit(0)
+}

@@ -1,0 +1,32 @@
+//! Four gauges that follow the trial, each with a gain of its own.
+
+use stretch_core::Branch;
+use stretch_receptor::{ArrayReading, ArrayWithheld, Domain, Withheld, code::CodeReading};
+
+/// Number of gauges.
+pub const GAUGES: usize = 4;
+
+/// Gain of a gauge over the trial's volts.
+pub fn gain(gauge: usize) -> f32 {
+    1.0 + 0.25 * gauge as f32
+}
+
+/// A sample of each gauge; NaN of each where the trial has none.
+pub fn samples(volts: f32) -> [f32; GAUGES] {
+    core::array::from_fn(|gauge| gain(gauge) * volts)
+}
+
+/// What goes into the checksum: a lost channel stands in the place of the branch.
+pub fn answer(
+    reading: Result<ArrayReading<f32>, ArrayWithheld>,
+) -> Result<CodeReading<f32>, Withheld> {
+    match reading {
+        Ok(reading) => Ok(CodeReading {
+            estimate: reading.estimate,
+            branch: if reading.lost == 0 { Branch::Inflation } else { Branch::Deflation },
+            domain: if reading.clamped { Domain::SignalClamped } else { Domain::Inside },
+        }),
+        Err(ArrayWithheld::Warming) => Err(Withheld::Warming),
+        Err(_) => Err(Withheld::Missing),
+    }
+}

@@ -1,0 +1,138 @@
+//! Gauges that sit elsewhere than at calibration: hours of simulated movement without a shift, and gauges that were put
+//! on again 8 mm off.
+
+use stretch_calibrate::{ArrayOptions, ROOM, SleeveCalibration, apply_array, calibrate_array};
+use stretch_core::ArrayCalibration;
+use stretch_data::{Channel, Trial};
+use stretch_fit::LineAccumulator;
+use stretch_sim::{Key, Rig, RunSettings, Session, TrialPlan};
+
+const GAUGES: usize = 3;
+/// Trials of a minute that a calibration is made of.
+const FITTED: usize = 3;
+
+/// A muscle with three gauges, whose gain, trim and memory are drawn.
+struct Worn {
+    sessions: Vec<Session>,
+    seed: u64,
+    done: usize,
+}
+
+impl Worn {
+    fn new(seed: u64) -> Self {
+        let drawn = Rig::default().draw(seed).expect("the rig has tolerances");
+        let gauge = |k: usize| {
+            let mut rig = drawn.clone();
+            let k_share = k as f64 / GAUGES as f64;
+            rig.params[Key::G] *= 0.8 + 0.3 * k_share;
+            rig.effects
+                .insert("gauge_relaxation", &[("c", 0.05 + 0.1 * k_share), ("tau", 0.4)])
+                .expect("an effect of the gauge");
+            let settings = RunSettings { seed: 1000 * seed + k as u64, ..RunSettings::default() };
+            Session::new(&rig, &settings).expect("the rig is in order")
+        };
+        Self { sessions: (0..GAUGES).map(gauge).collect(), seed, done: 0 }
+    }
+
+    /// The next minute of drawn movement.
+    fn next(&mut self) -> Trial {
+        self.done += 1;
+        let plan = TrialPlan::arbitrary(self.done, self.seed);
+        let mut trials =
+            self.sessions.iter_mut().map(|session| session.run(&plan).expect("a trial").1);
+        let mut trial = trials.next().expect("a gauge");
+        let mut channels = vec![Channel {
+            name: "length_mm".into(),
+            values: trial.channel("length_mm").expect("recorded").to_vec(),
+        }];
+        channels.push(gauge(0, &trial));
+        channels.extend(trials.enumerate().map(|(k, trial)| gauge(k + 1, &trial)));
+        trial.channels = channels;
+        trial
+    }
+
+    fn calibrated(&mut self) -> ArrayCalibration<ROOM> {
+        let trials: Vec<Trial> = (0..FITTED).map(|_| self.next()).collect();
+        let options = ArrayOptions {
+            signals: (0..GAUGES).map(name).collect(),
+            reference: "length_mm".into(),
+            ..ArrayOptions::default()
+        };
+        let fit = calibrate_array(&trials, &options).expect("a calibration");
+        match fit.calibration {
+            SleeveCalibration::Many(many) => *many,
+            SleeveCalibration::One(_) => unreachable!("three gauges"),
+        }
+    }
+}
+
+fn name(k: usize) -> String {
+    format!("gauge_{k}_v")
+}
+
+fn gauge(k: usize, trial: &Trial) -> Channel {
+    Channel { name: name(k), values: trial.channel("bridge_v").expect("recorded").to_vec() }
+}
+
+/// The volts that a gauge changes by for a millimetre: its regression on the length.
+fn volts_per_mm(trial: &Trial, k: usize) -> f64 {
+    let length = trial.channel("length_mm").expect("recorded");
+    let volts = trial.channel(&name(k)).expect("recorded");
+    let mut line = LineAccumulator::new();
+    for (&length, &volts) in length.iter().zip(volts) {
+        line.push(length, volts).expect("numbers");
+    }
+    line.fit().expect("the length moves").slope()
+}
+
+const RIGS: u64 = 8;
+const MINUTES: usize = 30;
+/// Of a Poisson count with a mean of one, the stated rate over the hours simulated here, more come once in 270.
+const MOST_ALARMS: usize = 4;
+
+#[test]
+fn hours_without_a_shift_have_no_more_alarms_than_is_stated() {
+    let (mut hours, mut alarms, mut rate) = (0.0, 0, 0.0);
+    for seed in 1..=RIGS {
+        let mut worn = Worn::new(seed);
+        let calibration = worn.calibrated();
+        rate = calibration.shifts.as_ref().expect("three minutes are enough").false_alarms_an_hour;
+        let mut before = 0;
+        for _ in 0..MINUTES {
+            let trial = worn.next();
+            hours += trial.duration_s() / 3600.0;
+            for (_, shifts) in apply_array(&calibration, &trial).expect("applies").shifts {
+                alarms += usize::from(shifts.shifted & !before != 0);
+                before = shifts.shifted;
+            }
+        }
+    }
+    assert!((0.95..1.05).contains(&(rate * hours)), "{rate} an hour over {hours} h");
+    assert!(alarms <= MOST_ALARMS, "{alarms} alarms in {hours} h");
+}
+
+#[test]
+fn a_gauge_that_was_put_on_8_mm_off_is_told_within_two_blocks() {
+    let (mut cases, mut named) = (0, 0);
+    for seed in 1..=RIGS {
+        let mut worn = Worn::new(seed);
+        let calibration = worn.calibrated();
+        let limits = calibration.shifts.clone().expect("three minutes are enough");
+        for k in 0..GAUGES {
+            let mut trial = worn.next();
+            let moved_v = 8.0 * volts_per_mm(&trial, k);
+            trial.channels[1 + k].values.iter_mut().for_each(|volts| *volts += moved_v);
+            let applied = apply_array(&calibration, &trial).expect("applies");
+            let (at_s, shifts) =
+                *applied.shifts.iter().find(|(_, s)| s.shifted != 0).expect("told");
+            assert!(at_s <= 2.0 * limits.block_s, "rig {seed}, gauge {k}: {at_s} s");
+            assert!(shifts.has_shifted(k), "rig {seed}, gauge {k}: {shifts:?}");
+            // what lies outside of the calibration's domain is moved to its end: it says at least how far
+            let off = shifts.off[k];
+            assert!(limits.limits[k] < off && off < 9.0, "rig {seed}, gauge {k}: {off} mm");
+            cases += 1;
+            named += usize::from(shifts.most == Some(k));
+        }
+    }
+    assert!(10 * named >= 9 * cases, "{named} of {cases} are named");
+}

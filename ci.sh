@@ -2,11 +2,11 @@
 # The gate, the same locally and in CI.
 #
 #     ./ci.sh quick    before a commit: format, lints, `cargo test`, documentation, no_std
-#     ./ci.sh          all of it
+#     ./ci.sh          the gate
+#     ./ci.sh deep     before a release, and once a week: the gate, guided fuzzing, diagnoses of sets of two, and Miri
 #
 # A step that cannot run here says SKIPPED and why; everything else must pass. At the end stands how many seconds each step took.
-# Fuzzing, firmware and the build of the fleet have target folders of their own and run beside the rest: one of two cores is idle half of the
-# time otherwise.
+# What has a target folder of its own runs beside the rest: one of two cores is idle half of the time otherwise.
 # STRETCH_TESTED=1: `cargo test` has just passed, and is not run again.
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -21,10 +21,12 @@ PACKAGES="$LIBRARIES $BESIDE stretch-cli"
 FEATURED="stretch-recording"
 
 what=${1:-all}
-[ "$what" = quick ] || [ "$what" = all ] || { echo "usage: ./ci.sh [quick]" >&2; exit 2; }
+case $what in
+quick) features= ;;
 # all features once are more than the default ones, and need no second run
-features=--all-features
-[ "$what" = all ] || features=
+all | deep) features=--all-features ;;
+*) echo "usage: ./ci.sh [quick | deep]" >&2; exit 2 ;;
+esac
 
 seconds="" name=""
 step() {
@@ -95,11 +97,17 @@ for target in $TARGETS; do
     fi
 done
 
-[ "$what" = all ] || exit 0
+[ "$what" != quick ] || exit 0
+
+# the program is a release build, which its slow tests gain most by; `demo` is shown with the same
+step "the program"
+cargo build --quiet --release --locked -p stretch-cli
+target=$PWD/target
+export STRETCH=$target/release/stretch
 
 beside fleet "fleet/gate.sh build"
-beside fuzzing "fuzz/run.sh gate"
 beside firmware firmware/gate.sh
+beside page "web/gate.sh build"
 start
 
 step "tests with the features that are off"
@@ -108,9 +116,8 @@ for crate in $FEATURED; do
 done
 
 step "slow tests, and those that need what not every machine has"
-# the program is a release build, which its slow tests gain most by; `demo` is shown with the same
-cargo build --quiet --release --locked -p stretch-cli
-without=(--skip gross::)
+without=()
+[ "$what" = deep ] || without+=(--skip every_effect::a_set_of_two)
 lacks() {
     skip "tests that begin with with_$1_: $2"
     without+=(--skip "with_$1_")
@@ -130,11 +137,7 @@ python3 -c 'import jsonschema' 2>/dev/null || lacks jsonschema "there is no pyth
 empty=$(mktemp -d)
 mounts "$empty" || lacks mount "no file system can be mounted here"
 rmdir "$empty"
-STRETCH_PROGRAM=$PWD/target/release/stretch \
-    cargo test --quiet --locked --no-fail-fast --lib --bins --tests -- --ignored "${without[@]}"
-
-step "errors of records and rig files, none of them given an effect's name"
-cargo test --quiet --release --locked -p stretch-problem --test it -- --ignored gross::
+STRETCH_PROGRAM=$STRETCH cargo test --quiet --locked --no-fail-fast --lib --bins --tests -- --ignored "${without[@]}"
 
 step "examples"
 # as cargo test has built them
@@ -143,7 +146,7 @@ for example in examples/*.rs; do
     cargo run --quiet --locked --example "$name_of" >/dev/null
     echo "$name_of"
 done
-cargo run --quiet --locked -p stretch-gap --example motor >/dev/null
+cargo run --quiet --locked --example motor >/dev/null
 echo motor
 
 step "every combination of features"
@@ -160,27 +163,24 @@ for library in $LIBRARIES; do
 done
 
 step "packages of all crates"
-# a folder of its own each time: cargo keeps what it unpacked for a path and a
-# version, and would verify against the sources of an earlier run
+# Each is unpacked and checked on its own, beside the others in the place of the registry.
 packages=$(mktemp -d)
-# nothing of it is run
 # shellcheck disable=SC2046,SC2086
-CARGO_PROFILE_DEV_OPT_LEVEL=0 cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $PACKAGES)
+cargo package --quiet --locked --allow-dirty --no-verify --target-dir "$packages" $(printf -- '-p %s ' $PACKAGES)
+for package in "$packages"/package/*.crate; do
+    tar -xzf "$package" -C "$packages"
+done
+{
+    printf '[workspace]\nresolver = "3"\nmembers = ["stretch-*"]\n[patch.crates-io]\n'
+    (cd "$packages" && for folder in stretch-*; do printf '%s = { path = "%s" }\n' "${folder%-*}" "$folder"; done)
+} >"$packages/Cargo.toml"
+cp Cargo.lock "$packages"
+for package in $PACKAGES; do
+    (cd "$packages" && CARGO_TARGET_DIR=$target cargo check --quiet --locked -p "$package")
+done
 rm -rf "$packages"
 
-step "Miri on the no_std crates"
-# proptest's cases are few there: a step is a thousand times slower
-# on a core for which libm has no assembly, which Miri could not follow
-if cargo +nightly miri --version >/dev/null 2>&1; then
-    # shellcheck disable=SC2046,SC2086
-    PROPTEST_CASES=4 MIRIFLAGS=-Zmiri-disable-isolation cargo +nightly miri test --quiet --target riscv64gc-unknown-linux-gnu --lib $(printf -- '-p %s ' $LIBRARIES)
-else
-    skip "there is no Miri: rustup +nightly component add miri"
-fi
-
 # Workspaces of their own. Those of the same profile have one target folder, so that what they all depend on is built once.
-target=$PWD/target
-
 step "benches, each run once"
 (cd benches && CARGO_TARGET_DIR=$target cargo test --quiet --locked --benches >/dev/null)
 
@@ -188,10 +188,17 @@ step "Python package"
 CARGO_TARGET_DIR=$target python/gate.sh
 
 step "the blind check, its tests, four cases, and ten of each plant of the benchmark"
-STRETCH=$target/release/stretch CARGO_TARGET_DIR=$target challenge/gate.sh
+CARGO_TARGET_DIR=$target challenge/gate.sh
 
-step "the reports' script, in a browser"
-STRETCH=$target/release/stretch web/gate.sh
+step "fuzzing, so many executions a target"
+CARGO_TARGET_DIR=$target fuzz/run.sh gate
+
+step "FMUs"
+CARGO_TARGET_DIR=$target fmu/gate.sh
+
+step "the reports' script and the page, in a browser"
+joined page
+web/gate.sh
 
 step "the page inside the program"
 if [ -f web/target/page/index.html ]; then
@@ -201,12 +208,8 @@ else
 fi
 spare web/target
 
-step "FMUs"
-CARGO_TARGET_DIR=$target fmu/gate.sh
-
 # its data base is too much to build at the others' level of optimisation
-step "what ran beside: fuzzing, so many executions a target, firmware in the emulator, the build of the fleet"
-joined fuzzing
+step "what ran beside: firmware in the emulator, the build of the fleet"
 joined firmware
 joined fleet
 spare fuzz/target firmware/target target/debug
@@ -270,4 +273,19 @@ if rustup run "$oldest" cargo --version >/dev/null 2>&1; then
     spare "$target/oldest"
 else
     skip "Rust $oldest is not installed: rustup toolchain install $oldest --profile minimal"
+fi
+
+[ "$what" = deep ] || exit 0
+
+step "fuzzing, guided"
+fuzz/run.sh guided
+
+step "Miri on the no_std crates"
+# proptest's cases are few there: a step is a thousand times slower
+# on a core for which libm has no assembly, which Miri could not follow
+if cargo +nightly miri --version >/dev/null 2>&1; then
+    # shellcheck disable=SC2046,SC2086
+    PROPTEST_CASES=4 MIRIFLAGS=-Zmiri-disable-isolation cargo +nightly miri test --quiet --target riscv64gc-unknown-linux-gnu --lib $(printf -- '-p %s ' $LIBRARIES)
+else
+    skip "there is no Miri: rustup +nightly component add miri"
 fi

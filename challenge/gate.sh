@@ -6,9 +6,8 @@ cd "$(dirname "$0")"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../target}"
 
 cargo fmt --check --package stretch-challenge --package stretch-blind
-cargo clippy --quiet --locked --workspace --all-targets -- -D warnings
-cargo test --quiet --locked --workspace --lib --bins --tests
-cargo test --quiet --locked --workspace --doc
+. ../.ci/lint-build.sh
+cargo test --quiet --locked --workspace
 # the page is then looked at in a browser, by web/gate.sh
 check="$CARGO_TARGET_DIR/challenge-check"
 rm -rf "$check"

@@ -39,7 +39,7 @@ for core in m3 m4f; do
     m4f) triple=thumbv7em-none-eabihf machine=mps2-an386 cpu=cortex-m4 ;;
     esac
     cargo build --locked --quiet --release --target "$triple" --features c --bin c
-    timeout 60 qemu-system-arm -M "$machine" -cpu "$cpu" -nographic -icount shift=7 \
+    timeout 600 qemu-system-arm -M "$machine" -cpu "$cpu" -nographic -icount shift=7 \
         -semihosting-config enable=on,target=native \
         -kernel "$target_dir/$triple/release/c" 2>/dev/null </dev/null |
         sed -n "s/^model=\(.*\) text_bytes=[0-9]*/core=$core c=\1/p"

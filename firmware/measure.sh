@@ -16,8 +16,8 @@ for core in m3 m4f; do
     esac
     cargo build --locked --quiet --release --target "$triple" --bins
     for model in $models; do
-        # a fault would hang the emulator; standard error has remarks for people
-        timeout 60 qemu-system-arm -M "$machine" -cpu "$cpu" -nographic -icount shift=7 \
+        # a fault would hang the emulator, on any machine; standard error has remarks for people
+        timeout 600 qemu-system-arm -M "$machine" -cpu "$cpu" -nographic -icount shift=7 \
             -semihosting-config enable=on,target=native \
             -kernel "$target_dir/$triple/release/$model" 2>/dev/null </dev/null |
             sed -n "s/^model=/core=$core model=/p"

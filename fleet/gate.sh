@@ -1,6 +1,5 @@
 #!/bin/sh
-# Format, lints and tests of this workspace, which the gate of the project calls. All of it is compiled once: lints are asked of the build
-# that is tested, for a check would compile the engine again.
+# Format, lints and tests of this workspace, which the gate of the project calls. All of it is compiled once.
 set -eu
 cd "$(dirname "$0")"
 
@@ -9,12 +8,7 @@ if [ "${STRETCH_SKIP_FLEET:-0}" = 1 ]; then
     exit 0
 fi
 cargo fmt --all --check
-# one build, by the compiler that lints as well: it makes the same code
-if clippy=$(rustup which clippy-driver 2>/dev/null); then
-    export RUSTC_WORKSPACE_WRAPPER=$clippy CLIPPY_ARGS="-Dwarnings"
-else
-    echo "SKIPPED lints of fleet: rustup knows no clippy-driver"
-fi
+. ../.ci/lint-build.sh
 if [ "${1:-}" = build ]; then
     # what its tests time, they time alone: the gate builds beside its other steps, and tests when they are done
     exec cargo test --quiet --locked --workspace --no-run

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Format, lints, tests and documentation of this workspace, which the gate of the
+# Format, lints and tests of this workspace, which the gate of the
 # project calls. Tests build FMUs with gcc and say SKIPPED where there is none;
 # without any C compiler nothing of it can be built.
 set -eu
@@ -10,7 +10,6 @@ if ! command -v cc >/dev/null 2>&1; then
     exit 0
 fi
 cargo fmt --check
-cargo clippy --quiet --locked --all-targets -- -D warnings
+. ../.ci/lint-build.sh
 # The words of a test that skips are those of its output.
 cargo test --quiet --locked -- --show-output
-RUSTDOCFLAGS="-D warnings" cargo doc --quiet --locked --no-deps

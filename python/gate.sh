@@ -10,7 +10,7 @@ python=${PYTHON:-python3}
 profile=${PROFILE:-dev}
 
 cargo fmt --check
-cargo clippy --quiet --locked --all-targets -- -D warnings
+. ../.ci/lint-build.sh
 
 command -v "$python" >/dev/null 2>&1 || skip "there is no $python"
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' || skip "$("$python" --version) is older than 3.10"

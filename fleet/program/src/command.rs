@@ -12,6 +12,7 @@ use clap::{Parser, Subcommand};
 use crate::{
     calibrate, diagnose, drift, ingest, make,
     panics::{message, tell_in_a_line},
+    prior,
     show::warn,
     sql,
 };
@@ -31,6 +32,7 @@ enum Command {
     Sql(sql::Args),
     Calibrate(calibrate::Args),
     Drift(drift::Args),
+    Prior(prior::Args),
     Diagnose(diagnose::Args),
 }
 
@@ -60,6 +62,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             Command::Sql(args) => sql::run(args).await,
             Command::Calibrate(args) => calibrate::run(args).await,
             Command::Drift(args) => drift::run(args).await,
+            Command::Prior(args) => tokio::task::block_in_place(|| prior::run(args)),
             Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
         }
     };
@@ -91,4 +94,39 @@ fn sentence(error: &anyhow::Error) -> String {
         }
     }
     stretch_files::without_temporary_names(&told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the pages ask of the program, it understands: words, options and values.
+    #[test]
+    fn every_command_of_the_pages_is_one() {
+        let pages = [
+            include_str!("../../README.md"),
+            include_str!("../../../book/src/tutorials/fleet.md"),
+            include_str!("../../../book/src/tutorials/sleeve.md"),
+            include_str!("prior.rs"),
+            include_str!("diagnose.rs"),
+            include_str!("calibrate.rs"),
+            include_str!("drift.rs"),
+            include_str!("make.rs"),
+        ];
+        let lines = pages.iter().flat_map(|page| page.lines());
+        let lines = lines.map(|line| line.trim_start_matches("///").trim());
+        let mut count = 0;
+        for line in lines.filter(|line| line.starts_with("stretch fleet ") && !line.contains("..."))
+        {
+            let words = shlex::split(line).expect(line);
+            let asked = Cli::try_parse_from(&words[1..]);
+            assert!(
+                asked.is_ok(),
+                "{line}: {}",
+                asked.err().map(|e| e.to_string()).unwrap_or_default()
+            );
+            count += 1;
+        }
+        assert!(count >= 15, "{count} commands were found");
+    }
 }

@@ -1,26 +1,21 @@
 //! `stretch-fleet diagnose`: every partition of a lake as a data set.
 
-use std::{collections::BTreeMap, fs::File, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use anyhow::{Context, ensure};
-use datafusion::{
-    arrow::{
-        array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch, StringArray, UInt64Array},
-        compute::{cast, concat_batches},
-        datatypes::{DataType, Field, Float64Type, Schema},
-    },
-    parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError},
+use datafusion::arrow::{
+    array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array},
+    datatypes::{Field, Schema},
 };
-use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
+    data_sets::{By, data_sets, read, trials},
     flat::table,
     lake::{Lake, LakeFile, digest, write_parquet},
     lock::remove_abandoned,
-    panics::caught,
     show::{bar, say, say_json},
     sql::tell_unfit,
 };
@@ -60,17 +55,6 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What a data set is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum By {
-    /// A sensor's trials of a day
-    Day,
-    /// A sensor's trials of a month
-    Month,
-    /// All trials of a sensor
-    Sensor,
-}
-
 fn share(text: &str) -> Result<(usize, usize), String> {
     let (which, of) = text.split_once('/').unwrap_or_default();
     match (which.parse(), of.parse()) {
@@ -83,16 +67,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let lake = Lake::open(&args.lake)?;
     tell_unfit(&lake);
     ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
-    let mut sets: BTreeMap<[String; 4], Vec<&LakeFile>> = BTreeMap::new();
-    for file in &lake.files {
-        let when = match args.by {
-            By::Day => file.place.date.to_string(),
-            By::Month => file.place.month(),
-            By::Sensor => "all".to_owned(),
-        };
-        let [site, rig, sensor] = file.place.gauge().map(str::to_owned);
-        sets.entry([site, rig, sensor, when]).or_default().push(file);
-    }
+    let sets = data_sets(&lake, args.by);
     let parts = args.out.join("verdicts");
     std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
     // shares write side by side: nobody has the folder alone
@@ -145,21 +120,9 @@ fn part(name: &[String; 4], files: &[&LakeFile], seed: u64) -> String {
     format!("{}-{}.parquet", name.join(","), &of[..16])
 }
 
-const DAY_S: f64 = 86400.0;
-
 /// The diagnosis of a data set, or why there is none.
 fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diagnosis> {
-    let first = files.iter().map(|file| file.place.date).min();
-    let mut trials = Vec::new();
-    for file in files {
-        let mut trial = trial(file)?;
-        let days = first.map_or(0, |first| (file.place.date - first).num_days());
-        trial.start_s += DAY_S * days as f64;
-        trials.push(trial);
-    }
-    trials.sort_by(|a, b| {
-        a.start_s.total_cmp(&b.start_s).then_with(|| a.trial.name.cmp(&b.trial.name))
-    });
+    let trials = trials(files)?;
     let options = Options { threads: args.threads, seed: args.seed, ..Options::default() };
     let catalogue = Catalogue::default();
     let is_rig = trials.iter().all(|t| t.trial.channel("inlet").is_some());
@@ -177,58 +140,6 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
         GaugeSimulator::new(&setup)?.into()
     };
     Ok(problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?.diagnosis)
-}
-
-/// A trial as it was recorded: samples that were lost are lost again.
-fn trial(file: &LakeFile) -> anyhow::Result<SessionTrial> {
-    let shown = || file.path.display().to_string();
-    let batch = read(std::slice::from_ref(&file.path))?;
-    let bridged = batch.column_by_name("is_bridged").and_then(|array| array.as_boolean_opt());
-    let kept: Vec<usize> = (0..batch.num_rows())
-        .filter(|&row| !bridged.is_some_and(|bridged| bridged.is_valid(row) && bridged.value(row)))
-        .collect();
-    let values = |name: &str| -> anyhow::Result<Vec<f64>> {
-        let array =
-            batch.column_by_name(name).with_context(|| format!("{}: no column {name}", shown()))?;
-        let array = cast(array, &DataType::Float64)?;
-        let array = array.as_primitive::<Float64Type>();
-        Ok(kept
-            .iter()
-            .map(|&row| if array.is_null(row) { f64::NAN } else { array.value(row) })
-            .collect())
-    };
-    let own = ["trial", "time_s", "rate", "contraction", "is_bridged"];
-    let schema = batch.schema();
-    let names = schema.fields().iter().map(|field| field.name().as_str());
-    let channels = names
-        .filter(|name| !own.contains(name) || *name == file.footer.about.reference)
-        .map(|name| Ok(Channel { name: name.to_owned(), values: values(name)? }))
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    let footer = &file.footer;
-    let trial = Trial { name: footer.trial.clone(), time_s: values("time_s")?, channels };
-    Ok(SessionTrial {
-        kind: footer.kind,
-        start_s: footer.start_s,
-        split: footer.split,
-        notes: footer.notes.clone(),
-        ..SessionTrial::new(trial)
-    })
-}
-
-/// All rows of some files of one layout.
-fn read(paths: &[PathBuf]) -> anyhow::Result<RecordBatch> {
-    let mut batches = Vec::new();
-    for path in paths {
-        let told = || path.display().to_string();
-        let file = File::open(path).with_context(told)?;
-        let rows = caught(|| {
-            let rows = ParquetRecordBatchReaderBuilder::try_new(file)?.build()?;
-            Ok::<_, ParquetError>(rows.collect::<Result<Vec<_>, _>>()?)
-        });
-        batches.extend(rows.with_context(told)?.with_context(told)?);
-    }
-    let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-    Ok(concat_batches(&schema, &batches)?)
 }
 
 /// A verdict as a row: what is named, how probable that is, how much of the held-out gap it closes, and what is left.

@@ -3,6 +3,7 @@
 mod calibrate;
 mod candidates;
 mod command;
+mod data_sets;
 mod diagnose;
 mod drift;
 mod false_discovery;
@@ -15,6 +16,7 @@ mod lock;
 mod make;
 mod month_test;
 mod panics;
+mod prior;
 mod records;
 mod session;
 mod show;

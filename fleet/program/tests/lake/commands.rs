@@ -126,6 +126,33 @@ fn a_partition_is_diagnosed_once() {
     );
 }
 
+/// Three sensors of four days each: the prior knows each of them, and what it errs by on a new one; `stretch calibrate` reads it.
+#[test]
+fn a_prior_is_learnt_from_every_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lake, out) = (folder.path().join("lake"), folder.path().join("prior.json"));
+    said("make --lake {} --sensors 3 --days 4 --seed 5", &[&lake]);
+    let told = said("prior --lake {} --out {}", &[&lake, &out]);
+    assert!(told.contains("12 sessions, 0 left out"), "{told}");
+    let prior = stretch_calibrate::Prior::read(&out).unwrap();
+    let mut sensors: Vec<String> = prior.paths().map(|path| path.join("/")).collect();
+    sensors.sort();
+    assert_eq!(sensors.len(), 3, "{sensors:?}");
+    let first = prior.expected.first().unwrap();
+    assert!(first.rmse_known.unwrap() < first.rmse_new.unwrap(), "{first:?}");
+    // the same lake gives the same bytes
+    let before = fs::read(&out).unwrap();
+    said("prior --lake {} --out {} --json", &[&lake, &out]);
+    assert!(fs::read(&out).unwrap() == before);
+    // one session tells nothing of how sessions vary
+    let whole = fleet("prior --lake {} --out {} --by sensor", &[&lake, &out]);
+    assert!(whole.status.success());
+    let few = folder.path().join("few");
+    said("make --lake {} --sensors 1 --days 1 --seed 5", &[&few]);
+    let told = String::from_utf8(fleet("prior --lake {} --out {}", &[&few, &out]).stderr).unwrap();
+    assert!(told.contains("give at least 3"), "{told}");
+}
+
 #[test]
 fn a_question_only_reads_unless_it_may_write() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,0 +1,115 @@
+//! `stretch-fleet prior`: what all sensors of a lake say of the next one.
+
+use std::path::PathBuf;
+
+use anyhow::ensure;
+use rayon::prelude::*;
+use stretch_calibrate::{Expected, Prior, Session, SessionOptions};
+use stretch_data::Trial;
+
+use crate::{
+    data_sets::{By, Name, data_sets, trials},
+    lake::{Lake, LakeFile, Refused},
+    show::{bar, say, say_json, warn_of},
+    sql::tell_unfit,
+};
+
+/// Learn what the sensors of a lake say of the next one
+///
+///   stretch fleet prior --lake lake --out prior.json
+///   stretch calibrate --prior prior.json --of rig-1/s042 today.csv --out cal.json
+///
+/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a session. Sessions vary around their sensor,
+/// sensors around their rig and rigs around their site, as far as there are several, each by a covariance of its own; stretch
+/// calibrate --prior then needs ten seconds to a minute of reference, or none. A session that cannot be used is told, and left
+/// out.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Folder of the lake
+    #[arg(long, value_name = "DIR")]
+    lake: PathBuf,
+    /// Where the prior goes
+    #[arg(long, value_name = "prior.json")]
+    out: PathBuf,
+    /// What a session is
+    #[arg(long, value_enum, default_value_t = By::Day)]
+    by: By,
+    /// Print JSON in place of a table
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let lake = Lake::open(&args.lake)?;
+    tell_unfit(&lake);
+    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
+    let sets: Vec<(Name, Vec<&LakeFile>)> = data_sets(&lake, args.by).into_iter().collect();
+    let above = levels_above(sets.iter().map(|(name, _)| name));
+    let bar = bar("sessions", sets.len());
+    let all: Vec<Result<Session, Refused>> = sets
+        .par_iter()
+        .map(|(name, files)| {
+            let found = session(&lake, name, above, files);
+            bar.inc(1);
+            found.map_err(|why| Refused { file: name.join("/"), why: format!("{why:#}") })
+        })
+        .collect();
+    bar.finish_and_clear();
+    ensure!(!stretch_files::interrupted(), "interrupted");
+    let (mut sessions, mut refused) = (Vec::new(), Vec::new());
+    for one in all {
+        match one {
+            Ok(session) => sessions.push(session),
+            Err(why) => refused.push(why),
+        }
+    }
+    warn_of("no session:", &refused);
+    let prior = Prior::learn(&sessions)?;
+    let text = prior.to_json()?;
+    stretch_files::write_whole(&args.out, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+    if args.json {
+        return say_json(&serde_json::json!({
+            "sessions": prior.sessions, "refused": refused, "signals": prior.signals,
+            "reference": prior.reference, "expected": prior.expected,
+        }));
+    }
+    let number = |rmse: Option<f64>| rmse.map_or_else(|| "-".to_owned(), |x| format!("{x:.4}"));
+    let unit = prior.unit();
+    say(format!("RMSE on the end of each session when it is left out, {unit}:"))?;
+    let whole = LEVELS[above];
+    let is_judged = |e: &&Expected| e.rmse_known.or(e.rmse_new).is_some();
+    for Expected { seconds, rmse_known, rmse_new, .. } in prior.expected.iter().filter(is_judged) {
+        let (known, new) = (number(*rmse_known), number(*rmse_new));
+        say(format!(
+            "  after {seconds:>2} s of reference {known}, of a {whole} that was not seen {new}"
+        ))?;
+    }
+    let (out, count) = (args.out.display(), prior.sessions);
+    let path = LEVELS[above..].join("/").to_uppercase();
+    say(format!(
+        "{out}: {count} sessions, {} left out; --of {path} says which sensor is new",
+        refused.len()
+    ))
+}
+
+/// What a sensor is of, from the coarsest to the finest.
+const LEVELS: [&str; 3] = ["site", "rig", "sensor"];
+
+/// How many levels have one name only, before the first that has several: nothing varies there.
+fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
+    let is_one = |level: &usize| {
+        let mut all = names.clone().map(|name| &name[*level]);
+        let first = all.next();
+        all.all(|other| Some(other) == first)
+    };
+    (0..LEVELS.len() - 1).take_while(is_one).count()
+}
+
+/// A data set as the sums that a prior is learnt from.
+fn session(lake: &Lake, name: &Name, above: usize, files: &[&LakeFile]) -> anyhow::Result<Session> {
+    let recorded: Vec<Trial> = trials(files)?.into_iter().map(|t| t.trial).collect();
+    let of = name[above..LEVELS.len()].join("/");
+    let options = SessionOptions::new([&*lake.about.signal], &lake.about.reference).of(&of);
+    Ok(Session::new(&name.join("/"), &recorded, &options)?.0)
+}

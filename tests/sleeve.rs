@@ -120,6 +120,59 @@ impl Scratch {
     }
 }
 
+/// A wrist bends and turns, and each of three gauges follows both: a record for each angle, out of one recording.
+#[test]
+fn several_references_get_a_record_each() {
+    let scratch = Scratch::new();
+    let wrist = |name: &str, phase: f64| {
+        let mut text = "time_s,s1,s2,s3,bend_deg,turn_deg\n".to_owned();
+        for k in 0..3000_u32 {
+            let t = f64::from(k) / 50.0;
+            let bend = 40.0 * (1.3 * t + phase).sin() + 5.0 * (0.31 * t).cos();
+            let turn = 25.0 * (0.7 * t - phase).cos() + 8.0 * (2.9 * t).sin();
+            let noise =
+                |k: u32| 2e-3 * (f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5);
+            let gauges = [(0.02, 0.005), (-0.004, 0.03), (0.01, -0.02)];
+            write!(text, "{t}").unwrap();
+            for (i, (a, b)) in (0..).zip(gauges) {
+                write!(text, ",{:.5}", 1.0 + a * bend + b * turn + noise(k + 991 * i)).unwrap();
+            }
+            writeln!(text, ",{bend:.4},{turn:.4}").unwrap();
+        }
+        scratch.write(name, text)
+    };
+    wrist("wrist.csv", 0.0);
+    wrist("later.csv", 1.0);
+    let asked =
+        ["calibrate", "wrist.csv", "--reference", "bend_deg,turn_deg", "--out", "wrist.json"];
+    let said = runs(scratch.sleeve(&asked).args(["--signals", "all"]));
+    for (angle, column) in [("bend_deg", 4), ("turn_deg", 5)] {
+        assert!(said.contains(&format!("{angle} on s1, s2, s3: RMSE")), "{said}");
+        let (record, truth) = (format!("wrist.{angle}.json"), scratch.path("later.csv"));
+        let told = prints(&mut scratch.sleeve(&["apply", "--calibration", &record, "later.csv"]));
+        let truth = std::fs::read_to_string(truth).unwrap();
+        let (mut sum, mut count) = (0.0, 0);
+        for (told, row) in told.lines().zip(truth.lines()).skip(1) {
+            let cell = |line: &str, k| line.split(',').nth(k).and_then(|x| x.parse::<f64>().ok());
+            if let (Some(told), Some(is)) = (cell(told, 1), cell(row, column)) {
+                sum += (told - is).powi(2);
+                count += 1;
+            }
+        }
+        // A hundredth of some 80 degrees, and what lies beyond the first recording's ranges.
+        let rmse_deg = (sum / f64::from(count)).sqrt();
+        assert!(count > 2000 && rmse_deg < 1.6, "{angle}: {rmse_deg} of {count}");
+        // No angle knows of the other.
+        let alone = ["--reference", angle, "--signals", "s1,s2,s3", "--out", "alone.json"];
+        runs(scratch.sleeve(&["calibrate", "wrist.csv"]).args(alone));
+        let text = |name: &str| std::fs::read_to_string(scratch.path(name)).unwrap();
+        assert_eq!(text("alone.json"), text(&record));
+    }
+    fails(&mut scratch.sleeve(&asked), &["name these with --signals"]);
+    let also = ["--signals", "all", "--session", "s.json"];
+    fails(scratch.sleeve(&asked).args(also), &["of one reference"]);
+}
+
 #[test]
 fn a_prior_needs_seconds_of_reference_or_none() {
     let scratch = Scratch::new();

@@ -24,7 +24,7 @@ use super::{
     causes,
     json::Json,
     long::Long,
-    reading::{Recorded, column, read_trials, with_columns_to_name},
+    reading::{Recorded, read_trials, with_columns_to_name},
     shared::{detail, of_files, stage_text, tell},
     sleeve::{Asked, Sleeve},
 };
@@ -43,6 +43,7 @@ use super::{
 ///   stretch calibrate ramps/*.csv --paper --out published.json
 ///   stretch calibrate ramps/*.csv --model observer --out cal.json --fixed cal.fixed.postcard
 ///   stretch calibrate knee.csv --reference angle_deg --signals s1,s2,s3 --out cal.json
+///   stretch calibrate wrist.csv --reference bend_deg,turn_deg --signals all --out wrist.json
 ///   stretch calibrate --prior prior.json --of left/anna half_a_minute.csv --out cal.json
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -72,8 +73,9 @@ pub(crate) struct Args {
     /// The method as published: central differences, strain rate, a branch a trial, no dead band
     #[arg(long, conflicts_with_all = ["rate", "rate_source", "branch_by", "dead_band"])]
     paper: bool,
-    /// Column of the reference; its last part is the unit of the estimate (`Pos (mm)` is pos_mm)
-    #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = column)]
+    /// Column of the reference; its last part is the unit of the estimate (`Pos (mm)` is pos_mm). With --signals several with
+    /// commas, such as the angles of a wrist: each gets a record of its own
+    #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = columns)]
     reference: String,
     /// Column of the signal, several with commas, or `auto`: the best by cross-validation
     #[arg(long, default_value = "bridge_v", value_name = "COL", value_parser = columns)]
@@ -274,6 +276,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             json: &args.json,
         });
     }
+    anyhow::ensure!(
+        !args.reference.contains(','),
+        "--reference {}: several references are those of several gauges; name these with --signals",
+        args.reference
+    );
     let mut options = args.options();
     let mut columns = args.recorded.options().require(&args.reference);
     if args.signal != "auto" {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use serde::Serialize;
 use stretch_calibrate::{
     ArrayOptions, Carried, Prior, Session, SessionOptions, SleeveCalibration, UpdateOptions,
@@ -43,7 +44,7 @@ const ONE_GAUGE: [&str; 14] = [
 /// Options of a calibration of several gauges, or from a prior.
 #[derive(clap::Args)]
 pub(crate) struct Sleeve {
-    /// Columns of several gauges that are calibrated together, or `all`: every column but the reference
+    /// Columns of several gauges that are calibrated together, or `all`: every column but the references
     #[arg(long, value_name = "COL,COL", value_delimiter = ',', value_parser = column,
           conflicts_with_all = ONE_GAUGE, conflicts_with = "signal")]
     signals: Vec<String>,
@@ -74,9 +75,18 @@ pub(crate) struct Asked<'a> {
     pub(crate) json: &'a Json,
 }
 
-/// What `--json` prints.
+/// What `--json` prints: of several references a list.
 #[derive(Serialize)]
-struct Output<'a> {
+#[serde(untagged)]
+enum Output<'a> {
+    One(Answer<'a>),
+    Several(Vec<Answer<'a>>),
+}
+
+/// A calibration to one reference.
+#[derive(Serialize)]
+struct Answer<'a> {
+    reference: &'a str,
     signals: &'a [String],
     /// Root mean square error on data left out.
     rmse: Option<f64>,
@@ -96,6 +106,19 @@ struct Made {
     notes: Vec<String>,
 }
 
+impl Made {
+    fn answer(&self) -> Answer<'_> {
+        Answer {
+            reference: &self.reference,
+            signals: &self.signals,
+            rmse: self.rmse,
+            carried: &self.carried,
+            update: self.update.as_ref(),
+            notes: &self.notes,
+        }
+    }
+}
+
 impl Sleeve {
     /// Whether the calibration is one of this file's.
     pub(crate) fn is_asked(&self) -> bool {
@@ -109,54 +132,63 @@ impl Sleeve {
 
     pub(crate) fn run(&self, asked: &Asked<'_>) -> anyhow::Result<()> {
         let prior = self.prior.as_deref().map(Prior::read).transpose()?;
-        let reference = match &prior {
+        let references: Vec<String> = match &prior {
             // the name that is there unless another is given
-            Some(prior) if asked.reference == "length_mm" => prior.reference.clone(),
-            _ => asked.reference.to_owned(),
+            Some(prior) if asked.reference == "length_mm" => vec![prior.reference.clone()],
+            _ => asked.reference.split(',').map(str::to_owned).collect(),
         };
-        let trials = self.trials(asked, &reference)?;
-        let signals = self.columns(asked, prior.as_ref(), &trials, &reference);
+        ensure!(
+            references.len() == 1 || self.files().iter().all(Option::is_none) && prior.is_none(),
+            "--reference {}: --prior, --session and --figure are of one reference: name one, and ask for each on its own",
+            asked.reference
+        );
+        let trials = self.trials(asked, &references)?;
+        let signals = self.columns(asked, prior.as_ref(), &trials, &references);
         let named = |error: stretch_calibrate::CalibrateError| of_files(error, asked.trials);
-        let made = match &prior {
-            Some(prior) => {
-                self.updated(prior, &trials, &signals, &reference, asked).map_err(named)?
-            }
-            None => fitted(&trials, &signals, &reference, asked).map_err(named)?,
+        let one = |reference: &String| {
+            let made = match &prior {
+                Some(prior) => self.updated(prior, &trials, &signals, reference, asked),
+                None => fitted(&trials, &signals, reference, asked),
+            };
+            made.map_err(named)
         };
+        let made: Vec<Made> = references.iter().map(one).collect::<anyhow::Result<_>>()?;
         let mut outputs = Outputs::default();
-        let record = made.calibration.bytes(asked.out)?;
-        outputs.file(asked.out, |out| out.write_all(&record))?;
+        let records = references.iter().map(|name| record_of(asked.out, name, references.len()));
+        let records: Vec<PathBuf> = records.collect();
+        for (made, path) in made.iter().zip(&records) {
+            let record = made.calibration.bytes(path)?;
+            outputs.file(path, |out| out.write_all(&record))?;
+        }
         if let Some(path) = &self.session {
-            let options = SessionOptions::new(signals.clone(), &reference).of(&self.of);
+            let options = SessionOptions::new(signals.clone(), &references[0]).of(&self.of);
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let (session, _) = Session::new(&name, &trials, &options).map_err(named)?;
             stage_text(&mut outputs, path, &session.to_json()?)?;
         }
         if let Some(path) = &self.figure {
-            let rmse = made.rmse.unwrap_or(f64::NAN);
-            let figure = channels_figure(&made.carried, rmse, &unit_of(&made.reference));
+            let rmse = made[0].rmse.unwrap_or(f64::NAN);
+            let figure = channels_figure(&made[0].carried, rmse, &unit_of(&made[0].reference));
             stage_text(&mut outputs, path, &figure)?;
         }
-        let answer = Output {
-            signals: &made.signals,
-            rmse: made.rmse,
-            carried: &made.carried,
-            update: made.update.as_ref(),
-            notes: &made.notes,
+        let answer = match &made[..] {
+            [one] => Output::One(one.answer()),
+            several => Output::Several(several.iter().map(Made::answer).collect()),
         };
         asked.json.stage(&mut outputs, &answer)?;
         outputs.keep()?;
         asked.json.say(&answer, || {
-            print(&made)?;
-            let mut written = [Some(asked.out)].into_iter().chain(self.files()).flatten();
+            made.iter().try_for_each(print)?;
+            let beside = self.files().into_iter().flatten();
+            let mut written = records.iter().map(PathBuf::as_path).chain(beside);
             written.try_for_each(|path| tell(format!("wrote {}", path.display())))
         })
     }
 
-    fn trials(&self, asked: &Asked<'_>, reference: &str) -> anyhow::Result<Vec<Trial>> {
-        let mut columns = asked.columns.clone().require(reference);
-        for signal in self.signals.iter().filter(|signal| *signal != "all") {
-            columns = columns.require(signal);
+    fn trials(&self, asked: &Asked<'_>, references: &[String]) -> anyhow::Result<Vec<Trial>> {
+        let mut columns = asked.columns.clone();
+        for named in references.iter().chain(self.signals.iter().filter(|name| *name != "all")) {
+            columns = columns.require(named);
         }
         let own = "name the columns of yours with --reference and --signals";
         let trials = read_trials(asked.trials, Split::Fit, &columns);
@@ -168,13 +200,13 @@ impl Sleeve {
         asked: &Asked<'_>,
         prior: Option<&Prior>,
         trials: &[Trial],
-        reference: &str,
+        references: &[String],
     ) -> Vec<String> {
         match (&self.signals[..], prior) {
             ([all], _) if all == "all" => {
                 let channels = trials.first().map(|trial| trial.channels.as_slice()).unwrap_or(&[]);
                 let named = channels.iter().map(|channel| channel.name.clone());
-                named.filter(|name| name != reference).collect()
+                named.filter(|name| !references.contains(name)).collect()
             }
             ([], Some(prior)) => prior.signals.clone(),
             ([], None) => vec![asked.signal.to_owned()],
@@ -235,11 +267,18 @@ fn fitted(
     })
 }
 
+/// Where the record of one of several references goes: wrist.json is wrist.bend_deg.json.
+fn record_of(out: &Path, reference: &str, of: usize) -> PathBuf {
+    let ending = out.extension().unwrap_or_default().to_string_lossy();
+    if of == 1 { out.to_owned() } else { out.with_extension(format!("{reference}.{ending}")) }
+}
+
 fn print(made: &Made) -> anyhow::Result<()> {
     let unit = unit_of(&made.reference);
     if let Some(rmse) = made.rmse {
         let joined = made.signals.join(", ");
-        say(format!("{joined}: RMSE {} {unit} on data left out of the fit", number(rmse)))?;
+        let to = &made.reference;
+        say(format!("{to} on {joined}: RMSE {} {unit} on data left out of the fit", number(rmse)))?;
         let header = ["channel", &format!("alone, RMSE {unit}"), "all others", "takes away"];
         let row = |c: &Carried| {
             let adds = c.adds.map_or("-".to_owned(), |adds| format!("{:.0} %", 100.0 * adds));

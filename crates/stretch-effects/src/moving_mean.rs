@@ -30,7 +30,7 @@ pub struct MovingMean {
 }
 
 impl MovingMean {
-    /// Over `window_s`; of no time at all it changes nothing.
+    /// Over `window_s`; of no time at all it changes nothing, and of more than a hundred thousand nodes it is the mean over those.
     pub fn new(grid: &Grid, window_s: f64) -> Self {
         let weights: Vec<Vec<f64>> =
             (0..grid.pieces()).map(|piece| weights(grid.steps(), piece, window_s)).collect();
@@ -39,10 +39,13 @@ impl MovingMean {
     }
 }
 
+/// Most nodes that a mean remembers: no time is so long that it is summed up for ever.
+const MOST_NODES: usize = 100_000;
+
 /// Weights of the nodes before one that a piece leads to, from the integrals of the lines between them.
 fn weights(steps: &[f64], piece: usize, window_s: f64) -> Vec<f64> {
-    let (mut found, mut left, mut at) = (Vec::new(), window_s, piece);
-    while left > 0.0 {
+    let (mut found, mut left, mut at, mut whole) = (Vec::new(), window_s, piece, 0.0);
+    while left > 0.0 && found.len() < MOST_NODES {
         let h = steps[at];
         let taken = h.min(left);
         // Of the line back to the node before: integral of 1 - s/h and of s/h over the part that is taken.
@@ -52,9 +55,10 @@ fn weights(steps: &[f64], piece: usize, window_s: f64) -> Vec<f64> {
         }
         found.push(earlier);
         left -= taken;
+        whole += taken;
         at = if at == 0 { steps.len() - 1 } else { at - 1 };
     }
-    found.iter_mut().for_each(|w| *w /= window_s);
+    found.iter_mut().for_each(|w| *w /= whole);
     found
 }
 
@@ -103,6 +107,16 @@ mod tests {
             first_node += count;
         }
         out
+    }
+
+    #[test]
+    fn a_time_without_end_is_a_mean_over_what_is_remembered() {
+        let grid = Grid::samples(0.01).unwrap();
+        for window_s in [f64::INFINITY, f64::MAX, f64::NAN, -1.0] {
+            let out = mean(&grid, window_s, &[0.0, 1.0, 2.0], 3);
+            let is_kept = if window_s > 0.0 { out[2] < 0.001 } else { out == [0.0, 1.0, 2.0] };
+            assert!(is_kept, "{window_s}: {out:?}");
+        }
     }
 
     proptest! {

@@ -42,7 +42,8 @@ const NEAR: usize = 12;
 
 /// Noise of all stages around a model.
 ///
-/// The variance of the noise is that of the output's own noise, known or taken from the record's second differences,
+/// The variance of the noise is that of the output's own noise, known or taken from the second differences of the record, or of what the model
+/// leaves where these are clearly less,
 /// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
 /// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the noise is one
 /// of every sample.
@@ -71,6 +72,10 @@ fn noise_level(
         Some(noise) => noise.clone(),
         None => of_record(simulator, roles, stage),
     };
+    let left = simulator.measured(stage).iter().zip(&output).map(|(m, s)| m - s);
+    let left: Vec<f64> = left.collect();
+    let looked = roles.looked_at().map(|s| &left[s.from..s.to]);
+    let noise = noise.at_most_left(looked, simulator.dt_s());
     let (own, mut source) = (noise.sd().powi(2), noise.source().to_owned());
     let known_to = noise.known_to();
     let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;

@@ -145,6 +145,23 @@ impl Noise {
         let sd = noise_variance(stretches, dt_s).sqrt();
         Self::white(sd, "second differences of the record".into(), DIFFERENCES_KNOWN_TO)
     }
+
+    /// The same where it was stated or found in rests. Second differences of a record hold whatever else is quick, such as a resonance of few
+    /// samples a turn; those of what a simulator leaves hold all noise, too, and less of that. So they count where they are clearly less.
+    pub(crate) fn at_most_left<'a>(self, left: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
+        if self.known_to != DIFFERENCES_KNOWN_TO {
+            return self;
+        }
+        let variance = noise_variance(left, dt_s);
+        match variance < (1.0 - DIFFERENCES_KNOWN_TO) * self.sd().powi(2) {
+            true => Self {
+                white: variance.sqrt(),
+                source: "second differences of what the simulator leaves".into(),
+                ..self
+            },
+            false => self,
+        }
+    }
 }
 
 /// Mean of a squared normal variable over the share `kept` of its least values: (kept - 2 z phi(z))/kept with

@@ -3,7 +3,12 @@
 use super::prepared;
 use crate::{
     fit::noise_level::noise_levels,
-    problem::{runs::Runs, sample_roles::SampleRoles, simulator::Model},
+    problem::{
+        noise::Noise,
+        runs::Runs,
+        sample_roles::SampleRoles,
+        simulator::{Model, Simulator},
+    },
     toys::{Effect, Law, Measured, Toy},
 };
 
@@ -57,4 +62,15 @@ fn noise_that_is_not_stated_comes_from_the_record() {
             approx::assert_relative_eq!(found, noise, max_relative = 0.15);
         }
     }
+}
+
+/// Four samples a turn: second differences of the record hold the motion itself, those of what the true law leaves hold the noise.
+#[test]
+fn motion_that_is_quick_is_no_noise() {
+    let toy = Toy { dt_s: 0.25, noise: 0.01, stated: None, ..Toy::of(&[Law::Oscillator]) };
+    let record = toy.measured(4);
+    let simulator: &dyn Simulator = &record;
+    let own = Noise::of_differences([simulator.measured(0)].into_iter(), 0.25).sd();
+    assert!(own > 0.05, "{own}");
+    approx::assert_relative_eq!(root_mean_square(&record, 0), 0.01, max_relative = 0.15);
 }

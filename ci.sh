@@ -174,9 +174,10 @@ done
     printf '[workspace]\nresolver = "3"\nmembers = ["stretch-*"]\n[patch.crates-io]\n'
     (cd "$packages" && for folder in stretch-*; do printf '%s = { path = "%s" }\n' "${folder%-*}" "$folder"; done)
 } >"$packages/Cargo.toml"
+# with the versions that are locked, less those that only tests need
 cp Cargo.lock "$packages"
 for package in $PACKAGES; do
-    (cd "$packages" && CARGO_TARGET_DIR=$target cargo check --quiet --locked -p "$package")
+    (cd "$packages" && CARGO_TARGET_DIR=$target cargo check --quiet --offline -p "$package")
 done
 rm -rf "$packages"
 

@@ -317,7 +317,7 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
 
 /// Takes the waves of the mains out of a stretch of differences of an order with the squares of their weights summed, one after the
 /// other; how many samples' worth of white noise went with them.
-pub(super) fn take_waves_out(values: &mut [f64], dt_s: f64, (order, power): (usize, f64)) -> f64 {
+pub(crate) fn take_waves_out(values: &mut [f64], dt_s: f64, (order, power): (usize, f64)) -> f64 {
     let mut taken = 0.0;
     for shown in mains(dt_s) {
         // What shows as a slow wave cannot be told from motion.

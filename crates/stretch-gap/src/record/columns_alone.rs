@@ -9,7 +9,8 @@
 //!
 //! * copied: the line of one column over another leaves less than half of what two independent noises would, and the second
 //!   differences of the two go together: a hum in one of them would pass for its noise;
-//! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less);
+//! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less); what repeats itself
+//!   within ten samples is no noise but motion of few samples a turn, the hum of the mains aside;
 //! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records, while
 //!   another moves. A sensor behind a play or a dead band repeats itself as well where it shows no noise: such a stretch counts only if
 //!   its column has white noise, which no play takes away; or jumps at its end, for what comes out of a play moves on from where it
@@ -18,7 +19,7 @@
 use stretch_data::ends;
 
 use crate::{
-    problem::{column::Column, spec::TrialSpec},
+    problem::{column::Column, noise::take_waves_out, spec::TrialSpec},
     record::{fault::DELAY_S, gross::Gross},
 };
 
@@ -34,6 +35,8 @@ const RANGE: f64 = 0.8;
 const KEEPS: f64 = 4.0;
 /// Samples of such a block.
 const BLOCK: usize = 10;
+/// Autocorrelation, at the lags of a block, that no noise has.
+const REPEATS: f64 = 0.5;
 /// Share of its range that another column moves by, at least, while one is stuck.
 const MOVES: f64 = 0.3;
 /// Times the greatest step of all but a thousandth by which a column jumps when it is stuck no more.
@@ -65,7 +68,7 @@ pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: 
     for (i, column) in own.iter().enumerate() {
         let others: Vec<&[f64]> =
             own.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, c)| &*c.values).collect();
-        let dead = dead(&column.values, &others, &bounds, (DELAY_S / dt_s) as usize);
+        let dead = dead(&column.values, &others, &bounds, dt_s);
         let stretches = match dead.is_empty() {
             true => stuck(&column.values, &others, &bounds),
             false => dead,
@@ -162,8 +165,9 @@ fn dead(
     values: &[f64],
     others: &[&[f64]],
     trials: &[(usize, usize)],
-    late: usize,
+    dt_s: f64,
 ) -> Vec<(usize, usize)> {
+    let late = (DELAY_S / dt_s) as usize;
     let (sd, _) = noise(values);
     let reach = 2.0 * KEEPS * sd / (BLOCK as f64).sqrt();
     let mut out = Vec::new();
@@ -180,7 +184,8 @@ fn dead(
                 let run = (begin + first * BLOCK, begin + i * BLOCK);
                 // Late is not dead: so far from its ends the others stand still if it is only that.
                 let inner = (run.0 + late, run.1.saturating_sub(late));
-                if inner.1 > inner.0 && others_move(others, inner, RANGE) {
+                let is_seen = inner.1 > inner.0 && others_move(others, inner, RANGE);
+                if is_seen && !repeats_itself(&values[run.0..run.1], dt_s) {
                     out.push(run);
                 }
                 (first, low, high) = (i, next, next);
@@ -190,6 +195,18 @@ fn dead(
         }
     }
     out
+}
+
+/// Whether a stretch repeats itself at a lag of a block or less, or turns over, as what moves does: |r_k| above [`REPEATS`] with
+/// r_k = sum x_i x_(i+k) / sum x_i^2 about the mean, the waves of the mains taken out.
+fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let mut apart: Vec<f64> = values.iter().map(|x| x - mean).collect();
+    take_waves_out(&mut apart, dt_s, (0, 1.0));
+    let all: f64 = apart.iter().map(|x| x * x).sum();
+    let product =
+        |lag: usize| -> f64 { apart.iter().skip(lag).zip(&apart).map(|(a, b)| a * b).sum() };
+    (1..=BLOCK).any(|lag| product(lag).abs() > REPEATS * all)
 }
 
 /// Stretches in which a column repeats one number that is no end of its range.
@@ -253,6 +270,7 @@ mod tests {
     use crate::numerics::random::RandomGenerator;
 
     const N: usize = 4000;
+    const DT_S: f64 = 0.01;
 
     fn wave(noise: f64, seed: u64) -> Vec<f64> {
         let mut random = RandomGenerator::new(seed, 0);
@@ -282,12 +300,26 @@ mod tests {
         let trials = [(0, N / 2), (N / 2, N)];
         let mut died = wave(0.05, 2);
         died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * random.gauss());
-        let found = dead(&died, &[&other], &trials, 100);
+        let found = dead(&died, &[&other], &trials, DT_S);
         assert!(matches!(found[..], [(from, to)] if from >= N / 2 - BLOCK && to == N), "{found:?}");
         // Half of the stroke is not seen.
         let slack: Vec<f64> =
             wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * random.gauss()).collect();
-        assert_eq!(dead(&slack, &[&other], &trials, 100), []);
+        assert_eq!(dead(&slack, &[&other], &trials, DT_S), []);
+    }
+
+    /// Seven samples a turn look like noise to differences; a broken wire that hums is dead all the same.
+    #[test]
+    fn quick_motion_is_not_dead_and_a_humming_wire_is() {
+        let other = wave(0.05, 1);
+        let mut random = RandomGenerator::new(4, 0);
+        let mut waving = |turns: f64, size: f64| -> Vec<f64> {
+            let wave = |i: usize| size * (std::f64::consts::TAU * turns * i as f64).sin();
+            (0..N).map(|i| wave(i) + 0.05 * random.gauss()).collect()
+        };
+        let (quick, humming) = (waving(1.0 / 7.0, 3.0), waving(60.0 * DT_S, 0.2));
+        assert_eq!(dead(&quick, &[&other], &[(0, N)], DT_S), []);
+        assert_eq!(dead(&humming, &[&other], &[(0, N)], DT_S), [(0, N)]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 #
 #     ./ci.sh quick    before a commit: format, lints, `cargo test`, documentation, no_std
 #     ./ci.sh          the gate
-#     ./ci.sh deep     before a release, and once a week: the gate, guided fuzzing, diagnoses of sets of two, and Miri
+#     ./ci.sh deep     before a release, and once a week: the gate, diagnoses of sets of two effects, and Miri
 #
 # A step that cannot run here says SKIPPED and why; everything else must pass. At the end stands how many seconds each step took.
 # What has a target folder of its own runs beside the rest: one of two cores is idle half of the time otherwise.
@@ -108,6 +108,7 @@ export STRETCH=$target/release/stretch
 beside fleet "fleet/gate.sh build"
 beside firmware firmware/gate.sh
 beside page "web/gate.sh build"
+beside fuzzing "fuzz/run.sh gate"
 start
 
 step "tests with the features that are off"
@@ -191,9 +192,6 @@ CARGO_TARGET_DIR=$target python/gate.sh
 step "the blind check, its tests, four cases, and ten of each plant of the benchmark"
 CARGO_TARGET_DIR=$target challenge/gate.sh
 
-step "fuzzing, so many executions a target"
-CARGO_TARGET_DIR=$target fuzz/run.sh gate
-
 step "FMUs"
 CARGO_TARGET_DIR=$target fmu/gate.sh
 
@@ -210,8 +208,9 @@ fi
 spare web/target
 
 # its data base is too much to build at the others' level of optimisation
-step "what ran beside: firmware in the emulator, the build of the fleet"
+step "what ran beside: firmware in the emulator, fuzzing, so many executions a target, the build of the fleet"
 joined firmware
+joined fuzzing
 joined fleet
 spare fuzz/target firmware/target target/debug
 
@@ -277,9 +276,6 @@ else
 fi
 
 [ "$what" = deep ] || exit 0
-
-step "fuzzing, guided"
-fuzz/run.sh guided
 
 step "Miri on the no_std crates"
 # proptest's cases are few there: a step is a thousand times slower

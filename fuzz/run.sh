@@ -1,17 +1,15 @@
 #!/usr/bin/env bash
 # Runs fuzz targets, with the stable compiler and without cargo-fuzz:
 #
-#     fuzz/run.sh gate [TARGET...]                what the gate runs: mutations of the corpus, as many as runs.txt says
-#     fuzz/run.sh guided [TARGET...]              as many, guided by what they cover
+#     fuzz/run.sh gate [TARGET...]                what the gate runs: the same inputs on every machine
 #     fuzz/run.sh campaign MINUTES [TARGET...]    so many minutes each; says how many executions that were
 #     fuzz/run.sh seeds                           writes fuzz/corpus, the inputs that fuzzing begins with
 #
 # All targets run where none is named, JOBS of them at once (2 where nothing is said).
 #
-# The answer of the first two depends on no clock: each target replays its corpus and what it once crashed on, then makes the number
-# of executions that runs.txt says for it, from a seed, and from nothing that an earlier run kept. The gate's build counts no edges,
-# so that it shares what the other workspaces have built. A campaign goes on from what the one before it kept in fuzz/target/corpus,
-# and stops by the clock. Inputs that crash are kept in fuzz/target/crashes.
+# The gate's answer depends on no clock: each target replays its corpus and what it once crashed on, then makes the number of
+# executions that runs.txt says for it, from a seed, and from nothing that an earlier run kept. A campaign goes on from what the
+# one before it kept in fuzz/target/corpus, and stops by the clock. Inputs that crash are kept in fuzz/target/crashes.
 # SEED is what chance begins with, 20261122 where nothing is said.
 #
 # libfuzzer-sys brings the engine; what it steers by, counters of edges, the compiler makes by flags that stable has. A target of
@@ -20,12 +18,12 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-usage() { sed -n '4,7s/^# *//p' run.sh >&2; exit 2; }
+usage() { sed -n '4,6s/^# *//p' run.sh >&2; exit 2; }
 what=${1:-}
 shift || usage
 export seconds=0
 case $what in
-gate | guided | seeds) ;;
+gate | seeds) ;;
 campaign)
     seconds=$(awk -v m="${1:?how many minutes a target?}" 'BEGIN { printf "%d", 60 * m }')
     shift
@@ -33,30 +31,24 @@ campaign)
 *) usage ;;
 esac
 
-triple=x86_64-unknown-linux-gnu
+export triple=x86_64-unknown-linux-gnu
 [ "$(uname -m)" = aarch64 ] && triple=aarch64-unknown-linux-gnu
-guided="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters"
-guided="$guided -Cllvm-args=-sanitizer-coverage-pc-table --cfg fuzzing"
-[ -n "${SANITIZER:-}" ] && guided="$guided -Zsanitizer=$SANITIZER"
+flags="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters"
+flags="$flags -Cllvm-args=-sanitizer-coverage-pc-table --cfg fuzzing"
+[ -n "${SANITIZER:-}" ] && flags="$flags -Zsanitizer=$SANITIZER"
+export RUSTFLAGS="$flags"
 if [ "$what" = seeds ]; then
-    exec cargo run --quiet --locked --example seeds
+    cargo build --quiet --release --locked --target "$triple" --example seeds
+    exec "target/$triple/release/examples/seeds"
 fi
-built=(--locked) programs=${CARGO_TARGET_DIR:-target}/debug
-# seeds that cover nothing new are kept: without counters none does
-kept=(-keep_seed=1)
-if [ "$what" != gate ]; then
-    export RUSTFLAGS="$guided"
-    built+=(--release --target "$triple") programs=${CARGO_TARGET_DIR:-target}/$triple/release kept=()
-fi
-export programs kept="${kept[*]}"
 targets=("$@")
 [ ${#targets[@]} -gt 0 ] || mapfile -t targets < <(ls fuzz_targets | sed 's/\.rs$//')
 # shellcheck disable=SC2046
-cargo ${TOOLCHAIN:-} build --quiet "${built[@]}" $(printf -- '--bin %s ' "${targets[@]}")
+cargo ${TOOLCHAIN:-} build --quiet --release --locked --target "$triple" $(printf -- '--bin %s ' "${targets[@]}")
 
 # one target; its last words when it fails
 one() {
-    local name=$1 program=$programs/$1 crashes=target/crashes/$1 log=target/logs/$1.log
+    local name=$1 program=target/$triple/release/$1 crashes=target/crashes/$1 log=target/logs/$1.log
     local own=target/corpus/$name limits=(-max_total_time="$seconds" -timeout=60) odd=../crates/stretch-recording/tests
     local once=() folders=() most=4096
     if [ "$seconds" = 0 ]; then
@@ -75,7 +67,6 @@ one() {
     mapfile -t once < <(ls "$odd"/found/*."${name#recording_}" 2>/dev/null)
     [ "$name" = recording_parquet ] || [ "$name" = recording_hdf5 ] && most=16384
     local with=(-rss_limit_mb=2048 -artifact_prefix="$crashes/" "${limits[@]}")
-    [ -z "$kept" ] || with+=("$kept")
     if ! {
         { [ ${#once[@]} = 0 ] || "$program" -rss_limit_mb=2048 "${once[@]}"; } &&
             "$program" -seed="${SEED:-20261122}" -max_len="$most" -print_final_stats=1 "${with[@]}" "${folders[@]}"
@@ -89,6 +80,5 @@ one() {
 }
 export -f one
 
-mkdir -p target
 printf '%s\n' "${targets[@]}" | xargs -P "${JOBS:-2}" -I {} bash -c "one {}" | tee target/total
 awk '{ all += $2 } END { printf "%-20s %12d executions\n", "together", all }' target/total

@@ -100,24 +100,28 @@ impl Scratch {
 
     /// Root mean square error of a record's estimates on a session, and what `apply` said on standard error.
     fn error(&self, record: &str, trial: &str) -> (f64, String) {
+        let (errors, said) = self.errors(record, trial, 3);
+        assert!(errors.len() > 100, "{said}");
+        (root_mean_square(&errors), said)
+    }
+
+    /// Errors of a record's estimates of the reference in a column, counted from 0, and what `apply` said on standard error.
+    fn errors(&self, record: &str, trial: &str, column: usize) -> (Vec<f64>, String) {
         let mut command = self.sleeve(&["apply", "--calibration", record, trial]);
         let output = command.output().unwrap();
         let said = one_line(&String::from_utf8_lossy(&output.stderr));
         assert!(output.status.success(), "{said}");
         let truth = std::fs::read_to_string(self.path(trial)).unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
-        let errors: Vec<f64> = text
-            .lines()
-            .zip(truth.lines())
-            .skip(1)
-            .filter_map(|(told, row)| {
-                let told: f64 = told.split(',').nth(1)?.parse().ok()?;
-                Some(told - row.split(',').nth(3)?.parse::<f64>().ok()?)
-            })
-            .collect();
-        assert!(errors.len() > 100, "{said}");
-        ((errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt(), said)
+        let rows = text.lines().zip(truth.lines()).skip(1);
+        let cell = |line: &str, k| line.split(',').nth(k)?.parse::<f64>().ok();
+        let errors = rows.filter_map(|(told, row)| Some(cell(told, 1)? - cell(row, column)?));
+        (errors.collect(), said)
     }
+}
+
+fn root_mean_square(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
 /// A wrist bends and turns, and each of three gauges follows both: a record for each angle, out of one recording.
@@ -148,19 +152,10 @@ fn several_references_get_a_record_each() {
     let said = runs(scratch.sleeve(&asked).args(["--signals", "all"]));
     for (angle, column) in [("bend_deg", 4), ("turn_deg", 5)] {
         assert!(said.contains(&format!("{angle} on s1, s2, s3: RMSE")), "{said}");
-        let (record, truth) = (format!("wrist.{angle}.json"), scratch.path("later.csv"));
-        let told = prints(&mut scratch.sleeve(&["apply", "--calibration", &record, "later.csv"]));
-        let truth = std::fs::read_to_string(truth).unwrap();
-        let (mut sum, mut count) = (0.0, 0);
-        for (told, row) in told.lines().zip(truth.lines()).skip(1) {
-            let cell = |line: &str, k| line.split(',').nth(k).and_then(|x| x.parse::<f64>().ok());
-            if let (Some(told), Some(is)) = (cell(told, 1), cell(row, column)) {
-                sum += (told - is).powi(2);
-                count += 1;
-            }
-        }
+        let record = format!("wrist.{angle}.json");
         // A hundredth of some 80 degrees, and what lies beyond the first recording's ranges.
-        let rmse_deg = (sum / f64::from(count)).sqrt();
+        let (errors, _) = scratch.errors(&record, "later.csv", column);
+        let (rmse_deg, count) = (root_mean_square(&errors), errors.len());
         assert!(count > 2000 && rmse_deg < 1.6, "{angle}: {rmse_deg} of {count}");
         // No angle knows of the other.
         let alone = ["--reference", angle, "--signals", "s1,s2,s3", "--out", "alone.json"];
@@ -171,6 +166,9 @@ fn several_references_get_a_record_each() {
     fails(&mut scratch.sleeve(&asked), &["name these with --signals"]);
     let also = ["--signals", "all", "--session", "s.json"];
     fails(scratch.sleeve(&asked).args(also), &["of one reference"]);
+    let stdout = ["calibrate", "wrist.csv", "--signals", "all", "--out", "-"];
+    let both = ["--reference", "bend_deg,turn_deg"];
+    fails(scratch.sleeve(&stdout).args(both), &["name a file with --out"]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use stretch_calibrate::{
     UpdateSummary, calibrate_array,
 };
 use stretch_data::{Split, Trial, unit_of};
-use stretch_files::Outputs;
+use stretch_files::{Outputs, is_standard_output};
 use stretch_recording::ReadOptions;
 use stretch_report::channels_figure;
 
@@ -142,6 +142,11 @@ impl Sleeve {
             "--reference {}: --prior, --session and --figure are of one reference: name one, and ask for each on its own",
             asked.reference
         );
+        ensure!(
+            references.len() == 1 || !is_standard_output(asked.out),
+            "--reference {}: a record each does not go to standard output; name a file with --out",
+            asked.reference
+        );
         let trials = self.trials(asked, &references)?;
         let signals = self.columns(asked, prior.as_ref(), &trials, &references);
         let named = |error: stretch_calibrate::CalibrateError| of_files(error, asked.trials);
@@ -154,8 +159,10 @@ impl Sleeve {
         };
         let made: Vec<Made> = references.iter().map(one).collect::<anyhow::Result<_>>()?;
         let mut outputs = Outputs::default();
-        let records = references.iter().map(|name| record_of(asked.out, name, references.len()));
-        let records: Vec<PathBuf> = records.collect();
+        let records: Vec<PathBuf> = match &references[..] {
+            [_] => vec![asked.out.to_owned()],
+            several => several.iter().map(|name| record_of(asked.out, name)).collect(),
+        };
         for (made, path) in made.iter().zip(&records) {
             let record = made.calibration.bytes(path)?;
             outputs.file(path, |out| out.write_all(&record))?;
@@ -267,10 +274,12 @@ fn fitted(
     })
 }
 
-/// Where the record of one of several references goes: wrist.json is wrist.bend_deg.json.
-fn record_of(out: &Path, reference: &str, of: usize) -> PathBuf {
-    let ending = out.extension().unwrap_or_default().to_string_lossy();
-    if of == 1 { out.to_owned() } else { out.with_extension(format!("{reference}.{ending}")) }
+/// Where the record of each of several references goes: wrist.json becomes wrist.bend_deg.json.
+fn record_of(out: &Path, reference: &str) -> PathBuf {
+    match out.extension() {
+        Some(ending) => out.with_extension(format!("{reference}.{}", ending.to_string_lossy())),
+        None => out.with_extension(reference),
+    }
 }
 
 fn print(made: &Made) -> anyhow::Result<()> {

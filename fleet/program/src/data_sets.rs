@@ -1,8 +1,13 @@
 //! Trials of a lake as they were recorded, by sensor and time.
 
-use std::{collections::BTreeMap, fs::File, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use datafusion::{
     arrow::{
         array::{Array, AsArray, RecordBatch},
@@ -16,6 +21,7 @@ use stretch_data::{Channel, SessionTrial, Trial};
 use crate::{
     lake::{Lake, LakeFile},
     panics::caught,
+    sql::tell_unfit,
 };
 
 const DAY_S: f64 = 86400.0;
@@ -33,6 +39,14 @@ pub(crate) enum By {
 
 /// Site, rig, sensor, and which time of it.
 pub(crate) type Name = [String; 4];
+
+/// A lake that holds trials; files that it cannot use are told.
+pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
+    let lake = Lake::open(folder)?;
+    tell_unfit(&lake);
+    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", folder.display());
+    Ok(lake)
+}
 
 /// The files of each data set.
 pub(crate) fn data_sets(lake: &Lake, by: By) -> BTreeMap<Name, Vec<&LakeFile>> {

@@ -12,12 +12,11 @@ use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup,
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
-    data_sets::{By, data_sets, read, trials},
+    data_sets::{By, Name, data_sets, lake_with_trials, read, trials},
     flat::table,
     lake::{Lake, LakeFile, digest, write_parquet},
     lock::remove_abandoned,
     show::{bar, say, say_json},
-    sql::tell_unfit,
 };
 
 /// Say of every sensor and day which effect causes a gap
@@ -64,9 +63,7 @@ fn share(text: &str) -> Result<(usize, usize), String> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let lake = Lake::open(&args.lake)?;
-    tell_unfit(&lake);
-    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
+    let lake = lake_with_trials(&args.lake)?;
     let sets = data_sets(&lake, args.by);
     let parts = args.out.join("verdicts");
     std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
@@ -113,7 +110,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 }
 
 /// The name of a verdict: with other trials it is another.
-fn part(name: &[String; 4], files: &[&LakeFile], seed: u64) -> String {
+fn part(name: &Name, files: &[&LakeFile], seed: u64) -> String {
     let seed = seed.to_le_bytes();
     let of = files.iter().map(|file| file.footer.digest.as_bytes());
     let of = digest(std::iter::once(&seed[..]).chain(of));
@@ -144,7 +141,7 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
 
 /// A verdict as a row: what is named, how probable that is, how much of the held-out gap it closes, and what is left.
 fn row(
-    name: &[String; 4],
+    name: &Name,
     trials: usize,
     verdict: anyhow::Result<Diagnosis>,
 ) -> anyhow::Result<RecordBatch> {

@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use anyhow::ensure;
-use rayon::prelude::*;
+use rayon::{iter::Either, prelude::*};
 use stretch_calibrate::{Expected, Prior, Session, SessionOptions};
 use stretch_data::Trial;
 
 use crate::{
-    data_sets::{By, Name, data_sets, trials},
+    data_sets::{By, Name, data_sets, lake_with_trials, trials},
     lake::{Lake, LakeFile, Refused},
     show::{bar, say, say_json, warn_of},
-    sql::tell_unfit,
 };
 
 /// Learn what the sensors of a lake say of the next one
@@ -41,33 +40,23 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let lake = Lake::open(&args.lake)?;
-    tell_unfit(&lake);
-    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
+    let lake = lake_with_trials(&args.lake)?;
     let sets: Vec<(Name, Vec<&LakeFile>)> = data_sets(&lake, args.by).into_iter().collect();
     let above = levels_above(sets.iter().map(|(name, _)| name));
     let bar = bar("sessions", sets.len());
-    let all: Vec<Result<Session, Refused>> = sets
-        .par_iter()
-        .map(|(name, files)| {
+    let (sessions, refused): (Vec<Session>, Vec<Refused>) =
+        sets.par_iter().partition_map(|(name, files)| {
             let found = session(&lake, name, above, files);
             bar.inc(1);
-            found.map_err(|why| Refused { file: name.join("/"), why: format!("{why:#}") })
-        })
-        .collect();
+            let refused = |why| Refused { file: name.join("/"), why: format!("{why:#}") };
+            found.map_or_else(|why| Either::Right(refused(why)), Either::Left)
+        });
     bar.finish_and_clear();
     ensure!(!stretch_files::interrupted(), "interrupted");
-    let (mut sessions, mut refused) = (Vec::new(), Vec::new());
-    for one in all {
-        match one {
-            Ok(session) => sessions.push(session),
-            Err(why) => refused.push(why),
-        }
-    }
     warn_of("no session:", &refused);
     let prior = Prior::learn(&sessions)?;
     let text = prior.to_json()?;
-    stretch_files::write_whole(&args.out, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+    stretch_files::write_whole(&args.out, |out| out.write_all(text.as_bytes()))?;
     if args.json {
         return say_json(&serde_json::json!({
             "sessions": prior.sessions, "refused": refused, "signals": prior.signals,
@@ -108,6 +97,7 @@ fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
 
 /// A data set as the sums that a prior is learnt from.
 fn session(lake: &Lake, name: &Name, above: usize, files: &[&LakeFile]) -> anyhow::Result<Session> {
+    ensure!(!stretch_files::interrupted(), "interrupted");
     let recorded: Vec<Trial> = trials(files)?.into_iter().map(|t| t.trial).collect();
     let of = name[above..LEVELS.len()].join("/");
     let options = SessionOptions::new([&*lake.about.signal], &lake.about.reference).of(&of);

@@ -146,10 +146,10 @@ impl Noise {
         Self::white(sd, "second differences of the record".into(), DIFFERENCES_KNOWN_TO)
     }
 
-    /// The same where it was stated or found in rests. Second differences of a record hold whatever else is quick, such as a resonance of few
+    /// The same where it is known better than second differences tell it, stated or found in rests. Second differences of a record hold whatever else is quick, such as a resonance of few
     /// samples a turn; those of what a simulator leaves hold all noise, too, and less of that. So they count where they are clearly less.
     pub(crate) fn at_most_left<'a>(self, left: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
-        if self.known_to != DIFFERENCES_KNOWN_TO {
+        if self.known_to < DIFFERENCES_KNOWN_TO {
             return self;
         }
         let variance = noise_variance(left, dt_s);

@@ -3,7 +3,7 @@
 #
 #     ./ci.sh quick    before a commit: format, lints, `cargo test`, documentation, no_std
 #     ./ci.sh          the gate
-#     ./ci.sh deep     before a release, and once a week: the gate, diagnoses of sets of two effects, and Miri
+#     ./ci.sh deep     before a release: the gate, diagnoses of sets of two effects, and Miri
 #
 # A step that cannot run here says SKIPPED and why; everything else must pass. At the end stands how many seconds each step took.
 # What has a target folder of its own runs beside the rest: one of two cores is idle half of the time otherwise.

@@ -33,14 +33,31 @@ pub(crate) struct Smoothed {
 }
 
 /// Sums of x^2 and x^4 over -h .. h, and the number of samples.
-fn moments(h: usize) -> (f64, f64, f64) {
-    let sum = |power: i32| 2.0 * (1..=h).map(|i| (i as f64).powi(power)).sum::<f64>();
-    (sum(2), sum(4), (2 * h + 1) as f64)
+const fn moments(h: usize) -> (f64, f64, f64) {
+    let (mut squares, mut fourths, mut i) = (0.0, 0.0, 1);
+    while i <= h {
+        let square = (i * i) as f64;
+        squares += square;
+        fourths += square * square;
+        i += 1;
+    }
+    (2.0 * squares, 2.0 * fourths, (2 * h + 1) as f64)
 }
+
+/// [`moments`] of every half-width.
+const MOMENTS: [(f64, f64, f64); WIDEST + 1] = {
+    let mut all = [(0.0, 0.0, 0.0); WIDEST + 1];
+    let mut h = 0;
+    while h <= WIDEST {
+        all[h] = moments(h);
+        h += 1;
+    }
+    all
+};
 
 /// Value and residual sum of squares of the parabola around sample `i`.
 fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
-    let (s2, s4, n) = moments(h);
+    let (s2, s4, n) = MOMENTS[h];
     let middle = record[i];
     let (mut y0, mut y1, mut y2, mut yy) = (0.0, 0.0, 0.0, 0.0);
     for (k, value) in record[i - h..=i + h].iter().enumerate() {

@@ -56,12 +56,11 @@ impl<'a> Comparison<'a> {
 
     /// Nuisances as large and as quick as the residual of a model has them; the rise of their likelihood, nats.
     pub(crate) fn adapt(&mut self, model: &Model) -> Result<f64, GapError> {
-        let dt_s = self.simulator().dt_s();
         let mut gained = 0.0;
         for stage in 0..self.metrics.len() {
             if !self.metrics[stage].loose().is_empty() {
                 let residual = self.residual_values(stage, model)?;
-                let (metric, more) = self.metrics[stage].adapted(&self.roles, dt_s, &residual);
+                let (metric, more) = self.metrics[stage].adapted(&self.roles, &residual);
                 self.metrics[stage] = metric;
                 gained += more;
             }

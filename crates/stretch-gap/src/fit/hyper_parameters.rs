@@ -30,17 +30,17 @@ const SPREAD: (f64, f64) = (0.7, 1.1);
 impl Metric {
     /// The metric with nuisances of the greatest likelihood for a residual in multiples of the noise, and by how many nats it is greater than with
     /// those of this one.
-    pub(crate) fn adapted(&self, roles: &SampleRoles, dt_s: f64, residual: &[f64]) -> (Self, f64) {
+    pub(crate) fn adapted(&self, roles: &SampleRoles, residual: &[f64]) -> (Self, f64) {
         let (mut best, mut gained) = (self.clone(), 0.0);
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
             let levels = hypotheses(&best.loose()[which]).chain([own]);
-            let one = |level| best.with(|i, own| if i == which { level } else { own }, roles, dt_s);
+            let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let levels: Vec<Level> = levels.collect();
             let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
             let noise = tried.par_iter().map(|m| m.spectral_level(roles, residual));
             let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
-            let fit = |m: &Self| m.beside(roles, dt_s, residual, noise);
+            let fit = |m: &Self| m.beside(roles, residual, noise);
             let fits: Vec<f64> = tried.par_iter().map(fit).collect();
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
@@ -60,14 +60,8 @@ impl Metric {
     ///
     /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the grid and the others as they are. It is
     /// exact for one nuisance, and as independent ones are beyond.
-    pub(crate) fn evidence(
-        &self,
-        roles: &SampleRoles,
-        dt_s: f64,
-        residual: &[f64],
-        noise: f64,
-    ) -> f64 {
-        let own = self.likelihood_beside(roles, dt_s, residual, noise);
+    pub(crate) fn evidence(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
+        let own = self.likelihood_beside(roles, residual, noise);
         let one = |which: usize| {
             let loose = &self.loose()[which];
             let levels: Vec<Level> = hypotheses(loose).collect();
@@ -75,8 +69,8 @@ impl Metric {
                 return 0.0;
             }
             let fit = |&level: &Level| {
-                let at = self.with(|i, own| if i == which { level } else { own }, roles, dt_s);
-                at.likelihood_beside(roles, dt_s, residual, noise) - own - cost(loose, level)
+                let at = self.with(|i, own| if i == which { level } else { own }, roles);
+                at.likelihood_beside(roles, residual, noise) - own - cost(loose, level)
             };
             let fits: Vec<f64> = levels.par_iter().map(fit).collect();
             let prior = levels.iter().map(|level| -cost(loose, *level));
@@ -86,25 +80,19 @@ impl Metric {
     }
 
     /// L of the module's head beside noise that is `noise` times as large.
-    fn beside(&self, roles: &SampleRoles, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+    fn beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
-        self.likelihood_beside(roles, dt_s, residual, noise) - price
+        self.likelihood_beside(roles, residual, noise) - price
     }
 
     /// The likelihood beside noise that is `noise` times as large: V/s has nuisances that much smaller.
-    fn likelihood_beside(
-        &self,
-        roles: &SampleRoles,
-        dt_s: f64,
-        residual: &[f64],
-        noise: f64,
-    ) -> f64 {
+    fn likelihood_beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
             return self.likelihood(roles, residual);
         }
         let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
         let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-        self.with(smaller, roles, dt_s).likelihood(roles, &scaled)
+        self.with(smaller, roles).likelihood(roles, &scaled)
     }
 
     /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
@@ -185,7 +173,7 @@ mod tests {
         let metric = Metric::with_drift(noise, drive.clone(), described, &roles, 0.01);
         for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
             let record = residual(size, time_s, &drive);
-            let (adapted, gained) = metric.adapted(&roles, 0.01, &record);
+            let (adapted, gained) = metric.adapted(&roles, &record);
             let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
             // The next one of the grid at most.
             assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
@@ -194,8 +182,8 @@ mod tests {
         }
         // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
         let record = residual(1.0, 3.0, &drive);
-        let (best, _) = metric.adapted(&roles, 0.01, &record);
-        let evidence = best.evidence(&roles, 0.01, &record, 1.0);
+        let (best, _) = metric.adapted(&roles, &record);
+        let evidence = best.evidence(&roles, &record, 1.0);
         let most = best.likelihood(&roles, &record);
         let count = (SIZES.len() * TIMES_S.len()) as f64;
         assert!(evidence < most, "{evidence} {most}");
@@ -204,11 +192,11 @@ mod tests {
             "{evidence} {most}"
         );
         // The same integral from any level that it is begun at.
-        let begun = metric.evidence(&roles, 0.01, &record, 1.0);
+        let begun = metric.evidence(&roles, &record, 1.0);
         approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
         // Noise alone: as little as there is, and nothing gained by a second look.
-        let (quiet, _) = metric.adapted(&roles, 0.01, &residual(0.0, 1.0, &drive));
+        let (quiet, _) = metric.adapted(&roles, &residual(0.0, 1.0, &drive));
         assert!(quiet.loose()[0].level.size < 0.5);
-        assert_eq!(quiet.adapted(&roles, 0.01, &residual(0.0, 1.0, &drive)).1, 0.0);
+        assert_eq!(quiet.adapted(&roles, &residual(0.0, 1.0, &drive)).1, 0.0);
     }
 }

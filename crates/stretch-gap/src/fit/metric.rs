@@ -16,7 +16,7 @@ use std::sync::Arc;
 use crate::{
     fit::{
         noise_level::NoiseLevel,
-        nuisance::{Drifting, Nuisance, Patch},
+        nuisance::{Drifting, Knots, Nuisance, Patch},
     },
     numerics::linear::dot,
     problem::{
@@ -52,6 +52,13 @@ pub(crate) struct Loose {
     pub(crate) is_by_tick: bool,
     /// Size and correlation time that the drift is taken to have.
     pub(crate) level: Level,
+    /// The drift's knots by segment; none for an offset.
+    knots: Arc<[Arc<Knots>]>,
+}
+
+/// The knots of a clock by segment.
+fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> {
+    roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }
 
 /// Size of a nuisance, as a multiple of what the simulator describes, and its correlation time, s (of no meaning for an offset).
@@ -105,22 +112,26 @@ impl Metric {
             }
             let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
             let clock = simulator.record().drift_clock(p).map_or_else(always, <[u32]>::to_vec);
+            let knots = match spec.drift {
+                Some(_) => knots_of(&clock, roles, simulator.dt_s()),
+                None => Arc::default(),
+            };
             let level = Level { size: 1.0, time_s: spec.drift.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());
-            metric.loose.push(Loose { column, clock, drift: spec.drift, is_by_tick, level });
+            metric.loose.push(Loose { column, clock, drift: spec.drift, is_by_tick, level, knots });
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
             pairs.for_each(|(own, other)| own.level = other.level);
         }
-        metric.marginalise(roles, simulator.dt_s());
+        metric.marginalise(roles);
         Ok(metric)
     }
 
     /// Factors of the nuisances as the loose parameters now are.
-    fn marginalise(&mut self, roles: &SampleRoles, dt_s: f64) {
-        let one = |segment: &Segment| {
+    fn marginalise(&mut self, roles: &SampleRoles) {
+        let one = |(at, segment): (usize, &Segment)| {
             let range = segment.from..segment.to;
             let (mut offsets, mut drifting) = (Vec::new(), Vec::new());
             for loose in &self.loose {
@@ -135,14 +146,14 @@ impl Metric {
                         from += tick.len();
                     }
                 } else if loose.drift.is_some() {
-                    drifting.push(Drifting::new(part, clock, time_s, dt_s));
+                    drifting.push(Drifting::new(part, Arc::clone(&loose.knots[at]), time_s));
                 } else {
                     offsets.push(Patch { from: 0, values: part });
                 }
             }
             (!self.loose.is_empty()).then(|| Nuisance::new(offsets, drifting))
         };
-        self.nuisances = roles.segments.iter().map(one).collect();
+        self.nuisances = roles.segments.iter().enumerate().map(one).collect();
     }
 
     /// Parameters of the stage that drift or are offset in each trial.
@@ -151,16 +162,12 @@ impl Metric {
     }
 
     /// The metric with every loose parameter at another level.
-    pub(crate) fn with(
-        &self,
-        level: impl Fn(usize, Level) -> Level,
-        roles: &SampleRoles,
-        dt_s: f64,
-    ) -> Self {
-        let mut other = self.clone();
+    pub(crate) fn with(&self, level: impl Fn(usize, Level) -> Level, roles: &SampleRoles) -> Self {
+        let (noise, loose) = (self.noise.clone(), self.loose.clone());
+        let mut other = Self { noise, loose, nuisances: Vec::new() };
         let each = other.loose.iter_mut().enumerate();
         each.for_each(|(i, loose)| loose.level = level(i, loose.level));
-        other.marginalise(roles, dt_s);
+        other.marginalise(roles);
         other
     }
 
@@ -233,12 +240,14 @@ impl Metric {
         roles: &SampleRoles,
         dt_s: f64,
     ) -> Self {
-        let clock = (0..column.len() as u32).collect();
+        let clock: Arc<[u32]> = (0..column.len() as u32).collect();
         let column = column.into();
         let level = Level { size: 1.0, time_s: drift.correlation_s };
-        let loose = vec![Loose { column, clock, drift: Some(drift), is_by_tick: false, level }];
+        let knots = knots_of(&clock, roles, dt_s);
+        let drift = Some(drift);
+        let loose = vec![Loose { column, clock, drift, is_by_tick: false, level, knots }];
         let mut metric = Self { noise, loose, nuisances: Vec::new() };
-        metric.marginalise(roles, dt_s);
+        metric.marginalise(roles);
         metric
     }
 }

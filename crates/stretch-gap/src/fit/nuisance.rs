@@ -11,7 +11,7 @@
 //! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
 //! b = (C'C + P)^-1 C'r.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use crate::numerics::{
     arrowhead::{Arrow, ArrowFactor},
@@ -67,16 +67,25 @@ impl Patch {
 #[derive(Debug, Clone)]
 pub(super) struct Drifting {
     sensitivity: Vec<f64>,
-    /// Knot before, and share of the way to the next.
-    place: Vec<(u32, f64)>,
-    knots: usize,
+    /// Knots of the segment, which may go on behind the samples.
+    knots: Arc<Knots>,
     /// Correlation of neighbouring knots, exp(-distance/correlation time).
     kept: f64,
 }
 
-impl Drifting {
-    /// A drift of variance 1 and correlation time `time_s`; `clock` counts samples of `dt_s`.
-    pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], time_s: f64, dt_s: f64) -> Self {
+/// The knots of a drift in one segment.
+#[derive(Debug)]
+pub(super) struct Knots {
+    /// By sample: knot before, and share of the way to the next.
+    place: Vec<(u32, f64)>,
+    count: usize,
+    /// Time between two, s.
+    step_s: f64,
+}
+
+impl Knots {
+    /// Those of a clock that counts samples of `dt_s`.
+    pub(super) fn of(clock: &[u32], dt_s: f64) -> Self {
         let knot = ((KNOT_S / dt_s) as usize).max(1);
         let first = clock.first().copied().unwrap_or(0);
         let place: Vec<(u32, f64)> = clock
@@ -86,19 +95,26 @@ impl Drifting {
                 ((at / knot) as u32, (at % knot) as f64 / knot as f64)
             })
             .collect();
-        let knots = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
-        let step_s = knot as f64 * dt_s;
-        Self { sensitivity, place, knots, kept: (-step_s / time_s).exp() }
+        let count = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
+        Self { place, count, step_s: knot as f64 * dt_s }
+    }
+}
+
+impl Drifting {
+    /// A drift of variance 1 and correlation time `time_s`.
+    pub(super) fn new(sensitivity: Vec<f64>, knots: Arc<Knots>, time_s: f64) -> Self {
+        let kept = (-knots.step_s / time_s).exp();
+        Self { sensitivity, knots, kept }
     }
 
     /// Sample, knot, weights of that knot and the next.
     fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
-        self.within(0..self.place.len())
+        self.within(0..self.sensitivity.len())
     }
 
     fn within(&self, samples: Range<usize>) -> impl Iterator<Item = (usize, usize, f64, f64)> {
         samples.map(|i| {
-            let (s, (k, share)) = (self.sensitivity[i], self.place[i]);
+            let (s, (k, share)) = (self.sensitivity[i], self.knots.place[i]);
             (i, k as usize, (1.0 - share) * s, share * s)
         })
     }
@@ -108,7 +124,7 @@ impl Nuisance {
     pub(super) fn new(offsets: Vec<Patch>, drifting: Vec<Drifting>) -> Self {
         let factor = precision(&offsets, &drifting).factor();
         // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
-        let prior = |w: &Drifting| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
+        let prior = |w: &Drifting| -(w.knots.count as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
         let prior: f64 = drifting.iter().map(prior).sum();
         let ln_determinant = factor.ln_determinant() - prior;
         Self { offsets, drifting, factor, ln_determinant }
@@ -135,7 +151,7 @@ impl Nuisance {
             for (i, k, this, next) in drifting.each() {
                 x[i] -= this * b[base + k] + next * b[base + k + 1];
             }
-            base += drifting.knots;
+            base += drifting.knots.count;
         }
         for (offset, b) in self.offsets.iter().zip(&b[base..]) {
             x[offset.from..].iter_mut().zip(&offset.values).for_each(|(x, d)| *x -= b * d);
@@ -148,7 +164,7 @@ fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
     let mut out = Vec::new();
     for drifting in drifting {
         let base = out.len();
-        out.resize(base + drifting.knots, 0.0);
+        out.resize(base + drifting.knots.count, 0.0);
         for (i, k, this, next) in drifting.each() {
             out[base + k] += this * x[i];
             out[base + k + 1] += next * x[i];
@@ -160,7 +176,7 @@ fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
 
 /// Posterior precision C'C + P. Two drifts of one stage are taken as orthogonal.
 fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
-    let knots = drifting.iter().map(|w| w.knots).sum();
+    let knots = drifting.iter().map(|w| w.knots.count).sum();
     let mut a = Arrow::zeros(knots, offsets.len());
     for (i, column) in offsets.iter().enumerate() {
         let mut base = 0;
@@ -171,7 +187,7 @@ fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
                 a.border[i][base + k] += this * x;
                 a.border[i][base + k + 1] += next * x;
             }
-            base += drifting.knots;
+            base += drifting.knots.count;
         }
         for (j, other) in offsets.iter().enumerate() {
             a.corner[i][j] = column.overlap(other);
@@ -189,7 +205,7 @@ fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
         }
         // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
         // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
-        let (knots, kept) = (drifting.knots, drifting.kept);
+        let (knots, kept) = (drifting.knots.count, drifting.kept);
         let scale = 1.0 / (1.0 - kept * kept);
         for k in 0..knots {
             let inner = k > 0 && k + 1 < knots;
@@ -218,7 +234,10 @@ mod tests {
     fn nuisance() -> Nuisance {
         let clock: Vec<u32> = (0..SAMPLES as u32).collect();
         let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
-        Nuisance::new(vec![patch(0, SAMPLES)], vec![Drifting::new(slope, &clock, 0.3, 0.01)])
+        Nuisance::new(
+            vec![patch(0, SAMPLES)],
+            vec![Drifting::new(slope, Arc::new(Knots::of(&clock, 0.01)), 0.3)],
+        )
     }
 
     /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.

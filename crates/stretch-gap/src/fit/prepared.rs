@@ -271,12 +271,11 @@ impl<'a> PreparedProblem<'a> {
     ) -> Result<f64, GapError> {
         let mut model = hypothesis.model.clone();
         model.effects.retain(|(e, _)| self.is_in_loose_stage(*e));
-        let simulator = self.simulator();
         let mut sum = -self.price(&model);
         for (stage, level) in self.loose_stages().zip(levels) {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
             let metric = &self.compare.metrics[stage];
-            sum += metric.evidence(&self.compare.roles, simulator.dt_s(), &residual, level.sqrt());
+            sum += metric.evidence(&self.compare.roles, &residual, level.sqrt());
         }
         Ok(sum)
     }

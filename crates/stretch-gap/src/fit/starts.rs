@@ -247,8 +247,7 @@ fn begun<'a>(compare: &Comparison<'a>, part: f64) -> Comparison<'a> {
         let samples = (part * (segment.to - segment.from) as f64).ceil() as usize;
         segment.to = segment.from + samples;
     }
-    let dt_s = compare.simulator().dt_s();
-    let own = |metric: &Metric| metric.with(|_, level| level, &roles, dt_s);
+    let own = |metric: &Metric| metric.with(|_, level| level, &roles);
     let metrics = compare.metrics.iter().map(own).collect();
     Comparison { runs: compare.runs.clone(), roles, metrics }
 }

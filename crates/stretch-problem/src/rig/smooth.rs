@@ -55,8 +55,8 @@ const MOMENTS: [(f64, f64, f64); WIDEST + 1] = {
     all
 };
 
-/// Value and residual sum of squares of the parabola around sample `i`.
-fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
+/// Residual sum of squares of the parabola around sample `i`.
+fn left_by_parabola(record: &[f64], i: usize, h: usize) -> f64 {
     let (s2, s4, n) = MOMENTS[h];
     let middle = record[i];
     let (mut y0, mut y1, mut y2, mut yy) = (0.0, 0.0, 0.0, 0.0);
@@ -71,7 +71,7 @@ fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
     let determinant = n * s4 - s2 * s2;
     let a = (s4 * y0 - s2 * y2) / determinant;
     let c = (n * y2 - s2 * y0) / determinant;
-    (middle + a, (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0))
+    (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0)
 }
 
 /// Half-widths that the commands allow: narrow behind a change of the commands, wider with the time since that change, never beyond the
@@ -112,7 +112,7 @@ impl Smoothed {
                 let mut h = usize::from(allowed).min(i).min(record.len() - 1 - i);
                 while h >= NARROWEST {
                     let free = (2 * h - 2) as f64;
-                    if parabola(record, i, h).1
+                    if left_by_parabola(record, i, h)
                         <= variance * (free + PATIENCE * (2.0 * free).sqrt())
                     {
                         return h as u8;
@@ -155,9 +155,32 @@ fn smoothed(record: &[f64], halves: &[u8]) -> Vec<f64> {
     let each = halves.iter().enumerate();
     each.map(|(i, &h)| match usize::from(h) {
         0 => record[i],
-        h => parabola(record, i, h).0,
+        h => middle_of(&record[i - h..=i + h], h),
     })
     .collect()
+}
+
+/// Sums that the middle of a parabola is made of side by side: one alone would wait for itself.
+const LANES: usize = 4;
+
+/// Value of the least-squares parabola in the middle of a window of 2 h + 1 samples: sum over k of (s4 - s2 k^2)/(n s4 - s2^2) y_k, k from -h to h.
+fn middle_of(window: &[f64], h: usize) -> f64 {
+    let (s2, s4, n) = MOMENTS[h];
+    let (middle, scale) = (window[h], 1.0 / (n * s4 - s2 * s2));
+    let term = |k: usize, y: f64| {
+        let x = k as f64 - h as f64;
+        (s4 - s2 * x * x) * (y - middle)
+    };
+    let (whole, rest) = window.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for (c, chunk) in whole.iter().enumerate() {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += term(LANES * c + lane, chunk[lane]);
+        }
+    }
+    let from = LANES * whole.len();
+    let rest: f64 = rest.iter().enumerate().map(|(k, y)| term(from + k, *y)).sum();
+    middle + scale * (sums.iter().sum::<f64>() + rest)
 }
 
 /// Number of draws of a channel's noise that are kept: those for the noise of the outputs and those for the transmitted noise.

@@ -107,15 +107,15 @@ impl Learnt {
         let movements_an_hour = count / hours;
         let share = FALSE_ALARMS_AN_HOUR / movements_an_hour;
         let t = student_two_sided(1.0 - share, (independent - 1.0) as u64);
-        let of_median = median_variance(alike);
+        let normal = t * scatter * (median_variance(alike) + 1.0 / independent).sqrt();
         Some(Self {
             high_share,
             level: mean,
             scatter,
             movements: count as u32,
-            limit: t * scatter * (of_median + 1.0 / independent).sqrt(),
+            limit: normal.max(tail(&sequences, mean, share)),
             movements_an_hour,
-            follow: follow(&sequences, count),
+            follow: follow(&sequences, count, variance),
             low,
             high,
         })
@@ -148,6 +148,17 @@ fn weighted(all: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     Some((low, high, share))
 }
 
+/// How far levels are off that are so rare that the median of five is beyond them with a probability of `share`, whatever the
+/// distribution of levels: on each side `share/2 = 10 q^3` for a level that a share `q` is beyond, up to terms in `q^4`
+/// (David and Nagaraja, Order Statistics, 2003, section 2.1), and the `j`-th of `n` levels is one that `j/(n + 1)` are beyond.
+fn tail(sequences: &[Vec<f64>], mean: f64, share: f64) -> f64 {
+    let mut off: Vec<f64> = sequences.iter().flatten().map(|level| level - mean).collect();
+    off.sort_by(f64::total_cmp);
+    let beyond = (share / 20.0).cbrt() * (off.len() + 1) as f64;
+    let rank = (beyond as usize).clamp(1, off.len());
+    off[off.len() - rank].max(-off[rank - 1])
+}
+
 /// Variance of the median of five levels over that of one, where neighbours correlate with `alike`: as that of their mean
 /// grows, `1 + 2 sum (1 - k/5) alike^k`, and at most 1.
 fn median_variance(alike: f64) -> f64 {
@@ -164,9 +175,10 @@ fn median_variance(alike: f64) -> f64 {
 ///
 /// With `d1`, `d2` the mean squared differences of levels one and two movements apart, the walk's variance is `q = d2 -
 /// d1` and the noise's `r = d1 - d2/2`; the variance before a level is `p = (q + sqrt(q^2 + 4 q r))/2` and the gain
-/// `p/(p + r)` (Harvey, Forecasting, structural time series models and the Kalman filter, 1989, section 3.3). At least `1/n`:
-/// `n` movements do not tell a slower walk, whose gain that is, from none.
-fn follow(sequences: &[Vec<f64>], count: f64) -> f64 {
+/// `p/(p + r)` (Harvey, Forecasting, structural time series models and the Kalman filter, 1989, section 3.3). Of independent
+/// levels of variance `v`, `d2 - d1` has the standard error `v sqrt(8/n)`, two of which are taken off `q`. The gain is at
+/// least `1/n`: `n` movements do not tell a slower walk, whose gain that is, from none.
+fn follow(sequences: &[Vec<f64>], count: f64, variance: f64) -> f64 {
     let apart = |k: usize| {
         let squares: Vec<f64> = sequences
             .iter()
@@ -175,7 +187,8 @@ fn follow(sequences: &[Vec<f64>], count: f64) -> f64 {
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
     };
     let (d1, d2) = (apart(1), apart(2));
-    let (q, r) = ((d2 - d1).max(0.0), (d1 - 0.5 * d2).max(0.0));
+    let error = variance * (8.0 / count).sqrt();
+    let (q, r) = ((d2 - d1 - 2.0 * error).max(0.0), (d1 - 0.5 * d2).max(0.0));
     let p = 0.5 * (q + (q * q + 4.0 * q * r).sqrt());
     let gain = if p + r > 0.0 { p / (p + r) } else { 0.0 };
     gain.clamp((1.0 / count).min(MOST_FOLLOW), MOST_FOLLOW)

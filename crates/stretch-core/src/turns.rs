@@ -13,7 +13,9 @@ use crate::{
 /// sqrt(v + 1/n)` with probability `p = false_alarms_an_hour/movements_an_hour`, where `t` is the two-sided quantile of
 /// Student's t for `n - 1` degrees of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6) and `v` the
 /// variance of a median of five over that of one, 0.2868 where levels are normal and independent (David and Nagaraja,
-/// Order Statistics, 2003, section 3.2). `n` and `v` are those of levels that are alike with their neighbours.
+/// Order Statistics, 2003, section 3.2). `n` and `v` are those of levels that are alike with their neighbours. For levels
+/// that are not normal the limit is no less than the distance that a share `q` of the calibration's levels exceeds on either side,
+/// where `10 q^3 = p/2`: three of five are beyond it as often as that.
 ///
 /// ```
 /// use stretch_core::Turns;

@@ -22,6 +22,8 @@ enum Scatter {
     Student,
     /// One-sided: exponential, 1 mm.
     OneSided,
+    /// Rests and hard ends within 0.01 mm, and a third that begin or end anywhere within 10 mm of it.
+    Partial,
     /// Normal, and alike with the movement before by 0.5.
     Alike,
 }
@@ -49,6 +51,11 @@ impl Movements {
             Scatter::Uniform => (4.0 * random.unit(), -4.0 * random.unit()),
             Scatter::Student => (student(random), student(random)),
             Scatter::OneSided => (-random.unit().ln(), random.unit().ln()),
+            Scatter::Partial => {
+                let mut some = || if random.unit() < 0.3 { 10.0 * random.unit() } else { 0.0 };
+                let (low, high) = (some(), -some());
+                (low + 0.01 * random.noise(), high + 0.01 * random.noise())
+            }
             Scatter::Alike => {
                 let mut next = |x: f64| 0.5 * x + 0.75f64.sqrt() * random.noise();
                 self.before = (next(self.before.0), next(self.before.1));
@@ -136,27 +143,26 @@ fn false_alarms(scatter: Scatter, movements: usize, drift: f64, follow: bool) ->
     (alarmed as f64 / hours / (draws as usize - silent) as f64, silent)
 }
 
-/// 600 simulated hours of each kind. Of normal levels the rate is the stated one: 0.25 an hour in 600 hours are 150
-/// alarms, whose standard deviation is 0.02 an hour, and alarms over movements that overlap come in clusters of about two.
-/// Tails that are heavier than normal may double it from a minute or more of movements; what is one-sided quadruples it.
+/// 600 simulated hours of each kind. The stated rate of 0.25 an hour holds for levels that are normal, bounded, or a hundred; a
+/// few are too few to know their tails or how alike they are. Four standard deviations of a count over 600 hours in
+/// clusters of two are 0.1 an hour.
 #[test]
 fn false_alarms_come_as_often_as_is_said() {
     for (scatter, most) in [
-        (Scatter::Normal, 0.32),
-        (Scatter::Amplitudes, 0.32),
-        (Scatter::Uniform, 0.25),
-        (Scatter::Student, 0.6),
-        (Scatter::OneSided, 1.5),
-        (Scatter::Alike, 1.0),
+        (Scatter::Normal, [0.35, 0.35]),
+        (Scatter::Amplitudes, [0.35, 0.35]),
+        (Scatter::Uniform, [0.35, 0.35]),
+        (Scatter::Student, [0.6, 0.35]),
+        (Scatter::OneSided, [1.0, 0.35]),
+        (Scatter::Partial, [1.0, 0.35]),
+        (Scatter::Alike, [1.0, 0.35]),
     ] {
-        for movements in [20, 40, 100] {
+        for (movements, most) in [(20, f64::INFINITY), (40, most[0]), (100, most[1])] {
             let (rate, silent) = false_alarms(scatter, movements, 0.0, false);
             println!(
                 "{scatter:?}, {movements} movements: {rate:.3} an hour, {silent} of 300 silent"
             );
-            // of twenty that are alike most are silent, and those that are not are so by chance
-            let is_chance = matches!(scatter, Scatter::Alike) && movements == 20;
-            assert!(rate <= most || is_chance, "{scatter:?}, {movements}: {rate}");
+            assert!(rate <= most, "{scatter:?}, {movements}: {rate}");
         }
     }
 }
@@ -187,7 +193,13 @@ fn a_slow_drift_is_followed_and_no_shift() {
 /// A gauge that is put on again 8 mm off after 200 movements.
 #[test]
 fn a_shift_is_found_and_told() {
-    for scatter in [Scatter::Normal, Scatter::Amplitudes, Scatter::Uniform, Scatter::Student] {
+    for scatter in [
+        Scatter::Normal,
+        Scatter::Amplitudes,
+        Scatter::Uniform,
+        Scatter::Student,
+        Scatter::OneSided,
+    ] {
         let (mut found, mut judged, mut errors, mut late) = (0, 0, 0.0, 0);
         for draw in 0..200 {
             let Some(calibration) = calibration(scatter, 40, draw) else { continue };

@@ -49,6 +49,7 @@ pub(crate) fn turns(prepared: &Prepared, calibration: &Calibration) -> Option<Tu
         scatter: learnt.scatter,
         movements: learnt.movements,
         limit: learnt.limit,
+        mean_limit: learnt.mean_limit,
         false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
         movements_an_hour: learnt.movements_an_hour,
         follow: learnt.follow,
@@ -82,6 +83,7 @@ struct Learnt {
     scatter: f64,
     movements: u32,
     limit: f64,
+    mean_limit: f64,
     movements_an_hour: f64,
     follow: f64,
     low: f64,
@@ -105,15 +107,19 @@ impl Learnt {
         }
         let scatter = (variance * independent / (independent - 1.0)).sqrt();
         let movements_an_hour = count / hours;
-        let share = FALSE_ALARMS_AN_HOUR / movements_an_hour;
+        // half for the median, half for the mean
+        let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
         let t = student_two_sided(1.0 - share, (independent - 1.0) as u64);
-        let normal = t * scatter * (median_variance(alike) + 1.0 / independent).sqrt();
+        let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
+        let mean_variance = Turns::MEAN_SHARE / (2.0 - Turns::MEAN_SHARE) * count / independent;
+        let level = clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter);
         Some(Self {
             high_share,
-            level: mean,
+            level,
             scatter,
             movements: count as u32,
-            limit: normal.max(tail(&sequences, mean, share)),
+            limit: spread(median_variance(alike)).max(tail(&sequences, level, share)),
+            mean_limit: spread(mean_variance.min(1.0)),
             movements_an_hour,
             follow: follow(&sequences, count, variance),
             low,
@@ -146,6 +152,16 @@ fn weighted(all: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     let whole = lows + highs - 2.0 * both;
     let share = if whole > 0.0 { ((lows - both) / whole).clamp(0.0, 1.0) } else { 0.0 };
     Some((low, high, share))
+}
+
+/// The level about which deviations, clipped at `most`, have a mean of zero (Huber, Ann. Math. Stat. 35 (1964) 73).
+fn clipped_mean(sequences: &[Vec<f64>], mean: f64, most: f64) -> f64 {
+    let count = sequences.iter().flatten().count() as f64;
+    let moved = |level: f64| {
+        let off = sequences.iter().flatten().map(|own| (own - level).clamp(-most, most));
+        level + off.sum::<f64>() / count
+    };
+    (0..50).fold(mean, |level, _| moved(level))
 }
 
 /// How far levels are off that are so rare that the median of five is beyond them with a probability of `share`, whatever the

@@ -17,6 +17,11 @@ use crate::{
 /// that are not normal the limit is no less than the distance that a share `q` of the calibration's levels exceeds on either side,
 /// where `10 q^3 = p/2`: three of five are beyond it as often as that.
 ///
+/// What is less than that, but lasts, is found by a running mean of levels about `level`, clipped at
+/// [`MOST_INNOVATION`](Self::MOST_INNOVATION) standard deviations, with a weight of [`MEAN_SHARE`](Self::MEAN_SHARE) for the
+/// newest (Roberts, Technometrics 1 (1959) 239): its variance is that of levels times `k/(2 - k)`, and `mean_limit` is made of it as
+/// `limit` is of `v`. Each of both has half of the false alarms.
+///
 /// ```
 /// use stretch_core::Turns;
 /// let turns = Turns {
@@ -26,6 +31,7 @@ use crate::{
 ///     scatter: 0.01,
 ///     movements: 40,
 ///     limit: 0.03,
+///     mean_limit: 0.012,
 ///     false_alarms_an_hour: 0.25,
 ///     movements_an_hour: 1200.0,
 ///     follow: 0.025,
@@ -38,7 +44,7 @@ use crate::{
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Turns {
-    /// Mean level of the movements, in the signal's unit.
+    /// Mean level of the movements, each clipped at [`Turns::MOST_INNOVATION`] standard deviations from it, in the signal's unit.
     pub level: f64,
     /// Weight of the high turning point in a level, 0 to 1. High is where the target is.
     pub high_share: f64,
@@ -50,7 +56,9 @@ pub struct Turns {
     pub movements: u32,
     /// How far the median of five levels may be off, in the signal's unit.
     pub limit: f64,
-    /// The rate of false alarms that the limit is for, while movements are of the kind that the calibration saw.
+    /// How far the running mean of levels may be off, in the signal's unit.
+    pub mean_limit: f64,
+    /// The rate of false alarms that both limits are for, while movements are of the kind that the calibration saw.
     pub false_alarms_an_hour: f64,
     /// Movements an hour of the calibration.
     pub movements_an_hour: f64,
@@ -63,7 +71,9 @@ pub struct Turns {
 impl Turns {
     /// Levels whose median is held against the limit.
     pub const MEDIAN_OF: usize = 5;
-    /// What an innovation counts for at most in a zero that is followed, in standard deviations of levels: a movement
+    /// Weight of the newest level in the running mean: twenty movements are a minute or two.
+    pub const MEAN_SHARE: f64 = 0.05;
+    /// What a level counts for at most in a mean, or in a zero that is followed, in standard deviations of levels: a movement
     /// that ends elsewhere is no drift (Huber, Ann. Math. Stat. 35 (1964) 73, doi 10.1214/aoms/1177703732).
     pub const MOST_INNOVATION: f64 = 2.0;
 
@@ -77,6 +87,7 @@ impl Turns {
             ("turns.least_span", self.least_span),
             ("turns.scatter", self.scatter),
             ("turns.limit", self.limit),
+            ("turns.mean_limit", self.mean_limit),
             ("turns.false_alarms_an_hour", self.false_alarms_an_hour),
             ("turns.movements_an_hour", self.movements_an_hour),
         ] {

@@ -92,7 +92,7 @@ fn an_unknown_or_missing_field_is_named() {
 #[test]
 fn turns_stand_in_text_alone_and_may_be_missing() {
     let turns = json!({
-        "level": 1.24, "high_share": 0.0, "least_span": 0.3, "scatter": 0.01, "movements": 40, "limit": 0.03,
+        "level": 1.24, "high_share": 0.0, "least_span": 0.3, "scatter": 0.01, "movements": 40, "limit": 0.03, "mean_limit": 0.012,
         "false_alarms_an_hour": 0.25, "movements_an_hour": 1200.0, "follow": 0.025, "reference_per_signal": -30.0,
     });
     let mut with = record();

@@ -284,12 +284,13 @@ fn a_zero_gives_the_same_bits() {
         scatter: 0.02,
         movements: 40,
         limit: 0.06,
+        mean_limit: 0.03,
         false_alarms_an_hour: 0.25,
         movements_an_hour: 1200.0,
         follow: 0.1,
         reference_per_signal: -31.0,
     };
-    let wide = Turns { limit: 0.5, scatter: 0.3, ..turns };
+    let wide = Turns { limit: 0.5, mean_limit: 0.2, scatter: 0.3, ..turns };
     let poly13 = stretch_receptor::example_calibration();
     let linear = read_calibration(&firmware("linear.postcard")).unwrap();
     let falling = |spec: &mut CalibrationSpec| {

@@ -87,8 +87,9 @@ impl<T: Real> TurnFinder<T> {
 ///
 /// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). What is told at the end of each is
 /// `off`, the median of the last five levels less that of the record. The zero has shifted where `off` exceeds the
-/// record's limit, which states the rate of false alarms, until it is within half of it; three movements after a shift are
-/// enough.
+/// record's limit, or where the running mean of levels does so of its own; the record states the rate of false
+/// alarms. Three movements are enough for a shift beyond the first limit, ten to thirty for one beyond the second. It is told until
+/// both are within half of their limits.
 ///
 /// A zero `z` that is followed is the state of a scalar Kalman filter at its steady gain `k`: `z += k clip(y - level -
 /// z)`, with innovations clipped at two standard deviations of levels and `z` at the limit. A shift is then told where
@@ -103,7 +104,7 @@ impl<T: Real> TurnFinder<T> {
 /// use stretch_receptor::{ZeroWatch, example_calibration};
 /// // a gauge that rests at 1.24 V, 0.03 mm a millivolt
 /// let turns = Turns {
-///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03,
+///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03, mean_limit: 0.012,
 ///     false_alarms_an_hour: 0.25, movements_an_hour: 1800.0, follow: 0.025, reference_per_signal: -30.0,
 /// };
 /// let mut spec = example_calibration().into_spec();
@@ -134,8 +135,10 @@ pub struct ZeroWatch<T> {
     pub level: T,
     /// How far the median of levels may be off.
     pub limit: T,
-    /// Within which a zero that has shifted is back.
-    pub half_limit: T,
+    /// How far the running mean of levels may be off.
+    pub mean_limit: T,
+    /// Weight of the newest level in it.
+    pub mean_share: T,
     /// What an innovation counts for at most.
     pub most: T,
     /// The share of an innovation by which the zero moves; 0 where it is not followed.
@@ -152,6 +155,8 @@ pub struct ZeroMemory<T> {
     ends: [u32; LEVELS],
     held: u8,
     samples: u32,
+    mean: T,
+    turned: u32,
     followed: T,
     since: Option<u32>,
 }
@@ -167,7 +172,8 @@ pub struct Zero<T> {
     pub followed: T,
     /// Whether the calibration no longer describes the signal.
     pub has_shifted: bool,
-    /// Samples since the end of the first movement that was off; 0 where none is.
+    /// Samples since the end of the first movement that was off, or since which the running mean is on that side; 0 where none
+    /// is.
     pub since_samples: u32,
 }
 
@@ -181,6 +187,8 @@ impl<T: Real> Design for ZeroWatch<T> {
             ends: [0; LEVELS],
             held: 0,
             samples: 0,
+            mean: T::zero(),
+            turned: 0,
             followed: T::zero(),
             since: None,
         }
@@ -198,7 +206,8 @@ impl<T: Real> ZeroWatch<T> {
             shares: [T::from_f64(1.0 - turns.high_share), T::from_f64(turns.high_share)],
             level: T::from_f64(sign * turns.level),
             limit: T::from_f64(turns.limit),
-            half_limit: T::from_f64(0.5 * turns.limit),
+            mean_limit: T::from_f64(turns.mean_limit),
+            mean_share: T::from_f64(Turns::MEAN_SHARE),
             most: T::from_f64(Turns::MOST_INNOVATION * turns.scatter),
             follow: T::zero(),
             reference: T::from_f64(sign * turns.reference_per_signal),
@@ -232,16 +241,24 @@ impl<T: Real> ZeroWatch<T> {
         }
         let whole = usize::from(memory.held) == LEVELS;
         let off = if whole { median(memory.levels) - self.level } else { T::zero() };
-        let rests = if memory.since.is_some() { self.half_limit } else { self.limit };
-        let jumped = whole && (off - memory.followed).abs() > rests;
-        if !jumped {
-            let innovation = level - self.level - memory.followed;
-            let clipped = innovation.max(-self.most).min(self.most);
+        let innovation = level - self.level - memory.followed;
+        let clipped = innovation.max(-self.most).min(self.most);
+        let before = memory.mean;
+        memory.mean = before + self.mean_share * (clipped - before);
+        if (memory.mean > T::zero()) != (before > T::zero()) {
+            memory.turned = memory.samples;
+        }
+        // one that has shifted is back within half of the limits
+        let share = if memory.since.is_some() { T::from_f64(0.5) } else { T::one() };
+        let jumped = whole && (off - memory.followed).abs() > share * self.limit;
+        let lasts = whole && memory.mean.abs() > share * self.mean_limit;
+        if !jumped && !lasts {
             let moved = memory.followed + self.follow * clipped;
             memory.followed = moved.max(-self.limit).min(self.limit);
         }
-        let has_shifted = jumped || memory.followed.abs() >= rests;
-        memory.since = has_shifted.then(|| memory.since.unwrap_or_else(|| self.first(memory, off)));
+        let has_shifted = jumped || lasts || memory.followed.abs() >= share * self.limit;
+        let began = || if jumped { self.first(memory, off) } else { memory.turned };
+        memory.since = has_shifted.then(|| memory.since.unwrap_or_else(began));
         whole.then(|| Zero {
             off: self.sign * off,
             off_reference: self.reference * off,

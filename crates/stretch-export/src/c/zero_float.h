@@ -10,11 +10,13 @@ typedef struct stretch_zero_state {
     float extreme;
     float low;
     float levels[STRETCH_ZERO_LEVELS];
+    float mean;
     float follow;
     float followed;
     uint32_t ends[STRETCH_ZERO_LEVELS];
     uint32_t samples;
     uint32_t since;
+    uint32_t turned;
     uint8_t seen;
     uint8_t rises;
     uint8_t has_low;
@@ -42,10 +44,12 @@ static inline void stretch_zero_init(stretch_zero_state *z, int follow)
     z->before[1] = 0.0f;
     z->extreme = 0.0f;
     z->low = 0.0f;
+    z->mean = 0.0f;
     z->follow = follow ? STRETCH_ZERO_FOLLOW : 0.0f;
     z->followed = 0.0f;
     z->samples = 0u;
     z->since = 0u;
+    z->turned = 0u;
     z->seen = 0u;
     z->rises = 1u;
     z->has_low = 0u;
@@ -141,8 +145,8 @@ static inline float stretch_zero_corrected(const stretch_zero_state *z, float vo
 /* A sample in the signal's unit; 1 where a movement has ended, from the fifth on. */
 static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, stretch_zero *told)
 {
-    float level = 0.0f, off = 0.0f, limit;
-    int whole, jumped, shifted, k;
+    float level = 0.0f, off = 0.0f, limit, share, clipped, before;
+    int whole, jumped, lasts, shifted, k;
     z->samples += 1u;
     if (!stretch_usable(volts) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * volts, &level)) {
         return 0;
@@ -160,16 +164,24 @@ static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, s
     if (whole) {
         off = stretch_zero_median(z) - STRETCH_ZERO_LEVEL;
     }
-    limit = z->shifted ? STRETCH_ZERO_HALF_LIMIT : STRETCH_ZERO_LIMIT;
-    jumped = whole && (off - z->followed > limit || off - z->followed < -limit);
-    if (!jumped) {
-        const float innovation = level - STRETCH_ZERO_LEVEL - z->followed;
-        const float moved = z->followed + z->follow * stretch_within(innovation, STRETCH_ZERO_MOST);
-        z->followed = stretch_within(moved, STRETCH_ZERO_LIMIT);
+    clipped = stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
+    before = z->mean;
+    z->mean = before + STRETCH_ZERO_MEAN_SHARE * (clipped - before);
+    if ((z->mean > 0.0f) != (before > 0.0f)) {
+        z->turned = z->samples;
     }
-    shifted = jumped || z->followed >= limit || z->followed <= -limit;
+    /* one that has shifted is back within half of the limits */
+    share = z->shifted ? 0.5f : 1.0f;
+    limit = share * STRETCH_ZERO_LIMIT;
+    jumped = whole && (off - z->followed > limit || off - z->followed < -limit);
+    lasts = whole && (z->mean > share * STRETCH_ZERO_MEAN_LIMIT ||
+                      z->mean < -(share * STRETCH_ZERO_MEAN_LIMIT));
+    if (!jumped && !lasts) {
+        z->followed = stretch_within(z->followed + z->follow * clipped, STRETCH_ZERO_LIMIT);
+    }
+    shifted = jumped || lasts || z->followed >= limit || z->followed <= -limit;
     if (shifted && !z->shifted) {
-        z->since = stretch_zero_first(z, off);
+        z->since = jumped ? stretch_zero_first(z, off) : z->turned;
     }
     z->shifted = shifted ? 1u : 0u;
     told->off = STRETCH_ZERO_SIGN * off;

@@ -32,12 +32,15 @@ impl Told {
     /// What a movement said that ended at a time.
     pub(super) fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
+            let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
             warn(format!(
-                "stretch: {}put on again? The zero is {} {unit} off since {:.2} s; usual is up to {} {unit}, with {} false alarms an hour. Calibrate again",
+                "stretch: {}put on again? The zero is {} {unit} off since {:.2} s; usual is up to {} {unit} over five movements and {} {unit} over \
+                 some twenty, with {} false alarms an hour. Calibrate again",
                 self.trial,
                 number(zero.off_reference.abs()),
                 time_s - f64::from(zero.since_samples) * self.period_s,
-                number((turns.limit * turns.reference_per_signal).abs()),
+                usual(turns.limit),
+                usual(turns.mean_limit),
                 turns.false_alarms_an_hour,
                 unit = self.unit,
             ));

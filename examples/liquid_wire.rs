@@ -112,6 +112,7 @@ fn calibrate(
         rate_source: RateSource::Voltage,
         dead_band,
         model: Model::Surfaces { inflation, deflation },
+        turns: None,
         provenance: Provenance::new("", ["simulated trial"]),
     })?)
 }

@@ -6,7 +6,8 @@ use std::{
 };
 
 use stretch_calibrate::{
-    Applied, LiveReceptor, Reach, SleeveCalibration, apply, not_its_own, pressure_column,
+    Applied, LiveReceptor, Reach, SleeveCalibration, apply, apply_following, not_its_own,
+    pressure_column,
 };
 use stretch_core::{Calibration, Model};
 use stretch_data::{Trial, push_number, unit};
@@ -19,6 +20,7 @@ use super::{
     pace::Pace,
     reading::{Recorded, read_recording, with_notes_printed},
     stop::RecordedInput,
+    zero::Told,
 };
 use crate::display::{Output, warn};
 
@@ -35,6 +37,9 @@ use crate::display::{Output, warn};
 ///   logger | stretch apply --calibration cal.json -
 ///
 /// With --out, Ctrl-C ends the stream, and what has come is written.
+///
+/// Where movements no longer turn at the levels of the calibration, a line on
+/// standard error says since when, and how far the zero is off.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -47,6 +52,10 @@ pub(crate) struct Args {
     /// Where the estimates go [default: standard output]
     #[arg(long, value_name = "out.csv")]
     out: Option<PathBuf>,
+    /// Follow a slow change of the signal's zero, by the levels at which movements
+    /// turn, no further than the calibration has seen; of one gauge
+    #[arg(long)]
+    follow_zero: bool,
     #[command(flatten)]
     recorded: Recorded,
 }
@@ -56,6 +65,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         SleeveCalibration::One(calibration) => *calibration,
         SleeveCalibration::Many(several) => {
             let options = args.recorded.options();
+            anyhow::ensure!(
+                !args.follow_zero,
+                "--follow-zero is for one gauge; several watch each other"
+            );
             return apply_several(&several, &args.trial, args.out.as_deref(), options);
         }
     };
@@ -63,14 +76,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(pressure) = pressure_column(&calibration) {
         options = options.require(pressure);
     }
+    let follow = args.follow_zero;
     if args.trial.as_os_str() == "-" {
         let path = args.out.as_ref().filter(|path| !is_standard_output(path));
         return match path {
-            None => live(&calibration, io::stdin(), &options, &mut Output),
+            None => live(&calibration, follow, io::stdin(), &options, &mut Output),
             Some(path) => {
                 let mut result = Ok(());
                 write_whole(path, |out| {
-                    result = live(&calibration, RecordedInput::new(), &options, out);
+                    result = live(&calibration, follow, RecordedInput::new(), &options, out);
                     result.as_ref().map(|_| ()).map_err(|e| io::Error::other(format!("{e:#}")))
                 })?;
                 result
@@ -78,7 +92,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
     }
     let trial = read_recording(&args.trial, &options)?;
-    let applied = apply(&calibration, &trial)?;
+    let applied = applied(&calibration, &trial, follow)?;
     let mut pace = Pace::of(calibration.sample_rate_hz.hz());
     let warning = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
     match args.out.as_ref().filter(|path| !is_standard_output(path)) {
@@ -96,6 +110,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn applied(calibration: &Calibration, trial: &Trial, follow: bool) -> anyhow::Result<Applied> {
+    Ok(if follow { apply_following(calibration, trial)? } else { apply(calibration, trial)? })
+}
+
 /// Reports on a trial on standard error.
 fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
     let faults = applied.faults;
@@ -111,6 +129,9 @@ fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
         faults.jittered,
     ));
     seen.doubt();
+    let mut told = Told::of(calibration, &trial.name);
+    applied.zeros.iter().for_each(|(time_s, zero)| told.take(*time_s, zero));
+    told.end();
 }
 
 /// What came of the samples.
@@ -155,6 +176,7 @@ impl Seen {
 /// Answers each line as it comes.
 fn live(
     calibration: &Calibration,
+    follow: bool,
     input: impl Read,
     options: &ReadOptions,
     out: &mut dyn Write,
@@ -163,16 +185,20 @@ fn live(
     if !Recording::is_text(input.fill_buf()?) {
         // Packed rows and arrays come whole.
         let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
-        let applied = apply(calibration, &trial)?;
+        let applied = applied(calibration, &trial, follow)?;
         write_all(calibration, &trial, &applied, out)?;
         report(calibration, &trial, &applied);
         return Ok(());
     }
     let mut receptor = LiveReceptor::new(calibration)?;
+    if follow {
+        receptor = receptor.following(calibration)?;
+    }
     let mut rows = RowReader::new(input, "standard input", options)?;
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
     let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));
+    let mut told = Told::of(calibration, "");
     let mut pace = Pace::of(calibration.sample_rate_hz.hz());
     while let Some(row) = rows.next_row() {
         match row {
@@ -182,6 +208,9 @@ fn live(
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading, row.values[0]);
+                if let Some(zero) = receptor.zero() {
+                    told.take(row.time_s, &zero);
+                }
                 if let Some(warning) = pace.take(row.time_s) {
                     warn(format!("stretch: {warning}"));
                 }
@@ -195,6 +224,7 @@ fn live(
         }
     }
     seen.doubt();
+    told.end();
     Ok(())
 }
 

@@ -36,3 +36,4 @@ pub(crate) mod shared;
 pub(crate) mod simulate;
 mod sleeve;
 pub(crate) mod stop;
+mod zero;

@@ -3,9 +3,9 @@
 use stretch_core::{Calibration, Design, Model, RateEstimator, Runner, Seconds, Stage, Volts};
 use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence, RateFilter};
-use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
+use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld, Zero, ZeroMemory, ZeroWatch};
 
-use crate::{CalibrateError, series::rates_at_use};
+use crate::{CalibrateError, series::rates_at_use, turns::follows_rest};
 
 /// An interval between samples that differs from the period by more than this share is counted as jitter.
 const JITTER_TOLERANCE: f64 = 0.2;
@@ -33,6 +33,8 @@ pub struct LiveReceptor {
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
+    watch: Option<(ZeroWatch<f64>, ZeroMemory<f64>)>,
+    zero: Option<Zero<f64>>,
 }
 
 /// Faults of a stream's time stamps.
@@ -54,12 +56,41 @@ impl LiveReceptor {
     /// needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
         let receptor = Receptor::new(calibration)?;
+        let watch = ZeroWatch::new(calibration).map(|watch| (watch, watch.memory()));
         Ok(Self {
+            watch,
+            zero: None,
             memory: receptor.memory(),
             receptor,
             cadence: Runner::new(Cadence::new(calibration.sample_rate_hz, JITTER_TOLERANCE)?),
             faults: Faults::default(),
         })
+    }
+
+    /// The same receptor, which follows a slow change of the signal's zero and answers for the signal without it.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Record`] for a record that does not hold where movements turn, and for a model that follows
+    /// the rest of its signal itself.
+    pub fn following(self, calibration: &Calibration) -> Result<Self, CalibrateError> {
+        let refused = |problem: &str| {
+            Err(CalibrateError::Record { file: "the calibration".into(), problem: problem.into() })
+        };
+        let Some((watch, memory)) = self.watch else {
+            return refused(
+                "it does not hold where movements turn, so that its zero cannot be followed: calibrate on a minute or more of movements",
+            );
+        };
+        if follows_rest(calibration) {
+            return refused("its model follows the zero at rest already");
+        }
+        Ok(Self { watch: Some((watch.following(calibration), memory)), ..self })
+    }
+
+    /// What the movement that ended with the last sample said of the zero; `None` while one is under way, and for a
+    /// record that does not hold where movements turn.
+    pub fn zero(&self) -> Option<Zero<f64>> {
+        self.zero
     }
 
     /// Takes the next sample.
@@ -77,11 +108,17 @@ impl LiveReceptor {
             Arrival::Backwards { .. } => {
                 self.faults.backwards += 1;
                 self.memory = self.receptor.memory();
+                self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
             }
             Arrival::Jitter { .. } => self.faults.jittered += 1,
             _ => {}
         }
-        self.receptor.step(&mut self.memory, Volts(signal))
+        let mut corrected = signal;
+        if let Some((watch, memory)) = &mut self.watch {
+            self.zero = watch.step(memory, signal);
+            corrected = watch.corrected(memory, signal);
+        }
+        self.receptor.step(&mut self.memory, Volts(corrected))
     }
 
     /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.
@@ -102,6 +139,8 @@ pub struct Applied {
     pub readings: Vec<Result<Reading, Withheld>>,
     /// Faults of the time stamps.
     pub faults: Faults,
+    /// Of each movement that said how far the zero is off, the time of its end.
+    pub zeros: Vec<(f64, Zero<f64>)>,
 }
 
 /// Applies a calibration to a logged trial, sample by sample, as it would run live.
@@ -113,28 +152,53 @@ pub struct Applied {
 /// [`CalibrateError::Data`] when the trial lacks the signal,
 /// [`CalibrateError::Filter`] when the estimator cannot be designed.
 pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
+    applied(calibration, trial, false)
+}
+
+/// The same, where the receptor follows a slow change of the signal's zero: [`LiveReceptor::following`].
+///
+/// # Errors
+/// As [`apply`] and [`LiveReceptor::following`].
+pub fn apply_following(
+    calibration: &Calibration,
+    trial: &Trial,
+) -> Result<Applied, CalibrateError> {
+    applied(calibration, trial, true)
+}
+
+fn applied(
+    calibration: &Calibration,
+    trial: &Trial,
+    follow: bool,
+) -> Result<Applied, CalibrateError> {
     trial.check_lengths()?;
     let signal = trial.require(calibration.signal.as_str())?;
-    if calibration.rate_estimator == RateEstimator::CentralDifference {
+    if calibration.rate_estimator == RateEstimator::CentralDifference && !follow {
         let rate = calibration.sample_rate_hz;
         let rates = Logged(rates_at_use(calibration.rate_estimator, rate, signal)?);
         let mut receptor = Runner::new(Receptor::with_rate(calibration, rates)?);
         let readings = signal.iter().map(|&v| receptor.step(Volts(v))).collect();
-        return Ok(Applied { readings, faults: Faults::default() });
+        return Ok(Applied { readings, faults: Faults::default(), zeros: Vec::new() });
     }
     let mut live = LiveReceptor::new(calibration)?;
+    if follow {
+        live = live.following(calibration)?;
+    }
     let pressure = match pressure_column(calibration) {
         Some(column) => Some(trial.require(column)?),
         None => None,
     };
+    let mut zeros = Vec::new();
     let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
         if let Some(pressure) = pressure {
             live.set_pressure(pressure[i]);
         }
-        live.step(t, v)
+        let reading = live.step(t, v);
+        zeros.extend(live.zero().map(|zero| (t, zero)));
+        reading
     };
     let readings = trial.time_s.iter().zip(signal).enumerate().map(one).collect();
-    Ok(Applied { readings, faults: live.faults() })
+    Ok(Applied { readings, faults: live.faults(), zeros })
 }
 
 /// The column of the pressure, where a calibration needs one beside its signal.

@@ -16,6 +16,7 @@ use crate::{
     prepared::Prepared,
     series::extent,
     split::branches,
+    turns::turns,
     twice::fitted_twice,
 };
 
@@ -93,8 +94,9 @@ pub(crate) fn calibrate_with(
     notes.extend(fitted_twice(names.clone(), checksums.iter().copied()));
     let provenance =
         Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
-    let calibration = prepared.calibration(model, provenance)?;
-    Ok((Calibrated { calibration, fits, notes }, made))
+    let mut spec = prepared.calibration(model, provenance)?.into_spec();
+    spec.turns = turns(&prepared, &Calibration::new(spec.clone())?);
+    Ok((Calibrated { calibration: Calibration::new(spec)?, fits, notes }, made))
 }
 
 /// Choices about a model that remembers, kept when the model is fitted to parts of the same data.

@@ -42,13 +42,16 @@ mod rest;
 mod rising;
 mod series;
 mod split;
+mod turns;
 mod twice;
 
 pub use acceptance::{
     beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,
     worse_than_the_mean,
 };
-pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
+pub use apply::{
+    Applied, Faults, LiveReceptor, apply, apply_following, pressure_column, rate_delay_s,
+};
 pub use array::{
     AppliedArray, ArrayFit, ArrayOptions, Carried, ROOM, SleeveCalibration, apply_array,
     array_bytes, array_seal, calibrate_array,

@@ -108,6 +108,7 @@ impl Prepared {
             rate_source: self.options.rate_source,
             dead_band: self.dead.signal,
             model,
+            turns: None,
             provenance,
         })?)
     }

@@ -1,7 +1,7 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
 use crate::{
-    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
+    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate, Turns,
     folded::{Scales, line_holds, surface_holds},
     sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
@@ -126,6 +126,11 @@ pub struct CalibrationSpec {
     pub dead_band: f64,
     /// From signal and rate to the normalised target.
     pub model: Model,
+    /// Where the movements of the calibration turned, for a gauge that is to tell when it was put on again; `None` where too
+    /// few were recorded, in earlier records, and in bytes: a board is given them by its program.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::turns::in_text"))]
+    pub turns: Option<Turns>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
@@ -159,6 +164,7 @@ pub struct CalibrationSpec {
 ///     rate_source: RateSource::Voltage,
 ///     dead_band: 0.05,
 ///     model: Model::Linear(line),
+///     turns: None,
 ///     provenance: Provenance::new("2026-11-21", ["ramp.csv"]),
 /// };
 /// let calibration = Calibration::new(spec.clone())?;
@@ -191,6 +197,7 @@ impl Calibration {
         spec.rate_estimator.validate()?;
         DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
         spec.model.validate()?;
+        spec.turns.as_ref().map_or(Ok(()), Turns::validate)?;
         check_sizes(&spec)?;
         Ok(Self(spec))
     }

@@ -32,6 +32,7 @@ mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 mod surface;
+mod turns;
 mod unit;
 mod values;
 
@@ -66,5 +67,6 @@ pub use rest::RestTracker;
 pub use rest_level::{Baseline, RestLevel};
 pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
+pub use turns::Turns;
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};
 pub use values::Values;

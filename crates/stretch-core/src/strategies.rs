@@ -336,6 +336,7 @@ impl Frame {
             rate_source: RateSource::Voltage,
             dead_band: self.dead_band,
             model,
+            turns: None,
             provenance: Provenance::new("", ["generated"]),
         })
         .expect("every part is in range")

@@ -88,6 +88,30 @@ fn an_unknown_or_missing_field_is_named() {
     assert!(error.contains("signal_range"), "{error}");
 }
 
+/// Records were written without turns before, and in bytes they are as they were.
+#[test]
+fn turns_stand_in_text_alone_and_may_be_missing() {
+    let turns = json!({
+        "level": 1.24, "high_share": 0.0, "least_span": 0.3, "scatter": 0.01, "movements": 40, "limit": 0.03, "mean_limit": 0.012,
+        "false_alarms_an_hour": 0.25, "movements_an_hour": 1200.0, "follow": 0.025, "reference_per_signal": -30.0,
+    });
+    let mut with = record();
+    assert!(with.get("turns").is_none());
+    let without: Calibration = serde_json::from_value(with.clone()).unwrap();
+    with["turns"] = turns;
+    let calibration: Calibration = serde_json::from_value(with.clone()).unwrap();
+    assert_eq!(calibration.turns.unwrap().movements, 40);
+    assert_eq!(serde_json::to_value(&calibration).unwrap(), with);
+    let mut buffers = [[0; 4096]; 2];
+    let [one, other] = &mut buffers;
+    let bytes = postcard::to_slice(&calibration, one).unwrap();
+    assert_eq!(bytes, postcard::to_slice(&without, other).unwrap());
+    assert_eq!(postcard::from_bytes::<Calibration>(bytes).unwrap(), without);
+    with["turns"]["limit"] = json!(-0.1);
+    let error = serde_json::from_value::<Calibration>(with).unwrap_err().to_string();
+    assert!(error.contains("turns.limit"), "{error}");
+}
+
 #[test]
 fn a_surface_needs_one_finite_coefficient_a_term() {
     assert!(Surface::new(Degree::POLY13, &[0.0; 6]).is_err());

@@ -12,7 +12,7 @@ use crate::{
     constants::{Constants, comment_safe},
     models::{
         array_float, diagnosed_float, observer_fixed, observer_float, surfaces_fixed,
-        surfaces_float,
+        surfaces_float, with_zero,
     },
     part::{Part, kept},
     self_test,
@@ -98,6 +98,7 @@ fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
             return Err(ExportError::NoForm { model: model.into() });
         }
     };
+    let part = with_zero(part, calibration);
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
     Ok(assembled(&Source::of(calibration, seal), options, Form::Float, part, &test))

@@ -17,12 +17,19 @@ int main(void)
 {
     char word[16];
     stretch_state state;
+#ifdef STRETCH_SHIFT_SAMPLES
+    stretch_shifts_state blocks;
+    stretch_shifts told;
+#endif
     const int wrong = stretch_self_test();
     if (wrong != 0) {
         printf("the self-test fails at sample %d\n", wrong);
         return 1;
     }
     stretch_init(&state);
+#ifdef STRETCH_SHIFT_SAMPLES
+    stretch_shifts_init(&blocks);
+#endif
     while (scanf("%15s", word) == 1) {
         float volts[STRETCH_CHANNELS];
         stretch_reading reading;
@@ -44,6 +51,14 @@ int main(void)
         for (k = 0; k < STRETCH_CHANNELS; k++) {
             printf(" %u", (unsigned)stretch_loss(&state, k));
         }
+#ifdef STRETCH_SHIFT_SAMPLES
+        if (stretch_shifts_step(&blocks, &state, &told)) {
+            printf(" shifts %u %d", (unsigned)told.shifted, (int)told.most);
+            for (k = 0; k < STRETCH_CHANNELS; k++) {
+                printf(" %08lx", bits_of(told.off[k]));
+            }
+        }
+#endif
         printf("\n");
     }
     return 0;

@@ -12,11 +12,11 @@ use proptest::{
 };
 use stretch_calibrate::parse_adc;
 use stretch_core::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArraySpec, Design, HistoryShape, Interval, Label,
-    Provenance, SampleRate, Schema, Stage, Values,
+    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, Design, HistoryShape,
+    Interval, Label, Provenance, SampleRate, Schema, Stage, Values,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, array_header};
-use stretch_receptor::{ArrayReceptor, ArrayWithheld, Loss, example_array};
+use stretch_receptor::{ArrayReceptor, ArrayWithheld, Loss, ShiftWatch, Shifts, example_array};
 
 const ROOM: usize = 16;
 
@@ -71,6 +71,17 @@ fn drawn(
     let without = if channels > 1 { channels } else { 0 };
     let without = (0..without).map(|lost| gains(&|k| k != lost)).collect();
     let alone = (0..channels).map(|only| gains(&|k| k == only)).collect();
+    let mut list = |from, to| {
+        let values: Vec<f64> = (0..channels).map(|_| draw(from, to)).collect();
+        Values::new("shifts", &values).unwrap()
+    };
+    // blocks of a fifth of a second, whose means are off by less or more
+    let shifts = (channels > 1).then(|| ArrayShifts {
+        block_s: 0.2,
+        false_alarms_an_hour: 0.25,
+        usual: list(-20.0, 20.0),
+        limits: list(10.0, 40.0),
+    });
     ArrayCalibration::new(ArraySpec {
         schema: Schema::CURRENT,
         reference: Label::new("angle_deg").unwrap(),
@@ -83,7 +94,7 @@ fn drawn(
         all,
         without,
         alone,
-        shifts: None,
+        shifts,
         provenance: Provenance::new("2026-11-24", ["drawn"]),
     })
     .unwrap()
@@ -136,6 +147,7 @@ fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
 fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (String, String) {
     let receptor = ArrayReceptor::<f32, N>::new(calibration);
     let mut memory = receptor.memory();
+    let mut watched = ShiftWatch::<f32, N>::new(calibration).map(|watch| (watch, watch.memory()));
     let (mut input, mut expected) = (String::new(), String::new());
     for row in rows {
         let shares = match row {
@@ -179,6 +191,14 @@ fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (Str
                 Some(_) => 4,
             };
             write!(expected, " {loss}").unwrap();
+        }
+        let shifts = watched.as_mut().and_then(|(watch, own)| watch.step(own, &receptor, &memory));
+        if let Some(Shifts { off, shifted, most }) = shifts {
+            let most = most.map_or(-1, |most| most as i32);
+            write!(expected, " shifts {shifted} {most}").unwrap();
+            for off in &off[..calibration.channels.len()] {
+                write!(expected, " {:08x}", off.to_bits()).unwrap();
+            }
         }
         expected.push('\n');
     }
@@ -234,10 +254,14 @@ fn every_kind(compilers: &[Compiler]) {
         let told = seen.lines().filter(|line| line.starts_with(&status.to_string())).count();
         assert!(told > 5, "status {status}: {told}");
     }
+    // blocks of which none, one or several gauges are off
+    for shifted in ["shifts 0 ", "shifts 1 ", "shifts 3 "] {
+        assert!(seen.contains(shifted), "{shifted}");
+    }
     for loss in 0..5 {
         let told = seen
             .lines()
-            .flat_map(|line| line.split(' ').skip(5))
+            .flat_map(|line| line.split(' ').skip(5).take_while(|word| *word != "shifts"))
             .filter(|l| *l == loss.to_string());
         assert!(told.count() > 20, "loss {loss}");
     }

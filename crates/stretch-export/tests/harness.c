@@ -17,12 +17,18 @@ int main(void)
 {
     char word[16];
     stretch_state state;
+#ifdef STRETCH_ZERO_LEVEL
+    stretch_zero_state zero;
+#endif
     const int wrong = stretch_self_test();
     if (wrong != 0) {
         printf("the self-test fails at sample %d\n", wrong);
         return 1;
     }
     stretch_init(&state);
+#ifdef STRETCH_ZERO_LEVEL
+    stretch_zero_init(&zero, 1);
+#endif
     while (scanf("%15s", word) == 1) {
         uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
         stretch_reading reading;
@@ -40,6 +46,18 @@ int main(void)
         bits = (uint32_t)strtoul(word, NULL, 16);
 #endif
         memcpy(&volts, &bits, sizeof volts);
+#ifdef STRETCH_ZERO_LEVEL
+        {
+            stretch_zero told;
+            if (stretch_zero_step(&zero, word[0] == 'x' ? STRETCH_NO_VOLTS : volts, &told)) {
+                printf("zero %08lx %08lx %08lx %lu %u\n", (unsigned long)bits_of(&told.off),
+                       (unsigned long)bits_of(&told.off_reference),
+                       (unsigned long)bits_of(&told.followed), (unsigned long)told.since_samples,
+                       (unsigned)told.shifted);
+            }
+            volts = stretch_zero_corrected(&zero, volts);
+        }
+#endif
         reading = word[0] == 'x' ? stretch_lost(&state) : stretch_step(&state, volts);
         rate = bits_of(&reading.rate);
 #ifdef STRETCH_TELLS_SD

@@ -9,11 +9,12 @@ use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Design, DiagnosedMap, Interval, Knee, Model,
-    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Values, Volts, Worn,
+    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Turns, Values, Volts, Worn,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, header};
 use stretch_receptor::{
-    Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
+    Receptor, Withheld, Zero, ZeroWatch, code::Adc, code::AdcCode, example_diagnosed,
+    example_observer,
 };
 
 fn adc() -> Adc {
@@ -84,19 +85,13 @@ fn takes_pressure(calibration: &Calibration) -> bool {
 /// What the harness should print.
 fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
-    let mut answer = |answer: Result<(u8, u8, [u32; 3]), Withheld>| match answer {
-        Ok((branch, domain, [estimate, rate, sd])) => {
-            writeln!(text, "{branch} {domain} {estimate:08x} {rate:08x} {sd:08x}").unwrap();
-        }
-        Err(withheld) => writeln!(text, "{withheld}").unwrap(),
-    };
     match form {
         Form::Fixed => {
             let record = fixed_record(calibration, &adc()).unwrap();
             let mut receptor = BoardReceptor::new(&record.bytes).unwrap();
             for &code in codes {
                 let reading = receptor.step(AdcCode(code));
-                answer(
+                text += &answer(
                     reading.map(|r| (r.branch as u8, r.domain as u8, [r.estimate as u32, 0, 0])),
                 );
             }
@@ -104,12 +99,19 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
         Form::Float => {
             let receptor = Receptor::<f32>::new(calibration).unwrap();
             let mut memory = receptor.memory();
+            let watch = ZeroWatch::<f32>::new(calibration);
+            let mut zero = watch.map(|w| (w.following(calibration), w.memory()));
             for (n, &code) in codes.iter().enumerate() {
+                let mut sample = volts(code);
+                if let Some((watch, own)) = &mut zero {
+                    text += &watch.step(own, sample).map_or(String::new(), told);
+                    sample = watch.corrected(own, sample);
+                }
                 if takes_pressure(calibration) {
                     memory.set_pressure(pressure(n));
                 }
-                let reading = receptor.step(&mut memory, Volts(volts(code)));
-                answer(reading.map(|r| {
+                let reading = receptor.step(&mut memory, Volts(sample));
+                text += &answer(reading.map(|r| {
                     let numbers = [r.estimate, r.rate, r.sd.unwrap_or(0.0)].map(f32::to_bits);
                     (r.branch as u8, r.domain as u8, numbers)
                 }));
@@ -117,6 +119,24 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
         }
     }
     text
+}
+
+/// A line of the harness.
+fn answer(answer: Result<(u8, u8, [u32; 3]), Withheld>) -> String {
+    match answer {
+        Ok((branch, domain, [estimate, rate, sd])) => {
+            format!("{branch} {domain} {estimate:08x} {rate:08x} {sd:08x}\n")
+        }
+        Err(withheld) => format!("{withheld}\n"),
+    }
+}
+
+/// What the harness says of a zero.
+fn told(zero: Zero<f32>) -> String {
+    let [off, reference, followed] =
+        [zero.off, zero.off_reference, zero.followed].map(f32::to_bits);
+    let (since, shifted) = (zero.since_samples, u8::from(zero.has_shifted));
+    format!("zero {off:08x} {reference:08x} {followed:08x} {since} {shifted}\n")
 }
 
 /// The samples as the harness reads them.
@@ -148,11 +168,14 @@ fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compile
                 run(&program, &input(calibration, form, &codes)),
                 expected(calibration, form, &codes),
             );
+            if calibration.turns.is_some() && form == Form::Float {
+                assert!(expected.contains("zero "), "{name}");
+            }
             let what = || format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
             for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
                 assert_eq!(found, expected, "{} sample {n} of {}", what(), codes.len());
             }
-            assert_eq!(found.lines().count(), codes.len(), "{}", what());
+            assert_eq!(found.lines().count(), expected.lines().count(), "{}", what());
         }
     }
 }
@@ -166,6 +189,7 @@ fn records_of_every_kind_give_the_same_bits() {
 #[ignore = "needs g++, takes a minute; ./ci.sh runs it"]
 fn with_gxx_records_of_every_kind_give_the_same_bits() {
     every_kind(&gcc_and_gxx());
+    zeros(&gcc_and_gxx());
 }
 
 #[test]
@@ -249,6 +273,45 @@ fn shapes_and_signs_give_the_same_bits() {
         spec.rate_estimator = RateEstimator::SavitzkyGolay { window: 12, degree: 3, delay: 5 };
     });
     holds("a delay", &late, Form::Float, &compilers);
+}
+
+/// A zero that is told and followed: within a limit that the samples stay in now and then, and one that they reach.
+#[test]
+fn a_zero_gives_the_same_bits() {
+    zeros(&strict_c());
+}
+
+fn zeros(compilers: &[Compiler]) {
+    let turns = Turns {
+        level: 1.4,
+        high_share: 0.3,
+        least_span: 0.2,
+        scatter: 0.02,
+        movements: 40,
+        limit: 0.06,
+        mean_limit: 0.03,
+        false_alarms_an_hour: 0.25,
+        movements_an_hour: 1200.0,
+        follow: 0.1,
+        reference_per_signal: -31.0,
+    };
+    let wide = Turns { limit: 0.5, mean_limit: 0.2, scatter: 0.3, ..turns };
+    let poly13 = stretch_receptor::example_calibration();
+    let linear = read_calibration(&firmware("linear.postcard")).unwrap();
+    let falling = |spec: &mut CalibrationSpec| {
+        (spec.polarity, spec.turns) = (Polarity::Falling, Some(wide));
+    };
+    for (name, calibration) in [
+        ("a narrow limit", changed(&poly13, |spec| spec.turns = Some(turns))),
+        ("a wide one", changed(&poly13, |spec| spec.turns = Some(wide))),
+        ("of a falling signal", changed(&linear, falling)),
+        ("of named defects", changed(&example_diagnosed(), |spec| spec.turns = Some(wide))),
+        ("of an observer", changed(&example_observer(), |spec| spec.turns = Some(turns))),
+    ] {
+        holds(name, &calibration, Form::Float, compilers);
+    }
+    // integers have no watch
+    holds("integers", &changed(&poly13, |spec| spec.turns = Some(turns)), Form::Fixed, compilers);
 }
 
 fn diagnosed_with(change: impl FnOnce(&mut DiagnosedMap)) -> Calibration {

@@ -208,6 +208,7 @@ fn build() -> Result<Calibration, DesignError> {
                 0.01821,
             ),
         },
+        turns: None,
         provenance: Provenance::new("", ["published coefficients"]),
     })
 }

@@ -20,6 +20,7 @@ mod reading;
 mod receptor;
 #[cfg(feature = "proptest")]
 pub mod strategies;
+mod zero;
 
 pub use array::{
     ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld, JUMP_SAMPLES, Jump, Loss, Repeats,
@@ -34,6 +35,7 @@ pub use observer::ObserverReceptor;
 pub use one::Receptor;
 pub use reading::{Domain, Reading, Withheld};
 pub use receptor::{BlendedReceptor, StretchReceptor};
+pub use zero::{TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch};
 
 /// The Rust of the tutorial for firmware, which runs as a test.
 #[cfg(doctest)]

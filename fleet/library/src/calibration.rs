@@ -66,6 +66,7 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
             rate_source: RateSource::Voltage,
             dead_band: 0.0,
             model,
+            turns: None,
             provenance: Provenance::new("", []),
         };
         let calibration = Calibration::new(spec).map_err(|e| e.to_string())?;

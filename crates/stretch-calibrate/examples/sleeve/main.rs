@@ -1,7 +1,7 @@
 //! Sleeves that are put on again or worn by another: priors and half a minute of reference, on published records.
 //!
 //! ```sh
-//! cargo run --release -p stretch-calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER [--auto] [--every N] [--faults] [--simulated HOURS]
+//! cargo run --release -p stretch-calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER [--auto] [--every N] [--faults] [--zero] [--simulated HOURS]
 //! ```
 //!
 //! The first folder is `data/Regression` of github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve (commit
@@ -12,12 +12,14 @@
 //! other sessions of the wearer. All errors are root mean squares over what follows the first minute, of which the
 //! reference is taken; the session's own calibration is judged by cross-validation over sixths. With `--auto` the
 //! choice of a model on the same half minute is judged too, which takes long; with `--faults` lost channels alone are.
+//! `--zero` asks single gauges alone whether they tell that they were put on again.
 //! `--simulated` asks how often a working gauge is taken for lost in hours of simulated ones.
 
 mod data;
 mod faults;
 mod judge;
 mod simulated;
+mod zero;
 
 use std::path::PathBuf;
 
@@ -38,6 +40,9 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = value("--sleeves") {
         let set = data::sleeves(&PathBuf::from(folder))?;
         println!("{} sessions of knitted sleeves", set.worn.len());
+        if arguments.iter().any(|a| a == "--zero") {
+            return zero::print(&set);
+        }
         let judge = Judge::new(set, 60.0, with_auto);
         if !faults_alone {
             print("sleeves", &judge.rows(every)?);

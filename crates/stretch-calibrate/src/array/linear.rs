@@ -177,6 +177,7 @@ impl Linear {
             rate_source: RateSource::Voltage,
             dead_band: 0.0,
             model: Model::History(map),
+            turns: None,
             provenance,
         })?)
     }

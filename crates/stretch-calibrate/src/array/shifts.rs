@@ -97,10 +97,35 @@ fn contrasts(parted: &Parted, linear: &Linear, ridges: &[f64]) -> Option<Vec<Vec
 /// Blocks that follow one another are alike where their correlation `r` is above zero: `n` of them count as `n (1 -
 /// r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of first order).
 fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
+    let Levels { mean, variance, alike, count } = levels(stretches)?;
+    let alike = alike.clamp(0.0, 0.99);
+    let independent = count * (1.0 - alike) / (1.0 + alike);
+    if !(independent >= LEAST_BLOCKS && variance > 0.0) {
+        return None;
+    }
+    let dof = independent - 1.0;
+    // the mean of n alike blocks is as near to the truth as that of so many independent ones, and so is their variance
+    let sd = (variance * independent / dof).sqrt();
+    let t = student_two_sided(1.0 - share, dof as u64);
+    Some((mean, t * sd * (1.0 + 1.0 / independent).sqrt()))
+}
+
+/// Values that follow one another in stretches.
+pub(crate) struct Levels {
+    pub(crate) mean: f64,
+    /// About the mean, over their count.
+    pub(crate) variance: f64,
+    /// Correlation of neighbours.
+    pub(crate) alike: f64,
+    pub(crate) count: f64,
+}
+
+/// Mean, variance and correlation of values in stretches; `None` of none.
+pub(crate) fn levels(stretches: &[Vec<f64>]) -> Option<Levels> {
     let all: Vec<f64> = stretches.iter().flatten().copied().collect();
-    let n = all.len() as f64;
-    let mean = all.iter().sum::<f64>() / n;
-    let squares: f64 = all.iter().map(|x| (x - mean).powi(2)).sum();
+    let count = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / count;
+    let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
     let products: f64 = stretches
         .iter()
         .flat_map(|own| own.windows(2))
@@ -109,17 +134,9 @@ fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
     let pairs: usize = stretches.iter().map(|own| own.len().saturating_sub(1)).sum();
     let alike = match pairs {
         0 => 0.0,
-        pairs => (products / pairs as f64 / (squares / n)).clamp(0.0, 0.99),
+        pairs => products / pairs as f64 / variance,
     };
-    let independent = n * (1.0 - alike) / (1.0 + alike);
-    if !(independent >= LEAST_BLOCKS && squares > 0.0) {
-        return None;
-    }
-    let dof = independent - 1.0;
-    // the mean of n alike blocks is as near to the truth as that of so many independent ones, and so is their variance
-    let sd = (squares / n * independent / dof).sqrt();
-    let t = student_two_sided(1.0 - share, dof as u64);
-    Some((mean, t * sd * (1.0 + 1.0 / independent).sqrt()))
+    (count > 0.0).then_some(Levels { mean, variance, alike, count })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use stretch_core::ArrayCalibration;
 use stretch_receptor::{
-    ArrayReceptor,
+    ArrayReceptor, ShiftWatch,
     numbers::{ArrayGainNumbers, ArrayNumbers},
 };
 
@@ -41,14 +41,16 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
         watched(&mut constants, numbers);
     }
     gains(&mut constants, numbers);
+    let mut step = vec![include_str!("../c/float.h"), include_str!("../c/array_float.h")];
+    if let Some(watch) = ShiftWatch::<f32, N>::new(calibration) {
+        shifts(&mut constants, &watch);
+        step.push(include_str!("../c/shifts_float.h"));
+    }
+    step.push(include_str!("../c/float_end.h"));
     Part {
         model: if count == 1 { "1 gauge".into() } else { format!("{count} gauges") },
         constants: constants.into_text(),
-        step: vec![
-            include_str!("../c/float.h"),
-            include_str!("../c/array_float.h"),
-            include_str!("../c/float_end.h"),
-        ],
+        step,
         has,
     }
 }
@@ -105,6 +107,17 @@ fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, 
         .rows("float", "alone", &each(alone, |gains| gains.terms[..terms].to_vec()))
         .define("LOW", numbers.low, "the least estimate")
         .define("HIGH", numbers.high, "the greatest");
+}
+
+/// What is usual of the differences between the channels.
+fn shifts<const N: usize>(constants: &mut Constants, watch: &ShiftWatch<f32, N>) {
+    let count = watch.channels;
+    constants
+        .define("SHIFT_SAMPLES", watch.samples_a_value, "between two values of a block")
+        .define("SHIFT_VALUES", watch.values_a_block, "of a block")
+        .define("SHIFT_PER_BLOCK", watch.per_block, "one over them")
+        .array("float", "shift_usual", &watch.usual[..count])
+        .array("float", "shift_limits", &watch.limits[..count]);
 }
 
 fn each<T, R>(of: &[T], number: impl Fn(&T) -> R) -> Vec<R> {

@@ -8,6 +8,7 @@ mod observer_fixed;
 mod observer_float;
 mod surfaces_fixed;
 mod surfaces_float;
+mod zero_float;
 
 pub(crate) use array_float::array_float;
 pub(crate) use diagnosed_float::diagnosed_float;
@@ -15,3 +16,4 @@ pub(crate) use observer_fixed::observer_fixed;
 pub(crate) use observer_float::observer_float;
 pub(crate) use surfaces_fixed::surfaces_fixed;
 pub(crate) use surfaces_float::surfaces_float;
+pub(crate) use zero_float::with_zero;

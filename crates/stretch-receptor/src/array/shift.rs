@@ -38,13 +38,18 @@ const VALUES_A_SECOND: f64 = 10.0;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftWatch<T, const N: usize> {
-    channels: usize,
-    /// Samples between two values, and values of a block.
-    samples_a_value: u32,
-    values_a_block: u32,
-    usual: [T; N],
-    limits: [T; N],
-    per_block: T,
+    /// Gauges.
+    pub channels: usize,
+    /// Samples between two values.
+    pub samples_a_value: u32,
+    /// Values of a block.
+    pub values_a_block: u32,
+    /// The usual mean of each gauge's difference.
+    pub usual: [T; N],
+    /// How far a block's mean may be off from it.
+    pub limits: [T; N],
+    /// One over the values of a block.
+    pub per_block: T,
 }
 
 /// What a [`ShiftWatch`] remembers: the sums of the block that is under way.

@@ -1,0 +1,86 @@
+
+/* ---- whether a gauge has shifted against the others ---- */
+
+/* A state beside the receptor's. After every stretch_step or stretch_lost
+ *     if (stretch_shifts_step(&blocks, &state, &told)) { a block of some seconds has ended: see told }
+ */
+typedef struct stretch_shifts_state {
+    float sums[STRETCH_CHANNELS];
+    uint32_t values;
+    uint32_t samples;
+} stretch_shifts_state;
+
+/* What a block of time said of every gauge. */
+typedef struct stretch_shifts {
+    float off[STRETCH_CHANNELS]; /* from what the others say, in STRETCH_UNIT */
+    uint16_t shifted;            /* a bit for each gauge that is off by more than its limit */
+    int8_t most;                 /* the gauge that is the most times its limit off; -1 where that cannot be told */
+} stretch_shifts;
+
+static inline void stretch_shifts_init(stretch_shifts_state *b)
+{
+    int k;
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        b->sums[k] = 0.0f;
+    }
+    b->values = 0u;
+    b->samples = 0u;
+}
+
+/* The estimate of one channel alone less that of all others. */
+STRETCH_INLINE float stretch_difference(const stretch_state *s, int k)
+{
+    uint8_t clamped = 0;
+    float own = stretch_add(&s->of[k], k, stretch_alone[k], stretch_alone_constant[k], &clamped);
+    float others = stretch_without_constant[k];
+    int j;
+    for (j = 0; j < STRETCH_CHANNELS; j++) {
+        if (j != k) {
+            const float *gains = stretch_without[k * STRETCH_CHANNELS + j];
+            others = stretch_add(&s->of[j], j, gains, others, &clamped);
+        }
+    }
+    return own - others;
+}
+
+/* 1 at the end of a block. One begins anew where a channel is left out or has no sample. */
+static STRETCH_APART int stretch_shifts_step(stretch_shifts_state *b, const stretch_state *s,
+                                             stretch_shifts *told)
+{
+    float most = 1.0f;
+    int k;
+    b->samples += 1u;
+    if (b->samples < STRETCH_SHIFT_SAMPLES) {
+        return 0;
+    }
+    b->samples = 0u;
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        if (s->of[k].loss != STRETCH_IN_USE || !s->of[k].begun) {
+            stretch_shifts_init(b);
+            return 0;
+        }
+    }
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        b->sums[k] = b->sums[k] + stretch_difference(s, k);
+    }
+    b->values += 1u;
+    if (b->values < STRETCH_SHIFT_VALUES) {
+        return 0;
+    }
+    told->shifted = 0u;
+    told->most = -1;
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        const float off = b->sums[k] * STRETCH_SHIFT_PER_BLOCK - stretch_shift_usual[k];
+        const float times = (off < 0.0f ? -off : off) / stretch_shift_limits[k];
+        told->off[k] = off;
+        if (times > 1.0f) {
+            told->shifted = (uint16_t)(told->shifted | (1u << k));
+        }
+        if (times > most && STRETCH_CHANNELS > 2) {
+            most = times;
+            told->most = (int8_t)k;
+        }
+    }
+    stretch_shifts_init(b);
+    return 1;
+}

@@ -1,0 +1,193 @@
+
+/* ---- whether the zero is still that of the calibration ---- */
+
+/* A state beside the receptor's: stretch_zero_init(&zero, 1) follows a slow change of zero, 0 does not. Then every period
+ *     if (stretch_zero_step(&zero, sample, &told)) { a movement has ended: see told }
+ *     reading = stretch_step(&state, stretch_zero_corrected(&zero, sample));
+ */
+typedef struct stretch_zero_state {
+    float before[2];
+    float extreme;
+    float low;
+    float levels[STRETCH_ZERO_LEVELS];
+    float mean;
+    float follow;
+    float followed;
+    uint32_t ends[STRETCH_ZERO_LEVELS];
+    uint32_t samples;
+    uint32_t since;
+    uint32_t turned;
+    uint8_t seen;
+    uint8_t rises;
+    uint8_t has_low;
+    uint8_t held;
+    uint8_t shifted;
+} stretch_zero_state;
+
+/* What a movement said of the zero. */
+typedef struct stretch_zero {
+    float off;              /* from the zero of the calibration, in the signal's unit */
+    float off_reference;    /* what that makes of the estimate, in STRETCH_UNIT */
+    float followed;         /* how far it is followed, in the signal's unit */
+    uint32_t since_samples; /* samples since the first movement that was off */
+    uint8_t shifted;        /* whether the calibration no longer describes the signal */
+} stretch_zero;
+
+static inline void stretch_zero_init(stretch_zero_state *z, int follow)
+{
+    int k;
+    for (k = 0; k < STRETCH_ZERO_LEVELS; k++) {
+        z->levels[k] = 0.0f;
+        z->ends[k] = 0u;
+    }
+    z->before[0] = 0.0f;
+    z->before[1] = 0.0f;
+    z->extreme = 0.0f;
+    z->low = 0.0f;
+    z->mean = 0.0f;
+    z->follow = follow ? STRETCH_ZERO_FOLLOW : 0.0f;
+    z->followed = 0.0f;
+    z->samples = 0u;
+    z->since = 0u;
+    z->turned = 0u;
+    z->seen = 0u;
+    z->rises = 1u;
+    z->has_low = 0u;
+    z->held = 0u;
+    z->shifted = 0u;
+}
+
+STRETCH_INLINE float stretch_less(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+STRETCH_INLINE float stretch_more(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+STRETCH_INLINE float stretch_within(float x, float most)
+{
+    return stretch_less(stretch_more(x, -most), most);
+}
+
+/* 1 at the end of a movement, with its level. */
+STRETCH_INLINE int stretch_zero_turn(stretch_zero_state *z, float x, float *level)
+{
+    const float first = z->before[0], second = z->before[1];
+    const float middle =
+        stretch_more(stretch_less(first, second), stretch_less(stretch_more(first, second), x));
+    z->before[0] = second;
+    z->before[1] = x;
+    if (z->seen < 2u) {
+        z->seen = (uint8_t)(z->seen + 1u);
+        return 0;
+    }
+    if (z->seen == 2u) {
+        z->seen = 3u;
+        z->extreme = middle;
+    }
+    if (z->rises) {
+        z->extreme = stretch_more(z->extreme, middle);
+        if (middle < z->extreme - STRETCH_ZERO_SPAN) {
+            *level = STRETCH_ZERO_LOW_SHARE * z->low + STRETCH_ZERO_HIGH_SHARE * z->extreme;
+            z->rises = 0u;
+            z->extreme = middle;
+            return z->has_low;
+        }
+    } else {
+        z->extreme = stretch_less(z->extreme, middle);
+        if (middle > z->extreme + STRETCH_ZERO_SPAN) {
+            z->low = z->extreme;
+            z->has_low = 1u;
+            z->rises = 1u;
+            z->extreme = middle;
+        }
+    }
+    return 0;
+}
+
+/* The middle of the last levels. */
+STRETCH_INLINE float stretch_zero_median(const stretch_zero_state *z)
+{
+    float sorted[STRETCH_ZERO_LEVELS];
+    int i, k;
+    for (i = 0; i < STRETCH_ZERO_LEVELS; i++) {
+        const float level = z->levels[i];
+        for (k = i; k > 0 && level < sorted[k - 1]; k--) {
+            sorted[k] = sorted[k - 1];
+        }
+        sorted[k] = level;
+    }
+    return sorted[STRETCH_ZERO_LEVELS / 2];
+}
+
+/* The end of the first of the last movements that is off by half of what their median is. */
+STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float off)
+{
+    const float half = 0.5f * off;
+    int k;
+    for (k = 0; k < STRETCH_ZERO_LEVELS; k++) {
+        if ((z->levels[k] - STRETCH_ZERO_LEVEL - half) * off >= 0.0f) {
+            return z->ends[k];
+        }
+    }
+    return z->samples;
+}
+
+/* A sample less the zero that is followed: what stretch_step is to be given. */
+static inline float stretch_zero_corrected(const stretch_zero_state *z, float volts)
+{
+    return volts - STRETCH_ZERO_SIGN * z->followed;
+}
+
+/* A sample in the signal's unit; 1 where a movement has ended, from the fifth on. */
+static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, stretch_zero *told)
+{
+    float level = 0.0f, off = 0.0f, limit, share, clipped, before;
+    int whole, jumped, lasts, shifted, k;
+    z->samples += 1u;
+    if (!stretch_usable(volts) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * volts, &level)) {
+        return 0;
+    }
+    for (k = 1; k < STRETCH_ZERO_LEVELS; k++) {
+        z->levels[k - 1] = z->levels[k];
+        z->ends[k - 1] = z->ends[k];
+    }
+    z->levels[STRETCH_ZERO_LEVELS - 1] = level;
+    z->ends[STRETCH_ZERO_LEVELS - 1] = z->samples;
+    if (z->held < STRETCH_ZERO_LEVELS) {
+        z->held = (uint8_t)(z->held + 1u);
+    }
+    whole = z->held == STRETCH_ZERO_LEVELS;
+    if (whole) {
+        off = stretch_zero_median(z) - STRETCH_ZERO_LEVEL;
+    }
+    clipped = stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
+    before = z->mean;
+    z->mean = before + STRETCH_ZERO_MEAN_SHARE * (clipped - before);
+    if ((z->mean > 0.0f) != (before > 0.0f)) {
+        z->turned = z->samples;
+    }
+    /* one that has shifted is back within half of the limits */
+    share = z->shifted ? 0.5f : 1.0f;
+    limit = share * STRETCH_ZERO_LIMIT;
+    jumped = whole && (off - z->followed > limit || off - z->followed < -limit);
+    lasts = whole && (z->mean > share * STRETCH_ZERO_MEAN_LIMIT ||
+                      z->mean < -(share * STRETCH_ZERO_MEAN_LIMIT));
+    if (!jumped && !lasts) {
+        z->followed = stretch_within(z->followed + z->follow * clipped, STRETCH_ZERO_LIMIT);
+    }
+    shifted = jumped || lasts || z->followed >= limit || z->followed <= -limit;
+    if (shifted && !z->shifted) {
+        z->since = jumped ? stretch_zero_first(z, off) : z->turned;
+    }
+    z->shifted = shifted ? 1u : 0u;
+    told->off = STRETCH_ZERO_SIGN * off;
+    told->off_reference = STRETCH_ZERO_REFERENCE * off;
+    told->followed = STRETCH_ZERO_SIGN * z->followed;
+    told->since_samples = shifted ? z->samples - z->since : 0u;
+    told->shifted = z->shifted;
+    return whole;
+}

@@ -10,12 +10,18 @@ const SIGNALS: [&str; 3] = ["s1", "s2", "s3"];
 
 /// Trials in which all signals show the angle of some time earlier, later and later where the clock drifts; the second one slips.
 fn recorded(late_s: f64, drift: f64, slip_deg: f64) -> Vec<SessionTrial> {
+    moved(late_s, drift, slip_deg, 0.0)
+}
+
+/// Those trials, with a movement of so many degrees below the sensors, which wanders within seconds and which nothing recorded.
+fn moved(late_s: f64, drift: f64, slip_deg: f64, below_deg: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let angle = |t: f64| {
             let waves = [(0.7, 25.0), (1.9, 15.0), (4.3, 6.0)];
             waves.iter().map(|(w, a)| a * (w * t + 1.3 * trial as f64 * w).sin()).sum::<f64>()
         };
         let start_s = 30.0 * trial as f64;
+        let below = wandering(trial, below_deg);
         let column = |which: usize| -> Vec<f64> {
             let mut random = RandomGenerator::new(31, (10 * trial + which) as u64);
             let [gain, offset] = [[0.02, 1.2], [-0.05, 3.0], [0.011, 0.4]][which];
@@ -24,7 +30,7 @@ fn recorded(late_s: f64, drift: f64, slip_deg: f64) -> Vec<SessionTrial> {
                 let t = i as f64 * DT_S;
                 let x = angle(t - late_s - drift * (start_s + t));
                 held = held.clamp(x - slip_deg, x + slip_deg);
-                let x = if which == 1 { held } else { x };
+                let x = if which == 1 { held } else { x } + [1.0, 0.9, 1.1][which] * below[i];
                 offset + gain * x + 0.02 * gain.abs() * random.gauss()
             };
             (0..SAMPLES).map(one).collect()
@@ -39,6 +45,17 @@ fn recorded(late_s: f64, drift: f64, slip_deg: f64) -> Vec<SessionTrial> {
         SessionTrial { start_s, split, ..SessionTrial::new(trial_of) }
     };
     (0..3).map(one).collect()
+}
+
+/// An Ornstein-Uhlenbeck process of a standard deviation and 3 s.
+fn wandering(trial: usize, sd: f64) -> Vec<f64> {
+    let mut random = RandomGenerator::new(32, trial as u64);
+    let (kept, mut z) = ((-DT_S / 3.0).exp(), random.gauss());
+    let one = |_| {
+        z = kept * z + (1.0 - kept * kept).sqrt() * random.gauss();
+        sd * z
+    };
+    (0..SAMPLES).map(one).collect()
 }
 
 fn diagnosed(trials: Vec<SessionTrial>) -> Diagnosis {
@@ -73,6 +90,23 @@ fn what_one_sensor_does_is_its_own() {
 fn sensors_that_do_as_they_should_lack_nothing() {
     let found = diagnosed(recorded(0.0, 0.0, 0.0));
     assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
+}
+
+/// Each of three sensors could be explained by the others, round a circle: what they share is an error, not crosstalk, and what the recorder did
+/// to all of them is still its own.
+#[test]
+fn an_error_that_all_sensors_share_is_no_crosstalk() {
+    for late_s in [0.0, 0.08] {
+        let found = diagnosed(moved(late_s, 0.0, 0.0, 1.0));
+        let effects = found.candidates.iter().flat_map(|c| &c.effects);
+        let crosstalk: Vec<&String> = effects.filter(|e| e.contains("crosstalk(s")).collect();
+        assert!(crosstalk.is_empty(), "{crosstalk:?}: {}", found.sentence);
+        let first = &found.candidates[0];
+        match late_s {
+            0.0 => assert!(found.named.is_empty(), "{}", found.sentence),
+            _ => assert!(first.effects.iter().any(|e| e == "record.skew"), "{first:?}"),
+        }
+    }
 }
 
 #[test]

@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--program", default="stretch")
     parser.add_argument("--only", type=int, default=len(FILES))
     args = parser.parse_args()
-    told = 0
+    named = told = 0
     for file in FILES[: args.only]:
         found = []
         for shift_s in (0.0, SHIFT_S):
@@ -43,9 +43,12 @@ def main() -> None:
                 problem = machines.prepare("knitted_sleeves", args.data, Path(folder), file=file, shift_s=shift_s)
                 found.append(machines.diagnose(problem, args.program))
         (names, before), (shifted, after) = map(late, found)
-        told += bool(shifted) and abs(after - before - SHIFT_S) < 0.02
+        named += bool(shifted)
+        # What is not named before is not known to be nothing.
+        told += bool(shifted and names) and abs(after - before - SHIFT_S) < 0.02
         print(f"{file}: as it is {names} {before:.3f} s; shifted {shifted} {after:.3f} s; {after - before:+.3f} s", flush=True)
-    print(f"{told} of {min(args.only, len(FILES))} sessions tell the shift within 20 ms")
+    print(f"something of time that all share is named in {named} of {min(args.only, len(FILES))} sessions that are shifted")
+    print(f"where it is named before, too, it is 80 ms more within 20 ms in {told}")
 
 
 if __name__ == "__main__":

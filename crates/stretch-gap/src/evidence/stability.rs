@@ -77,7 +77,7 @@ impl Left {
         let one = |(misfit, own): (&Misfit, &Blocks)| Misfit {
             fit: moved(misfit.fit, &own.fit, &drawn.fit),
             held: moved(misfit.held, &own.held, &drawn.held),
-            ..*misfit
+            ..misfit.clone()
         };
         let test = |own: &Blocks| gap(moved(mean_square(&own.test), &own.test, &drawn.test));
         Self {

@@ -1,9 +1,12 @@
 //! A simulator beside its measurements, every stage on its measured input and in its own metric.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::{
     fit::{
+        alike::{Errors, Read},
         coordinate::{Coordinate, coordinates},
         metric::{Column, Metric},
         noise_level::noise_levels,
@@ -16,6 +19,7 @@ use crate::{
         runs::Runs,
         sample_roles::{Role, SampleRoles},
         simulator::{Model, Run, Simulator},
+        spec::EffectSpec,
     },
 };
 
@@ -165,7 +169,29 @@ impl<'a> Comparison<'a> {
             if n > 0.0 { sum / n } else { 1.0 }
         };
         let octaves = self.octaves(stage, &residual.values);
-        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves }
+        let read = self.is_read(stage).then(|| {
+            let left = self.errors(stage, &residual.values);
+            Read { unread: Arc::clone(&left), left }
+        });
+        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves, read }
+    }
+
+    /// Whether an effect of the catalogue reads the output of a stage as another measures it, or changes a stage by what it reads.
+    fn is_read(&self, stage: usize) -> bool {
+        let reads =
+            |e: &EffectSpec| e.reads.is_some_and(|s| s == stage || e.touches.contains(&stage));
+        self.simulator().effects().iter().any(reads)
+    }
+
+    /// A residual by roles, nuisance taken out.
+    pub(super) fn errors(&self, stage: usize, residual: &[f64]) -> Arc<Errors> {
+        let mut clean = residual.to_vec();
+        self.metrics[stage].clean(&self.roles, &mut clean);
+        let of = |role| {
+            let own = self.roles.of_role(role).flat_map(|s| &clean[s.from..s.to]);
+            own.map(|x| *x as f32).collect()
+        };
+        Arc::new(Errors { fit: of(Role::Fit), held: of(Role::Held) })
     }
 
     /// Reduced chi-square over fitted and held-out samples together.

@@ -5,11 +5,12 @@
 //! In the order of use: the noise of every stage ([`noise_level`], less [`isolated_outliers`]); residuals in multiples of it with
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the
 //! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
-//! chi-square and scores ([`score`], [`octaves`]); what another form of the same effects explains ([`deviations`]); which parameters the data
+//! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]); what another form of the same effects explains ([`deviations`]); which parameters the data
 //! determine ([`identifiability`]).
 //! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`], [`begun_anew`]).
 //! Imports: `numerics`, `problem`.
 
+pub(crate) mod alike;
 pub(crate) mod begun_anew;
 pub(crate) mod comparison;
 pub(crate) mod coordinate;

@@ -16,12 +16,13 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{
+        alike::Read,
         comparison::{Comparison, Sensitivities},
         coordinate::{choice_cost, form_cost, free_parameters},
         hypothesis::Hypothesis,
         identifiability::{Identified, Information, identified},
         levenberg_marquardt::{Effort, FINE, Fitted},
-        score::{LEARNT, Misfit, Observations, gap, score},
+        score::{LEARNT, Misfit, Observations, gap, score, shared},
         starts::Starts,
     },
     problem::{
@@ -208,6 +209,7 @@ impl<'a> PreparedProblem<'a> {
             let stage = misfit.stage;
             let acts = |(e, _): &(usize, Vec<f64>)| effects[*e].touches.contains(&stage);
             let nominal = &self.transmitted[stage];
+            misfit.read = self.read(misfit, &fitted.model)?;
             if nominal.fit > 0.0 && fitted.model.effects.iter().any(acts) {
                 let own = self.compare.transmitted(stage, &fitted.model)?;
                 let gap = self.gap_in(&self.nominal, stage);
@@ -217,12 +219,39 @@ impl<'a> PreparedProblem<'a> {
         Ok(fitted)
     }
 
-    /// Score of a hypothesis's misfits and model against the re-tuned nominal, nats.
+    /// What a model leaves of an output with the effects that read other outputs, and without; none where no effect of the catalogue reads it.
+    fn read(&self, misfit: &Misfit, model: &Model) -> Result<Option<Read>, GapError> {
+        let (stage, compare) = (misfit.stage, &self.compare);
+        let effects = self.simulator().effects();
+        let reads = |e: usize| effects[e].reads.is_some() && effects[e].touches.contains(&stage);
+        if misfit.read.is_none() || !model.effects.iter().any(|(e, _)| reads(*e)) {
+            return Ok(misfit.read.clone());
+        }
+        let mut without = model.clone();
+        without.effects.retain(|(e, _)| !reads(*e));
+        let left = compare.residual_values(stage, model)?;
+        let unread = compare.residual_values(stage, &without)?;
+        let doing: Vec<f64> = unread.iter().zip(&left).map(|(a, b)| a - b).collect();
+        let column = compare.metrics[stage].column(&compare.roles, doing);
+        let known = &self.sensitivities[stage];
+        let (factor, mut taken) = compare.solved(stage, known, &column);
+        factor.backward(&mut taken);
+        let mut unread = unread;
+        for (share, (_, sensitivity)) in taken.iter().zip(known) {
+            unread.iter_mut().zip(&sensitivity.values).for_each(|(r, s)| *r -= share * s);
+        }
+        let unread = compare.errors(stage, &unread);
+        Ok(Some(Read { left: compare.errors(stage, &left), unread }))
+    }
+
+    /// Score of a hypothesis's misfits and model against the re-tuned nominal, nats; what effects take of errors that outputs
+    /// [share](crate::fit::alike) does not count.
     pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model);
         let blocks = self.compare.roles.blocks(Role::Fit);
         score(&self.nominal.misfits, misfits, &self.observations, free, blocks)
+            + shared(misfits, &self.observations)
             - form_cost(simulator, model)
             - choice_cost(simulator, model)
     }

@@ -24,16 +24,24 @@
 //! with Schwarz's penalty for k free parameters (1978, doi 10.1214/aos/1176344136), counted in blocks. Held-out samples
 //! enter with their own N and X and need no penalty.
 
-use crate::{fit::octaves::Octaves, numerics::linear::dot};
+use crate::{
+    fit::{
+        alike::{Read, taken},
+        octaves::Octaves,
+    },
+    numerics::linear::dot,
+};
 
 /// Mean squares of one stage in variances of its noise: the reduced chi-square over fitted and over held-out samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Misfit {
     pub(crate) stage: usize,
     pub(crate) fit: f64,
     pub(crate) held: f64,
     /// Mean squares of fitted and held-out samples together, by octaves.
     pub(crate) octaves: Octaves,
+    /// What is left, where an effect of the catalogue reads it or would read others: see [`crate::fit::alike`].
+    pub(crate) read: Option<Read>,
 }
 
 /// How much the samples of one stage count: fitted, held out.
@@ -67,13 +75,14 @@ pub(crate) fn mean_square(blocks: &[f64]) -> f64 {
 
 impl Misfit {
     /// This misfit, at the noise that is transmitted, moved as its residual's own misfit goes `from` one `to` another.
-    pub(crate) fn moved(self, from: &Self, to: &Self) -> Self {
+    pub(crate) fn moved(&self, from: &Self, to: &Self) -> Self {
         let moved = |x: f64, from: f64, to: f64| (x + to - from).max(LEAST_KEPT * x);
         Self {
             fit: moved(self.fit, from.fit, to.fit),
             held: moved(self.held, from.held, to.held),
             octaves: self.octaves.moved(&from.octaves, &to.octaves),
-            ..self
+            read: self.read.clone(),
+            stage: self.stage,
         }
     }
 
@@ -83,7 +92,7 @@ impl Misfit {
     /// win wherever the input is noisy, whether it exists or not. So hypotheses are compared at equal noise transmitted:
     /// X + k (T_nominal - T), where T is the noise transmitted, in multiples of the noise. It is known to a factor only, and a gap may be noise that is
     /// larger than was taken: k is what would make the nominal's gap of it, [`LARGER`] at most, where less is transmitted.
-    pub(crate) fn at_equal_noise(self, nominal: &Self, own: &Self, gap: f64) -> Self {
+    pub(crate) fn at_equal_noise(&self, nominal: &Self, own: &Self, gap: f64) -> Self {
         let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
         // Where the noise is known too large, more could be taken away than there is.
         let level = |x: f64, nominal: f64, own: f64| {
@@ -94,7 +103,8 @@ impl Misfit {
             fit: level(self.fit, nominal.fit, own.fit),
             held: level(self.held, nominal.held, own.held),
             octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves, larger),
-            ..self
+            read: self.read.clone(),
+            stage: self.stage,
         }
     }
 }
@@ -126,6 +136,15 @@ pub(crate) fn score(
         sum += 0.5 * n.fit * (a.fit / b.fit).ln() + 0.5 * n.held * (a.held / b.held).ln();
     }
     sum
+}
+
+/// What effects take of errors that outputs [share](crate::fit::alike), nats to be added to a score; `observations` by stage.
+pub(crate) fn shared(misfits: &[Misfit], observations: &[Observations]) -> f64 {
+    let read = misfits.iter().filter_map(|m| {
+        let Observations { fit, held } = observations[m.stage];
+        Some((m.read.as_ref()?, [fit, held]))
+    });
+    taken(&read.collect::<Vec<_>>())
 }
 
 #[cfg(test)]

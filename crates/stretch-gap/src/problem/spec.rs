@@ -119,6 +119,8 @@ pub struct EffectSpec {
     pub drifts: bool,
     /// Names of effects that are hard to tell from it.
     pub twins: Vec<String>,
+    /// Another stage whose measured output it reads, errors and all: what it explains by them are errors that two outputs share.
+    pub reads: Option<usize>,
 }
 
 impl EffectSpec {
@@ -144,6 +146,7 @@ impl EffectSpec {
             is_found: false,
             drifts: false,
             twins: Vec::new(),
+            reads: None,
         }
     }
 

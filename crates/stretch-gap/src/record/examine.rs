@@ -173,7 +173,8 @@ fn fitted(
     fitted.parameter_sd.iter().for_each(|(p, sd)| found.parameter_sd[*p] = *sd);
     found.model.effects = fitted.model.effects;
     for misfit in fitted.misfits {
-        found.misfits[misfit.stage] = misfit;
+        let stage = misfit.stage;
+        found.misfits[stage] = misfit;
     }
     found.score = problem.score(&found.misfits, &found.model);
     Ok(found)

@@ -145,7 +145,8 @@ impl<'a> Sets<'a> {
         }
         next.model.effects.retain(|(e, _)| next.effects.contains(e));
         for misfit in fitted.misfits {
-            next.misfits[misfit.stage] = misfit;
+            let stage = misfit.stage;
+            next.misfits[stage] = misfit;
         }
         next.score = self.problem.score(&next.misfits, &next.model);
         next

@@ -29,6 +29,7 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         is_found: effect.find().is_some(),
         drifts: effect.drifts(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
+        reads: None,
     }
 }
 

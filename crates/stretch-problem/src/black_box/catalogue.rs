@@ -78,7 +78,10 @@ impl Around {
     pub(crate) fn looked_for(&self, stages: &[StageEntry]) -> Vec<Entry> {
         let open = || self.wrappers.iter().enumerate().filter(|(at, _)| self.is_open[*at]);
         let among: Vec<Placed> = open().map(|(_, w)| w.clone()).collect();
-        let spec = |w: &Placed| w.spec(&among, &stages[w.site.stage].name);
+        let spec = |w: &Placed| EffectSpec {
+            reads: w.other().and_then(|column| read_by(stages, w.site.stage, column)),
+            ..w.spec(&among, &stages[w.site.stage].name)
+        };
         let mut out: Vec<Entry> = open().map(|(at, w)| (Acting::Wrapper(at), spec(w))).collect();
         let is_open = |name: &str| self.known_clocks.iter().all(|known| known != name);
         for (kind, name) in RECORDERS.into_iter().filter(|(_, name)| is_open(name)) {
@@ -115,6 +118,12 @@ impl Around {
         let is_left = |entry: &Entry| !names.iter().any(|name| is_called(entry, name));
         Ok(catalogue.into_iter().filter(is_left).collect())
     }
+}
+
+/// The stage whose output a column is, where a stage reads it that is not driven by it anyway.
+fn read_by(stages: &[StageEntry], reader: usize, column: &str) -> Option<usize> {
+    let is_input = stages[reader].inputs.iter().any(|input| input == column);
+    stages.iter().position(|s| s.output == column).filter(|s| *s != reader && !is_input)
 }
 
 /// The name of the wrappers behind an effect: those of the outputs for the recorder's clock, else the name itself.

@@ -236,6 +236,11 @@ impl Placed {
         self.name == name || self.aliases.iter().any(|alias| alias == name)
     }
 
+    /// The other column that the wrapper reads.
+    pub(crate) fn other(&self) -> Option<&str> {
+        self.load.as_ref().map(|(_, name)| name.as_str())
+    }
+
     /// The parameters of the wrapper, with their ranges.
     pub(crate) fn parameters(&self) -> &[EffectParameter] {
         &self.parameters

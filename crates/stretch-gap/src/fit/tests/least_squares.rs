@@ -159,7 +159,7 @@ fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     let fitted = 0..3000;
     let square = |i: usize| ((record.outputs[0][i] - p[0] * record.x[i] - p[1]) / 0.01).powi(2);
     let expected = fitted.clone().map(square).sum::<f64>() / fitted.len() as f64;
-    let misfit = problem.nominal.misfits[0];
+    let misfit = &problem.nominal.misfits[0];
     approx::assert_relative_eq!(misfit.fit, expected, max_relative = DIFFERENCED);
     // No trial is so long that it lends a part to be held out.
     assert_eq!(misfit.held, 1.0);

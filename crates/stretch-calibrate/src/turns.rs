@@ -5,7 +5,7 @@ use stretch_fit::student_two_sided;
 use stretch_receptor::{Receptor, TurnFinder};
 
 use crate::{
-    array::{Levels, levels},
+    array::{Levels, independent, levels},
     prepared::Prepared,
     series::noise,
 };
@@ -42,20 +42,7 @@ pub(crate) fn turns(prepared: &Prepared, calibration: &Calibration) -> Option<Tu
     let learnt = Learnt::of(&movements, hours)?;
     let level = sign * learnt.level;
     let slope = slope(calibration, level, learnt.ends(sign))?;
-    Some(Turns {
-        level,
-        high_share: learnt.high_share,
-        least_span,
-        scatter: learnt.scatter,
-        movements: learnt.movements,
-        limit: learnt.limit,
-        mean_limit: learnt.mean_limit,
-        false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
-        movements_an_hour: learnt.movements_an_hour,
-        follow: learnt.follow,
-        reference_per_signal: slope,
-    })
-    .filter(|turns| turns.validate().is_ok())
+    Some(learnt.turns(level, least_span, slope)).filter(|turns| turns.validate().is_ok())
 }
 
 /// Span of the samples without the lowest and the highest twentieth.
@@ -101,11 +88,10 @@ impl Learnt {
         let Levels { mean, variance, alike, count } = levels(&sequences)?;
         // the estimate of a correlation is low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403)
         let alike = (alike + (1.0 + 4.0 * alike) / count).clamp(0.0, 0.99);
-        let independent = count * (1.0 - alike) / (1.0 + alike);
+        let (independent, scatter) = independent(count, variance, alike);
         if !(independent >= LEAST_MOVEMENTS && variance > 0.0) {
             return None;
         }
-        let scatter = (variance * independent / (independent - 1.0)).sqrt();
         let movements_an_hour = count / hours;
         // half for the median, half for the mean
         let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
@@ -125,6 +111,23 @@ impl Learnt {
             low,
             high,
         })
+    }
+
+    /// For a record, with what is in the signal's unit: the level, the least span, and the change of the estimate per change of the signal.
+    fn turns(self, level: f64, least_span: f64, reference_per_signal: f64) -> Turns {
+        Turns {
+            level,
+            high_share: self.high_share,
+            least_span,
+            scatter: self.scatter,
+            movements: self.movements,
+            limit: self.limit,
+            mean_limit: self.mean_limit,
+            false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
+            movements_an_hour: self.movements_an_hour,
+            follow: self.follow,
+            reference_per_signal,
+        }
     }
 
     /// The mean ends of movements, in the signal's unit.

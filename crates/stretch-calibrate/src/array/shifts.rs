@@ -93,21 +93,23 @@ fn contrasts(parted: &Parted, linear: &Linear, ridges: &[f64]) -> Option<Vec<Vec
 }
 
 /// Mean of blocks, and how far a further one is off from it with a probability of `share`.
-///
-/// Blocks that follow one another are alike where their correlation `r` is above zero: `n` of them count as `n (1 -
-/// r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of first order).
 fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
     let Levels { mean, variance, alike, count } = levels(stretches)?;
-    let alike = alike.clamp(0.0, 0.99);
-    let independent = count * (1.0 - alike) / (1.0 + alike);
+    let (independent, sd) = independent(count, variance, alike.clamp(0.0, 0.99));
     if !(independent >= LEAST_BLOCKS && variance > 0.0) {
         return None;
     }
-    let dof = independent - 1.0;
-    // the mean of n alike blocks is as near to the truth as that of so many independent ones, and so is their variance
-    let sd = (variance * independent / dof).sqrt();
-    let t = student_two_sided(1.0 - share, dof as u64);
+    let t = student_two_sided(1.0 - share, (independent - 1.0) as u64);
     Some((mean, t * sd * (1.0 + 1.0 / independent).sqrt()))
+}
+
+/// How many independent values as many that follow one another count as, and the standard deviation of one, from their variance about their mean.
+///
+/// Values are alike where their correlation `r` is above zero: `n` of them count as `n (1 - r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc.
+/// Suppl. 8 (1946) 184, for a process of first order). The mean of so many is as near to the truth as that of independent ones, and so is their variance.
+pub(crate) fn independent(count: f64, variance: f64, alike: f64) -> (f64, f64) {
+    let independent = count * (1.0 - alike) / (1.0 + alike);
+    (independent, (variance * independent / (independent - 1.0)).sqrt())
 }
 
 /// Values that follow one another in stretches.

@@ -1,6 +1,6 @@
 //! False alarms in simulated hours, and what is found of shifts.
 
-use stretch_core::{Calibration, Design, Polarity, Turns};
+use stretch_core::{Calibration, Design, Polarity};
 use stretch_receptor::{Zero, ZeroWatch};
 use testkit::random::Random;
 
@@ -80,23 +80,11 @@ fn calibration(scatter: Scatter, movements: usize, seed: u64) -> Option<Calibrat
     let learnt = Learnt::of(&[ends], movements as f64 / AN_HOUR)?;
     let mut spec = stretch_receptor::example_calibration().into_spec();
     spec.polarity = Polarity::Rising;
-    spec.turns = Some(Turns {
-        level: learnt.level,
-        high_share: learnt.high_share,
-        least_span: 0.2,
-        scatter: learnt.scatter,
-        movements: learnt.movements,
-        limit: learnt.limit,
-        mean_limit: learnt.mean_limit,
-        false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
-        movements_an_hour: learnt.movements_an_hour,
-        follow: learnt.follow,
-        reference_per_signal: -50.0,
-    });
+    spec.turns = Some(learnt.turns(learnt.level, 0.2, -50.0));
     Some(Calibration::new(spec).unwrap())
 }
 
-/// What is told of so many further movements, whose zero is off by `off_mm` of each.
+/// What the watch says of so many further movements, whose zero is off by `off_mm` of each.
 fn told(
     watch: ZeroWatch<f64>,
     mut own: Movements,

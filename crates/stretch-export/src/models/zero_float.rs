@@ -24,7 +24,7 @@ pub(crate) fn with_zero(mut part: Part, calibration: &Calibration) -> Part {
         .define("ZERO_FOLLOW", watch.following(calibration).follow, "the share by which it moves")
         .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
     part.constants.push_str(&constants.into_text());
-    // the last part of a step ends what the compiler was told of floats
+    // the last part of a step ends the compiler's rules for floats
     let last = part.step.len() - 1;
     part.step.insert(last, include_str!("../c/zero_float.h"));
     part

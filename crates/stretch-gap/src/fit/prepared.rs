@@ -230,13 +230,12 @@ impl<'a> PreparedProblem<'a> {
         let mut without = model.clone();
         without.effects.retain(|(e, _)| !reads(*e));
         let left = compare.residual_values(stage, model)?;
-        let unread = compare.residual_values(stage, &without)?;
+        let mut unread = compare.residual_values(stage, &without)?;
         let doing: Vec<f64> = unread.iter().zip(&left).map(|(a, b)| a - b).collect();
         let column = compare.metrics[stage].column(&compare.roles, doing);
         let known = &self.sensitivities[stage];
         let (factor, mut taken) = compare.solved(stage, known, &column);
         factor.backward(&mut taken);
-        let mut unread = unread;
         for (share, (_, sensitivity)) in taken.iter().zip(known) {
             unread.iter_mut().zip(&sensitivity.values).for_each(|(r, s)| *r -= share * s);
         }

@@ -45,7 +45,7 @@ const fn moments(h: usize) -> (f64, f64, f64) {
 }
 
 /// [`moments`] of every half-width.
-const MOMENTS: [(f64, f64, f64); WIDEST + 1] = {
+static MOMENTS: [(f64, f64, f64); WIDEST + 1] = {
     let mut all = [(0.0, 0.0, 0.0); WIDEST + 1];
     let mut h = 0;
     while h <= WIDEST {

@@ -224,7 +224,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
 
     /// Samples so far, without those of weight zero.
     pub fn samples(&self) -> u64 {
-        self.factor.samples() + self.filled as u64
+        self.factor.samples().saturating_add(self.filled as u64)
     }
 
     /// The degree that the samples are accumulated for.

@@ -110,14 +110,14 @@ pub fn cross_validate<T: Real, const TERMS: usize>(
     degree: Degree,
 ) -> Result<CrossValidation<T>, FitError> {
     let mut count = 0;
-    let mut samples = 0;
+    let mut samples: u64 = 0;
     let mut sse = T::zero();
     let mut weight = T::zero();
     let mut worst: Option<HeldOut<T>> = None;
     for held_out in held_out(trials, degree) {
         let trial = held_out?;
         count += 1;
-        samples += trial.samples;
+        samples = samples.saturating_add(trial.samples);
         sse = sse + trial.sse;
         weight = weight + trial.weight;
         if worst.is_none_or(|worst| trial.mean_square() > worst.mean_square()) {

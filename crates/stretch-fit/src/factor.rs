@@ -250,7 +250,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         lower.residual = self.residual;
         lower.add_residual(squares);
         lower.samples = self.samples;
-        lower.folds = self.folds + 1;
+        lower.folds = self.folds.saturating_add(1);
         Ok(lower)
     }
 

@@ -3,7 +3,8 @@
 use approx::assert_abs_diff_eq;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
-    FitError, LineAccumulator, Loss, SurfaceAccumulator, cross_validate, robust_fit,
+    Factor, FactorSpec, FitError, LineAccumulator, Loss, SurfaceAccumulator, cross_validate,
+    robust_fit,
 };
 use testkit::tolerance::F64_ROUNDING;
 
@@ -173,4 +174,30 @@ fn cross_validation_needs_two_trials() {
     }
     assert_eq!(cross_validate(&[sums.factor()], Degree::POLY13).unwrap_err(), needed);
     assert!(cross_validate(&[sums.factor(), sums.factor()], Degree::POLY13).is_ok());
+}
+
+#[test]
+fn counts_that_were_damaged_where_they_were_stored_never_panic() {
+    let mut sums = poly13();
+    for k in 0..50 {
+        sums.push(f64::from(k % 5), f64::from(k % 7), f64::from(k % 11)).unwrap();
+    }
+    let sound = sums.factor();
+    for (samples, folds) in [(u64::MAX, u64::MAX), (50, u64::MAX), (u64::MAX, 0), (1, 0)] {
+        let damaged = Factor::new(FactorSpec { samples, folds, ..sound.spec() }).unwrap();
+        let mut both = damaged;
+        both.merge(&damaged).unwrap();
+        both.merge(&sound).unwrap();
+        assert_eq!(both.samples(), samples.saturating_mul(2).saturating_add(50));
+        for degree in [Degree::POLY13, Degree::new(1, 2).unwrap(), Degree::new(0, 1).unwrap()] {
+            let lower = both.restrict(degree).unwrap();
+            assert_eq!(lower.samples(), both.samples());
+            // so many roundings may hide every term, which is said
+            let Ok(fit) = lower.fit() else { continue };
+            assert!(fit.coefficients().iter().all(|c| c.is_finite()));
+            assert!(fit.adjusted_r_squared().is_none_or(f64::is_finite));
+            let judged = cross_validate(&[damaged, damaged, sound], degree);
+            assert!(judged.is_err() || judged.unwrap().rmse.is_finite());
+        }
+    }
 }

@@ -137,7 +137,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
                 }
                 self.take(own, columns.map(|values| &values[row..end]))?;
             } else if is_row(row) {
-                self.left_out[groups[row]] += 1;
+                let left_out = &mut self.left_out[groups[row]];
+                *left_out = left_out.saturating_add(1);
             }
             row = end;
         }

@@ -43,6 +43,7 @@ use crate::{
         nothing_above::nothing_above,
         proposal::lacking,
         sentence::{Answer, cut_short, tell},
+        swinging::swinging,
         too_little::TooLittle,
     },
 };
@@ -390,6 +391,10 @@ fn report(
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(searched.problem.starts.note());
     text.notes.extend(extrapolated(simulator, &evidence.roles, &naming.named));
+    // Where a gap is left, what is left may look like a swing.
+    if is_quiet || judged.kind == VerdictKind::Effect {
+        text.notes.extend(swinging(cause.problem, &evidence));
+    }
     let model_runs = runs.counted();
     if let Some(note) = model_runs.and_then(|runs| runs.note()) {
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;

@@ -42,6 +42,8 @@ pub(crate) struct Metric {
 /// A parameter that drifts or is offset in each trial.
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
+    /// Index of the parameter.
+    pub(crate) parameter: usize,
     /// Change of the output, in multiples of the noise, for one standard deviation as the simulator describes it.
     column: Arc<[f64]>,
     /// See [`RecordFacts::drift_clocks`](crate::RecordFacts::drift_clocks).
@@ -119,7 +121,9 @@ impl Metric {
             let level = Level { size: 1.0, time_s: spec.drift.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());
-            metric.loose.push(Loose { column, clock, drift: spec.drift, is_by_tick, level, knots });
+            let drift = spec.drift;
+            let own = Loose { parameter: p, column, clock, drift, is_by_tick, level, knots };
+            metric.loose.push(own);
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
@@ -159,6 +163,11 @@ impl Metric {
     /// Parameters of the stage that drift or are offset in each trial.
     pub(crate) fn loose(&self) -> &[Loose] {
         &self.loose
+    }
+
+    /// The nuisance of each segment.
+    pub(super) fn nuisances(&self) -> &[Option<Nuisance>] {
+        &self.nuisances
     }
 
     /// The metric with every loose parameter at another level.
@@ -245,7 +254,8 @@ impl Metric {
         let level = Level { size: 1.0, time_s: drift.correlation_s };
         let knots = knots_of(&clock, roles, dt_s);
         let drift = Some(drift);
-        let loose = vec![Loose { column, clock, drift, is_by_tick: false, level, knots }];
+        let is_by_tick = false;
+        let loose = vec![Loose { parameter: 0, column, clock, drift, is_by_tick, level, knots }];
         let mut metric = Self { noise, loose, nuisances: Vec::new() };
         metric.marginalise(roles);
         metric

@@ -6,7 +6,7 @@
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the
 //! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
 //! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]); what another form of the same effects explains ([`deviations`]); which parameters the data
-//! determine ([`identifiability`]).
+//! determine ([`identifiability`]); whether a drift swings ([`swing`]).
 //! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`], [`begun_anew`]).
 //! Imports: `numerics`, `problem`.
 
@@ -27,6 +27,7 @@ pub(crate) mod octaves;
 pub(crate) mod prepared;
 pub(crate) mod score;
 pub(crate) mod starts;
+pub(crate) mod swing;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -142,6 +142,18 @@ impl Nuisance {
         tail
     }
 
+    /// Time between knots, s, and C'x at the knots of the drift of that place among the drifts.
+    pub(super) fn at_knots(&self, which: usize, x: &[f64]) -> (f64, Vec<f64>) {
+        let drifting = &self.drifting[which];
+        (drifting.knots.step_s, project(&[], std::slice::from_ref(drifting), x))
+    }
+
+    /// C b: what a drift of these values at its knots does to the samples.
+    pub(super) fn course(&self, which: usize, knots: &[f64]) -> Vec<f64> {
+        let each = self.drifting[which].each();
+        each.map(|(_, k, this, next)| this * knots[k] + next * knots[k + 1]).collect()
+    }
+
     /// Takes the most likely nuisance out of a residual.
     pub(super) fn clean(&self, x: &mut [f64]) {
         let mut b = project(&self.offsets, &self.drifting, x);

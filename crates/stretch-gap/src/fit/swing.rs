@@ -1,0 +1,272 @@
+//! Does what drifts swing? A line beside the drift, weighed against the drift alone.
+//!
+//! A drift that is adapted to the record takes a swing of its parameter for a quick drift, so that no gap is left. What
+//! [cleaning](crate::fit::metric::Metric::clean) leaves of a residual r is V^-1 r, and V holds the adapted drift. The hypothesis beside it: in segment k the
+//! parameter swings with one frequency f and amplitude s, and a phase of the segment's own,
+//!
+//! ```text
+//! a_k cos(2 pi f t) + b_k sin(2 pi f t),     a_k, b_k ~ N(0, s^2/2),     U_k = C (cos, sin) at the knots of the drift
+//! ln B = sum_k ( q_k' M_k^-1 q_k - ln det M_k + 2 ln(2/s^2) )/2,     M_k = A_k + (2/s^2) I
+//! A_k = U_k' V^-1 U_k,     q_k = U_k' V^-1 r
+//! ```
+//!
+//! (Rasmussen and Williams 2006, section 2.7; without a drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is the
+//! mean over amplitudes of a quarter to twice the drift and over all frequencies, of which those whose |q|^2 stands out most among
+//! their neighbours are computed and the others taken for 0, so that it errs to the side of the drift. The odds before the data are even.
+
+use std::f64::consts::TAU;
+
+use crate::{
+    fit::{
+        metric::{Loose, Metric},
+        nuisance::Nuisance,
+    },
+    numerics::linear::dot,
+};
+
+/// A parameter whose drift is rather a swing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Swing {
+    /// Index of the parameter.
+    pub(crate) parameter: usize,
+    /// Frequency, Hz.
+    pub(crate) hertz: f64,
+    /// Amplitude, in the parameter's unit.
+    pub(crate) amplitude: f64,
+    /// Probability beside that of the drift alone.
+    pub(crate) probability: f64,
+}
+
+/// Amplitudes that are tried, as multiples of the drift's standard deviation.
+const AMPLITUDES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+/// Knots that a turn has at least, and turns in the longest segment.
+const KNOTS: f64 = 4.0;
+const TURNS: f64 = 2.0;
+/// Frequencies to either side that tell the usual power.
+const BESIDE: usize = 10;
+/// Peaks that are computed.
+const PEAKS: usize = 6;
+
+impl Metric {
+    /// The likeliest swing of every parameter that drifts; `clean` is a residual over all segments, nuisances taken out.
+    pub(crate) fn swings(&self, segments: &[(usize, usize)], clean: &[f64]) -> Vec<Swing> {
+        let drifts = self.loose().iter().filter(|loose| loose.drift.is_some() && !loose.is_by_tick);
+        let one = |(which, loose): (usize, &Loose)| {
+            let (hertz, share, probability) = self.likeliest(which, segments, clean)?;
+            let sd = loose.drift.map_or(0.0, |drift| drift.sd) * loose.level.size;
+            Some(Swing { parameter: loose.parameter, hertz, amplitude: share * sd, probability })
+        };
+        drifts.enumerate().filter_map(one).collect()
+    }
+
+    /// Frequency of the likeliest swing of one drift, its amplitude as a multiple of the drift's standard deviation, and its probability.
+    fn likeliest(
+        &self,
+        which: usize,
+        segments: &[(usize, usize)],
+        clean: &[f64],
+    ) -> Option<(f64, f64, f64)> {
+        let there = self.nuisances().iter().zip(segments);
+        let parts: Vec<Part<'_>> = there
+            .filter_map(|(nuisance, &(from, to))| {
+                Some(Part::of(nuisance.as_ref()?, which, &clean[from..to]))
+            })
+            .collect();
+        let longest = parts.iter().max_by(|a, b| a.lasts_s().total_cmp(&b.lasts_s()))?;
+        let (lasts_s, step_s) = (longest.lasts_s(), longest.step_s);
+        let count = (2.0 * lasts_s / (KNOTS * step_s) - 2.0 * TURNS) as usize;
+        let hertz = |k: usize| (TURNS + 0.5 * k as f64) / lasts_s;
+        let powers: Vec<f64> = (0..count)
+            .map(|k| parts.iter().flat_map(|part| part.heard(hertz(k))).map(|q| q * q).sum())
+            .collect();
+        let is_peak = |&k: &usize| {
+            let beside = [k.wrapping_sub(1), k + 1].map(|at| powers.get(at).copied());
+            beside.iter().flatten().all(|power| *power <= powers[k])
+        };
+        let mut peaks: Vec<usize> = (0..count).filter(is_peak).collect();
+        let standing: Vec<f64> = (0..count).map(|k| powers[k] / usual(&powers, k)).collect();
+        peaks.sort_by(|&a, &b| standing[b].total_cmp(&standing[a]));
+        peaks.truncate(PEAKS);
+        let mut sum = 0.0;
+        let mut best: Option<(f64, f64, f64)> = None;
+        for hertz in peaks.into_iter().map(hertz) {
+            let heard: Vec<Heard> = parts.iter().map(|part| part.line(hertz)).collect();
+            for amplitude in AMPLITUDES {
+                let precision = 2.0 / (amplitude * amplitude);
+                let factor: f64 = heard.iter().map(|h| h.ln_factor(precision)).sum();
+                // odds that no record exceeds stay finite
+                sum += factor.min(300.0).exp();
+                if best.as_ref().is_none_or(|(most, ..)| factor > *most) {
+                    best = Some((factor, hertz, rms_amplitude(&heard, precision)));
+                }
+            }
+        }
+        let factor = sum / (count * AMPLITUDES.len()) as f64;
+        best.map(|(_, hertz, share)| (hertz, share, factor / (1.0 + factor)))
+    }
+}
+
+/// Median power of the frequencies on both sides.
+fn usual(powers: &[f64], k: usize) -> f64 {
+    let mut beside = powers[k.saturating_sub(BESIDE)..(k + BESIDE).min(powers.len())].to_vec();
+    beside.sort_by(f64::total_cmp);
+    beside[beside.len() / 2].max(f64::MIN_POSITIVE)
+}
+
+/// One segment as one of its drifts sees it.
+struct Part<'a> {
+    nuisance: &'a Nuisance,
+    which: usize,
+    step_s: f64,
+    /// C'V^-1 r at the knots.
+    heard: Vec<f64>,
+}
+
+impl<'a> Part<'a> {
+    fn of(nuisance: &'a Nuisance, which: usize, clean: &[f64]) -> Self {
+        let (step_s, heard) = nuisance.at_knots(which, clean);
+        Self { nuisance, which, step_s, heard }
+    }
+
+    fn lasts_s(&self) -> f64 {
+        self.heard.len() as f64 * self.step_s
+    }
+
+    /// Cosine and sine of a frequency at the knots.
+    fn waves(&self, hertz: f64) -> [Vec<f64>; 2] {
+        let phase = |k: usize| TAU * hertz * self.step_s * k as f64;
+        let knots = || 0..self.heard.len();
+        [
+            knots().map(|k| libm::cos(phase(k))).collect(),
+            knots().map(|k| libm::sin(phase(k))).collect(),
+        ]
+    }
+
+    /// q of the module's head.
+    fn heard(&self, hertz: f64) -> [f64; 2] {
+        self.waves(hertz).map(|wave| dot(&wave, &self.heard))
+    }
+
+    /// A and q of the module's head.
+    fn line(&self, hertz: f64) -> Heard {
+        let waves = self.waves(hertz);
+        let q = [0, 1].map(|i| dot(&waves[i], &self.heard));
+        let columns = waves.map(|wave| self.nuisance.course(self.which, &wave));
+        let tails = [0, 1].map(|i| self.nuisance.tail(&columns[i]));
+        let product =
+            |i: usize, j: usize| dot(&columns[i], &columns[j]) - dot(&tails[i], &tails[j]);
+        Heard { a: [product(0, 0), product(0, 1), product(1, 1)], q }
+    }
+}
+
+/// What one segment says of a line: A (its upper triangle) and q of the module's head.
+struct Heard {
+    a: [f64; 3],
+    q: [f64; 2],
+}
+
+impl Heard {
+    /// M and its determinant.
+    fn with(&self, precision: f64) -> ([f64; 3], f64) {
+        let m = [self.a[0] + precision, self.a[1], self.a[2] + precision];
+        (m, m[0] * m[2] - m[1] * m[1])
+    }
+
+    /// Cosine and sine that are the likeliest: M^-1 q.
+    fn likeliest(&self, precision: f64) -> [f64; 2] {
+        let ([a, b, d], det) = self.with(precision);
+        let [x, y] = self.q;
+        [(d * x - b * y) / det, (a * y - b * x) / det]
+    }
+
+    /// The segment's part of ln B.
+    fn ln_factor(&self, precision: f64) -> f64 {
+        let (_, det) = self.with(precision);
+        let best = self.likeliest(precision);
+        0.5 * (dot(&best, &self.q) - det.ln() + 2.0 * precision.ln())
+    }
+}
+
+/// Root mean square over segments of the likeliest amplitude, each as it is told.
+fn rms_amplitude(heard: &[Heard], precision: f64) -> f64 {
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for own in heard {
+        let [x, y] = own.likeliest(precision);
+        let told = own.a[0] + own.a[2];
+        sum += told * (x * x + y * y);
+        weight += told;
+    }
+    (sum / f64::max(weight, f64::MIN_POSITIVE)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        fit::noise_level::NoiseLevel,
+        numerics::random::RandomGenerator,
+        problem::{
+            sample_roles::{Role, SampleRoles, Segment},
+            spec::SlowDrift,
+        },
+    };
+
+    const TRIAL: usize = 2000;
+    const TRIALS: usize = 8;
+
+    /// What is found of a parameter that drifts, by the described size and a correlation time, and swings at 0.7 Hz with an amplitude in multiples of the drift.
+    fn found(seed: u64, time_s: f64, amplitude: f64) -> Swing {
+        let mut random = RandomGenerator::new(seed, 0);
+        let samples = TRIAL * TRIALS;
+        let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
+        let kept = (-0.01 / time_s).exp();
+        let (mut drift, mut phase) = (random.gauss(), 0.0);
+        let mut residual = Vec::new();
+        for (i, drive) in drive.iter().enumerate() {
+            if i.is_multiple_of(TRIAL) {
+                (drift, phase) = (random.gauss(), TAU * random.unit());
+            }
+            drift = kept * drift + (1.0 - kept * kept).sqrt() * random.gauss();
+            let swing = amplitude * (phase + TAU * 0.7 * 0.01 * i as f64).sin();
+            residual.push(drive * (drift + swing) + random.gauss());
+        }
+        let noise =
+            NoiseLevel { sd: vec![1.0; samples], rms: 1.0, source: String::new(), known_to: 0.0 };
+        let segment = |trial: usize| Segment {
+            trial,
+            from: trial * TRIAL,
+            to: (trial + 1) * TRIAL,
+            role: Role::Fit,
+        };
+        let segments: Vec<Segment> = (0..TRIALS).map(segment).collect();
+        let ranges: Vec<_> = segments.iter().map(|s| (s.from, s.to)).collect();
+        let roles = SampleRoles { segments, block: 50, fit_trials: TRIALS, borrowed_test: false };
+        let described = SlowDrift { sd: 3.0, correlation_s: 4.0 };
+        let metric = Metric::with_drift(noise, drive, described, &roles, 0.01);
+        let (adapted, _) = metric.adapted(&roles, &residual);
+        let mut clean = residual;
+        adapted.clean(&roles, &mut clean);
+        adapted.swings(&ranges, &clean)[0]
+    }
+
+    #[test]
+    fn a_drift_alone_does_not_swing() {
+        for (seed, time_s) in (0..40).zip([0.5, 1.0, 4.0, 12.0].into_iter().cycle()) {
+            let swing = found(seed, time_s, 0.0);
+            assert!(swing.probability < 0.5, "{seed}: {swing:?}");
+        }
+    }
+
+    #[test]
+    fn a_swing_is_told_with_its_frequency_and_amplitude() {
+        for (seed, time_s) in [(1, 1.0), (2, 4.0), (3, 12.0)] {
+            for amplitude in [0.5, 1.0, 1.5] {
+                let swing = found(seed, time_s, amplitude);
+                assert!(swing.probability > 0.95, "{swing:?}");
+                approx::assert_abs_diff_eq!(swing.hertz, 0.7, epsilon = 0.025);
+                // in the parameter's unit: one multiple is 3
+                approx::assert_relative_eq!(swing.amplitude, 3.0 * amplitude, max_relative = 0.3);
+            }
+        }
+    }
+}

@@ -78,8 +78,10 @@ impl Source for Arm {
             let mut all = vec![Vec::new(); JOINTS];
             for trial in 0..ask.trials {
                 let range = trial * SAMPLES..(trial + 1) * SAMPLES;
-                let of = |joint: usize| match ask.inputs {
-                    Some(inputs) if joint == ask.stage => &inputs[0][range.clone()],
+                let other = |joint| ask.others.iter().find(|o| o.stage == joint);
+                let of = |joint: usize| match (ask.inputs, other(joint)) {
+                    (Some(inputs), _) if joint == ask.stage => &inputs[0][range.clone()],
+                    (_, Some(other)) => &other.values[range.clone()],
                     _ => &self.commands[joint][range.clone()],
                 };
                 let commands: Vec<&[f64]> = (0..JOINTS).map(of).collect();
@@ -93,6 +95,10 @@ impl Source for Arm {
 
     fn answers_all(&self) -> bool {
         true
+    }
+
+    fn takes_inputs_of_several(&self) -> bool {
+        std::env::var("SEVERAL").is_err()
     }
 }
 
@@ -163,7 +169,8 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     let column =
         |joint: usize| problem.session().column(&format!("u{joint}_V")).expect("a column").to_vec();
     let arm = Arm { commands: (0..JOINTS).map(column).collect() };
-    let asked = Ask { stage: 0, parameters: &truth, effects: &[], inputs: None, trials: 3 };
+    let asked =
+        Ask { stage: 0, parameters: &truth, effects: &[], inputs: None, others: &[], trials: 3 };
     let begun = Instant::now();
     assert!(arm.simulate_many(&[asked])[0].is_ok());
     let each = begun.elapsed();
@@ -179,6 +186,9 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
         found.simulations,
         found.sentence
     );
+    for note in stretch_problem::Diagnosable::afterwards(&bench) {
+        println!("{note}");
+    }
     let mut named = found.named.clone();
     named.sort();
     assert_eq!(named, ["joint1.output.backlash", "joint4.input.dead_zone"], "{}", found.sentence);

@@ -139,7 +139,14 @@ def begin(**more):
     let spec =
         WorkersSpec { jobs, deadline_s: 0.5, start_s: 10.0, ..WorkersSpec::new(&command, ".") };
     let workers = Workers::start(spec, problem.session()).map_err(|e| e.to_string())?;
-    let ask = Ask { stage: 0, parameters: &[10.0, 0.1], effects: &[0.0], inputs: None, trials: 1 };
+    let ask = Ask {
+        stage: 0,
+        parameters: &[10.0, 0.1],
+        effects: &[0.0],
+        inputs: None,
+        others: &[],
+        trials: 1,
+    };
     Ok(workers.simulate_many(&[ask]))
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Diagnosis, Options, RandomGenerator, Simulator, diagnose};
+use stretch_gap::{Diagnosis, Laboratory, Model, Options, RandomGenerator, Simulator, diagnose};
 use stretch_problem::{
     Ask, BlackBox, Checked, Diagnosable, Parameter, ProblemSpec, Source, SourceError, StageEntry,
     Tolerance, Wrapped,
@@ -197,6 +197,28 @@ fn a_wrapper_that_acts_in_every_run_acts_on_both_joints() {
     let problem = ProblemSpec { wrapped, ..problem(CARRIED, DEAD, &NAMES) };
     let (found, _) = diagnosed(problem, CARRIED, true);
     assert!(found.named.is_empty(), "{}", found.sentence);
+}
+
+#[test]
+fn an_experiment_drives_both_joints_at_once() {
+    let problem = Checked::new(problem(CARRIED, DEAD, &NAMES)).expect("a problem");
+    let bench = BlackBox::new(problem, Arc::new(Leg { carried: CARRIED, takes_several: true }));
+    let effects = &bench.description().effects;
+    let dead_zone = effects.iter().position(|e| e.name == "hip.input.dead_zone").expect("a zone");
+    let mut values = effects[dead_zone].starts[0].clone();
+    values[0] = DEAD.hip;
+    let model = Model { parameters: SHIPPED.into(), effects: vec![(dead_zone, values)] };
+    let (plan, course) = bench.experiments().remove(0);
+    let predicted = bench.predict(&model, &course).expect("a prediction");
+    let command = |name: &str| plan.trial.channel(name).expect("a column").to_vec();
+    let hip: Vec<f64> = command("hip_V").iter().map(|u| u - u.clamp(-DEAD.hip, DEAD.hip)).collect();
+    let angles = leg(&SHIPPED, CARRIED, [&hip, &command("knee_V")]);
+    for (angle, predicted) in angles.iter().zip(&predicted) {
+        // Predictions are multiples of the noise.
+        let noise = angle[500] / predicted[500];
+        let differs = |(y, p): (&f64, &f64)| (y - noise * p).abs() > 1e-9;
+        assert!(noise > 0.0 && !angle.iter().zip(predicted).any(differs));
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod facts;
 mod families;
 mod fixed;
 mod linear;
+mod needed;
 mod repeated;
 mod runs;
 pub(crate) mod source;
@@ -20,8 +21,7 @@ pub(crate) mod velocity;
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
 use stretch_gap::{
-    Batch, Costly, Description, GapError, Line, Model, ModelRuns, RandomGenerator, Run, Simulator,
-    SpectralLines,
+    Batch, Costly, Description, GapError, Line, Model, ModelRuns, Run, Simulator, SpectralLines,
 };
 
 use stretch_effects::{Find, Kind, Measured, Side};
@@ -30,7 +30,7 @@ use crate::{file::ProblemFile, wrap::Trials};
 use catalogue::Acting;
 use coupled::{Coupled, probes};
 use linear::Linear;
-use runs::{Altered, Inner, Runs, alteration};
+use runs::{Altered, Inner, Runs};
 use undeclared::Undeclared;
 
 pub use checked::Checked;
@@ -135,11 +135,14 @@ impl BlackBox {
     }
 
     /// The least number of runs with which there is an answer: of every stage the run as shipped, one a parameter, and the draws of the
-    /// noise of its inputs; one for each column that may move the outputs of several stages; one run is repeated.
+    /// noise of its inputs; one for each column that may move the outputs of several stages, and one without what always stands in
+    /// front of these; one run is repeated.
     pub fn least_runs(&self) -> usize {
         let stages = &self.problem.description().stages;
         let each = stages.iter().map(|spec| 1 + spec.parameters.len());
-        1 + each.sum::<usize>() + self.draws() + self.probes.len()
+        let stands = self.problem.standing.iter().any(|(at, _)| self.problem.is_in_front(*at));
+        let probes = self.probes.len();
+        1 + each.sum::<usize>() + self.draws() + probes + usize::from(stands && probes > 0)
     }
 
     /// What the wrappers in front of the stages act on, found by runs the first time.
@@ -161,100 +164,6 @@ impl BlackBox {
     /// Notes the file that the problem was read from: a [fix](crate::Fix) is that file with what was found.
     pub fn from_file(self, file: ProblemFile) -> Self {
         Self { file: Some(file), ..self }
-    }
-
-    /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the model, and wrappers that act in every run.
-    fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
-        self.acting_at(run, run.stage, side)
-    }
-
-    /// Of those around another stage the ones that a model has there.
-    fn acting_at<'a>(
-        &'a self,
-        run: &Run<'a>,
-        stage: usize,
-        side: Side,
-    ) -> Vec<(usize, &'a Vec<f64>)> {
-        let problem = &self.problem;
-        let mut all: Vec<(usize, &Vec<f64>)> = problem.standing(stage, side).collect();
-        for (effect, values) in &run.model.effects {
-            all.extend(problem.around(*effect, stage, side).map(|at| (at, values)));
-        }
-        all.sort_by_key(|(at, _)| *at);
-        all
-    }
-
-    /// The run of the source that a model needs.
-    fn inner(&self, run: &Run<'_>) -> Inner {
-        let end = self.problem.session().samples(run.trials);
-        let measured =
-            |stage| self.problem.stage_inputs(stage).map(|c| c[..end].to_vec()).collect();
-        let stages = 0..self.problem.stages.len();
-        let altered = stages.filter_map(|stage| self.altered(run, stage, &measured));
-        self.driven_by(run, altered.collect())
-    }
-
-    /// The inputs of a stage as they are altered for a run; none where they stay as they are.
-    fn altered(
-        &self,
-        run: &Run<'_>,
-        stage: usize,
-        unaltered: &impl Fn(usize) -> Vec<Vec<f64>>,
-    ) -> Option<Altered> {
-        let problem = &self.problem;
-        let is_own = stage == run.stage;
-        let mut before = self.acting_at(run, stage, Side::Input);
-        before.retain(|(at, _)| is_own || self.coupled().acts_on(*at, run.stage));
-        let noise = &problem.input_noise[stage];
-        let is_noisy = is_own && noise.iter().any(|sd| *sd > 0.0);
-        let noise_seed = run.input_noise.filter(|_| is_noisy);
-        if before.is_empty() && noise_seed.is_none() {
-            return None;
-        }
-        let (mut columns, mut how) = (unaltered(stage), Vec::new());
-        if let Some(seed) = noise_seed {
-            how.push(seed);
-            for (i, (column, sd)) in columns.iter_mut().zip(noise).enumerate() {
-                let mut random = RandomGenerator::new(seed, 1 + (stage * 64 + i) as u64);
-                column.iter_mut().for_each(|x| *x += sd * random.gauss());
-            }
-        }
-        let trials = self.trials_of();
-        for (at, values) in &before {
-            let wrapper = &problem.wrappers[*at];
-            how.extend(alteration(*at, values));
-            wrapper.act(values, &trials, &mut columns[wrapper.site.input]);
-        }
-        let touched = |i: &usize| {
-            let is_noisy = noise_seed.is_some() && noise[*i] > 0.0;
-            is_noisy || before.iter().any(|(at, _)| problem.wrappers[*at].site.input == *i)
-        };
-        let which = (0..columns.len()).filter(touched).collect();
-        Some(Altered { stage, columns, which, how })
-    }
-
-    /// The run of a model on inputs that were altered. A simulator whose stages hang together is run with all parameters of the model, so
-    /// that one run serves every stage; any other with those of the stage.
-    fn driven_by(&self, run: &Run<'_>, altered: Vec<Altered>) -> Inner {
-        let about = self.problem.description();
-        let mut parameters: Vec<f64> = about.parameters.iter().map(|p| p.nominal).collect();
-        if self.is_coupled() {
-            parameters.clone_from(&run.model.parameters);
-        } else {
-            for &p in &about.stages[run.stage].parameters {
-                parameters[p] = run.model.parameters[p];
-            }
-        }
-        let mut effects = self.problem.off.clone();
-        for (effect, values) in &run.model.effects {
-            let touches = about.effects[*effect].touches.contains(&run.stage);
-            if let Acting::Own(first) = self.problem.acting[*effect]
-                && touches
-            {
-                effects[first..first + values.len()].copy_from_slice(values);
-            }
-        }
-        Inner { stage: run.stage, parameters, effects, altered, trials: run.trials }
     }
 
     /// The run that a run is predicted from, and the difference of the parameters; the run itself where it has to be exact.

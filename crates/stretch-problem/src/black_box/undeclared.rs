@@ -59,33 +59,45 @@ impl Undeclared {
     pub(super) fn notes(&self, problem: &Checked) -> Vec<String> {
         let about = problem.description();
         let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut alike: BTreeMap<(Vec<&str>, usize), Vec<(f64, &str)>> = BTreeMap::new();
+        let mut alike: Vec<Alike<'_>> = Vec::new();
         for (&(parameter, stage), &multiple) in known.iter().filter(|(_, m)| **m > LEAST) {
             let said = about.stages.iter().filter(|s| s.parameters.contains(&parameter));
-            let said = said.map(|s| s.name.as_str()).collect();
-            let name = about.parameters[parameter].name.as_str();
-            alike.entry((said, stage)).or_default().push((multiple, name));
-        }
-        let sentence = |((said, stage), mut own): ((Vec<&str>, usize), Vec<(f64, &str)>)| {
-            own.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let most = own.first().map_or(0.0, |(multiple, _)| *multiple);
-            let mut names: Vec<String> =
-                own.iter().take(LISTED).map(|(_, name)| (*name).to_owned()).collect();
-            if own.len() > LISTED {
-                names.push(format!("{} more", own.len() - LISTED));
+            let said: Vec<&str> = said.map(|s| s.name.as_str()).collect();
+            let (name, moves) =
+                (about.parameters[parameter].name.as_str(), &*about.stages[stage].name);
+            match alike.iter_mut().find(|a| a.moves == moves && a.said == said) {
+                Some(alike) => alike.own.push((multiple, name)),
+                None => alike.push(Alike { said, moves, own: vec![(multiple, name)] }),
             }
-            let (is, it, up_to) = match own.len() {
-                1 => ("is", "it", ""),
-                _ => ("are", "each", "up to "),
-            };
-            let stage = &about.stages[stage].name;
-            format!(
-                "{} {is} said to act on {} alone, but one tolerance of {it} moves {stage} by {up_to}{most:.1} times its noise: add {stage} to the `stages`",
-                joined(&names),
-                said.join(" and "),
-            )
+        }
+        alike.into_iter().map(Alike::sentence).collect()
+    }
+}
+
+/// Parameters that are said to act in the same stages, and move the same other one.
+struct Alike<'a> {
+    said: Vec<&'a str>,
+    moves: &'a str,
+    /// By how many multiples of the noise, and names.
+    own: Vec<(f64, &'a str)>,
+}
+
+impl Alike<'_> {
+    fn sentence(mut self) -> String {
+        self.own.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (moves, most) = (self.moves, self.own[0].0);
+        let listed = self.own.iter().take(LISTED).map(|(_, name)| (*name).to_owned());
+        let left = self.own.len().saturating_sub(LISTED);
+        let names: Vec<String> = listed.chain((left > 0).then(|| format!("{left} more"))).collect();
+        let (are, each, up_to) = match self.own.len() {
+            1 => ("is", "it", ""),
+            _ => ("are", "each", "up to "),
         };
-        alike.into_iter().map(sentence).collect()
+        format!(
+            "{} {are} said to act on {} alone, but one tolerance of {each} moves {moves} by {up_to}{most:.1} times its noise: add {moves} to the `stages`",
+            joined(&names),
+            self.said.join(" and "),
+        )
     }
 }
 

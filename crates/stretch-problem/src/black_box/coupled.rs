@@ -14,10 +14,9 @@ use stretch_effects::Side;
 use stretch_gap::{Description, EffectSpec};
 
 use super::{
-    BlackBox,
     catalogue::Acting,
     checked::Checked,
-    runs::{Altered, Inner, alteration},
+    runs::{Altered, Inner, Runs, alteration},
     source::Source,
 };
 use crate::wrap::{Placed, Trials};
@@ -95,12 +94,11 @@ pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
 
 impl Coupled {
     /// Runs the probes. Where the runs are spent, or a probe cannot be simulated, a stage is taken to move its own output alone.
-    pub(super) fn of(bench: &BlackBox) -> Self {
-        let problem = &bench.problem;
+    pub(super) fn of(problem: &Checked, runs: &Runs, probes: &[Altered]) -> Self {
         let stages = &problem.session().stages;
         let mut beside = vec![Vec::new(); problem.wrappers.len()];
-        let moved = moved(bench);
-        let takes_several = bench.runs.source().takes_inputs_of_several();
+        let moved = moved(problem, runs, probes);
+        let takes_several = runs.source().takes_inputs_of_several();
         let moves = |(probe, others): &(&Altered, Vec<usize>)| {
             let column = &stages[probe.stage].inputs[probe.which[0]];
             let others: Vec<&str> = others.iter().map(|s| stages[*s].name.as_str()).collect();
@@ -132,8 +130,11 @@ impl Coupled {
 }
 
 /// Every probe that moves outputs of other stages, with these.
-fn moved(bench: &BlackBox) -> Vec<(&Altered, Vec<usize>)> {
-    let (problem, probes) = (&bench.problem, &bench.probes);
+fn moved<'a>(
+    problem: &Checked,
+    runs: &Runs,
+    probes: &'a [Altered],
+) -> Vec<(&'a Altered, Vec<usize>)> {
     let session = problem.session();
     if probes.is_empty() {
         return Vec::new();
@@ -149,7 +150,7 @@ fn moved(bench: &BlackBox) -> Vec<(&Altered, Vec<usize>)> {
     let alterations = std::iter::once(&[][..]).chain(probes.chunks(1));
     let wanted: Vec<Inner> =
         alterations.flat_map(|altered| (0..stages).map(move |s| run(s, altered))).collect();
-    let outputs = bench.runs.outputs(session, &wanted);
+    let outputs = runs.outputs(session, &wanted);
     let (shipped, there) = outputs.split_at(stages);
     let is_moved = |stage: usize, there: &[f64]| {
         let Ok(shipped) = &shipped[stage] else { return false };

@@ -118,7 +118,7 @@ impl BlackBox {
         session.stages[stage].inputs.iter().map(of).collect()
     }
 
-    /// Wrappers around a stage that act on what is run in an experiment, on one of its sides, with their values.
+    /// Wrappers that stand around a stage in an experiment, on one of its sides, with their values.
     fn around<'a>(
         &'a self,
         run: &Run<'a>,
@@ -139,7 +139,7 @@ impl BlackBox {
         }
     }
 
-    /// The inputs of a stage in an experiment, with the wrappers that act on what is run.
+    /// The inputs of a stage in an experiment, behind the wrappers in front of it.
     fn driven_in(
         &self,
         run: &Run<'_>,

@@ -147,7 +147,7 @@ impl BlackBox {
 
     /// What the wrappers in front of the stages act on, found by runs the first time.
     fn coupled(&self) -> &Coupled {
-        self.coupled.get_or_init(|| Coupled::of(self))
+        self.coupled.get_or_init(|| Coupled::of(&self.problem, &self.runs, &self.probes))
     }
 
     /// Runs with draws of the noise of inputs, of all stages together.

@@ -15,7 +15,7 @@ impl BlackBox {
         self.acting_at(run, run.stage, side)
     }
 
-    /// Of those around another stage the ones that a model has there.
+    /// The same of any stage, whichever is run.
     pub(super) fn acting_at<'a>(
         &'a self,
         run: &Run<'a>,
@@ -33,21 +33,12 @@ impl BlackBox {
 
     /// The run of the source that a model needs.
     pub(super) fn inner(&self, run: &Run<'_>) -> Inner {
-        let end = self.problem.session().samples(run.trials);
-        let measured =
-            |stage| self.problem.stage_inputs(stage).map(|c| c[..end].to_vec()).collect();
         let stages = 0..self.problem.stages.len();
-        let altered = stages.filter_map(|stage| self.altered(run, stage, &measured));
-        self.driven_by(run, altered.collect())
+        self.driven_by(run, stages.filter_map(|stage| self.altered(run, stage)).collect())
     }
 
     /// The inputs of a stage as they are altered for a run; none where they stay as they are.
-    fn altered(
-        &self,
-        run: &Run<'_>,
-        stage: usize,
-        unaltered: &impl Fn(usize) -> Vec<Vec<f64>>,
-    ) -> Option<Altered> {
+    fn altered(&self, run: &Run<'_>, stage: usize) -> Option<Altered> {
         let problem = &self.problem;
         let is_own = stage == run.stage;
         let mut before = self.acting_at(run, stage, Side::Input);
@@ -58,7 +49,10 @@ impl BlackBox {
         if before.is_empty() && noise_seed.is_none() {
             return None;
         }
-        let (mut columns, mut how) = (unaltered(stage), Vec::new());
+        let end = problem.session().samples(run.trials);
+        let mut columns: Vec<Vec<f64>> =
+            problem.stage_inputs(stage).map(|column| column[..end].to_vec()).collect();
+        let mut how = Vec::new();
         if let Some(seed) = noise_seed {
             how.push(seed);
             for (i, (column, sd)) in columns.iter_mut().zip(noise).enumerate() {

@@ -177,7 +177,7 @@ pub trait Source: Send + Sync {
     /// Whether an answer holds the outputs of all stages, one behind the other, whatever stage is asked for: a simulator that runs as a
     /// whole is then run once for all stages. The inputs of an ask are those of the stage asked for.
     ///
-    /// Such a source may be asked for a stage whose inputs are altered in order to read the output of another stage.
+    /// Where the inputs of one stage are altered, such a source is asked for that stage, whichever output is looked at.
     fn answers_all(&self) -> bool {
         false
     }

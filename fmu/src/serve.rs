@@ -4,7 +4,8 @@ use std::io::{ErrorKind, Read, Write};
 
 use serde_json::{Map, Value, json};
 use stretch_problem::{
-    Ask, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
+    AlteredColumn, Ask, RecordedSession, SessionColumn, SessionPart, SessionStage, Source,
+    SourceError,
     worker::{FrameError, PREFIX, Prefix, WorkerFrame},
 };
 
@@ -70,7 +71,7 @@ where
     while let Some(frame) = receive(from)? {
         let bytes = match frame.header.get("kind").and_then(Value::as_str) {
             Some("hello") => {
-                let hello = json!({ "all": true, "batch": 1, "inputs": true, "kind": "hello", "version": VERSION });
+                let hello = json!({ "all": true, "batch": 1, "inputs": true, "kind": "hello", "several": true, "version": VERSION });
                 WorkerFrame::bytes(&hello, &[])
             }
             Some("session") => {
@@ -166,6 +167,7 @@ struct Owned<'a> {
     parameters: &'a [f64],
     effects: &'a [f64],
     inputs: Option<Vec<Vec<f64>>>,
+    others: Vec<AlteredColumn<'a>>,
     trials: usize,
 }
 
@@ -192,7 +194,15 @@ fn read_asks<'a>(frame: &'a WorkerFrame, session: &RecordedSession) -> Option<Ve
             ),
             false => None,
         };
-        Some(Owned { stage, parameters, effects, inputs, trials })
+        let other = |place: &Value| {
+            let at = |i: usize| usize::try_from(place.get(i)?.as_u64()?).ok();
+            let (stage, input) = (at(0)?, at(1)?);
+            session.stages.get(stage)?.inputs.get(input)?;
+            Some(AlteredColumn { stage, input, values: take(samples)? })
+        };
+        let others = model.get("others").and_then(Value::as_array).into_iter().flatten();
+        let others = others.map(other).collect::<Option<_>>()?;
+        Some(Owned { stage, parameters, effects, inputs, others, trials })
     })
 }
 
@@ -203,8 +213,8 @@ fn simulate(
 ) -> Result<Vec<u8>, ServeError> {
     let asks = read_asks(frame, session).ok_or_else(|| wrong("models"))?;
     let ask = |own: &Owned<'_>| -> Result<Vec<f64>, SourceError> {
-        let Owned { stage, parameters, effects, ref inputs, trials } = *own;
-        let asked = Ask { stage, parameters, effects, inputs: inputs.as_deref(), trials };
+        let Owned { stage, parameters, effects, ref inputs, ref others, trials } = *own;
+        let asked = Ask { stage, parameters, effects, inputs: inputs.as_deref(), others, trials };
         let mut answers = source.simulate_many(&[asked]);
         answers.pop().unwrap_or_else(|| Err(SourceError::Gone("there is no answer".into())))
     };

@@ -64,14 +64,17 @@ impl FmuSource {
         Ok(out)
     }
 
-    /// Columns that drive it: those of the stage asked for as the ask has them, all others as measured.
+    /// Columns that drive it: those that the ask alters as the ask has them, all others as measured.
     fn inputs<'a>(&'a self, ask: &Ask<'a>) -> Result<Vec<Cow<'a, [f64]>>, SourceError> {
-        let own = &self.session.stages[ask.stage].inputs;
+        let inputs = |stage: usize| &self.session.stages[stage].inputs;
         let samples = self.session.samples(ask.trials);
         let one = |name: &String| {
             let altered = ask.inputs.and_then(|columns| {
-                Some(columns.get(own.iter().position(|o| o == name)?)?.as_slice())
+                let own = inputs(ask.stage).iter().position(|o| o == name)?;
+                Some(columns.get(own)?.as_slice())
             });
+            let other = ask.others.iter().find(|o| inputs(o.stage)[o.input] == *name);
+            let altered = other.map(|o| o.values).or(altered);
             let column = altered.or_else(|| self.session.column(name));
             let column = column.filter(|column| column.len() >= samples);
             column.map(Cow::Borrowed).ok_or_else(|| {
@@ -130,6 +133,10 @@ impl Source for FmuSource {
     }
 
     fn answers_all(&self) -> bool {
+        true
+    }
+
+    fn takes_inputs_of_several(&self) -> bool {
         true
     }
 

@@ -50,8 +50,14 @@ fn samples_are_those_of_the_equations_and_runs_leave_nothing_behind() {
         for (trials, inputs, brake) in asks {
             let inputs = inputs.map(|columns: &[Vec<f64>]| columns);
             let effects = [brake];
-            let ask =
-                Ask { stage: 0, parameters: &[11.0, 0.12], effects: &effects, inputs, trials };
+            let ask = Ask {
+                stage: 0,
+                parameters: &[11.0, 0.12],
+                effects: &effects,
+                inputs,
+                others: &[],
+                trials,
+            };
             assert_eq!(source.simulate_many(&[ask])[0], answer(&problem, &ask), "FMI {fmi}");
         }
     }

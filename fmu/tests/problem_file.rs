@@ -66,7 +66,14 @@ fn a_problem_is_read_and_its_fmu_found_and_run() {
         assert!(spec.command.windows(2).any(|two| two == pair), "{:?}", spec.command);
     }
     let workers = Workers::start(spec, problem.session()).unwrap();
-    let ask = Ask { stage: 0, parameters: &[10.0, 0.1], effects: &[1.0], inputs: None, trials: 2 };
+    let ask = Ask {
+        stage: 0,
+        parameters: &[10.0, 0.1],
+        effects: &[1.0],
+        inputs: None,
+        others: &[],
+        trials: 2,
+    };
     assert_eq!(workers.simulate_many(&[ask])[0], answer(&problem, &ask));
 }
 

@@ -98,7 +98,14 @@ fn troubled(fmi: u8, trouble: f64) -> Option<(Answer, Vec<String>)> {
     let workers = WorkersSpec { deadline_s, ..worker(&built.file, &[]) };
     let workers = Workers::start(workers, problem.session()).unwrap();
     let parameters = [10.0, 0.1, trouble];
-    let ask = Ask { stage: 0, parameters: &parameters, effects: &[0.0], inputs: None, trials: 2 };
+    let ask = Ask {
+        stage: 0,
+        parameters: &parameters,
+        effects: &[0.0],
+        inputs: None,
+        others: &[],
+        trials: 2,
+    };
     let answer = workers.simulate_many(&[ask]).remove(0);
     Some((answer, workers.notes()))
 }

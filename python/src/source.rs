@@ -32,6 +32,8 @@ pub(crate) struct Question {
     parameters: Vec<f64>,
     effects: Vec<f64>,
     inputs: Option<Vec<Vec<f64>>>,
+    /// Altered columns of other stages: stage, input, values.
+    others: Vec<(usize, usize, Vec<f64>)>,
     reply: Sender<Result<Vec<f64>, SourceError>>,
 }
 
@@ -70,6 +72,7 @@ impl<T: Send> Source for Asked<T> {
                 parameters: ask.parameters.to_vec(),
                 effects: ask.effects.to_vec(),
                 inputs: ask.inputs.map(<[Vec<f64>]>::to_vec),
+                others: ask.others.iter().map(|o| (o.stage, o.input, o.values.to_vec())).collect(),
                 reply,
             };
             self.main_thread.send(Message::Question(question)).map(|()| answer).map_err(|_| gone())
@@ -87,6 +90,10 @@ impl<T: Send> Source for Asked<T> {
         self.takes_inputs
     }
 
+    fn takes_inputs_of_several(&self) -> bool {
+        self.takes_inputs
+    }
+
     fn batch(&self) -> usize {
         self.batch
     }
@@ -94,8 +101,8 @@ impl<T: Send> Source for Asked<T> {
 
 /// Answers questions with the user's simulator until the work is done.
 ///
-/// `simulator` is called with stage, number of trials, parameters `[n, p]`, effects `[n, e]`, and the altered inputs, an
-/// array `[n, samples]` each, or None; it returns `[n, samples]`.
+/// `simulator` is called with stage, number of trials, parameters `[n, p]`, effects `[n, e]`, the altered inputs, an
+/// array `[n, samples]` each, or None, and those of other stages, each with stage and input; it returns `[n, samples]`.
 ///
 /// # Errors
 /// Exceptions of the simulator, and KeyboardInterrupt; the work then ends by itself, for its questions stay without an answer.
@@ -149,10 +156,16 @@ pub(crate) fn serve<T: Send>(
 }
 
 impl Question {
+    /// Stage and input of every altered column of other stages.
+    fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.others.iter().map(|(stage, input, _)| (*stage, *input))
+    }
+
     /// Whether two questions can be asked in one call.
     fn goes_with(&self, other: &Self) -> bool {
         (self.stage, self.trials) == (other.stage, other.trials)
             && self.inputs.is_some() == other.inputs.is_some()
+            && self.places().eq(other.places())
     }
 }
 
@@ -201,7 +214,16 @@ fn call(
         };
         (0..columns.len()).map(of).collect::<Vec<_>>()
     });
-    let answer = simulator.call1((first.stage, first.trials, parameters, effects, inputs))?;
+    let others: Vec<_> = first
+        .places()
+        .enumerate()
+        .map(|(at, (stage, input))| {
+            let rows = group.iter().map(|q| PyArray1::from_slice(py, &q.others[at].2));
+            (stage, input, rows.collect::<Vec<_>>())
+        })
+        .collect();
+    let asked = (first.stage, first.trials, parameters, effects, inputs, others);
+    let answer = simulator.call1(asked)?;
     let rows: PyReadonlyArray2<'_, f64> = answer.extract()?;
     Ok(rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect())
 }

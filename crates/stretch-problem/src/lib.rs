@@ -22,9 +22,9 @@ pub mod worker;
 mod wrap;
 
 pub use black_box::{
-    Agreed, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter, ProblemSpec,
-    RecordedSession, Sensor, SessionColumn, SessionPart, SessionStage, Source, SourceError,
-    StageEntry, State, Wrapped, agreed, closure,
+    Agreed, AlteredColumn, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter,
+    ProblemSpec, RecordedSession, Sensor, SessionColumn, SessionPart, SessionStage, Source,
+    SourceError, StageEntry, State, Wrapped, agreed, closure,
 };
 pub use by_trial::{Apart, ByTrial, FittedValue, Heterogeneity, RunFit, Standing};
 pub use causes::{Causes, causes};

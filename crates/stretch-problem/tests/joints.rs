@@ -5,7 +5,8 @@ use std::{sync::Arc, time::Instant};
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Options, RandomGenerator, diagnose};
 use stretch_problem::{
-    Ask, BlackBox, Checked, Parameter, ProblemSpec, Source, SourceError, StageEntry, Tolerance,
+    Ask, BlackBox, Checked, Diagnosable, Parameter, ProblemSpec, Source, SourceError, StageEntry,
+    Tolerance,
 };
 
 const JOINTS: usize = 6;
@@ -78,8 +79,10 @@ impl Source for Arm {
             let mut all = vec![Vec::new(); JOINTS];
             for trial in 0..ask.trials {
                 let range = trial * SAMPLES..(trial + 1) * SAMPLES;
-                let of = |joint: usize| match ask.inputs {
-                    Some(inputs) if joint == ask.stage => &inputs[0][range.clone()],
+                let other = |joint| ask.others.iter().find(|o| o.stage == joint);
+                let of = |joint: usize| match (ask.inputs, other(joint)) {
+                    (Some(inputs), _) if joint == ask.stage => &inputs[0][range.clone()],
+                    (_, Some(other)) => &other.values[range.clone()],
                     _ => &self.commands[joint][range.clone()],
                 };
                 let commands: Vec<&[f64]> = (0..JOINTS).map(of).collect();
@@ -92,6 +95,10 @@ impl Source for Arm {
     }
 
     fn answers_all(&self) -> bool {
+        true
+    }
+
+    fn takes_inputs_of_several(&self) -> bool {
         true
     }
 }
@@ -137,7 +144,11 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     };
     for joint in 0..JOINTS {
         for (name, value) in OWN {
-            add(format!("{name}{joint}"), value, vec![format!("joint{joint}")]);
+            // What moves a joint moves the next one, which carries a share of it; what only shows there does not.
+            let is_carried = !["offset", "bend", "carry"].contains(&name);
+            let last = (joint + usize::from(is_carried)).min(JOINTS - 1);
+            let stages = (joint..=last).map(|j| format!("joint{j}")).collect();
+            add(format!("{name}{joint}"), value, stages);
         }
     }
     SHARED.iter().for_each(|(name, value)| add((*name).to_owned(), *value, Vec::new()));
@@ -163,7 +174,8 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     let column =
         |joint: usize| problem.session().column(&format!("u{joint}_V")).expect("a column").to_vec();
     let arm = Arm { commands: (0..JOINTS).map(column).collect() };
-    let asked = Ask { stage: 0, parameters: &truth, effects: &[], inputs: None, trials: 3 };
+    let asked =
+        Ask { stage: 0, parameters: &truth, effects: &[], inputs: None, others: &[], trials: 3 };
     let begun = Instant::now();
     assert!(arm.simulate_many(&[asked])[0].is_ok());
     let each = begun.elapsed();
@@ -179,6 +191,8 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
         found.simulations,
         found.sentence
     );
+    let notes = bench.afterwards();
+    assert!(notes.len() == 1 && notes[0].starts_with("altered inputs act"), "{notes:?}");
     let mut named = found.named.clone();
     named.sort();
     assert_eq!(named, ["joint1.output.backlash", "joint4.input.dead_zone"], "{}", found.sentence);

@@ -3,6 +3,7 @@
 mod budget;
 mod by_trial;
 mod contacts;
+mod coupled;
 mod effects;
 mod experiments;
 mod flow;

@@ -10,8 +10,8 @@ use proptest::prelude::*;
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options, RandomGenerator, diagnose};
 use stretch_problem::{
-    Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Source, SourceError,
-    StageEntry, Tolerance,
+    AlteredColumn, Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Source,
+    SourceError, StageEntry, Tolerance,
     worker::{WorkerFrame, Workers, WorkersSpec},
 };
 
@@ -116,6 +116,57 @@ fn in_c() -> Diagnosis {
     diagnosed(&[servo.to_str().unwrap()], 2)
 }
 
+#[test]
+#[ignore = "needs python3 with NumPy; ./ci.sh runs it"]
+fn with_numpy_altered_columns_of_several_stages_reach_a_simulator_in_python() {
+    let folder = tempfile::tempdir().unwrap();
+    let code = "def both(params, effects, inputs):
+    return {'x_deg': inputs['a_V'] + 10 * inputs['b_V'], 'y_deg': inputs['a_V'] - inputs['b_V']}
+";
+    std::fs::write(folder.path().join("sum.py"), code).unwrap();
+    let column = |name: &str, at: usize| {
+        let values = (0..400).map(|i| ((i * (7 + at)) % 11) as f64).collect();
+        Channel { name: name.into(), values }
+    };
+    let names = ["a_V", "b_V", "x_deg", "y_deg"];
+    let channels = names.iter().enumerate().map(|(at, name)| column(name, at)).collect();
+    let time_s = (0..400).map(|i| i as f64 * 0.01).collect();
+    let trial = Trial { name: "a.csv".into(), time_s, channels };
+    let stage = |at: usize| StageEntry {
+        name: ["first", "second"][at].into(),
+        output: names[2 + at].into(),
+        inputs: vec![names[at].into()],
+        ..StageEntry::default()
+    };
+    let problem = Checked::new(ProblemSpec {
+        stages: vec![stage(0), stage(1)],
+        trials: vec![SessionTrial::new(trial)],
+        ..ProblemSpec::default()
+    })
+    .unwrap();
+    let spec = WorkersSpec::python("sum:both", folder.path());
+    let workers = Workers::start(spec, problem.session()).unwrap();
+    assert!(workers.takes_inputs_of_several() && workers.answers_all());
+    let (own, other) = ([vec![5.0; 400]], [[2.0; 400], [3.0; 400]]);
+    let others =
+        other.each_ref().map(|values| [AlteredColumn { stage: 1, input: 0, values: &values[..] }]);
+    let asks = others.each_ref().map(|others| Ask {
+        stage: 0,
+        parameters: &[],
+        effects: &[],
+        inputs: Some(&own),
+        others,
+        trials: 1,
+    });
+    let answers = workers.simulate_many(&asks);
+    let expected = |b: f64| Ok([[5.0 + 10.0 * b; 400], [5.0 - b; 400]].concat());
+    assert_eq!(answers, [expected(2.0), expected(3.0)]);
+    // With one altered stage the other column stays as measured.
+    let alone = workers.simulate_many(&[Ask { others: &[], ..asks[0] }]).remove(0).unwrap();
+    let b = problem.session().column("b_V").unwrap();
+    assert!(alone[400..].iter().zip(b).all(|(y, b)| *y == 5.0 - b));
+}
+
 /// What a worker that is a few lines of Python answers to one ask.
 fn answer(script: &str, jobs: usize) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
     const HEAD: &str = r#"
@@ -139,7 +190,14 @@ def begin(**more):
     let spec =
         WorkersSpec { jobs, deadline_s: 0.5, start_s: 10.0, ..WorkersSpec::new(&command, ".") };
     let workers = Workers::start(spec, problem.session()).map_err(|e| e.to_string())?;
-    let ask = Ask { stage: 0, parameters: &[10.0, 0.1], effects: &[0.0], inputs: None, trials: 1 };
+    let ask = Ask {
+        stage: 0,
+        parameters: &[10.0, 0.1],
+        effects: &[0.0],
+        inputs: None,
+        others: &[],
+        trials: 1,
+    };
     Ok(workers.simulate_many(&[ask]))
 }
 

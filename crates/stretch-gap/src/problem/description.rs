@@ -121,6 +121,21 @@ impl Description {
         out
     }
 
+    /// The description with other stages touched by its effects, of which there are as many: `touches` gives them anew for every
+    /// effect, and a stage that is not there is left out.
+    pub fn with_touches(&self, touches: impl Fn(usize, &EffectSpec) -> Vec<usize>) -> Self {
+        let mut out = self.clone();
+        let stages = out.spec.stages.len();
+        for (index, effect) in out.spec.effects.iter_mut().enumerate() {
+            let mut touched = touches(index, effect);
+            touched.retain(|stage| *stage < stages);
+            if !touched.is_empty() {
+                effect.touches = touched;
+            }
+        }
+        out
+    }
+
     /// The description with other tolerances: `altered` gives every parameter anew, and keeps it valid.
     pub(crate) fn with_parameters(
         &self,

@@ -200,6 +200,14 @@ impl Checked {
         self.wrappers[wrapper].site.side == Side::Input
     }
 
+    /// Indices of the inputs of a stage that drive no other stage.
+    pub(crate) fn unshared(&self, stage: usize) -> impl Iterator<Item = usize> {
+        let columns = || self.stages.iter().flat_map(|s| &s.inputs);
+        let own = self.stages[stage].inputs.iter().enumerate();
+        own.filter(move |(_, column)| columns().filter(|other| other == column).count() == 1)
+            .map(|(input, _)| input)
+    }
+
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
         self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
     }

@@ -12,7 +12,7 @@ use stretch_data::{Channel, Trial, ends};
 use stretch_effects::{Beside, Side};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
-use super::{BlackBox, source::SourceError};
+use super::{BlackBox, runs::Altered, source::SourceError};
 use crate::bench::courses::{course, moving};
 
 /// Greatest number of inputs that candidates move.
@@ -107,7 +107,8 @@ impl BlackBox {
         let session = self.problem.session();
         let of = |column: &String| {
             let before = session.stages[..stage].iter().position(|s| s.output == *column);
-            let known = course.of(column).or(before.map(|at| outputs[at].as_slice()));
+            let known =
+                course.of(column).or(before.and_then(|at| outputs.get(at)).map(Vec::as_slice));
             known.map(<[f64]>::to_vec).ok_or_else(|| {
                 let stage = &session.stages[stage].name;
                 let why = format!("{stage} is driven by {column}, the output of a later stage");
@@ -121,9 +122,10 @@ impl BlackBox {
     fn around<'a>(
         &'a self,
         run: &Run<'a>,
+        stage: usize,
         side: Side,
     ) -> Result<Vec<(usize, &'a Vec<f64>)>, GapError> {
-        let all = self.acting(run, side);
+        let all = self.acting_at(run, stage, side);
         let unpredicted = |(at, _): &&(usize, &Vec<f64>)| {
             !matches!(self.problem.wrappers[*at].kind.beside, Beside::Nothing | Beside::Itself)
         };
@@ -136,6 +138,25 @@ impl BlackBox {
             None => Ok(all),
         }
     }
+
+    /// The inputs of a stage in an experiment, behind the wrappers in front of it.
+    fn driven_in(
+        &self,
+        run: &Run<'_>,
+        stage: usize,
+        course: &Course,
+        outputs: &[Vec<f64>],
+    ) -> Result<Altered, GapError> {
+        let mut columns = self.inputs_in(stage, course, outputs)?;
+        for (at, values) in self.around(run, stage, Side::Input)? {
+            let wrapper = &self.problem.wrappers[at];
+            wrapper.act(values, &self.trials_of(), &mut columns[wrapper.site.input]);
+        }
+        let mut hasher = DefaultHasher::new();
+        columns.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
+        let which = self.problem.unshared(stage).collect();
+        Ok(Altered { stage, columns, which, how: vec![u64::MAX, hasher.finish()] })
+    }
 }
 
 impl Laboratory for BlackBox {
@@ -145,7 +166,7 @@ impl Laboratory for BlackBox {
         let all = self.driven();
         let dt_s = self.description().dt_s;
         let lasts_s = self.problem.session().samples(1) as f64 * dt_s;
-        if all.is_empty() || !self.runs.takes_inputs() {
+        if all.is_empty() || !self.runs.source().takes_inputs() {
             return Vec::new();
         }
         let mut candidates = Vec::new();
@@ -184,19 +205,19 @@ impl Laboratory for BlackBox {
         let mut outputs: Vec<Vec<f64>> = Vec::new();
         for stage in 0..session.stages.len() {
             let run = Run::exact(stage, model, 1);
-            let mut inputs = self.inputs_in(stage, course, &outputs)?;
-            for (at, values) in self.around(&run, Side::Input)? {
-                let wrapper = &self.problem.wrappers[at];
-                wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
-            }
-            let mut hasher = DefaultHasher::new();
-            inputs.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
-            let inner = self.driven_by(&run, Some((inputs, vec![u64::MAX, hasher.finish()])));
+            let own = self.driven_in(&run, stage, course, &outputs)?;
+            // A simulator whose stages hang together is driven as a whole, as far as the outputs before are known.
+            let all = if self.is_coupled() { 0..session.stages.len() } else { 0..0 };
+            let others = all.filter(|other| *other != stage);
+            let others = others.filter_map(|s| self.driven_in(&run, s, course, &outputs).ok());
+            let mut altered: Vec<Altered> = others.chain([own]).collect();
+            altered.sort_by_key(|a| a.stage);
+            let inner = self.driven_by(&run, altered);
             let answer = self.runs.outputs(session, &[inner]).pop();
             let answer = answer.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
             let mut output =
                 answer.map_err(|error| super::refused(error, self.least_runs()))?.to_vec();
-            for (at, values) in self.around(&run, Side::Output)? {
+            for (at, values) in self.around(&run, stage, Side::Output)? {
                 self.problem.wrappers[at].act(values, &trials, &mut output);
             }
             outputs.push(output);

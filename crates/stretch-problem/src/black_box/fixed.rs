@@ -74,6 +74,8 @@ impl Diagnosable for BlackBox {
     /// The notes of the source on its runs, and the number of runs that it refused.
     fn afterwards(&self) -> Vec<String> {
         let mut notes = self.runs.notes();
+        notes.extend(self.coupled.get().and_then(|coupled| coupled.note.clone()));
+        notes.extend(self.undeclared.notes(&self.problem));
         let refused = self.runs.refused();
         if let Some(first) = refused.first() {
             notes.push(format!(

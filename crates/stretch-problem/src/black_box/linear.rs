@@ -29,8 +29,8 @@ pub(crate) struct Linear {
 /// A parameter moved by a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Move {
-    parameter: usize,
-    step: f64,
+    pub(crate) parameter: usize,
+    pub(crate) step: f64,
     pub(crate) inner: Inner,
 }
 
@@ -66,14 +66,17 @@ impl Linear {
         self.at.trials
     }
 
-    /// Whether the linearisation serves another run: effects and inputs are the same, parameters differ by at most half a tolerance.
-    pub(crate) fn serves(&self, run: &Inner, specs: &[ParameterSpec]) -> bool {
-        let pairs = self.at.parameters.iter().zip(&run.parameters).zip(specs);
-        let how = |inner: &Inner| inner.inputs.as_ref().map(|(_, how)| how.clone());
+    /// Whether the linearisation serves another run: effects and inputs are the same, the stage's own parameters differ by at most half a
+    /// tolerance.
+    pub(crate) fn serves(&self, run: &Inner, own: &[usize], specs: &[ParameterSpec]) -> bool {
+        let apart = |p: usize| (self.at.parameters[p] - run.parameters[p]).abs();
+        let how = |inner: &Inner| -> Vec<(usize, Vec<u64>)> {
+            inner.altered.iter().map(|a| (a.stage, a.how.clone())).collect()
+        };
         self.at.trials >= run.trials
             && self.at.effects == run.effects
             && how(&self.at) == how(run)
-            && pairs.into_iter().all(|((a, b), spec)| (a - b).abs() <= SERVES * spec.sd)
+            && own.iter().all(|&p| apart(p) <= SERVES * specs[p].sd)
     }
 
     /// Moves an output by differences of the parameters.

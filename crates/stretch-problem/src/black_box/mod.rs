@@ -3,37 +3,41 @@
 mod catalogue;
 pub(crate) mod checked;
 pub(crate) mod columns;
+mod coupled;
 mod experiments;
 mod facts;
 mod families;
 mod fixed;
 mod linear;
+mod needed;
 mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
 pub(crate) mod states;
+mod undeclared;
 pub(crate) mod velocity;
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
 use stretch_gap::{
-    Batch, Costly, Description, GapError, Line, Model, ModelRuns, RandomGenerator, Run, Simulator,
-    SpectralLines,
+    Batch, Costly, Description, GapError, Line, Model, ModelRuns, Run, Simulator, SpectralLines,
 };
 
 use stretch_effects::{Find, Kind, Measured, Side};
 
 use crate::{file::ProblemFile, wrap::Trials};
 use catalogue::Acting;
+use coupled::{Coupled, probes};
 use linear::Linear;
-use runs::{Inner, Runs};
+use runs::{Altered, Inner, Runs};
+use undeclared::Undeclared;
 
 pub use checked::Checked;
 pub use families::{Agreed, agreed};
 pub use source::{
-    Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
-    closure,
+    AlteredColumn, Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source,
+    SourceError, closure,
 };
 
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
@@ -96,6 +100,10 @@ pub struct BlackBox {
     runs: Runs,
     /// By stage, the last linearisation.
     lines: RwLock<Vec<Option<Arc<Linear>>>>,
+    /// Columns that are altered to see which outputs they move.
+    probes: Vec<Altered>,
+    coupled: OnceLock<Coupled>,
+    undeclared: Undeclared,
 }
 
 impl BlackBox {
@@ -109,9 +117,11 @@ impl BlackBox {
         let samples =
             problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
         let stages = if source.answers_all() { problem.stages.len() } else { 1 };
+        let probes = probes(&problem, &*source);
         let runs = Runs::new(source, budget, stages * samples);
         let lines = RwLock::new(vec![None; problem.stages.len()]);
-        Self { problem, file: None, runs, lines }
+        let (coupled, undeclared) = (OnceLock::new(), Undeclared::default());
+        Self { problem, file: None, runs, lines, probes, coupled, undeclared }
     }
 
     /// The problem.
@@ -125,10 +135,19 @@ impl BlackBox {
     }
 
     /// The least number of runs with which there is an answer: of every stage the run as shipped, one a parameter, and the draws of the
-    /// noise of its inputs; one run is repeated.
+    /// noise of its inputs; one for each column that may move the outputs of several stages, and one without what always stands in
+    /// front of these; one run is repeated.
     pub fn least_runs(&self) -> usize {
-        let each = self.description().stages.iter().map(|spec| 1 + spec.parameters.len());
-        1 + each.sum::<usize>() + self.draws()
+        let stages = &self.problem.description().stages;
+        let each = stages.iter().map(|spec| 1 + spec.parameters.len());
+        let stands = self.problem.standing.iter().any(|(at, _)| self.problem.is_in_front(*at));
+        let probes = self.probes.len();
+        1 + each.sum::<usize>() + self.draws() + probes + usize::from(stands && probes > 0)
+    }
+
+    /// What the wrappers in front of the stages act on, found by runs the first time.
+    fn coupled(&self) -> &Coupled {
+        self.coupled.get_or_init(|| Coupled::of(&self.problem, &self.runs, &self.probes))
     }
 
     /// Runs with draws of the noise of inputs, of all stages together.
@@ -137,69 +156,14 @@ impl BlackBox {
         DRAWS * self.problem.input_noise.iter().filter(is_noisy).count()
     }
 
+    /// Whether what alters the input of one stage acts on the outputs of others.
+    fn is_coupled(&self) -> bool {
+        self.coupled().about.is_some()
+    }
+
     /// Notes the file that the problem was read from: a [fix](crate::Fix) is that file with what was found.
     pub fn from_file(self, file: ProblemFile) -> Self {
         Self { file: Some(file), ..self }
-    }
-
-    /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the model, and wrappers that act in every run.
-    fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
-        let problem = &self.problem;
-        let mut all: Vec<(usize, &Vec<f64>)> = problem.standing(run.stage, side).collect();
-        for (effect, values) in &run.model.effects {
-            all.extend(problem.around(*effect, run.stage, side).map(|at| (at, values)));
-        }
-        all.sort_by_key(|(at, _)| *at);
-        all
-    }
-
-    /// The run of the source that a model needs.
-    fn inner(&self, run: &Run<'_>) -> Inner {
-        let problem = &self.problem;
-        let before = self.acting(run, Side::Input);
-        let noise = &problem.input_noise[run.stage];
-        let noise_seed = run.input_noise.filter(|_| noise.iter().any(|sd| *sd > 0.0));
-        if before.is_empty() && noise_seed.is_none() {
-            return self.driven_by(run, None);
-        }
-        let end = problem.session().samples(run.trials);
-        let mut inputs: Vec<Vec<f64>> =
-            problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
-        let mut how = Vec::new();
-        if let Some(seed) = noise_seed {
-            how.push(seed);
-            for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
-                let mut random = RandomGenerator::new(seed, 1 + (run.stage * 64 + i) as u64);
-                column.iter_mut().for_each(|x| *x += sd * random.gauss());
-            }
-        }
-        let trials = self.trials_of();
-        for (at, values) in &before {
-            let wrapper = &problem.wrappers[*at];
-            how.push(u64::MAX - *at as u64);
-            how.extend(values.iter().map(|v| v.to_bits()));
-            wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
-        }
-        self.driven_by(run, Some((inputs, how)))
-    }
-
-    /// The run of a model on inputs that were altered; beside the inputs stand the numbers that identify the alteration.
-    fn driven_by(&self, run: &Run<'_>, inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>) -> Inner {
-        let mut parameters: Vec<f64> =
-            self.description().parameters.iter().map(|p| p.nominal).collect();
-        for &p in &self.description().stages[run.stage].parameters {
-            parameters[p] = run.model.parameters[p];
-        }
-        let mut effects = self.problem.off.clone();
-        for (effect, values) in &run.model.effects {
-            let touches = self.description().effects[*effect].touches.contains(&run.stage);
-            if let Acting::Own(first) = self.problem.acting[*effect]
-                && touches
-            {
-                effects[first..first + values.len()].copy_from_slice(values);
-            }
-        }
-        Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
     }
 
     /// The run that a run is predicted from, and the difference of the parameters; the run itself where it has to be exact.
@@ -209,13 +173,12 @@ impl BlackBox {
         let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
             return (inner, None);
         };
-        let mut base = inner.clone();
-        for &p in &self.description().stages[run.stage].parameters {
-            base.parameters[p] = near[p];
-        }
-        if base.parameters == inner.parameters {
+        let own = &self.problem.description().stages[run.stage].parameters;
+        if own.iter().all(|&p| near[p] == inner.parameters[p]) {
             return (inner, None);
         }
+        let mut base = inner.clone();
+        own.iter().for_each(|&p| base.parameters[p] = near[p]);
         let apart = inner.parameters.iter().zip(&base.parameters).map(|(a, b)| a - b).collect();
         (base, Some((line, apart)))
     }
@@ -280,7 +243,7 @@ fn refused(error: SourceError, least: usize) -> GapError {
 
 impl Simulator for BlackBox {
     fn description(&self) -> &Description {
-        self.problem.description()
+        self.coupled().about.as_ref().unwrap_or(self.problem.description())
     }
 
     fn measured(&self, stage: usize) -> &[f64] {
@@ -330,21 +293,21 @@ impl Costly for BlackBox {
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
         let run = Run::exact(stage, model, trials);
         let inner = self.inner(&run);
-        if self.line(stage).is_some_and(|line| line.serves(&inner, &self.description().parameters))
-        {
+        let about = self.problem.description();
+        let own = &about.stages[stage].parameters;
+        if self.line(stage).is_some_and(|line| line.serves(&inner, own, &about.parameters)) {
             return Ok(());
         }
-        let moves = Linear::moves(
-            &inner,
-            &self.description().stages[stage].parameters,
-            &self.description().parameters,
-        );
+        let moves = Linear::moves(&inner, own, &about.parameters);
         let wanted: Vec<Inner> =
             std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
         let outputs: Result<Vec<_>, SourceError> =
             self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
         match outputs {
-            Ok(outputs) => self.set_line(stage, Linear::of(inner, &moves, &outputs)),
+            Ok(outputs) => {
+                self.undeclared.look(&self.problem, &self.runs, &inner, &moves);
+                self.set_line(stage, Linear::of(inner, &moves, &outputs));
+            }
             // Without a linearisation every run is exact.
             Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}
             Err(error) => return Err(refused(error, self.least_runs())),
@@ -371,7 +334,8 @@ impl Costly for BlackBox {
 
 impl SpectralLines for BlackBox {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let is_here = |effect: usize| self.description().effects[effect].touches.contains(&stage);
+        let effects = &self.problem.description().effects;
+        let is_here = |effect: usize| effects[effect].touches.contains(&stage);
         let found = model.effects.iter().filter(|(effect, _)| is_here(*effect));
         let found = found.filter_map(|(effect, v)| Some((self.problem.wrapper(*effect)?, v)));
         let own = self.problem.standing(stage, Side::Output);

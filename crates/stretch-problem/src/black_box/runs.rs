@@ -11,7 +11,7 @@ use lru::LruCache;
 
 use crate::black_box::{
     repeated::{self, LONG},
-    source::{Ask, RecordedSession, Source, SourceError},
+    source::{AlteredColumn, Ask, RecordedSession, Source, SourceError},
 };
 
 /// Number of samples that are kept, of all runs together: a quarter of a gigabyte.
@@ -32,9 +32,26 @@ pub(crate) struct Inner {
     pub(crate) stage: usize,
     pub(crate) parameters: Vec<f64>,
     pub(crate) effects: Vec<f64>,
-    /// Altered inputs, and the numbers that identify the alteration.
-    pub(crate) inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>,
+    /// Stages whose inputs are altered, in order.
+    pub(crate) altered: Vec<Altered>,
     pub(crate) trials: usize,
+}
+
+/// The inputs of a stage, altered.
+#[derive(Debug, Clone)]
+pub(crate) struct Altered {
+    pub(crate) stage: usize,
+    /// All columns that drive the stage.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Indices of the columns that differ from what was measured.
+    pub(crate) which: Vec<usize>,
+    /// Numbers that identify the alteration.
+    pub(crate) how: Vec<u64>,
+}
+
+/// Numbers that identify what a wrapper does to an input: its index and its values.
+pub(crate) fn alteration(wrapper: usize, values: &[f64]) -> impl Iterator<Item = u64> {
+    std::iter::once(u64::MAX - wrapper as u64).chain(values.iter().map(|v| v.to_bits()))
 }
 
 type Answer = Result<Arc<Vec<f64>>, SourceError>;
@@ -88,9 +105,8 @@ impl Runs {
         self.budget
     }
 
-    /// Whether the source takes inputs that were altered.
-    pub(crate) fn takes_inputs(&self) -> bool {
-        self.source.takes_inputs()
+    pub(crate) fn source(&self) -> &dyn Source {
+        &*self.source
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {
@@ -109,12 +125,19 @@ impl Runs {
 
     fn key(&self, run: &Inner) -> Key {
         let numbers = run.parameters.iter().chain(&run.effects).map(|x| x.to_bits());
-        let inputs = run.inputs.iter().flat_map(|(_, how)| how.iter().copied());
-        let is_whole = self.answers_all && run.inputs.is_none();
+        let altered = &run.altered;
+        let how = altered.iter().flat_map(|a| [a.stage as u64].into_iter().chain(a.how.clone()));
         Key {
-            stage: if is_whole { usize::MAX } else { run.stage },
-            bits: numbers.chain(inputs).collect(),
+            stage: if self.answers_all { usize::MAX } else { run.stage },
+            bits: numbers.chain(how).collect(),
         }
+    }
+
+    /// The output of a run that was made; none where it was not, or is not kept.
+    pub(crate) fn kept(&self, session: &RecordedSession, run: &Inner) -> Option<Arc<Vec<f64>>> {
+        let made = self.lock();
+        let kept = made.kept.peek(&self.key(run))?;
+        self.part(session, run, kept)?.ok()
     }
 
     /// The part of an answer that a run asks for; none where the answer covers fewer trials.
@@ -216,7 +239,8 @@ impl Runs {
 
     /// What the source answers, asked from a thread of its own.
     fn asked(&self, runs: &[&Inner]) -> Vec<Result<Vec<f64>, SourceError>> {
-        let asks: Vec<Ask<'_>> = runs.iter().map(|run| ask(run)).collect();
+        let others: Vec<Vec<AlteredColumn<'_>>> = runs.iter().map(|run| others(run)).collect();
+        let asks: Vec<Ask<'_>> = runs.iter().zip(&others).map(|(run, o)| ask(run, o)).collect();
         let source = &*self.source;
         std::thread::scope(|scope| {
             let asked = scope.spawn(|| source.simulate_many(&asks)).join();
@@ -280,12 +304,29 @@ impl Runs {
     }
 }
 
-fn ask(run: &Inner) -> Ask<'_> {
+/// The altered stage that a run is asked for: its own, else the first; none where every input is as measured.
+fn asked_for(run: &Inner) -> Option<&Altered> {
+    run.altered.iter().find(|a| a.stage == run.stage).or(run.altered.first())
+}
+
+/// Altered columns of the stages beside the one that a run is asked for.
+fn others(run: &Inner) -> Vec<AlteredColumn<'_>> {
+    let own = asked_for(run).map(|a| a.stage);
+    let all = run.altered.iter().flat_map(|a| a.which.iter().map(move |&input| (a, input)));
+    let others = all.filter(|(a, _)| Some(a.stage) != own);
+    others
+        .map(|(a, input)| AlteredColumn { stage: a.stage, input, values: &a.columns[input] })
+        .collect()
+}
+
+fn ask<'a>(run: &'a Inner, others: &'a [AlteredColumn<'a>]) -> Ask<'a> {
+    let altered = asked_for(run);
     Ask {
-        stage: run.stage,
+        stage: altered.map_or(run.stage, |a| a.stage),
         parameters: &run.parameters,
         effects: &run.effects,
-        inputs: run.inputs.as_ref().map(|(columns, _)| columns.as_slice()),
+        inputs: altered.map(|a| a.columns.as_slice()),
+        others,
         trials: run.trials,
     }
 }

@@ -77,8 +77,22 @@ pub struct Ask<'a> {
     pub effects: &'a [f64],
     /// Columns that drive the stage, in the stage's order, each over the trials asked for; none where the columns are as measured.
     pub inputs: Option<&'a [Vec<f64>]>,
+    /// Columns that drive other stages and are altered as well; empty unless the source [takes inputs of several
+    /// stages](Source::takes_inputs_of_several).
+    pub others: &'a [AlteredColumn<'a>],
     /// Number of the session's trials, from the first.
     pub trials: usize,
+}
+
+/// A column in front of a stage, altered for one run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlteredColumn<'a> {
+    /// Index of the stage that the column drives.
+    pub stage: usize,
+    /// Index of the column among the inputs of that stage.
+    pub input: usize,
+    /// Values over the trials asked for.
+    pub values: &'a [f64],
 }
 
 /// Why a source has no answer.
@@ -153,7 +167,7 @@ pub enum SourceError {
 /// let source = closure(|ask: &Ask<'_>| -> Result<Vec<f64>, SourceError> {
 ///     Ok(vec![ask.parameters[0]; 3])
 /// });
-/// let ask = Ask { stage: 0, parameters: &[2.0], effects: &[], inputs: None, trials: 1 };
+/// let ask = Ask { stage: 0, parameters: &[2.0], effects: &[], inputs: None, others: &[], trials: 1 };
 /// assert_eq!(source.simulate_many(&[ask]), [Ok(vec![2.0; 3])]);
 /// ```
 pub trait Source: Send + Sync {
@@ -162,6 +176,8 @@ pub trait Source: Send + Sync {
 
     /// Whether an answer holds the outputs of all stages, one behind the other, whatever stage is asked for: a simulator that runs as a
     /// whole is then run once for all stages. The inputs of an ask are those of the stage asked for.
+    ///
+    /// Where the inputs of one stage are altered, such a source is asked for that stage, whichever output is looked at.
     fn answers_all(&self) -> bool {
         false
     }
@@ -169,6 +185,12 @@ pub trait Source: Send + Sync {
     /// Whether the simulator can be driven by other inputs than the measured ones.
     fn takes_inputs(&self) -> bool {
         true
+    }
+
+    /// Whether a source that [answers all stages](Source::answers_all) is also driven by the altered columns of
+    /// [other stages](Ask::others).
+    fn takes_inputs_of_several(&self) -> bool {
+        false
     }
 
     /// Number of asks at once that makes the source fast; more than one where a batch costs little more than a run.

@@ -133,10 +133,17 @@ class Asked:
         params: Array,
         effects: Array,
         altered: Sequence[Sequence[Array]] | None,
+        others: Sequence[tuple[int, int, Sequence[Array]]] = (),
     ) -> Array:
-        """Outputs of some models, `[n, samples]`; with several stages those of all, one behind the other."""
+        """Outputs of some models, `[n, samples]`; with several stages those of all, one behind the other.
+
+        `altered` holds a row a model for each column that drives the stage, `others` the same with stage and input for columns of
+        other stages.
+        """
         models, samples = params.shape[0], self.samples(trials)
-        inputs = self._inputs(stage, samples, models, altered)
+        rows_by_name = dict(zip(self.inputs[stage], altered or ()))
+        rows_by_name.update((self.inputs[other][at], rows) for other, at, rows in others)
+        inputs = self._inputs(samples, models, rows_by_name)
         more: dict[str, Any] = {}
         if "trials" in self.optional:
             more["trials"] = self.spans[:trials]
@@ -158,16 +165,12 @@ class Asked:
             rows.append(self._table(_first_axis(answer), 1, samples, outputs))
         return np.concatenate(rows)
 
-    def _inputs(
-        self, stage: int, samples: int, models: int, altered: Sequence[Sequence[Array]] | None
-    ) -> dict[str, Array] | None:
-        """Every column by name, `[n, samples]`: those that drive the stage as they were altered, the others as measured."""
+    def _inputs(self, samples: int, models: int, altered: Mapping[str, Sequence[Array]]) -> dict[str, Array] | None:
+        """Every column by name, `[n, samples]`: those that were altered as they are now, the others as measured."""
         if not self.takes_inputs:
             return None
         given = {name: np.broadcast_to(values[:samples], (models, samples)) for name, values in self.columns.items()}
-        for name, rows in zip(self.inputs[stage], altered or ()):
-            given[name] = np.stack(rows)
-        return given
+        return {**given, **{name: np.stack(rows) for name, rows in altered.items()}}
 
     def _table(self, answer: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
         """What came back, checked; several outputs side by side."""

@@ -28,6 +28,8 @@ pub(super) struct Hello {
     pub(super) inputs: bool,
     /// Whether the worker answers all stages at once.
     pub(super) all: bool,
+    /// Whether one model may have altered inputs of several stages.
+    pub(super) several: bool,
     /// Parameters that the worker knows; all parameters where the list is missing.
     pub(super) parameters: Option<Vec<String>>,
     /// Effects that the worker knows; all effects where the list is missing.
@@ -131,15 +133,23 @@ pub(super) fn read_ready(frame: &WorkerFrame) -> Result<Vec<String>, Wrong> {
     Ok(notes.filter_map(|note| note.as_str().map(str::to_owned)).collect())
 }
 
-/// The message that asks for models.
+/// The message that asks for models. A model with altered columns of other stages has their places, `[stage, input]`, under `others`.
 pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
-    let one = |ask: &Ask<'_>| json!({ "stage": ask.stage, "trials": ask.trials, "inputs": ask.inputs.is_some() });
+    let one = |ask: &Ask<'_>| {
+        let mut model =
+            json!({ "stage": ask.stage, "trials": ask.trials, "inputs": ask.inputs.is_some() });
+        if !ask.others.is_empty() {
+            model["others"] = ask.others.iter().map(|o| json!([o.stage, o.input])).collect();
+        }
+        model
+    };
     let models: Vec<Value> = asks.iter().map(one).collect();
     let mut body = Vec::new();
     for ask in asks {
         body.extend_from_slice(ask.parameters);
         body.extend_from_slice(ask.effects);
         ask.inputs.iter().copied().flatten().for_each(|column| body.extend_from_slice(column));
+        ask.others.iter().for_each(|other| body.extend_from_slice(other.values));
     }
     WorkerFrame::bytes(&json!({ "kind": "simulate", "models": models }), &body)
 }
@@ -179,10 +189,33 @@ pub(super) fn read_outputs(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::black_box::source::AlteredColumn;
 
     fn outputs(header: Value, body: &[f64]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
         let (frame, _) = WorkerFrame::first(&WorkerFrame::bytes(&header, body)).unwrap().unwrap();
         read_outputs(&frame, 2)
+    }
+
+    #[test]
+    fn altered_columns_of_other_stages_follow_those_of_the_stage_asked_for() {
+        let (own, other) = ([vec![1.0, 2.0]], [3.0, 4.0]);
+        let others = [AlteredColumn { stage: 2, input: 1, values: &other }];
+        let ask = Ask {
+            stage: 0,
+            parameters: &[7.0],
+            effects: &[8.0],
+            inputs: Some(&own),
+            others: &others,
+            trials: 1,
+        };
+        let bytes = simulate(&[ask, Ask { others: &[], ..ask }]);
+        let (frame, _) = WorkerFrame::first(&bytes).unwrap().unwrap();
+        let models = json!([
+            { "inputs": true, "others": [[2, 1]], "stage": 0, "trials": 1 },
+            { "inputs": true, "stage": 0, "trials": 1 },
+        ]);
+        assert_eq!(frame.header["models"], models);
+        assert_eq!(frame.body, [7.0, 8.0, 1.0, 2.0, 3.0, 4.0, 7.0, 8.0, 1.0, 2.0]);
     }
 
     #[test]

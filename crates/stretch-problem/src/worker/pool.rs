@@ -244,6 +244,10 @@ impl Source for Workers {
         self.hello.all
     }
 
+    fn takes_inputs_of_several(&self) -> bool {
+        self.hello.several
+    }
+
     fn batch(&self) -> usize {
         self.hello.batch.saturating_mul(self.spec.jobs)
     }

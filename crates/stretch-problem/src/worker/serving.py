@@ -33,7 +33,8 @@ def find(path):
 
 def hello(asked):
     known = {k: getattr(asked.simulator, k) for k in ("units", "parameters", "effects") if hasattr(asked.simulator, k)}
-    return {"kind": "hello", "version": 1, "batch": asked.batch, "inputs": asked.takes_inputs, "all": asked.answers_all, **known}
+    able = {"inputs": asked.takes_inputs, "all": asked.answers_all, "several": asked.takes_inputs}
+    return {"kind": "hello", "version": 1, "batch": asked.batch, **able, **known}
 
 
 def bind(asked, session, body):
@@ -42,7 +43,7 @@ def bind(asked, session, body):
 
 
 def take(asked, models, body):
-    """One model after the other: stage, trials, parameters, effects, altered inputs."""
+    """One model after the other: stage, trials, parameters, effects, altered inputs, and places and columns of other altered inputs."""
     at = 0
 
     def numbers(count):
@@ -54,23 +55,25 @@ def take(asked, models, body):
         stage, trials = model["stage"], model["trials"]
         parameters, effects = numbers(len(asked.parameters)), numbers(len(asked.effects))
         altered = [numbers(asked.samples(trials)) for _ in asked.inputs[stage]] if model["inputs"] else None
-        yield stage, trials, parameters, effects, altered
+        places = [tuple(place) for place in model.get("others", ())]
+        yield stage, trials, parameters, effects, altered, places, [numbers(asked.samples(trials)) for _ in places]
 
 
 def simulate(asked, models, body):
     """Neighbours of one kind are one call."""
-    kind = lambda model: (model[0], model[1], model[4] is None)
+    kind = lambda model: (model[0], model[1], model[4] is None, model[5])
     groups = itertools.groupby(take(asked, models, body), kind)
     return [row for _, group in groups for row in answer(asked, list(group))]
 
 
 def answer(asked, group):
     """A row for each model, or what was raised: of several models each is asked for alone then."""
-    stage, trials, _, _, altered = group[0]
+    stage, trials, _, _, altered, places, _ = group[0]
     inputs = None if altered is None else list(zip(*(model[4] for model in group)))
+    others = [(*place, rows) for place, rows in zip(places, zip(*(model[6] for model in group)))]
     table = lambda at: np.array([model[at] for model in group], "<f8").reshape(len(group), -1)
     try:
-        return list(asked(stage, trials, table(2), table(3), inputs))
+        return list(asked(stage, trials, table(2), table(3), inputs, others))
     except Exception as error:
         if len(group) > 1:
             return [row for model in group for row in answer(asked, [model])]

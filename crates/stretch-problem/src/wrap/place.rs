@@ -246,6 +246,11 @@ impl Placed {
         &self.parameters
     }
 
+    /// Values at which the search for the wrapper begins.
+    pub(crate) fn starts(&self) -> &[Vec<f64>] {
+        &self.starts
+    }
+
     /// The wrapper as an effect of the catalogue.
     pub(crate) fn spec(&self, among: &[Self], stage: &str) -> EffectSpec {
         let parameters = self.parameters.clone();

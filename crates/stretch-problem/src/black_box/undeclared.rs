@@ -1,0 +1,111 @@
+//! Parameters that move the output of a stage in which they are not said to act.
+//!
+//! A diagnosis re-tunes a parameter by the stages that its `stages` name alone. Where a simulator answers all stages at once, the runs of its
+//! sensitivities hold the other outputs as well; the change of output t for one tolerance sd of a parameter, in multiples of the noise, is
+//!
+//! ```text
+//! sqrt(mean of (y_t(p + d) - y_t(p))^2) sd/(|d| sd_t)
+//! ```
+
+use std::{
+    collections::BTreeMap,
+    sync::{Mutex, PoisonError},
+};
+
+use super::{
+    checked::Checked,
+    coupled::apart,
+    linear::Move,
+    runs::{Inner, Runs},
+};
+
+/// Multiples of its noise by which an output moves at least.
+const LEAST: f64 = 1.0;
+/// Names that a sentence lists.
+const LISTED: usize = 3;
+
+/// By parameter and by stage in which it is not said to act: the change of the output for one tolerance, in multiples of its noise.
+#[derive(Debug, Default)]
+pub(super) struct Undeclared(Mutex<BTreeMap<(usize, usize), f64>>);
+
+impl Undeclared {
+    /// Takes what the runs of a linearisation, which were made, say of the stages beside its own; the first look at a parameter counts.
+    pub(super) fn look(&self, problem: &Checked, runs: &Runs, at: &Inner, moves: &[Move]) {
+        let (about, session) = (problem.description(), problem.session());
+        if session.stages.len() < 2 || !runs.source().answers_all() {
+            return;
+        }
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for stage in 0..session.stages.len() {
+            let is_new = |m: &&Move| {
+                let is_declared = about.stages[stage].parameters.contains(&m.parameter);
+                !is_declared && !known.contains_key(&(m.parameter, stage))
+            };
+            let new: Vec<&Move> = moves.iter().filter(is_new).collect();
+            let output = |run: &Inner| runs.kept(session, &Inner { stage, ..run.clone() });
+            let noise = problem.noise[stage];
+            let Some(here) = output(at).filter(|_| !new.is_empty() && noise > 0.0) else {
+                continue;
+            };
+            for m in new {
+                let Some(there) = output(&m.inner) else { continue };
+                let share = about.parameters[m.parameter].sd / m.step.abs();
+                known.insert((m.parameter, stage), apart(&there, &here) * share / noise);
+            }
+        }
+    }
+
+    /// What is to be declared, in sentences: one for all parameters that act in the same stages and move the same other one.
+    pub(super) fn notes(&self, problem: &Checked) -> Vec<String> {
+        let about = problem.description();
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut alike: Vec<Alike<'_>> = Vec::new();
+        for (&(parameter, stage), &multiple) in known.iter().filter(|(_, m)| **m > LEAST) {
+            let said = about.stages.iter().filter(|s| s.parameters.contains(&parameter));
+            let said: Vec<&str> = said.map(|s| s.name.as_str()).collect();
+            let (name, moves) =
+                (about.parameters[parameter].name.as_str(), &*about.stages[stage].name);
+            match alike.iter_mut().find(|a| a.moves == moves && a.said == said) {
+                Some(alike) => alike.own.push((multiple, name)),
+                None => alike.push(Alike { said, moves, own: vec![(multiple, name)] }),
+            }
+        }
+        alike.into_iter().map(Alike::sentence).collect()
+    }
+}
+
+/// Parameters that are said to act in the same stages, and move the same other one.
+struct Alike<'a> {
+    said: Vec<&'a str>,
+    moves: &'a str,
+    /// By how many multiples of the noise, and names.
+    own: Vec<(f64, &'a str)>,
+}
+
+impl Alike<'_> {
+    fn sentence(mut self) -> String {
+        self.own.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (moves, most) = (self.moves, self.own[0].0);
+        let listed = self.own.iter().take(LISTED).map(|(_, name)| (*name).to_owned());
+        let left = self.own.len().saturating_sub(LISTED);
+        let names: Vec<String> = listed.chain((left > 0).then(|| format!("{left} more"))).collect();
+        let (are, each, up_to) = match self.own.len() {
+            1 => ("is", "it", ""),
+            _ => ("are", "each", "up to "),
+        };
+        format!(
+            "{} {are} said to act on {} alone, but one tolerance of {each} moves {moves} by {up_to}{most:.1} times its noise: add {moves} to the `stages`",
+            joined(&names),
+            self.said.join(" and "),
+        )
+    }
+}
+
+/// Names in a row: `a`, `a and b`, `a, b and c`.
+fn joined(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

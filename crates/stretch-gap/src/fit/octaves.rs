@@ -79,6 +79,21 @@ impl Octaves {
         self
     }
 
+    /// Mean squares without what model discrepancy may have left of them: in each octave the share `of_closed` of what was closed of the `nominal` there, as
+    /// far as `next` leaves less.
+    pub(crate) fn less_discrepancy(mut self, nominal: &Self, next: &Self, of_closed: f64) -> Self {
+        for ((x, nominal), next) in self.sums.iter_mut().zip(nominal.sums).zip(next.sums) {
+            let may_be_left = of_closed * (nominal - *x).max(0.0);
+            *x = (*x - may_be_left).max(next).min(*x);
+        }
+        self
+    }
+
+    /// Mean squares of as many coefficients of noise as it is described.
+    pub(crate) fn of_noise(&self) -> Self {
+        Self { sums: self.counts, counts: self.counts }
+    }
+
     /// S of the module's head, from this one to the next.
     pub(crate) fn rise(&self, next: &Self) -> f64 {
         let mean = |sum: f64, count: f64| (sum / count).max(LEAST);
@@ -142,6 +157,31 @@ mod tests {
             approx::assert_relative_eq!(sum, dot(&x, &x), max_relative = FIT_WELL);
             assert_eq!(octaves.counts.iter().sum::<f64>(), samples as f64);
         }
+    }
+
+    /// What is left where nothing was closed is no discrepancy; where much was, little more that closes is none of a further effect's.
+    #[test]
+    fn discrepancy_is_a_share_of_what_was_closed_in_its_octave() {
+        let of = |slow: f64, quick: f64| {
+            let mut octaves = Octaves { sums: [100.0; OCTAVES], counts: [100.0; OCTAVES] };
+            (octaves.sums[9], octaves.sums[1]) = (100.0 * slow, 100.0 * quick);
+            octaves
+        };
+        let nominal = of(401.0, 5.0);
+        let rise =
+            |base: Octaves, next: Octaves| base.less_discrepancy(&nominal, &next, 0.03).rise(&next);
+        let (base, next) = (of(9.0, 5.0), of(1.0, 1.0));
+        // of 392 closed slowly 11.8 may be left; of the quick part nothing was closed
+        approx::assert_relative_eq!(
+            rise(base, next),
+            of(1.0, 5.0).rise(&next),
+            max_relative = FIT_WELL
+        );
+        assert!(rise(of(20.0, 1.0), next) > 12.0);
+        // what a further effect spoils counts as it is, and without a first effect there is no discrepancy
+        assert_eq!(rise(next, base), next.rise(&base));
+        assert_eq!(rise(nominal, next), nominal.rise(&next));
+        assert_eq!(base.less_discrepancy(&nominal, &next, 0.0), base);
     }
 
     /// Of a regressor that does nothing chance makes chi^2/2 nats with one degree of freedom: 0.5 in the mean, above 12 nats once in

@@ -22,6 +22,7 @@ use crate::{
         hypothesis::Hypothesis,
         identifiability::{Identified, Information, identified},
         levenberg_marquardt::{Effort, FINE, Fitted},
+        octaves::Octaves,
         score::{LEARNT, Misfit, Observations, gap, score, shared},
         starts::Starts,
     },
@@ -329,10 +330,29 @@ impl<'a> PreparedProblem<'a> {
         -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
-    /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::fit::octaves) of what they leave, nats.
-    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
-        let pairs = base.misfits.iter().zip(&next.misfits);
-        pairs.map(|(a, b)| a.octaves.rise(&b.octaves)).sum()
+    /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::fit::octaves) of what they leave, nats, beyond the share
+    /// `of_closed` of what the first closes in each octave.
+    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis, of_closed: f64) -> f64 {
+        let stages = 0..base.misfits.len();
+        stages.map(|s| self.rise_in(base, s, of_closed, |_| next.misfits[s].octaves)).sum()
+    }
+
+    /// The same in one stage, were noise alone left of it.
+    pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize, of_closed: f64) -> f64 {
+        self.rise_in(base, stage, of_closed, Octaves::of_noise)
+    }
+
+    fn rise_in(
+        &self,
+        base: &Hypothesis,
+        stage: usize,
+        of_closed: f64,
+        next: impl Fn(&Octaves) -> Octaves,
+    ) -> f64 {
+        let octaves = |set: &Hypothesis| set.misfits[stage].octaves;
+        let (nominal, base) = (octaves(&self.nominal), octaves(base));
+        let next = next(&base);
+        base.less_discrepancy(&nominal, &next, of_closed).rise(&next)
     }
 
     /// Share of a stage's noise that noise of its measured input makes.

@@ -1,10 +1,10 @@
 //! What an effect must bring to be taken: more than chance, more than what counts, more than model discrepancy.
 //!
-//! Four acceptance criteria, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour: `rise` nats by the
-//! [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little may be
-//! model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
-//! closes than *model discrepancy* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
-//! `model_discrepancy` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
+//! Three acceptance criteria, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour, and more than *model
+//! discrepancy*: the rig's backlash is not the textbook's; an effect in the right place leaves a share `model_discrepancy` of what it closes, in the
+//! octaves in which it closes it, and evidence grows with the samples while that share does not. Beyond that share the further effect brings `rise`
+//! nats by the [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little
+//! may be model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes.
 //! Both sets stand beside each other with the [deviations](crate::fit::deviations) of their own effects' forms as well.
 
 use crate::{
@@ -42,15 +42,19 @@ impl Acceptance<'_> {
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         next.score - base.score > self.least_rise(closed)
-            && self.problem.rise(base, next) > self.thresholds.rise
+            && self.problem.rise(base, next, self.thresholds.model_discrepancy)
+                > self.thresholds.rise
             && closed >= self.thresholds.share * self.left(base, new)
-            && self.exceeds_discrepancy(base, next, new)
     }
 
-    /// Whether an effect on top of `base` can be more than what model discrepancy left.
+    /// Whether an effect on top of `base` can be more than what model discrepancy left: in a stage in which nothing acts yet, or where
+    /// more is left than that.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
-        let mut touched = self.touched(effect).iter();
-        touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))
+        let specs = self.problem.simulator().effects();
+        let is_free = |s: &usize| base.effects.iter().all(|e| !specs[*e].touches.contains(s));
+        let (discrepancy, rise) = (self.thresholds.model_discrepancy, self.thresholds.rise);
+        let is_left = |s: &usize| self.problem.most_rise(base, *s, discrepancy) > rise;
+        self.touched(effect).iter().any(|s| is_free(s) || is_left(s))
     }
 
     /// Rise of the score that one effect more has to bring, if it closes that much.
@@ -62,19 +66,6 @@ impl Acceptance<'_> {
     /// Gap that is left in the stages that an effect touches.
     pub(crate) fn left(&self, base: &Hypothesis, effect: usize) -> f64 {
         self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
-    }
-
-    fn exceeds_discrepancy(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
-        self.touched(new).iter().any(|&s| {
-            let closed = self.problem.closes(base, next, s);
-            closed > 0.0 && closed >= self.discrepancy(base, s)
-        })
-    }
-
-    /// Gap that model discrepancy may leave of what a set closes in a stage.
-    fn discrepancy(&self, base: &Hypothesis, stage: usize) -> f64 {
-        let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
-        self.thresholds.model_discrepancy * (gap(&self.problem.nominal) - gap(base)).max(0.0)
     }
 
     fn touched(&self, effect: usize) -> &[usize] {

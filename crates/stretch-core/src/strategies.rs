@@ -244,6 +244,7 @@ pub fn turns() -> impl Strategy<Value = Turns> {
                 movements_an_hour,
                 follow,
                 reference_per_signal,
+                limit_growth: 1e-3 * follow,
             }
         },
     )

@@ -48,10 +48,13 @@ pub(crate) struct Priors {
     each: Vec<Prior>,
 }
 
-/// The prior of all sessions but those that it refuses beside the others, such as a sensor that falls where it rises elsewhere.
-fn learnt(mut sessions: Vec<Session>) -> anyhow::Result<Prior> {
+/// What is made of all sessions but those that are refused beside the others, such as a sensor that falls where it rises elsewhere.
+fn of_accepted(
+    mut sessions: Vec<Session>,
+    make: impl Fn(&[Session]) -> Result<Prior, CalibrateError>,
+) -> anyhow::Result<Prior> {
     loop {
-        match Prior::learn(&sessions) {
+        match make(&sessions) {
             Err(CalibrateError::Prior { file, .. }) if sessions.iter().any(|s| s.name == file) => {
                 sessions.retain(|s| s.name != file);
             }
@@ -92,10 +95,14 @@ impl Judge {
         let kept: Vec<Session> =
             self.sessions.iter().filter(|s| s.path[0] != wearer).cloned().collect();
         let channels = 0..self.set.signals.len();
-        let each =
-            channels.map(|k| learnt(self.alone(&kept, k)?)).collect::<Result<Vec<_>, _>>()?;
+        let each = channels
+            .map(|k| of_accepted(self.alone(&kept, k)?, Prior::learn))
+            .collect::<Result<Vec<_>, _>>()?;
         let is_many = each.len() > 1 && !self.asked.leave_sensor;
-        Ok(Priors { all: if is_many { Some(learnt(kept)?) } else { None }, each })
+        Ok(Priors {
+            all: if is_many { Some(of_accepted(kept, Prior::learn)?) } else { None },
+            each,
+        })
     }
 
     /// The sessions of one channel that a prior for a channel is learnt from: its own, or those of all others.
@@ -115,11 +122,13 @@ impl Judge {
     pub(crate) fn rows(&self, every: usize) -> anyhow::Result<Vec<Row>> {
         let mut rows = Vec::new();
         for wearer in self.wearers() {
+            let worn = self.set.worn.iter().enumerate().step_by(every);
+            let mut worn = worn.filter(|(_, worn)| worn.wearer == wearer).peekable();
+            if worn.peek().is_none() {
+                continue;
+            }
             let priors = self.without(&wearer)?;
-            for (index, worn) in self.set.worn.iter().enumerate() {
-                if worn.wearer != wearer || index % every != 0 {
-                    continue;
-                }
+            for (index, worn) in worn {
                 let places: Vec<Option<usize>> = match self.asked.leave_sensor {
                     true => (0..self.set.signals.len()).map(Some).collect(),
                     false => vec![None],
@@ -190,8 +199,11 @@ impl Judge {
         let has_others = others.iter().any(|s| s.path[0] == worn.wearer);
         for (what, prior) in [("one", Some(&priors.each[place])), ("all", priors.all.as_ref())] {
             let Some(prior) = prior else { continue };
-            let own = if what == "one" { &self.alone(&others, place)? } else { &others };
-            let knowing = if has_others { Some(prior.knowing(own)?) } else { None };
+            let own = if what == "one" { self.alone(&others, place)? } else { others.clone() };
+            let knowing = match has_others {
+                true => Some(of_accepted(own, |own| prior.knowing(own))?),
+                false => None,
+            };
             let told = UpdateOptions::of(&format!("{}/{}", worn.wearer, worn.activity));
             let cases = [
                 ("new wearer", Some(prior), UpdateOptions::default()),

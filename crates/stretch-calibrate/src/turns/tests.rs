@@ -123,7 +123,7 @@ fn false_alarms(scatter: Scatter, movements: usize, drift: f64, follow: bool) ->
             continue;
         };
         let watch = ZeroWatch::new(&calibration).unwrap();
-        let watch = if follow { watch.following(&calibration) } else { watch };
+        let watch = if follow { watch.following() } else { watch };
         let count = (hours * AN_HOUR) as usize;
         let limit_mm = calibration.turns.unwrap().limit / 0.02;
         let drifts = |k: usize| drift * limit_mm * k as f64 / AN_HOUR;
@@ -133,7 +133,7 @@ fn false_alarms(scatter: Scatter, movements: usize, drift: f64, follow: bool) ->
 }
 
 /// 600 simulated hours of each kind. The stated rate of 0.25 an hour holds from a hundred movements for every kind, and
-/// from forty where levels scatter to both sides; twenty are too few to know their tails or how alike they are.
+/// from forty but for levels of which a third lie anywhere to one side; twenty are too few to know such tails.
 #[test]
 fn false_alarms_come_as_often_as_is_said() {
     for (scatter, most) in [
@@ -141,9 +141,9 @@ fn false_alarms_come_as_often_as_is_said() {
         (Scatter::Amplitudes, [0.25, 0.25]),
         (Scatter::Uniform, [0.25, 0.25]),
         (Scatter::Student, [0.25, 0.25]),
-        (Scatter::OneSided, [1.0, 0.25]),
-        (Scatter::Partial, [1.0, 0.25]),
-        (Scatter::Alike, [1.0, 0.25]),
+        (Scatter::OneSided, [0.25, 0.25]),
+        (Scatter::Partial, [0.5, 0.25]),
+        (Scatter::Alike, [0.25, 0.25]),
     ] {
         for (movements, most) in [(20, f64::INFINITY), (40, most[0]), (100, most[1])] {
             let (rate, silent) = false_alarms(scatter, movements, 0.0, false);
@@ -155,19 +155,19 @@ fn false_alarms_come_as_often_as_is_said() {
     }
 }
 
-/// A zero that drifts by half of the limit in two hours is taken for a shift more often than is said, unless it is followed.
+/// A zero that drifts by half of the limit in two hours is no shift.
 #[test]
 fn a_slow_drift_is_followed_and_no_shift() {
     for movements in [20, 40, 100] {
         let (still, _) = false_alarms(Scatter::Normal, movements, 0.25, false);
         let (followed, _) = false_alarms(Scatter::Normal, movements, 0.25, true);
         println!("drift, {movements} movements: {still:.3} an hour, followed {followed:.3}");
-        assert!(followed <= 0.32 && followed <= still, "{movements}: {followed}, {still}");
+        assert!(followed <= 0.25 && still <= 0.25, "{movements}: {followed}, {still}");
     }
     let (mut squares, mut left) = (0.0, 0.0);
     for draw in 0..100 {
         let calibration = calibration(Scatter::Normal, 40, draw).unwrap();
-        let watch = ZeroWatch::new(&calibration).unwrap().following(&calibration);
+        let watch = ZeroWatch::new(&calibration).unwrap().following();
         let own = Movements::new(Scatter::Normal, 1_000_000 + draw);
         let all = told(watch, own, 1200, |k| k as f64 / AN_HOUR);
         // a millimetre is 0.02 V
@@ -211,8 +211,10 @@ fn a_shift_is_found_and_told() {
         println!(
             "{scatter:?}: {found} of {judged} shifts of 8 mm, after {middle} movements, 0.95 of them {last}, distance off by {rms:.2} mm"
         );
+        // a third of the movements that end within 10 mm are as far off as the shift
+        let least = if matches!(scatter, Scatter::Partial) { 0.8 } else { 0.95 };
         assert!(
-            found as f64 >= 0.95 * f64::from(judged) && rms < 2.0,
+            found as f64 >= least * f64::from(judged) && rms < 2.0,
             "{scatter:?}: {found}, {rms}"
         );
     }

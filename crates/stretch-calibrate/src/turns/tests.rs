@@ -228,3 +228,31 @@ fn what_says_nothing_is_none() {
     let walk: Vec<(f64, f64)> = (0..30).map(|k| (f64::from(k), 100.0 + f64::from(k))).collect();
     assert_eq!(Learnt::of(&[walk], 1.0), None);
 }
+
+/// A walk is one of the levels whatever their unit and zero, and is found again where there are enough of them.
+#[test]
+fn a_walk_is_found_and_scales_as_levels_do() {
+    let levels = |count: usize, gain: f64, seed: u64| -> Vec<f64> {
+        let (mut random, mut zero) = (Random(seed), 0.0);
+        let step = gain / (1.0 - gain).sqrt();
+        let next = |_| {
+            zero += step * random.noise();
+            zero + random.noise()
+        };
+        (0..count).map(next).collect()
+    };
+    for (seed, gain) in [(1, 0.0), (2, 0.1), (3, 0.3), (4, 0.6)] {
+        let own = levels(2000, gain, seed);
+        let found = walk(std::slice::from_ref(&own));
+        assert!((found.gain - gain).abs() < 0.04, "{found:?} of {gain}");
+        let step = gain * gain / (1.0 - gain);
+        assert!((found.step - step).abs() < 0.15 * step + 1e-4, "{found:?} of {step}");
+        let moved: Vec<f64> = own.iter().map(|level| 5.0 - 1e-3 * level).collect();
+        let moved = walk(&[moved]);
+        assert!((moved.gain - found.gain).abs() < 1e-9, "{moved:?}, {found:?}");
+        assert!((moved.step / found.step * 1e6 - 1.0).abs() < 1e-6, "{moved:?}, {found:?}");
+    }
+    // what few levels leave open is more than what many do
+    let open = |count| walk(&[levels(count, 0.0, 7)]).gain;
+    assert!(open(10) > open(100) && open(100) > open(1000));
+}

@@ -23,7 +23,7 @@ use crate::{
 /// `limit` is of `v`. Each of both has half of the false alarms.
 ///
 /// A zero may also walk at random, by a variance `q` a movement. After `k` movements it has a variance of `q (k + n/3)` about
-/// the mean level of `n`; that of the running mean's limit grows so, by `limit_growth = t^2 q` a movement. The median is
+/// the mean level of `n`; limits of what lasts grow so, by `limit_growth = t^2 q` a movement. The median is
 /// held against a zero that follows levels by a share `follow` of what they are off, so that its limit need not grow. Both are means over what the
 /// calibration's levels say of `q`.
 ///
@@ -72,7 +72,7 @@ pub struct Turns {
     pub follow: f64,
     /// Change of the estimate per change of the signal at the level.
     pub reference_per_signal: f64,
-    /// What the square of the running mean's limit grows by with each movement, in the signal's unit squared; 0 in earlier records.
+    /// What the squares of the limits of what lasts grow by with each movement, in the signal's unit squared; 0 in earlier records.
     #[cfg_attr(feature = "serde", serde(default))]
     pub limit_growth: f64,
 }

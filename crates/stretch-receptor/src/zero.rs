@@ -88,8 +88,8 @@ impl<T: Real> TurnFinder<T> {
 /// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). What is told at the end of each is
 /// `off`, the median of the last five levels less that of the record. A zero `z` follows levels as the state of a scalar Kalman filter at its
 /// steady gain `k`: `z += k clip(y - level - z)`, with innovations clipped at two standard deviations of levels. The zero has
-/// shifted where `off - z` exceeds the record's limit, or where the running mean of `y - level` does so of its own, whose limit
-/// grows with the movements since as a zero that walks at random may get away; the record states the rate of false
+/// shifted where `off - z` exceeds the record's limit, or where the running mean of `y - level` does so of its own or `z` of the median's, both of which
+/// grow with the movements since as a zero that walks at random may get away; the record states the rate of false
 /// alarms. Three movements are enough for a shift beyond the first limit, ten to thirty for one beyond the second. It is told until
 /// both are within half of their limits, and meanwhile is not followed.
 ///
@@ -145,9 +145,9 @@ pub struct ZeroWatch<T> {
     pub follow: T,
     /// How much of it is taken off a sample at most; 0 where it is not taken off.
     pub most_corrected: T,
-    /// What the square of the mean's limit grows by with each movement.
+    /// What the squares of limits grow by with each movement, but for a median that is held against a zero that is followed.
     pub growth: T,
-    /// What it has grown by at the beginning.
+    /// What they have grown by at the beginning.
     pub grown: T,
     /// Change of the estimate per change of the signal, times `sign`.
     pub reference: T,
@@ -275,9 +275,13 @@ impl<T: Real> ZeroWatch<T> {
             let innovation = clipped(level - self.level - memory.followed);
             memory.followed = memory.followed + self.follow * innovation;
         }
-        let is_at_most =
-            self.most_corrected > T::zero() && memory.followed.abs() >= share * self.most_corrected;
-        let has_shifted = jumped || lasts || is_at_most;
+        let most = if self.most_corrected > T::zero() {
+            self.most_corrected * self.most_corrected
+        } else {
+            self.limit * self.limit + memory.grown
+        };
+        let is_far = whole && memory.followed * memory.followed >= share * share * most;
+        let has_shifted = jumped || lasts || is_far;
         let began = || if jumped { self.first(memory, off) } else { memory.turned };
         memory.since = has_shifted.then(|| memory.since.unwrap_or_else(began));
         whole.then(|| Zero {

@@ -164,6 +164,17 @@ fn a_slow_drift_is_followed_and_no_shift() {
         println!("drift, {movements} movements: {still:.3} an hour, followed {followed:.3}");
         assert!(followed <= 0.25 && still <= 0.25, "{movements}: {followed}, {still}");
     }
+    let mut found = 0;
+    for draw in 0..100 {
+        let calibration = calibration(Scatter::Normal, 100, draw).unwrap();
+        let limit_mm = calibration.turns.unwrap().limit / 0.02;
+        let far = |k: usize| 8.0 * limit_mm * k as f64 / 2.0 / AN_HOUR;
+        let watch = ZeroWatch::new(&calibration).unwrap();
+        let all = told(watch, Movements::new(Scatter::Normal, 1_000_000 + draw), 2400, far);
+        found += u32::from(all[2399].unwrap().has_shifted);
+    }
+    println!("a drift by eight limits in two hours: {found} of 100 told");
+    assert!(found >= 75, "{found}");
     let (mut squares, mut left) = (0.0, 0.0);
     for draw in 0..100 {
         let calibration = calibration(Scatter::Normal, 40, draw).unwrap();

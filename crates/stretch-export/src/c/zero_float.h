@@ -183,9 +183,9 @@ static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, s
     if (whole && !jumped && !lasts) {
         z->followed = z->followed + STRETCH_ZERO_FOLLOW * stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
     }
-    limit = share * z->most_corrected;
-    shifted = jumped || lasts ||
-              (z->most_corrected > 0.0f && (z->followed >= limit || z->followed <= -limit));
+    limit = z->most_corrected > 0.0f ? z->most_corrected * z->most_corrected
+                                     : STRETCH_ZERO_LIMIT * STRETCH_ZERO_LIMIT + z->grown;
+    shifted = jumped || lasts || (whole && z->followed * z->followed >= share * share * limit);
     if (shifted && !z->shifted) {
         z->since = jumped ? stretch_zero_first(z, off) : z->turned;
     }

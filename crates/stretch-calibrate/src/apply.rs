@@ -84,7 +84,7 @@ impl LiveReceptor {
         if follows_rest(calibration) {
             return refused("its model follows the zero at rest already");
         }
-        Ok(Self { watch: Some((watch.following(), memory)), ..self })
+        Ok(Self { watch: Some((watch.following(calibration), memory)), ..self })
     }
 
     /// What the movement that ended with the last sample said of the zero; `None` while one is under way, and for a

@@ -7,7 +7,7 @@ use stretch_fit::student_two_sided;
 use stretch_receptor::{Receptor, TurnFinder, TurnMemory};
 
 use crate::{
-    array::{Levels, independent, levels},
+    levels::{Levels, independent, levels},
     series::{extent, noise},
 };
 
@@ -23,8 +23,6 @@ const LEAST_NOISES: f64 = 6.0;
 const LEAST_MOVEMENTS: f64 = 8.0;
 /// Variance of the median of five normal values over that of one.
 const MEDIAN_VARIANCE: f64 = 0.2868;
-/// Gains that the likelihood of levels is summed over.
-const GAINS: u32 = 100;
 /// A zero is not followed faster than the median of five can tell a shift from it.
 const MOST_FOLLOW: f64 = 0.2;
 /// A constant signal is held this long, so that what a model remembers has faded.
@@ -149,7 +147,6 @@ struct Learnt {
     mean_limit: f64,
     movements_an_hour: f64,
     follow: f64,
-    limit_growth: f64,
     low: f64,
     high: f64,
 }
@@ -175,7 +172,6 @@ impl Learnt {
         let t = student_two_sided(1.0 - share, (independent - 1.0) as u64);
         let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
         let mean_variance = Turns::MEAN_SHARE / (2.0 - Turns::MEAN_SHARE) * count / independent;
-        let walk = walk(&sequences);
         let level = clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter);
         Some(Self {
             high_share,
@@ -185,9 +181,7 @@ impl Learnt {
             limit: spread(median_variance(alike)).max(tail(&sequences, level, share)),
             mean_limit: spread(mean_variance.min(1.0)),
             movements_an_hour,
-            // so many movements do not tell a slower walk from none
-            follow: walk.gain.clamp((1.0 / count).min(MOST_FOLLOW), MOST_FOLLOW),
-            limit_growth: t * t * walk.step,
+            follow: follow(&sequences, count, variance),
             low,
             high,
         })
@@ -207,7 +201,6 @@ impl Learnt {
             movements_an_hour: self.movements_an_hour,
             follow: self.follow,
             reference_per_signal,
-            limit_growth: self.limit_growth,
         }
     }
 
@@ -271,53 +264,27 @@ fn median_variance(alike: f64) -> f64 {
     (MEDIAN_VARIANCE * factor).min(1.0)
 }
 
-/// A zero that walks at random below levels with noise.
-#[derive(Debug, Clone, Copy, Default)]
-struct Walk {
-    /// Steady gain of the scalar Kalman filter that follows it.
-    gain: f64,
-    /// Variance of its step from one level to the next.
-    step: f64,
-}
-
-/// The mean walk over what levels say of it, of a uniform distribution of the gain.
+/// Steady gain of the scalar Kalman filter of a zero that walks at random below levels with noise.
 ///
-/// A zero with steps of variance `q` below levels with noise of variance `r` is followed by a filter of steady gain `k`, where `q = r k^2/(1 - k)`
-/// (Harvey, Forecasting, structural time series models and the Kalman filter, 1989, section 3.3). Given `k`, the innovations `v` of the filter and
-/// their variances `r f` have the likelihood `prod f^-1/2 (sum v^2/f)^(-m/2)` of `m` of them, where `r` is integrated over
-/// with the density `1/r`, and `r = sum v^2/(f m)`. That a short record cannot exclude a walk is so kept: its mean is above zero.
-fn walk(sequences: &[Vec<f64>]) -> Walk {
-    let given = |gain: f64| {
-        let ratio = gain * gain / (1.0 - gain);
-        let (mut logs, mut squares, mut count) = (0.0, 0.0, 0.0);
-        for own in sequences.iter().filter(|own| !own.is_empty()) {
-            // the first level says where the zero is, with the variance of the noise
-            let (mut zero, mut variance) = (own[0], 1.0);
-            for level in &own[1..] {
-                let before = variance + ratio;
-                let all = before + 1.0;
-                let innovation = level - zero;
-                logs += all.ln();
-                squares += innovation * innovation / all;
-                count += 1.0;
-                zero += before / all * innovation;
-                variance = before / all;
-            }
-        }
-        let noise: f64 = squares / count;
-        (-0.5 * (logs + count * squares.ln()), Walk { gain, step: ratio * noise })
+/// With `d1`, `d2` the mean squared differences of levels one and two movements apart, the walk's variance is `q = d2 -
+/// d1` and the noise's `r = d1 - d2/2`; the variance before a level is `p = (q + sqrt(q^2 + 4 q r))/2` and the gain
+/// `p/(p + r)` (Harvey, Forecasting, structural time series models and the Kalman filter, 1989, section 3.3). Of independent
+/// levels of variance `v`, `d2 - d1` has the standard error `v sqrt(8/n)`, two of which are taken off `q`. The gain is at
+/// least `1/n`: `n` movements do not tell a slower walk, whose gain that is, from none.
+fn follow(sequences: &[Vec<f64>], count: f64, variance: f64) -> f64 {
+    let apart = |k: usize| {
+        let squares: Vec<f64> = sequences
+            .iter()
+            .flat_map(|own| own.iter().zip(own.iter().skip(k)).map(|(a, b)| (b - a).powi(2)))
+            .collect();
+        squares.iter().sum::<f64>() / squares.len().max(1) as f64
     };
-    let all: Vec<(f64, Walk)> =
-        (0..GAINS).map(|k| given(f64::from(k) / f64::from(GAINS))).collect();
-    let most = all.iter().map(|(likelihood, _)| *likelihood).fold(f64::MIN, f64::max);
-    let (mut mean, mut weights) = (Walk::default(), 0.0);
-    for (likelihood, Walk { gain, step }) in all {
-        let weight = (likelihood - most).exp();
-        mean.gain += weight * gain;
-        mean.step += weight * step;
-        weights += weight;
-    }
-    Walk { gain: mean.gain / weights, step: mean.step / weights }
+    let (d1, d2) = (apart(1), apart(2));
+    let error = variance * (8.0 / count).sqrt();
+    let (q, r) = ((d2 - d1 - 2.0 * error).max(0.0), (d1 - 0.5 * d2).max(0.0));
+    let p = 0.5 * (q + (q * q + 4.0 * q * r).sqrt());
+    let gain = if p + r > 0.0 { p / (p + r) } else { 0.0 };
+    gain.clamp((1.0 / count).min(MOST_FOLLOW), MOST_FOLLOW)
 }
 
 /// Change of the estimate per change of the signal about a level, from two signals that are held.

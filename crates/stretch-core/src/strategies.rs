@@ -244,7 +244,6 @@ pub fn turns() -> impl Strategy<Value = Turns> {
                 movements_an_hour,
                 follow,
                 reference_per_signal,
-                limit_growth: 1e-3 * follow,
             }
         },
     )

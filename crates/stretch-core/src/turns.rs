@@ -2,7 +2,7 @@
 
 use crate::{
     DesignError,
-    sizes::{MOST, MOST_SLOPE, extent, size},
+    sizes::{MOST_SLOPE, extent, size},
 };
 
 /// The levels at which the signal turned while calibrating, and how far a later one may be off.
@@ -22,11 +22,6 @@ use crate::{
 /// newest (Roberts, Technometrics 1 (1959) 239): its variance is that of levels times `k/(2 - k)`, and `mean_limit` is made of it as
 /// `limit` is of `v`. Each of both has half of the false alarms.
 ///
-/// A zero may also walk at random, by a variance `q` a movement. After `k` movements it has a variance of `q (k + n/3)` about
-/// the mean level of `n`; limits of what lasts grow so, by `limit_growth = t^2 q` a movement. The median is
-/// held against a zero that follows levels by a share `follow` of what they are off, so that its limit need not grow. Both are means over what the
-/// calibration's levels say of `q`.
-///
 /// ```
 /// use stretch_core::Turns;
 /// let turns = Turns {
@@ -41,7 +36,6 @@ use crate::{
 ///     movements_an_hour: 1200.0,
 ///     follow: 0.025,
 ///     reference_per_signal: -30.0,
-///     limit_growth: 1e-6,
 /// };
 /// assert!(turns.validate().is_ok());
 /// assert!(Turns { limit: f64::NAN, ..turns }.validate().is_err());
@@ -68,13 +62,10 @@ pub struct Turns {
     pub false_alarms_an_hour: f64,
     /// Movements an hour of the calibration.
     pub movements_an_hour: f64,
-    /// Share of a level's innovation by which the zero moves that is followed, 0 to 1.
+    /// Share of a level's innovation by which a zero that is followed moves, 0 to 1.
     pub follow: f64,
     /// Change of the estimate per change of the signal at the level.
     pub reference_per_signal: f64,
-    /// What the squares of the limits of what lasts grow by with each movement, in the signal's unit squared; 0 in earlier records.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub limit_growth: f64,
 }
 
 impl Turns {
@@ -105,8 +96,6 @@ impl Turns {
         for (field, x) in [("turns.high_share", self.high_share), ("turns.follow", self.follow)] {
             DesignError::check(field, x, (0.0..=1.0).contains(&x))?;
         }
-        let growth = self.limit_growth;
-        DesignError::check("turns.limit_growth", growth, (0.0..=MOST).contains(&growth))?;
         let slope = self.reference_per_signal;
         DesignError::check("turns.reference_per_signal", slope, slope.abs() <= MOST_SLOPE)?;
         Ok(())

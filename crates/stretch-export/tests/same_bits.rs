@@ -100,7 +100,7 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
             let receptor = Receptor::<f32>::new(calibration).unwrap();
             let mut memory = receptor.memory();
             let watch = ZeroWatch::<f32>::new(calibration);
-            let mut zero = watch.map(|w| (w.following(), w.memory()));
+            let mut zero = watch.map(|w| (w.following(calibration), w.memory()));
             for (n, &code) in codes.iter().enumerate() {
                 let mut sample = volts(code);
                 if let Some((watch, own)) = &mut zero {
@@ -294,7 +294,6 @@ fn zeros(compilers: &[Compiler]) {
         movements_an_hour: 1200.0,
         follow: 0.1,
         reference_per_signal: -31.0,
-        limit_growth: 1e-5,
     };
     let wide = Turns { limit: 0.5, mean_limit: 0.2, scatter: 0.3, ..turns };
     let poly13 = stretch_receptor::example_calibration();

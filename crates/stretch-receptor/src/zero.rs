@@ -86,15 +86,15 @@ impl<T: Real> TurnFinder<T> {
 /// and follows a slow change where it is asked to.
 ///
 /// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). What is told at the end of each is
-/// `off`, the median of the last five levels less that of the record. A zero `z` follows levels as the state of a scalar Kalman filter at its
-/// steady gain `k`: `z += k clip(y - level - z)`, with innovations clipped at two standard deviations of levels. The zero has
-/// shifted where `off - z` exceeds the record's limit, or where the running mean of `y - level` does so of its own or `z` of the median's, both of which
-/// grow with the movements since as a zero that walks at random may get away; the record states the rate of false
+/// `off`, the median of the last five levels less that of the record. The zero has shifted where `off` exceeds the
+/// record's limit, or where the running mean of levels does so of its own; the record states the rate of false
 /// alarms. Three movements are enough for a shift beyond the first limit, ten to thirty for one beyond the second. It is told until
-/// both are within half of their limits, and meanwhile is not followed.
+/// both are within half of their limits.
 ///
-/// Where the receptor is given samples without the zero that is followed, the running mean is of `y - level - z`, `z` is taken off
-/// as far as the limit, and a shift is told where it is at it: the calibration has seen no more.
+/// A zero `z` that is followed is the state of a scalar Kalman filter at its steady gain `k`: `z += k clip(y - level -
+/// z)`, with innovations clipped at two standard deviations of levels and `z` at the limit. A shift is then told where
+/// `off - z` exceeds the limit, or where `z` is at it: the calibration has seen no more. A zero that has shifted
+/// is not followed.
 ///
 /// What is assumed is that movements return to the ends that they had in the calibration; a movement that does not is as
 /// good as a shift. Without movements nothing is told.
@@ -105,7 +105,7 @@ impl<T: Real> TurnFinder<T> {
 /// // a gauge that rests at 1.24 V, 0.03 mm a millivolt
 /// let turns = Turns {
 ///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03, mean_limit: 0.012,
-///     false_alarms_an_hour: 0.25, movements_an_hour: 1800.0, follow: 0.025, reference_per_signal: -30.0, limit_growth: 0.0,
+///     false_alarms_an_hour: 0.25, movements_an_hour: 1800.0, follow: 0.025, reference_per_signal: -30.0,
 /// };
 /// let mut spec = example_calibration().into_spec();
 /// spec.turns = Some(turns);
@@ -141,14 +141,8 @@ pub struct ZeroWatch<T> {
     pub mean_share: T,
     /// What an innovation counts for at most.
     pub most: T,
-    /// The share of an innovation by which the zero that is followed moves.
+    /// The share of an innovation by which the zero moves; 0 where it is not followed.
     pub follow: T,
-    /// How much of it is taken off a sample at most; 0 where it is not taken off.
-    pub most_corrected: T,
-    /// What the squares of limits grow by with each movement, but for a median that is held against a zero that is followed.
-    pub growth: T,
-    /// What they have grown by at the beginning.
-    pub grown: T,
     /// Change of the estimate per change of the signal, times `sign`.
     pub reference: T,
 }
@@ -164,7 +158,6 @@ pub struct ZeroMemory<T> {
     mean: T,
     turned: u32,
     followed: T,
-    grown: T,
     since: Option<u32>,
 }
 
@@ -175,7 +168,7 @@ pub struct Zero<T> {
     pub off: T,
     /// What that makes of the estimate, in the reference's unit, by the slope of the curve where movements turn.
     pub off_reference: T,
-    /// How much of the zero that is followed is taken off samples, in the signal's unit; 0 where it is not.
+    /// How far the zero is followed, in the signal's unit; 0 where it is not.
     pub followed: T,
     /// Whether the calibration no longer describes the signal.
     pub has_shifted: bool,
@@ -197,7 +190,6 @@ impl<T: Real> Design for ZeroWatch<T> {
             mean: T::zero(),
             turned: 0,
             followed: T::zero(),
-            grown: self.grown,
             since: None,
         }
     }
@@ -208,7 +200,6 @@ impl<T: Real> ZeroWatch<T> {
     pub fn new(calibration: &Calibration) -> Option<Self> {
         let turns = calibration.turns.as_ref()?;
         let sign = calibration.polarity.sign();
-        let (growth, movements) = (turns.limit_growth, f64::from(turns.movements));
         Some(Self {
             finder: TurnFinder::new(T::from_f64(turns.least_span)),
             sign: T::from_f64(sign),
@@ -218,30 +209,22 @@ impl<T: Real> ZeroWatch<T> {
             mean_limit: T::from_f64(turns.mean_limit),
             mean_share: T::from_f64(Turns::MEAN_SHARE),
             most: T::from_f64(Turns::MOST_INNOVATION * turns.scatter),
-            follow: T::from_f64(turns.follow),
-            most_corrected: T::zero(),
-            growth: T::from_f64(growth),
-            grown: T::from_f64(growth * movements / 3.0),
+            follow: T::zero(),
             reference: T::from_f64(sign * turns.reference_per_signal),
         })
     }
 
-    /// The same watch, which takes the zero that it follows off the samples.
+    /// The same watch, which follows a slow change of zero as `calibration` lets expect.
     #[must_use]
-    pub fn following(self) -> Self {
-        Self { most_corrected: self.limit, ..self }
-    }
-
-    /// The zero that is taken off samples.
-    #[inline]
-    fn taken(&self, memory: &ZeroMemory<T>) -> T {
-        memory.followed.max(-self.most_corrected).min(self.most_corrected)
+    pub fn following(self, calibration: &Calibration) -> Self {
+        let follow = calibration.turns.as_ref().map_or(0.0, |turns| turns.follow);
+        Self { follow: T::from_f64(follow), ..self }
     }
 
     /// A sample less the zero that is followed: what a receptor is to be given.
     #[inline]
     pub fn corrected(&self, memory: &ZeroMemory<T>, sample: T) -> T {
-        sample - self.sign * self.taken(memory)
+        sample - self.sign * memory.followed
     }
 
     /// Takes a sample; answers at the end of a movement, from the fifth on. A missing sample changes nothing.
@@ -258,36 +241,28 @@ impl<T: Real> ZeroWatch<T> {
         }
         let whole = usize::from(memory.held) == LEVELS;
         let off = if whole { median(memory.levels) - self.level } else { T::zero() };
-        let taken = self.taken(memory);
-        let clipped = |innovation: T| innovation.max(-self.most).min(self.most);
+        let innovation = level - self.level - memory.followed;
+        let clipped = innovation.max(-self.most).min(self.most);
         let before = memory.mean;
-        memory.mean = before + self.mean_share * (clipped(level - self.level - taken) - before);
-        memory.grown = memory.grown + self.growth;
+        memory.mean = before + self.mean_share * (clipped - before);
         if (memory.mean > T::zero()) != (before > T::zero()) {
             memory.turned = memory.samples;
         }
         // one that has shifted is back within half of the limits
         let share = if memory.since.is_some() { T::from_f64(0.5) } else { T::one() };
         let jumped = whole && (off - memory.followed).abs() > share * self.limit;
-        let mean_limit = self.mean_limit * self.mean_limit + memory.grown;
-        let lasts = whole && memory.mean * memory.mean > share * share * mean_limit;
-        if whole && !jumped && !lasts {
-            let innovation = clipped(level - self.level - memory.followed);
-            memory.followed = memory.followed + self.follow * innovation;
+        let lasts = whole && memory.mean.abs() > share * self.mean_limit;
+        if !jumped && !lasts {
+            let moved = memory.followed + self.follow * clipped;
+            memory.followed = moved.max(-self.limit).min(self.limit);
         }
-        let most = if self.most_corrected > T::zero() {
-            self.most_corrected * self.most_corrected
-        } else {
-            self.limit * self.limit + memory.grown
-        };
-        let is_far = whole && memory.followed * memory.followed >= share * share * most;
-        let has_shifted = jumped || lasts || is_far;
+        let has_shifted = jumped || lasts || memory.followed.abs() >= share * self.limit;
         let began = || if jumped { self.first(memory, off) } else { memory.turned };
         memory.since = has_shifted.then(|| memory.since.unwrap_or_else(began));
         whole.then(|| Zero {
             off: self.sign * off,
             off_reference: self.reference * off,
-            followed: self.sign * self.taken(memory),
+            followed: self.sign * memory.followed,
             has_shifted,
             since_samples: memory.since.map_or(0, |since| memory.samples.wrapping_sub(since)),
         })

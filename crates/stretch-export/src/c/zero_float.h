@@ -1,7 +1,7 @@
 
 /* ---- whether the zero is still that of the calibration ---- */
 
-/* A state beside the receptor's: stretch_zero_init(&zero, 1) takes a slow change of zero off samples, 0 does not. Then every period
+/* A state beside the receptor's: stretch_zero_init(&zero, 1) follows a slow change of zero, 0 does not. Then every period
  *     if (stretch_zero_step(&zero, sample, &told)) { a movement has ended: see told }
  *     reading = stretch_step(&state, stretch_zero_corrected(&zero, sample));
  */
@@ -11,9 +11,8 @@ typedef struct stretch_zero_state {
     float low;
     float levels[STRETCH_ZERO_LEVELS];
     float mean;
+    float follow;
     float followed;
-    float most_corrected;
-    float grown;
     uint32_t ends[STRETCH_ZERO_LEVELS];
     uint32_t samples;
     uint32_t since;
@@ -46,9 +45,8 @@ static inline void stretch_zero_init(stretch_zero_state *z, int follow)
     z->extreme = 0.0f;
     z->low = 0.0f;
     z->mean = 0.0f;
+    z->follow = follow ? STRETCH_ZERO_FOLLOW : 0.0f;
     z->followed = 0.0f;
-    z->most_corrected = follow ? STRETCH_ZERO_LIMIT : 0.0f;
-    z->grown = STRETCH_ZERO_GROWN;
     z->samples = 0u;
     z->since = 0u;
     z->turned = 0u;
@@ -141,13 +139,13 @@ STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float of
 /* A sample less the zero that is followed: what stretch_step is to be given. */
 static inline float stretch_zero_corrected(const stretch_zero_state *z, float volts)
 {
-    return volts - STRETCH_ZERO_SIGN * stretch_within(z->followed, z->most_corrected);
+    return volts - STRETCH_ZERO_SIGN * z->followed;
 }
 
 /* A sample in the signal's unit; 1 where a movement has ended, from the fifth on. */
 static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, stretch_zero *told)
 {
-    float level = 0.0f, off = 0.0f, limit, share, taken, before, mean_limit;
+    float level = 0.0f, off = 0.0f, limit, share, clipped, before;
     int whole, jumped, lasts, shifted, k;
     z->samples += 1u;
     if (!stretch_usable(volts) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * volts, &level)) {
@@ -166,11 +164,9 @@ static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, s
     if (whole) {
         off = stretch_zero_median(z) - STRETCH_ZERO_LEVEL;
     }
-    taken = stretch_within(z->followed, z->most_corrected);
+    clipped = stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
     before = z->mean;
-    z->mean = before + STRETCH_ZERO_MEAN_SHARE *
-                           (stretch_within(level - STRETCH_ZERO_LEVEL - taken, STRETCH_ZERO_MOST) - before);
-    z->grown = z->grown + STRETCH_ZERO_GROWTH;
+    z->mean = before + STRETCH_ZERO_MEAN_SHARE * (clipped - before);
     if ((z->mean > 0.0f) != (before > 0.0f)) {
         z->turned = z->samples;
     }
@@ -178,21 +174,19 @@ static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, s
     share = z->shifted ? 0.5f : 1.0f;
     limit = share * STRETCH_ZERO_LIMIT;
     jumped = whole && (off - z->followed > limit || off - z->followed < -limit);
-    mean_limit = STRETCH_ZERO_MEAN_LIMIT * STRETCH_ZERO_MEAN_LIMIT + z->grown;
-    lasts = whole && z->mean * z->mean > share * share * mean_limit;
-    if (whole && !jumped && !lasts) {
-        z->followed = z->followed + STRETCH_ZERO_FOLLOW * stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
+    lasts = whole && (z->mean > share * STRETCH_ZERO_MEAN_LIMIT ||
+                      z->mean < -(share * STRETCH_ZERO_MEAN_LIMIT));
+    if (!jumped && !lasts) {
+        z->followed = stretch_within(z->followed + z->follow * clipped, STRETCH_ZERO_LIMIT);
     }
-    limit = z->most_corrected > 0.0f ? z->most_corrected * z->most_corrected
-                                     : STRETCH_ZERO_LIMIT * STRETCH_ZERO_LIMIT + z->grown;
-    shifted = jumped || lasts || (whole && z->followed * z->followed >= share * share * limit);
+    shifted = jumped || lasts || z->followed >= limit || z->followed <= -limit;
     if (shifted && !z->shifted) {
         z->since = jumped ? stretch_zero_first(z, off) : z->turned;
     }
     z->shifted = shifted ? 1u : 0u;
     told->off = STRETCH_ZERO_SIGN * off;
     told->off_reference = STRETCH_ZERO_REFERENCE * off;
-    told->followed = STRETCH_ZERO_SIGN * stretch_within(z->followed, z->most_corrected);
+    told->followed = STRETCH_ZERO_SIGN * z->followed;
     told->since_samples = shifted ? z->samples - z->since : 0u;
     told->shifted = z->shifted;
     return whole;

@@ -21,9 +21,7 @@ pub(crate) fn with_zero(mut part: Part, calibration: &Calibration) -> Part {
         .define("ZERO_MEAN_LIMIT", watch.mean_limit, "how far their running mean may be off")
         .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in it")
         .define("ZERO_MOST", most, "what a level counts for at most in a zero that is followed")
-        .define("ZERO_FOLLOW", watch.follow, "the share by which it moves")
-        .define("ZERO_GROWTH", watch.growth, "of the square of the mean's limit with a movement")
-        .define("ZERO_GROWN", watch.grown, "what it has grown by at the beginning")
+        .define("ZERO_FOLLOW", watch.following(calibration).follow, "the share by which it moves")
         .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
     part.constants.push_str(&constants.into_text());
     // the last part of a step ends the compiler's rules for floats

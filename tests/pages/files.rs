@@ -57,7 +57,7 @@ check` checks its digest, and `stretch record seal` renews the digest after a ch
 | `signal_range`, `target_range` | least and greatest value of the fitted trials, by which both are divided |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
 | `rate_source` | what the rate of the fit was taken from |
-| `turns` | the levels at which the fitted trials' movements turned, and how far later ones may be off; not where they held too few, nor in bytes |
+| `turns` | the levels at which the fitted trials' movements turned, and how far later ones may be off; not where they held too few |
 | `dead_band` | rate within which the direction of motion is kept, in units of the signal a second |
 | `model` | the model by its name, with its coefficients, time constants and domains |
 | `provenance` | date, number, names and checksums of the fitted trials |

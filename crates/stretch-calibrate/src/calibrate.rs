@@ -16,7 +16,7 @@ use crate::{
     prepared::Prepared,
     series::extent,
     split::branches,
-    turns::turns,
+    turns::with_turns,
     twice::fitted_twice,
 };
 
@@ -94,9 +94,9 @@ pub(crate) fn calibrate_with(
     notes.extend(fitted_twice(names.clone(), checksums.iter().copied()));
     let provenance =
         Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
-    let mut spec = prepared.calibration(model, provenance)?.into_spec();
-    spec.turns = turns(&prepared, &Calibration::new(spec.clone())?);
-    Ok((Calibrated { calibration: Calibration::new(spec)?, fits, notes }, made))
+    let signals: Vec<&[f64]> = prepared.series.iter().map(|s| s.signal.as_slice()).collect();
+    let calibration = with_turns(prepared.calibration(model, provenance)?, &signals)?;
+    Ok((Calibrated { calibration, fits, notes }, made))
 }
 
 /// Choices about a model that remembers, kept when the model is fitted to parts of the same data.

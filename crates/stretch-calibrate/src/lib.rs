@@ -24,6 +24,7 @@ mod fixed_record;
 mod gross_errors;
 mod history_fit;
 mod least_squares;
+mod levels;
 mod long;
 mod model_words;
 mod observer_bounds;

@@ -5,6 +5,8 @@
 //! pass 2   extents, covariance, noise, count  -> ranges, polarity, dead band
 //! pass 3   extents of the rates by branch     -> ranges of the rates
 //! pass 4   a triangle a branch and fold       -> the fit
+//! pass 5   counts in parts of the extent      -> the least movement
+//! pass 6   movements, from block to block     -> where they turn
 //! ```
 //!
 //! A block is treated as the part of a trial behind a gap: at its beginning the estimator of the rate warms up again,
@@ -13,7 +15,7 @@
 
 use std::cell::RefCell;
 
-use stretch_core::{Model, Provenance};
+use stretch_core::{Calibration, Model, Provenance};
 use stretch_files::Checksum;
 
 use crate::{
@@ -32,7 +34,7 @@ pub fn is_plain(options: &Options) -> bool {
         && options.split == SplitBy::Rate
 }
 
-/// Fits a calibration to trials that are read block by block, four times; `names` are the names of the trials.
+/// Fits a calibration to trials that are read block by block, six times; `names` are the names of the trials.
 ///
 /// The memory used is that of one block, however long the log is. Gross errors of signal and reference are removed as
 /// in [`without_gross_errors`](crate::without_gross_errors).
@@ -91,11 +93,11 @@ pub fn calibrate_long(
         })
     };
     let long = Passes { log, gross: &gross, options, trials: names.len() };
-    let (prepared, total) = Passes { log: summed, ..long }.prepared(names)?;
+    let (prepared, seen) = Passes { log: summed, ..long }.prepared(names)?;
     let (model, fits) = match options.model {
-        ModelKind::Linear => long.line(&prepared, total)?,
-        ModelKind::Surface(degree) => long.surfaces(&prepared, degree, total)?,
-        ModelKind::Blended(degree) => match long.surfaces(&prepared, degree, total)? {
+        ModelKind::Linear => long.line(&prepared, seen.samples)?,
+        ModelKind::Surface(degree) => long.surfaces(&prepared, degree, seen.samples)?,
+        ModelKind::Blended(degree) => match long.surfaces(&prepared, degree, seen.samples)? {
             (Model::Surfaces { inflation, deflation }, fits) => {
                 (Model::Blended { inflation, deflation }, fits)
             }
@@ -104,7 +106,7 @@ pub fn calibrate_long(
         // `is_plain` refused this model above
         ModelKind::Remembering { .. } => return Err(too_long()),
     };
-    let mut notes = gross.sentences;
+    let mut notes = gross.sentences.clone();
     notes.extend(prepared.notes.iter().cloned());
     if !matches!(options.model, ModelKind::Linear) {
         notes.extend(fits.iter().filter_map(FitReport::note));
@@ -113,5 +115,7 @@ pub fn calibrate_long(
     let checksums: Vec<u32> = checksums.borrow().iter().map(Checksum::value).collect();
     notes.extend(fitted_twice(names.clone(), checksums.iter().copied().map(Some)));
     let provenance = Provenance::new(&options.date, names).with_checksums(checksums);
-    Ok(Calibrated { calibration: prepared.calibration(model, provenance)?, fits, notes })
+    let mut spec = prepared.calibration(model, provenance)?.into_spec();
+    spec.turns = long.turns(&Calibration::new(spec.clone())?, &seen, &prepared)?;
+    Ok(Calibrated { calibration: Calibration::new(spec)?, fits, notes })
 }

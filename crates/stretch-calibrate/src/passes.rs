@@ -1,11 +1,12 @@
 //! The passes over a long log after the first pass, which looks for gross errors.
 
 use stretch_core::{
-    Branch, BranchSurface, Degree, Interval, LinearMap, MAX_TERMS, Model, Polarity, Range,
-    RangeSpec, RateSource, SampleRate, Surface,
+    Branch, BranchSurface, Calibration, Degree, Interval, LinearMap, MAX_TERMS, Model, Polarity,
+    Range, RangeSpec, RateSource, SampleRate, Surface, Turns,
 };
 use stretch_data::Rows;
 use stretch_fit::{FitError, SurfaceAccumulator};
+use stretch_receptor::MAX_BRIDGED;
 
 use crate::{
     CalibrateError, FitReport, Options,
@@ -14,6 +15,7 @@ use crate::{
     prepared::{Evened, Prepared, dead_bands, pooled_range, target_below},
     series::{Series, extent, noise, sample_rate_hz, series},
     split::branches,
+    turns::{Movements, Spread},
 };
 
 /// Most notes about single blocks that are shown; further notes are only counted.
@@ -30,6 +32,14 @@ pub(crate) struct Passes<'a> {
     pub options: &'a Options,
     /// Number of trials.
     pub trials: usize,
+}
+
+/// What the second pass saw of the signal.
+pub(crate) struct Signal {
+    pub samples: u64,
+    pub extent: Interval,
+    /// Median of the noises of the blocks.
+    pub noise: f64,
 }
 
 /// Sums of the second pass.
@@ -160,6 +170,8 @@ impl Passes<'_> {
         first: &mut Option<(String, SampleRate)>,
         take: &mut dyn FnMut(Evened) -> Result<(), CalibrateError>,
     ) -> Result<(), CalibrateError> {
+        // the trial and the last time of the block before
+        let mut before: Option<(usize, f64)> = None;
         (self.log)(&mut |index, block| {
             let block = self.gross.without(block);
             // the last block of a trial may be too short to determine its sample rate
@@ -171,14 +183,20 @@ impl Passes<'_> {
                 *first = Some((block.name.clone(), SampleRate::new(sample_rate_hz(&block)?)?));
             }
             let Some((name, rate)) = first.as_ref() else { return Ok(()) };
-            let mut evened = Evened::default();
+            let longest_s = (f64::from(MAX_BRIDGED) + 1.5) * rate.period_s();
+            let goes_on = |begin_s: f64| {
+                before.is_some_and(|(own, end_s)| own == index && begin_s - end_s < longest_s)
+            };
+            let continues = block.time_s.first().is_some_and(|begin_s| goes_on(*begin_s));
+            before = block.time_s.last().map(|end_s| (index, *end_s));
+            let mut evened = Evened { continues, ..Evened::default() };
             evened.take(index, &block, (name, *rate), self.options)?;
             take(evened)
         })
     }
 
-    /// The second pass: ranges, polarity and dead bands, and the number of samples.
-    pub(crate) fn prepared(&self, names: &[String]) -> Result<(Prepared, u64), CalibrateError> {
+    /// The second pass: ranges, polarity and dead bands, and what was seen of the signal.
+    pub(crate) fn prepared(&self, names: &[String]) -> Result<(Prepared, Signal), CalibrateError> {
         let options = self.options;
         let mut seen = Extents::new();
         let mut row_notes = RowNotes::default();
@@ -219,7 +237,35 @@ impl Passes<'_> {
             options,
             first: names.first().cloned().unwrap_or(first),
         };
-        Ok((prepared, seen.samples))
+        Ok((prepared, Signal { samples: seen.samples, extent: seen.signal, noise: noise_v }))
+    }
+
+    /// The last two passes: how the signal spreads over its extent, and where its movements turn.
+    pub(crate) fn turns(
+        &self,
+        calibration: &Calibration,
+        seen: &Signal,
+        prepared: &Prepared,
+    ) -> Result<Option<Turns>, CalibrateError> {
+        let first = || Some((prepared.first.clone(), prepared.sample_rate));
+        let mut spread = Spread::new(seen.extent);
+        self.evened(&mut first(), &mut |evened| {
+            evened.pieces.iter().for_each(|(_, [signal, ..])| spread.take(signal));
+            Ok(())
+        })?;
+        let Some(mut movements) = Movements::new(calibration, &spread, seen.noise) else {
+            return Ok(None);
+        };
+        self.evened(&mut first(), &mut |evened| {
+            for (k, (_, [signal, ..])) in evened.pieces.iter().enumerate() {
+                if k > 0 || !evened.continues {
+                    movements.begin();
+                }
+                movements.take(signal);
+            }
+            Ok(())
+        })?;
+        Ok(movements.turns(calibration))
     }
 
     /// Calls `take` with every part of the log, its rates, and the index of its first sample in the whole log.

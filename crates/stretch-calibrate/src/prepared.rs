@@ -38,7 +38,7 @@ impl Prepared {
         for (index, trial) in trials.iter().enumerate() {
             evened.take(index, trial, (&first.name, sample_rate), options)?;
         }
-        let Evened { pieces, rows, mut notes } = evened;
+        let Evened { pieces, rows, mut notes, .. } = evened;
         notes.extend(rows.note());
         if pieces.is_empty() {
             let (trial, samples) = (first.name.clone(), first.len());
@@ -142,6 +142,8 @@ pub(crate) struct Evened {
     pub pieces: Vec<Piece>,
     pub rows: Rows,
     pub notes: Vec<String>,
+    /// Whether the first piece goes on where the block before it ended.
+    pub continues: bool,
 }
 
 impl Evened {

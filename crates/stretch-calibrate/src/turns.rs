@@ -1,19 +1,22 @@
 //! Where the movements of a calibration turn, and how far a later one may be off.
 
-use stretch_core::{Calibration, Interval, Model, Runner, Turns, Volts};
+use stretch_core::{
+    Calibration, CalibrationSpec, DesignError, Interval, Model, Runner, Turns, Volts,
+};
 use stretch_fit::student_two_sided;
-use stretch_receptor::{Receptor, TurnFinder};
+use stretch_receptor::{Receptor, TurnFinder, TurnMemory};
 
 use crate::{
-    array::{Levels, independent, levels},
-    prepared::Prepared,
-    series::noise,
+    levels::{Levels, independent, levels},
+    series::{extent, noise},
 };
 
 /// False alarms an hour. The array's share for a gauge that has shifted is the same.
 const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
 /// Share of the signal's range, without the twentieths at its ends, that a movement goes through at least.
 const LEAST_SPAN: f64 = 1.0 / 3.0;
+/// Parts of the extent that samples are counted in.
+const PARTS: usize = 4096;
 /// Standard deviations of the noise that are no movement.
 const LEAST_NOISES: f64 = 6.0;
 /// Fewest movements, counted as independent ones: from fewer their correlation is a guess.
@@ -27,39 +30,110 @@ const HELD_S: f64 = 5.0;
 /// The slope is taken over this share of a movement.
 const SLOPE_SHARE: f64 = 0.25;
 
-/// The turns of the trials that a calibration was fitted to; `None` where they hold too few movements, or none.
-pub(crate) fn turns(prepared: &Prepared, calibration: &Calibration) -> Option<Turns> {
-    let sign = prepared.polarity.sign();
-    let signals: Vec<&[f64]> = prepared.series.iter().map(|s| s.signal.as_slice()).collect();
-    let least_span = LEAST_SPAN * middle_span(&signals)?;
-    if least_span <= LEAST_NOISES * noise(signals.iter().copied()) {
-        return None;
+/// A calibration that holds where the movements of these signals turn, each a stretch without a gap; without levels where they
+/// hold too few movements, or none.
+pub(crate) fn with_turns(
+    calibration: Calibration,
+    signals: &[&[f64]],
+) -> Result<Calibration, DesignError> {
+    let turns = turns(&calibration, signals);
+    Calibration::new(CalibrationSpec { turns, ..calibration.into_spec() })
+}
+
+fn turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns> {
+    let mut spread = Spread::new(extent(signals.iter().copied().flatten().copied()));
+    signals.iter().for_each(|signal| spread.take(signal));
+    let mut movements = Movements::new(calibration, &spread, noise(signals.iter().copied()))?;
+    for signal in signals {
+        movements.begin();
+        movements.take(signal);
     }
-    let movements: Vec<Vec<(f64, f64)>> =
-        signals.iter().map(|signal| movements(signal, sign, least_span)).collect();
-    let samples: usize = signals.iter().map(|signal| signal.len()).sum();
-    let hours = samples as f64 * prepared.sample_rate.period_s() / 3600.0;
-    let learnt = Learnt::of(&movements, hours)?;
-    let level = sign * learnt.level;
-    let slope = slope(calibration, level, learnt.ends(sign))?;
-    Some(learnt.turns(level, least_span, slope)).filter(|turns| turns.validate().is_ok())
+    movements.turns(calibration)
 }
 
-/// Span of the samples without the lowest and the highest twentieth.
-fn middle_span(signals: &[&[f64]]) -> Option<f64> {
-    let mut all: Vec<f64> = signals.iter().flat_map(|signal| signal.iter().copied()).collect();
-    let twentieth = all.len() / 20;
-    let last = all.len().checked_sub(1 + twentieth)?;
-    let low = *all.select_nth_unstable_by(twentieth, f64::total_cmp).1;
-    let high = *all.select_nth_unstable_by(last, f64::total_cmp).1;
-    (high > low).then_some(high - low)
+/// How many samples of a signal lie in each of equal parts of its extent.
+pub(crate) struct Spread {
+    extent: Interval,
+    counts: Vec<u64>,
 }
 
-/// The ends of the movements of a signal, times the sign of its polarity.
-fn movements(signal: &[f64], sign: f64, least_span: f64) -> Vec<(f64, f64)> {
-    let finder = TurnFinder::new(least_span);
-    let mut memory = finder.memory();
-    signal.iter().filter_map(|v| finder.step(&mut memory, sign * v)).collect()
+impl Spread {
+    pub(crate) fn new(extent: Interval) -> Self {
+        Self { extent, counts: vec![0; PARTS] }
+    }
+
+    pub(crate) fn take(&mut self, signal: &[f64]) {
+        let Interval { min, max } = self.extent;
+        for v in signal {
+            let part = (v - min) / (max - min) * PARTS as f64;
+            self.counts[(part as usize).min(PARTS - 1)] += 1;
+        }
+    }
+
+    /// Span of the samples without the lowest and the highest twentieth, to a part of the extent.
+    fn middle(&self) -> Option<f64> {
+        let all = self.counts.iter().sum::<u64>();
+        // the part that the sample of a rank lies in
+        let part_of = |rank: u64| {
+            let mut seen = 0;
+            self.counts.iter().position(|count| {
+                seen += count;
+                seen > rank
+            })
+        };
+        let (low, high) = (part_of(all / 20)?, part_of(all.checked_sub(1 + all / 20)?)?);
+        let span = (high - low) as f64 / PARTS as f64 * (self.extent.max - self.extent.min);
+        (low < high).then_some(span)
+    }
+}
+
+/// The movements of a signal that is given stretch by stretch, and a stretch in one piece or in several.
+pub(crate) struct Movements {
+    finder: TurnFinder<f64>,
+    memory: TurnMemory<f64>,
+    sign: f64,
+    /// The ends of movements, times the sign of the polarity, stretch by stretch.
+    found: Vec<Vec<(f64, f64)>>,
+    samples: usize,
+}
+
+impl Movements {
+    /// None yet; `None` where the signal's noise is as large as a movement would be.
+    pub(crate) fn new(calibration: &Calibration, spread: &Spread, noise: f64) -> Option<Self> {
+        let finder = TurnFinder::new(LEAST_SPAN * spread.middle()?);
+        (finder.least_span > LEAST_NOISES * noise).then(|| Self {
+            finder,
+            memory: finder.memory(),
+            sign: calibration.polarity.sign(),
+            found: Vec::new(),
+            samples: 0,
+        })
+    }
+
+    /// What follows begins another stretch.
+    pub(crate) fn begin(&mut self) {
+        self.memory = self.finder.memory();
+        self.found.push(Vec::new());
+    }
+
+    pub(crate) fn take(&mut self, signal: &[f64]) {
+        self.samples += signal.len();
+        let (finder, sign) = (self.finder, self.sign);
+        let found = signal.iter().filter_map(|v| finder.step(&mut self.memory, sign * v));
+        if let Some(own) = self.found.last_mut() {
+            own.extend(found);
+        }
+    }
+
+    /// What they say of their levels; `None` where they are too few.
+    pub(crate) fn turns(&self, calibration: &Calibration) -> Option<Turns> {
+        let hours = self.samples as f64 * calibration.sample_rate_hz.period_s() / 3600.0;
+        let learnt = Learnt::of(&self.found, hours)?;
+        let level = self.sign * learnt.level;
+        let slope = slope(calibration, level, learnt.ends(self.sign))?;
+        let turns = learnt.turns(level, self.finder.least_span, slope);
+        Some(turns).filter(|turns| turns.validate().is_ok())
+    }
 }
 
 /// What movements say of their levels, times the sign of the polarity.

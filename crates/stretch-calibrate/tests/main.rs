@@ -7,7 +7,7 @@ mod seal;
 
 use stretch_core::Calibration;
 
-/// A calibration as its record holds it: checksums of trials and levels of movements stand in JSON alone.
+/// A calibration as its record holds it: checksums of trials stand in JSON alone.
 fn as_held(calibration: &Calibration, name: &str) -> Calibration {
     assert_eq!(
         calibration.provenance.checksums().len(),
@@ -18,6 +18,5 @@ fn as_held(calibration: &Calibration, name: &str) -> Calibration {
     }
     let mut spec = calibration.clone().into_spec();
     spec.provenance = spec.provenance.with_checksums([]);
-    spec.turns = None;
     Calibration::new(spec).unwrap()
 }

@@ -6,10 +6,11 @@ use crate::{
     sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
 
-/// The schema of calibration records that this release writes, and the newest it reads.
+/// The schema of calibration records that this release writes.
 ///
 /// 1: without a seal. 2: the same fields under a checksum, which whoever loads the bytes checks
-/// (`record::load`, or `stretch_calibrate::read_calibration`).
+/// (`record::load`, or `stretch_calibrate::read_calibration`). 3, the newest it reads: in bytes, where movements turn behind
+/// the fields of schema 2; records without turns stay as they are.
 pub const CALIBRATION_SCHEMA: u32 = 2;
 
 /// What is estimated, and how a normalised target becomes a number with a unit.
@@ -78,15 +79,18 @@ pub struct Schema(u32);
 impl Schema {
     /// The schema that this release writes.
     pub const CURRENT: Self = Self(CALIBRATION_SCHEMA);
+    /// That of records in bytes which hold turns, and the newest.
+    pub(crate) const WITH_TURNS: Self = Self(3);
 }
 
 impl TryFrom<u32> for Schema {
     type Error = DesignError;
     fn try_from(found: u32) -> Result<Self, DesignError> {
-        if (1..=CALIBRATION_SCHEMA).contains(&found) {
+        let newest = Self::WITH_TURNS.0;
+        if (1..=newest).contains(&found) {
             Ok(Self(found))
         } else {
-            Err(DesignError::Schema { found, newest: CALIBRATION_SCHEMA })
+            Err(DesignError::Schema { found, newest })
         }
     }
 }
@@ -99,8 +103,6 @@ impl From<Schema> for u32 {
 
 /// The parts of a [`Calibration`], all public; [`Calibration::new`] checks them.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct CalibrationSpec {
     /// First in every record, so that a newer one is refused before the rest is read.
     pub schema: Schema,
@@ -127,9 +129,7 @@ pub struct CalibrationSpec {
     /// From signal and rate to the normalised target.
     pub model: Model,
     /// Where the movements of the calibration turned, for a gauge that is to tell when it was put on again; `None` where too
-    /// few were recorded, in earlier records, and in bytes: a board is given them by its program.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    #[cfg_attr(feature = "serde", serde(with = "crate::turns::in_text"))]
+    /// few were recorded, and in earlier records.
     pub turns: Option<Turns>,
     /// Where it comes from.
     pub provenance: Provenance,

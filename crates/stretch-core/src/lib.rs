@@ -4,6 +4,8 @@
 mod array;
 mod branch;
 mod calibration;
+#[cfg(feature = "serde")]
+mod calibration_forms;
 mod degree;
 mod diagnosed;
 mod error;

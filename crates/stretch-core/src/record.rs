@@ -14,9 +14,10 @@
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use crate::DesignError;
+use crate::{DesignError, Schema};
 
-/// The schema of the records that this release writes, and the newest it reads, of all kinds.
+/// The schema of the records that this release writes, of all kinds; [`CALIBRATION_SCHEMA`](crate::CALIBRATION_SCHEMA) tells of a
+/// newer one for calibrations that hold turns.
 pub const SCHEMA: u32 = crate::CALIBRATION_SCHEMA;
 
 /// Without a table: a kilobyte of flash for a few thousand instructions when the board starts.
@@ -95,8 +96,9 @@ fn body(bytes: &[u8]) -> Result<&[u8], DesignError> {
     if stored != computed {
         return Err(DesignError::Damaged { stored, computed });
     }
-    if found > SCHEMA {
-        return Err(DesignError::Schema { found, newest: SCHEMA });
+    let newest = Schema::WITH_TURNS.into();
+    if found > newest {
+        return Err(DesignError::Schema { found, newest });
     }
     Ok(body)
 }

@@ -19,7 +19,8 @@ use crate::{
     BranchSurface, Calibration, CalibrationSpec, Crosstalk, Degree, DiagnosedMap, Fading,
     FitSummary, HistoryMap, HistoryShape, Interval, Knee, Label, LinearMap, MAX_HISTORY_TERMS,
     Model, Normalisation, ObserverMap, Plays, Polarity, Provenance, Range, RangeSpec,
-    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Values, Worn,
+    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Turns, Values,
+    Worn,
 };
 
 /// Either way of normalising.
@@ -220,6 +221,29 @@ pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = Diagnosed
                 spread: 1.0,
                 estimate_domain: map.estimate_domain,
                 fit: map.fit,
+            }
+        },
+    )
+}
+
+/// Levels at which movements turn.
+pub fn turns() -> impl Strategy<Value = Turns> {
+    let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 1e-6..1e3, 1e-3..1e3];
+    (sizes, 0.0..1.0, -100.0..100.0, any::<u32>(), 0.0..0.2, -1e3..1e3).prop_map(
+        |(sizes, high_share, level, movements, follow, reference_per_signal)| {
+            let [least_span, scatter, limit, mean_limit, movements_an_hour] = sizes;
+            Turns {
+                level,
+                high_share,
+                least_span,
+                scatter,
+                movements,
+                limit,
+                mean_limit,
+                false_alarms_an_hour: 0.25,
+                movements_an_hour,
+                follow,
+                reference_per_signal,
             }
         },
     )

@@ -101,30 +101,3 @@ impl Turns {
         Ok(())
     }
 }
-
-/// Turns in records that are text. In bytes, where nothing may be optional, they take no place.
-#[cfg(feature = "serde")]
-pub(crate) mod in_text {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    use super::Turns;
-
-    pub(crate) fn serialize<S: Serializer>(
-        turns: &Option<Turns>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        match serializer.is_human_readable() {
-            true => turns.serialize(serializer),
-            false => serializer.serialize_unit(),
-        }
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Turns>, D::Error> {
-        match deserializer.is_human_readable() {
-            true => Option::deserialize(deserializer),
-            false => Ok(None),
-        }
-    }
-}

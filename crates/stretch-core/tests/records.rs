@@ -1,9 +1,6 @@
 //! Records that must be refused, and what the refusal says.
 
-use proptest::{
-    strategy::{Strategy, ValueTree},
-    test_runner::TestRunner,
-};
+use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
 use stretch_core::{Calibration, Degree, Model, Surface, strategies};
 
@@ -88,28 +85,61 @@ fn an_unknown_or_missing_field_is_named() {
     assert!(error.contains("signal_range"), "{error}");
 }
 
-/// Records were written without turns before, and in bytes they are as they were.
 #[test]
-fn turns_stand_in_text_alone_and_may_be_missing() {
+fn turns_may_be_missing_in_text_and_are_checked() {
     let turns = json!({
         "level": 1.24, "high_share": 0.0, "least_span": 0.3, "scatter": 0.01, "movements": 40, "limit": 0.03, "mean_limit": 0.012,
         "false_alarms_an_hour": 0.25, "movements_an_hour": 1200.0, "follow": 0.025, "reference_per_signal": -30.0,
     });
     let mut with = record();
     assert!(with.get("turns").is_none());
-    let without: Calibration = serde_json::from_value(with.clone()).unwrap();
     with["turns"] = turns;
     let calibration: Calibration = serde_json::from_value(with.clone()).unwrap();
     assert_eq!(calibration.turns.unwrap().movements, 40);
     assert_eq!(serde_json::to_value(&calibration).unwrap(), with);
-    let mut buffers = [[0; 4096]; 2];
-    let [one, other] = &mut buffers;
-    let bytes = postcard::to_slice(&calibration, one).unwrap();
-    assert_eq!(bytes, postcard::to_slice(&without, other).unwrap());
-    assert_eq!(postcard::from_bytes::<Calibration>(bytes).unwrap(), without);
+    // the schema of bytes is none of text
+    let mut of_bytes = with.clone();
+    of_bytes["schema"] = json!(3);
+    assert!(serde_json::from_value::<Calibration>(of_bytes).is_err());
     with["turns"]["limit"] = json!(-0.1);
     let error = serde_json::from_value::<Calibration>(with).unwrap_err().to_string();
     assert!(error.contains("turns.limit"), "{error}");
+}
+
+proptest! {
+    /// Records of bytes were written without turns before: such a one is what it was, and turns stand behind it.
+    #[test]
+    fn turns_stand_behind_what_a_record_without_them_is(
+        calibration in strategies::calibration(), turns in strategies::turns(),
+    ) {
+        let mut spec = calibration.clone().into_spec();
+        spec.turns = Some(turns);
+        let with = Calibration::new(spec).unwrap();
+        let mut buffers = [[0; 4096]; 3];
+        let [one, other, alone] = &mut buffers;
+        let bytes = postcard::to_slice(&with, one).unwrap();
+        let without = postcard::to_slice(&calibration, other).unwrap();
+        let alone = postcard::to_slice(&turns, alone).unwrap();
+        prop_assert_eq!((bytes[0], without[0]), (3, 2));
+        prop_assert_eq!(&bytes[1..without.len()], &without[1..]);
+        prop_assert_eq!(&bytes[without.len()..], alone);
+        prop_assert_eq!(postcard::from_bytes::<Calibration>(without).unwrap(), calibration);
+        for length in 0..bytes.len() {
+            prop_assert!(postcard::from_bytes::<Calibration>(&bytes[..length]).is_err());
+        }
+        prop_assert_eq!(postcard::from_bytes::<Calibration>(bytes).unwrap(), with);
+    }
+}
+
+/// A record that an earlier release wrote, which had no turns in bytes.
+#[test]
+fn an_earlier_record_loads_and_says_that_it_holds_no_turns() {
+    let bytes = include_bytes!("../../../firmware/data/poly13.postcard");
+    assert_eq!(bytes[0], 2);
+    let calibration = stretch_core::record::load::<Calibration>(bytes).unwrap();
+    assert_eq!(calibration.turns, None);
+    let mut buffer = [0; 4096];
+    assert_eq!(stretch_core::record::store(&calibration, &mut buffer).unwrap(), bytes);
 }
 
 #[test]

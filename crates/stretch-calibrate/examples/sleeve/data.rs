@@ -57,6 +57,61 @@ pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
     Ok(Set { signals, reference: "angle_deg".into(), worn })
 }
 
+/// One ankle of ten people, 125 Hz: files such as `P001_WALK1_BF.csv`, whose first columns are named in their header. The six
+/// walks of a person barefoot are one session, those in shoes another.
+///
+/// The foot is `L` or `R`; the angle is `FLX` (flexion) or `IEV` (inversion). Signals are those of the feet that are named: the
+/// five of one ankle, or the ten of both.
+pub(crate) fn ankles(folder: &Path, foot: &str, angle: &str, feet: &[&str]) -> anyhow::Result<Set> {
+    let places = ["PFX", "INV", "DFX", "EVR", "HEEL"];
+    let signals = feet.iter().flat_map(|foot| places.map(|place| format!("{foot}_{place}")));
+    let signals: Vec<String> = signals.collect();
+    let mut names = vec![format!("{foot}_{angle}")];
+    names.extend(signals.iter().cloned());
+    let mut worn: Vec<Worn> = Vec::new();
+    for path in files(folder)? {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let parts: Vec<&str> = stem.split('_').collect();
+        let [wearer, walk, shoe] = parts[..] else { continue };
+        if !walk.starts_with("WALK") {
+            continue;
+        }
+        let text = fs::read_to_string(&path)?;
+        let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let header = lines.next().unwrap_or_default();
+        let places: Option<Vec<usize>> =
+            names.iter().map(|name| header.iter().position(|own| own == name)).collect();
+        let Some(places) = places else { continue };
+        let row = |cells: Vec<&str>| -> Option<Vec<f64>> {
+            places
+                .iter()
+                .map(|&c| cells.get(c)?.parse().ok().filter(|x: &f64| x.is_finite()))
+                .collect()
+        };
+        let values: Vec<Vec<f64>> = lines.filter_map(row).collect();
+        let channel = |(c, name): (usize, &String)| Channel {
+            name: if c == 0 { "ankle_deg".into() } else { name.clone() },
+            values: values.iter().map(|row| row[c]).collect(),
+        };
+        let trial = Trial {
+            name: stem.clone(),
+            time_s: (0..values.len()).map(|i| i as f64 * 0.008).collect(),
+            channels: names.iter().enumerate().map(channel).collect(),
+        };
+        let name = format!("{wearer}_{shoe}");
+        match worn.iter_mut().find(|own| own.name == name) {
+            Some(own) => own.trials.push(trial),
+            None => worn.push(Worn {
+                wearer: wearer.to_owned(),
+                activity: shoe.to_owned(),
+                name,
+                trials: vec![trial],
+            }),
+        }
+    }
+    Ok(Set { signals, reference: "ankle_deg".into(), worn })
+}
+
 /// The knee sensor of sixteen people, 250 Hz: files such as `P001_WALK1.csv` with stamps, angle and capacitance. The
 /// files of a person are one session, walks first.
 pub(crate) fn knees(folder: &Path) -> anyhow::Result<Set> {

@@ -32,7 +32,7 @@ pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
     let mut found = vec![Found::default(); FAULTS.len()];
     let (mut alarms, mut hours) = (0, 0.0);
     for wearer in judge.wearers() {
-        let prior = judge.without(&wearer)?.all;
+        let Some(prior) = judge.without(&wearer)?.all else { continue };
         for worn in judge.set.worn.iter().filter(|w| w.wearer == wearer).step_by(every) {
             let short = first_seconds(&worn.trials, 60.0);
             let updated = prior.update(&short, &UpdateOptions::default())?;

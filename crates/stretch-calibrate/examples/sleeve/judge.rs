@@ -9,7 +9,6 @@ use stretch_data::Trial;
 
 use crate::data::{Set, Worn};
 
-pub(crate) const LINEAR: &str = "linear, 30 s";
 pub(crate) const OWN_ONE: &str = "own calibration, one";
 pub(crate) const OWN_ALL: &str = "own calibration, all";
 
@@ -31,19 +30,31 @@ pub(crate) struct Judge {
     sessions: Vec<Session>,
     /// Seconds whose reference may be used.
     pub(crate) used_s: f64,
-    with_auto: bool,
+    asked: Asked,
 }
 
-/// The priors of one wearer left out: of all channels, and of each.
+/// What is judged beside the usual.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Asked {
+    /// The model that `auto` chooses.
+    pub(crate) auto: bool,
+    /// Each sensor with a prior of all others, in place of the best one with a prior of the same.
+    pub(crate) leave_sensor: bool,
+}
+
+/// The priors of one wearer left out: of all channels, where there are several and none is left out, and of each.
 pub(crate) struct Priors {
-    pub(crate) all: Prior,
+    pub(crate) all: Option<Prior>,
     each: Vec<Prior>,
 }
 
-/// The prior of all sessions but those that it refuses beside the others, such as a sensor that falls where it rises elsewhere.
-fn learnt(mut sessions: Vec<Session>) -> anyhow::Result<Prior> {
+/// What is made of all sessions but those that are refused beside the others, such as a sensor that falls where it rises elsewhere.
+fn of_accepted(
+    mut sessions: Vec<Session>,
+    make: impl Fn(&[Session]) -> Result<Prior, CalibrateError>,
+) -> anyhow::Result<Prior> {
     loop {
-        match Prior::learn(&sessions) {
+        match make(&sessions) {
             Err(CalibrateError::Prior { file, .. }) if sessions.iter().any(|s| s.name == file) => {
                 sessions.retain(|s| s.name != file);
             }
@@ -54,7 +65,7 @@ fn learnt(mut sessions: Vec<Session>) -> anyhow::Result<Prior> {
 
 impl Judge {
     /// Sums the sessions up; those that the library refuses are named and left out.
-    pub(crate) fn new(mut set: Set, used_s: f64, with_auto: bool) -> Self {
+    pub(crate) fn new(mut set: Set, used_s: f64, asked: Asked) -> Self {
         let mut sessions = Vec::new();
         let (signals, reference) = (set.signals.clone(), set.reference.clone());
         set.worn.retain(|worn| {
@@ -69,7 +80,7 @@ impl Judge {
             }
             true
         });
-        Self { set, sessions, used_s, with_auto }
+        Self { set, sessions, used_s, asked }
     }
 
     /// The wearers, in order.
@@ -83,22 +94,47 @@ impl Judge {
     pub(crate) fn without(&self, wearer: &str) -> anyhow::Result<Priors> {
         let kept: Vec<Session> =
             self.sessions.iter().filter(|s| s.path[0] != wearer).cloned().collect();
-        let of = |k: usize| -> anyhow::Result<Prior> {
-            let own: Result<Vec<_>, _> = kept.iter().map(|s| s.of_channels(&[k])).collect();
-            learnt(own?)
+        let channels = 0..self.set.signals.len();
+        let each = channels
+            .map(|k| of_accepted(self.alone(&kept, k)?, Prior::learn))
+            .collect::<Result<Vec<_>, _>>()?;
+        let is_many = each.len() > 1 && !self.asked.leave_sensor;
+        Ok(Priors {
+            all: if is_many { Some(of_accepted(kept, Prior::learn)?) } else { None },
+            each,
+        })
+    }
+
+    /// The sessions of one channel that a prior for a channel is learnt from: its own, or those of all others.
+    fn alone(&self, sessions: &[Session], channel: usize) -> anyhow::Result<Vec<Session>> {
+        let channels =
+            (0..self.set.signals.len()).filter(|k| (*k == channel) != self.asked.leave_sensor);
+        let channels: Vec<usize> = channels.collect();
+        let one = |session: &Session, k: usize| -> anyhow::Result<Session> {
+            let name = format!("{} {}", session.name, session.signals[k]);
+            let mut own = session.of_channels(&[k])?;
+            own.name = name;
+            Ok(own)
         };
-        let each = (0..self.set.signals.len()).map(of).collect::<Result<Vec<_>, _>>()?;
-        let all = if each.len() == 1 { each[0].clone() } else { learnt(kept.clone())? };
-        Ok(Priors { all, each })
+        sessions.iter().flat_map(|s| channels.iter().map(move |&k| one(s, k))).collect()
     }
 
     pub(crate) fn rows(&self, every: usize) -> anyhow::Result<Vec<Row>> {
         let mut rows = Vec::new();
         for wearer in self.wearers() {
+            let worn = self.set.worn.iter().enumerate().step_by(every);
+            let mut worn = worn.filter(|(_, worn)| worn.wearer == wearer).peekable();
+            if worn.peek().is_none() {
+                continue;
+            }
             let priors = self.without(&wearer)?;
-            for (index, worn) in self.set.worn.iter().enumerate() {
-                if worn.wearer == wearer && index % every == 0 {
-                    match self.row(index, worn, &priors) {
+            for (index, worn) in worn {
+                let places: Vec<Option<usize>> = match self.asked.leave_sensor {
+                    true => (0..self.set.signals.len()).map(Some).collect(),
+                    false => vec![None],
+                };
+                for place in places {
+                    match self.row(index, worn, &priors, place) {
                         Ok(row) => {
                             eprintln!("{}: {:?}", worn.name, row.errors);
                             rows.push(row);
@@ -111,7 +147,14 @@ impl Judge {
         Ok(rows)
     }
 
-    fn row(&self, index: usize, worn: &Worn, priors: &Priors) -> anyhow::Result<Row> {
+    /// Errors of one session, of the gauge at `place` or of the one that is best on the first seconds.
+    fn row(
+        &self,
+        index: usize,
+        worn: &Worn,
+        priors: &Priors,
+        place: Option<usize>,
+    ) -> anyhow::Result<Row> {
         let mut errors = Vec::new();
         let half = self.used_s.min(30.0);
         let short = first_seconds(&worn.trials, half);
@@ -120,28 +163,32 @@ impl Judge {
             reference: self.set.reference.clone(),
             ..Options::default()
         };
-        let ranking = rank_signals(&short, &self.set.signals, &base)?;
-        let signal = ranking[0].signal.clone();
-        let place = self.set.signals.iter().position(|s| *s == signal).unwrap_or(0);
-        let options = Options { signal: signal.clone(), ..base };
+        let place = match place {
+            Some(place) => place,
+            None => {
+                let ranking = rank_signals(&short, &self.set.signals, &base)?;
+                let best = |signal: &String| *signal == ranking[0].signal;
+                self.set.signals.iter().position(best).unwrap_or(0)
+            }
+        };
+        let options = Options { signal: self.set.signals[place].clone(), ..base };
         let mut classic = |name: &str, options: &Options| {
             let error = calibrate(&short, options).map(|c| c.calibration);
             let error = error
                 .ok()
                 .and_then(|c| self.error(&SleeveCalibration::One(Box::new(c)), worn).ok());
-            errors.push((name.to_owned(), error.unwrap_or(f64::NAN)));
+            errors.push((format!("{name}, {half} s"), error.unwrap_or(f64::NAN)));
         };
         let model = |name: &str| {
             Ok::<_, anyhow::Error>(Options { model: name.parse()?, ..options.clone() })
         };
-        classic(LINEAR, &model("linear")?);
-        classic("poly13, 30 s", &model("poly13")?);
-        if self.with_auto {
+        classic("linear", &model("linear")?);
+        classic("poly13", &model("poly13")?);
+        if self.asked.auto {
             let choice = choose_model(&short, &options)?;
-            classic("auto, 30 s", &Options { model: choice.model, ..options.clone() });
+            classic("auto", &Options { model: choice.model, ..options.clone() });
         }
         let mut inside = Vec::new();
-        let many = self.set.signals.len() > 1;
         let others: Vec<Session> = self
             .sessions
             .iter()
@@ -150,15 +197,13 @@ impl Judge {
             .map(|(_, s)| s.clone())
             .collect();
         let has_others = others.iter().any(|s| s.path[0] == worn.wearer);
-        for (what, channels) in
-            [("one", vec![place]), ("all", (0..self.set.signals.len()).collect())]
-        {
-            if what == "all" && !many {
-                continue;
-            }
-            let prior = if what == "one" { &priors.each[place] } else { &priors.all };
-            let own: Result<Vec<_>, _> = others.iter().map(|s| s.of_channels(&channels)).collect();
-            let knowing = if has_others { Some(prior.knowing(&own?)?) } else { None };
+        for (what, prior) in [("one", Some(&priors.each[place])), ("all", priors.all.as_ref())] {
+            let Some(prior) = prior else { continue };
+            let own = if what == "one" { self.alone(&others, place)? } else { others.clone() };
+            let knowing = match has_others {
+                true => Some(of_accepted(own, |own| prior.knowing(own))?),
+                false => None,
+            };
             let told = UpdateOptions::of(&format!("{}/{}", worn.wearer, worn.activity));
             let cases = [
                 ("new wearer", Some(prior), UpdateOptions::default()),
@@ -166,8 +211,15 @@ impl Judge {
             ];
             for (who, prior, options) in cases {
                 let Some(prior) = prior else { continue };
+                // a prior of other sensors is of other columns
+                let signals = if what == "one" {
+                    vec![self.set.signals[place].clone()]
+                } else {
+                    self.set.signals.clone()
+                };
+                let options = UpdateOptions { signals: signals.clone(), ..options };
                 let renewing =
-                    RenewOptions { path: options.path.clone(), ..RenewOptions::default() };
+                    RenewOptions { path: options.path.clone(), signals, ..RenewOptions::default() };
                 let error = match prior.renew(&first_seconds(&worn.trials, 60.0), &renewing) {
                     Ok(renewed) => self.error(&renewed.calibration, worn)?,
                     Err(refusal) => {

@@ -1,17 +1,20 @@
 //! Sleeves that are put on again or worn by another: priors and half a minute of reference, on published records.
 //!
 //! ```sh
-//! cargo run --release -p stretch-calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER [--auto] [--every N] [--faults] [--zero] [--simulated HOURS]
+//! cargo run --release -p stretch-calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER --ankles FOLDER \
+//!     [--auto] [--every N] [--leave sensor] [--faults] [--zero] [--simulated HOURS]
 //! ```
 //!
 //! The first folder is `data/Regression` of github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve (commit
-//! 47369aba, MIT), the second `datasets/Part VIII Knee Dataset/Part VIII Knee Data Preprocessed` of
-//! github.com/msstate-athlete-engineering/soft-sensors-research (commit 5f9b7fd3). The project holds neither.
+//! 47369aba, MIT), the others `datasets/Part VIII Knee Dataset/Part VIII Knee Data Preprocessed` and `datasets/Part IX SRS
+//! Prototype Validation Dataset/00-PREPROCESSED-DATA` of github.com/msstate-athlete-engineering/soft-sensors-research
+//! (commit 5f9b7fd3). The project holds none of them.
 //!
 //! Every prior is learnt without the wearer that it is judged on, spreads included; "next session" then tells it the
 //! other sessions of the wearer. All errors are root mean squares over what follows the first minute, of which the
 //! reference is taken; the session's own calibration is judged by cross-validation over sixths. With `--auto` the
-//! choice of a model on the same half minute is judged too, which takes long; with `--faults` lost channels alone are.
+//! choice of a model on the same half minute is judged too; with `--leave sensor` each sensor is, with priors that have seen all
+//! others and never this one; with `--faults` lost channels alone are.
 //! `--zero` asks single gauges alone whether they tell that they were put on again.
 //! `--simulated` asks how often a working gauge is taken for lost in hours of simulated ones.
 
@@ -23,7 +26,7 @@ mod zero;
 
 use std::path::PathBuf;
 
-use judge::{Judge, Row};
+use judge::{Asked, Judge, Row};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -31,7 +34,8 @@ fn main() -> anyhow::Result<()> {
         let at = arguments.iter().position(|a| a == name)?;
         arguments.get(at + 1).cloned()
     };
-    let with_auto = arguments.iter().any(|a| a == "--auto");
+    let leave_sensor = value("--leave").is_some_and(|what| what == "sensor");
+    let asked = Asked { auto: arguments.iter().any(|a| a == "--auto"), leave_sensor };
     let faults_alone = arguments.iter().any(|a| a == "--faults");
     let every = value("--every").map_or(Ok(1), |n| n.parse::<usize>())?.max(1);
     if let Some(hours) = value("--simulated") {
@@ -43,17 +47,33 @@ fn main() -> anyhow::Result<()> {
         if arguments.iter().any(|a| a == "--zero") {
             return zero::print(&set);
         }
-        let judge = Judge::new(set, 60.0, with_auto);
+        let judge = Judge::new(set, 60.0, asked);
         if !faults_alone {
             print("sleeves", &judge.rows(every)?);
         }
-        faults::print(&judge, every)?;
+        if !leave_sensor {
+            faults::print(&judge, every)?;
+        }
     }
     if let Some(folder) = value("--knees") {
         let set = data::knees(&PathBuf::from(folder))?;
         println!("{} wearers of a knee sensor", set.worn.len());
-        let judge = Judge::new(set, 20.0, with_auto);
+        let judge = Judge::new(set, 20.0, asked);
         print("knees", &judge.rows(every)?);
+    }
+    if let Some(folder) = value("--ankles") {
+        for (angle, what) in [("FLX", "flexion"), ("IEV", "inversion")] {
+            for (feet, sensors) in
+                [(vec![vec!["L"], vec!["R"]], "five"), (vec![vec!["L", "R"]; 2], "ten")]
+            {
+                let mut rows = Vec::new();
+                for (foot, feet) in ["L", "R"].into_iter().zip(&feet) {
+                    let set = data::ankles(&PathBuf::from(&folder), foot, angle, feet)?;
+                    rows.extend(Judge::new(set, 10.0, asked).rows(every)?);
+                }
+                print(&format!("ankles, {what}, {sensors} sensors"), &rows);
+            }
+        }
     }
     Ok(())
 }
@@ -63,18 +83,18 @@ fn print(title: &str, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("\n### {title}: {} sessions\n", rows.len());
     println!(
-        "| calibration | sessions | RMSE | to linear, 30 s | worst | above 1.05 | to the session's own | within the 95 % interval |"
+        "| calibration | sessions | RMSE | to the line | worst | above 1.05 | to the session's own | within the 95 % interval |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let logs: Vec<f64> = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::ln).collect();
         (logs.iter().sum::<f64>() / logs.len() as f64).exp()
     };
+    let line = &first.errors[0].0;
     for (name, _) in &first.errors {
         let of = |row: &Row, name: &str| row.error(name).unwrap_or(f64::NAN);
         let error = mean(&mut rows.iter().map(|row| of(row, name)));
-        let ratios: Vec<f64> =
-            rows.iter().map(|row| of(row, name) / of(row, judge::LINEAR)).collect();
+        let ratios: Vec<f64> = rows.iter().map(|row| of(row, name) / of(row, line)).collect();
         let own = if name.contains("all") { judge::OWN_ALL } else { judge::OWN_ONE };
         let to_own = mean(&mut rows.iter().map(|row| of(row, name) / of(row, own)));
         let worst = ratios.iter().copied().fold(0.0, f64::max);

@@ -109,7 +109,7 @@ pub fn calibrate_array(
     let provenance = Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str()))
         .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
     Ok(ArrayFit {
-        calibration: linear.record(&watched, provenance)?,
+        calibration: linear.record(&watched, Some(&channels), provenance)?,
         carried,
         rmse: held.rmse * unit,
         notes,

@@ -10,7 +10,9 @@ use stretch_core::{
 use crate::{
     CalibrateError,
     bank::{BANK, Bank},
+    channels::Channels,
     positive::{cholesky, term_correlation},
+    turns::with_turns,
 };
 
 use super::still::Still;
@@ -65,13 +67,20 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
+    /// The record, with what the channels of the calibration say of where a single gauge turns.
     pub(crate) fn record(
         &self,
         watched: &Watched,
+        channels: Option<&Channels>,
         provenance: Provenance,
     ) -> Result<SleeveCalibration, CalibrateError> {
         match self.signals.len() {
-            1 => Ok(SleeveCalibration::One(Box::new(self.one(provenance)?))),
+            1 => {
+                let stretches = channels.iter().flat_map(|own| &own.stretches);
+                let signals: Vec<&[f64]> = stretches.map(|own| own.signals[0].as_slice()).collect();
+                let one = with_turns(self.one(provenance)?, &signals)?;
+                Ok(SleeveCalibration::One(Box::new(one)))
+            }
             _ => Ok(SleeveCalibration::Many(Box::new(self.many(watched, provenance)?))),
         }
     }

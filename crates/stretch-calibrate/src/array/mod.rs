@@ -21,6 +21,5 @@ pub use linear::{ROOM, SleeveCalibration};
 pub use record::{array_bytes, array_seal};
 
 pub(crate) use linear::Linear;
-pub(crate) use shifts::{Levels, independent, levels};
 pub(crate) use still::Still;
 pub(crate) use watch::watched;

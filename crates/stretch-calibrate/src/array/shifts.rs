@@ -8,7 +8,13 @@ use stretch_core::{ArrayShifts, Values};
 use stretch_fit::student_two_sided;
 use stretch_receptor::block_of;
 
-use crate::{CalibrateError, bank::Bank, channels::Channels, least_squares::LinearFactor};
+use crate::{
+    CalibrateError,
+    bank::Bank,
+    channels::Channels,
+    least_squares::LinearFactor,
+    levels::{Levels, independent, levels},
+};
 
 use super::{
     linear::{Linear, ROOM},
@@ -101,44 +107,6 @@ fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
     }
     let t = student_two_sided(1.0 - share, (independent - 1.0) as u64);
     Some((mean, t * sd * (1.0 + 1.0 / independent).sqrt()))
-}
-
-/// How many independent values as many that follow one another count as, and the standard deviation of one, from their variance about their mean.
-///
-/// Values are alike where their correlation `r` is above zero: `n` of them count as `n (1 - r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc.
-/// Suppl. 8 (1946) 184, for a process of first order). The mean of so many is as near to the truth as that of independent ones, and so is their variance.
-pub(crate) fn independent(count: f64, variance: f64, alike: f64) -> (f64, f64) {
-    let independent = count * (1.0 - alike) / (1.0 + alike);
-    (independent, (variance * independent / (independent - 1.0)).sqrt())
-}
-
-/// Values that follow one another in stretches.
-pub(crate) struct Levels {
-    pub(crate) mean: f64,
-    /// About the mean, over their count.
-    pub(crate) variance: f64,
-    /// Correlation of neighbours.
-    pub(crate) alike: f64,
-    pub(crate) count: f64,
-}
-
-/// Mean, variance and correlation of values in stretches; `None` of none.
-pub(crate) fn levels(stretches: &[Vec<f64>]) -> Option<Levels> {
-    let all: Vec<f64> = stretches.iter().flatten().copied().collect();
-    let count = all.len() as f64;
-    let mean = all.iter().sum::<f64>() / count;
-    let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
-    let products: f64 = stretches
-        .iter()
-        .flat_map(|own| own.windows(2))
-        .map(|pair| (pair[0] - mean) * (pair[1] - mean))
-        .sum();
-    let pairs: usize = stretches.iter().map(|own| own.len().saturating_sub(1)).sum();
-    let alike = match pairs {
-        0 => 0.0,
-        pairs => products / pairs as f64 / variance,
-    };
-    (count > 0.0).then_some(Levels { mean, variance, alike, count })
 }
 
 #[cfg(test)]

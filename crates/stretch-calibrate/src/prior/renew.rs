@@ -148,7 +148,7 @@ impl Prior {
         let provenance = Provenance::new(&options.date, names)
             .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)));
         Ok(Renewed {
-            calibration: linear.record(&watched, provenance)?,
+            calibration: linear.record(&watched, Some(&channels), provenance)?,
             summary: self.summary(&normal.mean, &after.mean, &rows, &values, (distance, variance)),
             notes,
         })

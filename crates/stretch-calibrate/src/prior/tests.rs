@@ -1,10 +1,11 @@
 //! Priors of simulated sleeves, whose wearers differ in gain and zero.
 
+use stretch_core::Turns;
 use stretch_data::{Channel, Trial};
 
 use crate::{
-    ArrayOptions, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration, UpdateOptions,
-    apply, apply_array, calibrate_array,
+    ArrayOptions, Options, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration,
+    UpdateOptions, apply, apply_array, calibrate, calibrate_array,
 };
 
 const HZ: f64 = 50.0;
@@ -84,6 +85,39 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
     let (seen, told) = of(0.0, 2, "w2", &again);
     let (new, _) = of(0.0, 2, "", &again);
     assert!(seen < 0.5 * new && told.known == 1, "{seen} beside {new}");
+}
+
+/// A prior's calibration holds the levels of the seconds that it was given, as any calibration of them does, and so tells a
+/// gauge that was put on again. Without seconds there are none.
+#[test]
+fn levels_are_those_of_the_seconds_of_reference() {
+    let prior = prior(&["s1"]);
+    let turns = |trials: &[Trial]| {
+        let updated = prior.update(trials, &UpdateOptions::default()).unwrap();
+        let SleeveCalibration::One(one) = updated.calibration else { panic!("one gauge") };
+        one
+    };
+    assert_eq!(turns(&[]).turns, None);
+    for seconds in [60.0, 90.0, 120.0] {
+        let trials = [session(9, 0, seconds)];
+        let (signal, reference) = ("s1".into(), "angle_deg".into());
+        let options = Options { signal, reference, ..Options::default() };
+        let usual = calibrate(&trials, &options).unwrap().calibration.turns.unwrap();
+        let own = turns(&trials);
+        let (held, slope) = (own.turns.unwrap(), usual.reference_per_signal);
+        assert_eq!(Turns { reference_per_signal: slope, ..held }, usual);
+        assert!((held.reference_per_signal / slope - 1.0).abs() < 0.2, "{held:?}, {slope}");
+        let renewed = prior.renew(&trials, &RenewOptions::default()).unwrap().calibration;
+        let SleeveCalibration::One(renewed) = renewed else { panic!("one gauge") };
+        let renewed = renewed.turns.unwrap();
+        assert_eq!(Turns { reference_per_signal: slope, ..renewed }, usual);
+        let tells = |off: f64| {
+            let mut again = session(9, 0, 60.0);
+            again.channels[0].values.iter_mut().for_each(|x| *x += off);
+            apply(&own, &again).unwrap().zeros.iter().any(|(_, zero)| zero.has_shifted)
+        };
+        assert!(tells(2.0 * held.limit) && tells(-2.0 * held.limit) && !tells(0.0));
+    }
 }
 
 #[test]

@@ -126,7 +126,7 @@ impl Prior {
         };
         let watched = watched(&linear, channels.as_ref(), None)?;
         Ok(Updated {
-            calibration: linear.record(&watched, provenance)?,
+            calibration: linear.record(&watched, channels.as_ref(), provenance)?,
             summary: UpdateSummary {
                 seconds,
                 known,

@@ -1,10 +1,11 @@
 //! What an effect must bring to be taken: more than chance, more than what counts, more than model discrepancy.
 //!
-//! Three acceptance criteria, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour, and more than *model
-//! discrepancy*: the rig's backlash is not the textbook's; an effect in the right place leaves a share `model_discrepancy` of what it closes, in the
-//! octaves in which it closes it, and evidence grows with the samples while that share does not. Beyond that share the further effect brings `rise`
-//! nats by the [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little
-//! may be model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes.
+//! Three acceptance criteria, all of them in [`Thresholds`]. At least `share` of the gap that is left in the effect's stages closes. What is closed is
+//! more than chance makes of noise of this colour: `rise` nats by the [octaves](crate::fit::octaves), and by the score. And it is more than *model
+//! discrepancy*: the rig's backlash is not the textbook's; an effect in the right place leaves a share `model_discrepancy` of what it closes, with the shape of
+//! a further effect, and evidence grows with the samples while that share does not. What closes no more than that share, or would not count as a gap, so that it may be
+//! discrepancy within the noise, has to raise the score by `faint_rise`. Within the share it has to leave noise alone as well, and to be more than the share of
+//! what was closed in the octaves in which it acts: a discrepancy has no reason to have the very form of one further effect.
 //! Both sets stand beside each other with the [deviations](crate::fit::deviations) of their own effects' forms as well.
 
 use crate::{
@@ -39,22 +40,26 @@ impl Acceptance<'_> {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
+        let Thresholds { model_discrepancy, rise, unknown_excess, .. } = *self.thresholds;
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
-        next.score - base.score > self.least_rise(closed)
-            && self.problem.rise(base, next, self.thresholds.model_discrepancy)
-                > self.thresholds.rise
+        let is_beyond = self.exceeds_discrepancy(base, next, new);
+        let least = if is_beyond { self.least_rise(closed) } else { self.thresholds.faint_rise };
+        let may_be_left = if is_beyond { 0.0 } else { model_discrepancy };
+        next.score - base.score > least
+            && self.problem.rise(base, next, may_be_left) > rise
             && closed >= self.thresholds.share * self.left(base, new)
+            && (is_beyond || self.left(next, new) <= unknown_excess)
     }
 
-    /// Whether an effect on top of `base` can be more than what model discrepancy left: in a stage in which nothing acts yet, or where
-    /// more is left than that.
+    /// Whether an effect on top of `base` can be more than what model discrepancy left.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
-        let specs = self.problem.simulator().effects();
-        let is_free = |s: &usize| base.effects.iter().all(|e| !specs[*e].touches.contains(s));
-        let (discrepancy, rise) = (self.thresholds.model_discrepancy, self.thresholds.rise);
-        let is_left = |s: &usize| self.problem.most_rise(base, *s, discrepancy) > rise;
-        self.touched(effect).iter().any(|s| is_free(s) || is_left(s))
+        let Thresholds { model_discrepancy, rise, .. } = *self.thresholds;
+        let mut touched = self.touched(effect).iter();
+        touched.any(|&s| {
+            self.problem.gap_in(base, s) >= self.discrepancy(base, s)
+                || self.problem.most_rise(base, s, model_discrepancy) > rise
+        })
     }
 
     /// Rise of the score that one effect more has to bring, if it closes that much.
@@ -66,6 +71,19 @@ impl Acceptance<'_> {
     /// Gap that is left in the stages that an effect touches.
     pub(crate) fn left(&self, base: &Hypothesis, effect: usize) -> f64 {
         self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
+    }
+
+    fn exceeds_discrepancy(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
+        self.touched(new).iter().any(|&s| {
+            let closed = self.problem.closes(base, next, s);
+            closed > 0.0 && closed >= self.discrepancy(base, s)
+        })
+    }
+
+    /// Gap that model discrepancy may leave of what a set closes in a stage.
+    fn discrepancy(&self, base: &Hypothesis, stage: usize) -> f64 {
+        let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
+        self.thresholds.model_discrepancy * (gap(&self.problem.nominal) - gap(base)).max(0.0)
     }
 
     fn touched(&self, effect: usize) -> &[usize] {

@@ -42,6 +42,8 @@ const AMPLITUDES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 /// Knots that a turn has at least, and turns in the longest segment.
 const KNOTS: f64 = 4.0;
 const TURNS: f64 = 2.0;
+/// Frequencies that are looked at, the slow ones first: all of a segment of five minutes.
+const MOST: usize = 1500;
 /// Frequencies to either side that tell the usual power.
 const BESIDE: usize = 10;
 /// Peaks that are computed.
@@ -74,11 +76,14 @@ impl Metric {
             .collect();
         let longest = parts.iter().max_by(|a, b| a.lasts_s().total_cmp(&b.lasts_s()))?;
         let (lasts_s, step_s) = (longest.lasts_s(), longest.step_s);
-        let count = (2.0 * lasts_s / (KNOTS * step_s) - 2.0 * TURNS) as usize;
+        let count = ((2.0 * lasts_s / (KNOTS * step_s) - 2.0 * TURNS) as usize).min(MOST);
         let hertz = |k: usize| (TURNS + 0.5 * k as f64) / lasts_s;
-        let powers: Vec<f64> = (0..count)
-            .map(|k| parts.iter().flat_map(|part| part.heard(hertz(k))).map(|q| q * q).sum())
-            .collect();
+        let waves = |hertz: f64| waves(TAU * hertz * step_s, longest.heard.len());
+        let power = |k: usize| {
+            let waves = waves(hertz(k));
+            parts.iter().flat_map(|part| part.q(&waves)).map(|q| q * q).sum()
+        };
+        let powers: Vec<f64> = (0..count).map(power).collect();
         let is_peak = |&k: &usize| {
             let beside = [k.wrapping_sub(1), k + 1].map(|at| powers.get(at).copied());
             beside.iter().flatten().all(|power| *power <= powers[k])
@@ -90,7 +95,8 @@ impl Metric {
         let mut sum = 0.0;
         let mut best: Option<(f64, f64, f64)> = None;
         for hertz in peaks.into_iter().map(hertz) {
-            let heard: Vec<Heard> = parts.iter().map(|part| part.line(hertz)).collect();
+            let waves = waves(hertz);
+            let heard: Vec<Heard> = parts.iter().map(|part| part.line(&waves)).collect();
             for amplitude in AMPLITUDES {
                 let precision = 2.0 / (amplitude * amplitude);
                 let factor: f64 = heard.iter().map(|h| h.ln_factor(precision)).sum();
@@ -132,31 +138,27 @@ impl<'a> Part<'a> {
         self.heard.len() as f64 * self.step_s
     }
 
-    /// Cosine and sine of a frequency at the knots.
-    fn waves(&self, hertz: f64) -> [Vec<f64>; 2] {
-        let phase = |k: usize| TAU * hertz * self.step_s * k as f64;
-        let knots = || 0..self.heard.len();
-        [
-            knots().map(|k| libm::cos(phase(k))).collect(),
-            knots().map(|k| libm::sin(phase(k))).collect(),
-        ]
-    }
-
-    /// q of the module's head.
-    fn heard(&self, hertz: f64) -> [f64; 2] {
-        self.waves(hertz).map(|wave| dot(&wave, &self.heard))
+    /// q of the module's head; the waves may go on behind the segment.
+    fn q(&self, waves: &[Vec<f64>; 2]) -> [f64; 2] {
+        [0, 1].map(|i| dot(&waves[i][..self.heard.len()], &self.heard))
     }
 
     /// A and q of the module's head.
-    fn line(&self, hertz: f64) -> Heard {
-        let waves = self.waves(hertz);
-        let q = [0, 1].map(|i| dot(&waves[i], &self.heard));
-        let columns = waves.map(|wave| self.nuisance.course(self.which, &wave));
+    fn line(&self, waves: &[Vec<f64>; 2]) -> Heard {
+        let columns = [0, 1].map(|i| self.nuisance.course(self.which, &waves[i]));
         let tails = [0, 1].map(|i| self.nuisance.tail(&columns[i]));
         let product =
             |i: usize, j: usize| dot(&columns[i], &columns[j]) - dot(&tails[i], &tails[j]);
-        Heard { a: [product(0, 0), product(0, 1), product(1, 1)], q }
+        Heard { a: [product(0, 0), product(0, 1), product(1, 1)], q: self.q(waves) }
     }
+}
+
+/// Cosine and sine at knots `turn` rad apart, each turned on from the one before.
+fn waves(turn: f64, knots: usize) -> [Vec<f64>; 2] {
+    let (sin, cos) = (libm::sin(turn), libm::cos(turn));
+    let turned = |&(c, s): &(f64, f64)| Some((c * cos - s * sin, s * cos + c * sin));
+    let (c, s) = std::iter::successors(Some((1.0, 0.0)), turned).take(knots).unzip();
+    [c, s]
 }
 
 /// What one segment says of a line: A (its upper triangle) and q of the module's head.

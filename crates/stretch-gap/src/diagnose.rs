@@ -391,8 +391,8 @@ fn report(
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(searched.problem.starts.note());
     text.notes.extend(extrapolated(simulator, &evidence.roles, &naming.named));
-    // Where a gap is left, what is left may look like a swing.
-    if is_quiet || judged.kind == VerdictKind::Effect {
+    // What another form of an effect leaves may look like a swing.
+    if is_quiet || evidence.gap.left <= thresholds.unknown_excess {
         text.notes.extend(swinging(cause.problem, &evidence));
     }
     let model_runs = runs.counted();

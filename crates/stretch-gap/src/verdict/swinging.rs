@@ -19,14 +19,14 @@ pub(crate) fn swinging(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Ve
     let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
     let note = |swing: &Swing, stage: &str| {
         let spec = &simulator.parameters()[swing.parameter];
-        let share = match spec.nominal {
-            0.0 => String::new(),
-            nominal => format!(" ({:.2} %)", 100.0 * (swing.amplitude / nominal).abs()),
+        let size = match spec.nominal {
+            0.0 => format!("{:.2e} {}", swing.amplitude, spec.unit),
+            nominal => format!("{:.2} %", 100.0 * (swing.amplitude / nominal).abs()),
         };
         format!(
-            "{} swings at {:.2} Hz by {:.2e} {} to either side{share}, as stage {stage} tells with a probability of {:.2}: \
+            "{} swings at {:.2} Hz by {size} to either side, as stage {stage} tells with a probability of {:.2}: \
              the diagnosis counts it as drift, and no effect is blamed for it",
-            spec.name, swing.hertz, swing.amplitude, spec.unit, swing.probability
+            spec.name, swing.hertz, swing.probability
         )
     };
     stages

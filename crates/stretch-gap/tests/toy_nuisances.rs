@@ -22,7 +22,34 @@ fn a_drift_that_is_described_is_no_effect() {
             let told =
                 drifting(DESCRIBED, course, 10 * i as u64 + seed).measured(seed).diagnosed().0;
             assert!(told.named.is_empty(), "{course:?} {seed}: {}", told.sentence);
+            assert_eq!(swings(&told.notes), [""; 0]);
         }
+    }
+}
+
+fn swings(notes: &[String]) -> Vec<&str> {
+    notes.iter().map(String::as_str).filter(|note| note.contains("swings")).collect()
+}
+
+/// What a drift could have done is no gap, but a swing of one frequency is told with its frequency and size.
+#[test]
+fn a_drift_that_swings_is_told() {
+    for seed in 0..5 {
+        let mut toy = drifting(DESCRIBED, (0.015, 3.0), seed);
+        let (turn, share) =
+            (std::f64::consts::TAU * 0.7 * toy.dt_s, 0.045 / toy.parameters[1].nominal);
+        let swing = |(i, drift): (usize, &mut f64)| *drift += 0.045 * (turn * i as f64).sin();
+        toy.courses[0].1.iter_mut().enumerate().for_each(swing);
+        let begins = format!("{} swings at ", toy.parameters[1].name);
+        let told = toy.measured(seed).diagnosed().0;
+        assert!(told.named.is_empty(), "{}", told.sentence);
+        let [note] = swings(&told.notes)[..] else { panic!("one note: {:?}", told.notes) };
+        let rest = note.strip_prefix(&begins).expect(note);
+        let number = |at: usize| rest.split(' ').nth(at).and_then(|x| x.parse().ok()).expect(note);
+        // A trial of 10 s parts frequencies by half of a tenth, and the drift, a third as large, adds to a swing or takes from it.
+        let [hertz, percent]: [f64; 2] = [number(0), number(3)];
+        approx::assert_abs_diff_eq!(hertz, 0.7, epsilon = 0.05);
+        approx::assert_relative_eq!(percent, 100.0 * share, max_relative = 0.3);
     }
 }
 

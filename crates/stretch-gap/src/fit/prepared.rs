@@ -355,6 +355,11 @@ impl<'a> PreparedProblem<'a> {
         base.less_discrepancy(&nominal, &next, of_closed).rise(&next)
     }
 
+    /// Fall of a fit's cost that a gap stands for, nats: a block of the fitted samples counts as one.
+    pub(crate) fn gain_of(&self, gap: f64) -> f64 {
+        0.5 * self.compare.roles.blocks(Role::Fit) * gap
+    }
+
     /// Share of a stage's noise that noise of its measured input makes.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {
         self.transmitted[stage].fit

@@ -11,7 +11,11 @@
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, thresholds::Thresholds},
+    search::screen::Screened,
 };
+
+/// Share of all that is left that a screen must promise of an effect which is to leave noise alone: where the change bends it promises too little.
+const ALONE: f64 = 0.5;
 
 /// The acceptance criteria of a problem.
 #[derive(Clone, Copy)]
@@ -54,12 +58,19 @@ impl Acceptance<'_> {
 
     /// Whether an effect on top of `base` can be more than what model discrepancy left.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
-        let Thresholds { model_discrepancy, rise, .. } = *self.thresholds;
         let mut touched = self.touched(effect).iter();
-        touched.any(|&s| {
-            self.problem.gap_in(base, s) >= self.discrepancy(base, s)
-                || self.problem.most_rise(base, s, model_discrepancy) > rise
-        })
+        touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))
+    }
+
+    /// The same of an effect of which a screen promises a gain, or whether it may leave noise alone: it promises [`ALONE`] of all that is left there, and that is
+    /// more than discrepancy in the octaves.
+    pub(crate) fn is_promising(&self, base: &Hypothesis, screened: &Screened) -> bool {
+        let Thresholds { model_discrepancy, rise, .. } = *self.thresholds;
+        let touched = self.touched(screened.effect).iter();
+        let mut rises = touched.map(|&s| self.problem.most_rise(base, s, model_discrepancy));
+        let all = self.problem.gain_of(self.left(base, screened.effect));
+        self.is_possible(base, screened.effect)
+            || (screened.gain() >= ALONE * all && rises.any(|most| most > rise))
     }
 
     /// Rise of the score that one effect more has to bring, if it closes that much.

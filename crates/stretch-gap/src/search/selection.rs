@@ -246,7 +246,7 @@ impl<'a> Search<'a> {
     /// The best of a screen, and the twins of the very best.
     fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
         let screened: Vec<&Screened> =
-            screened.iter().filter(|s| self.acceptance.is_possible(base, s.effect)).collect();
+            screened.iter().filter(|s| self.acceptance.is_promising(base, s)).collect();
         let specs = self.problem.simulator().effects();
         let best = screened.first().map_or(0.0, |s| s.gain());
         // Gains count a block as one observation, scores the effective sample size.
@@ -287,7 +287,7 @@ impl<'a> Search<'a> {
             let screened: Vec<&Screened> = all
                 .iter()
                 .filter(|s| !best.effects.contains(&s.effect))
-                .filter(|s| self.acceptance.is_possible(&less, s.effect))
+                .filter(|s| self.acceptance.is_promising(&less, s))
                 .collect();
             let catalogue = self.problem.simulator().effects();
             let twins = &catalogue[effect].twins;

@@ -15,13 +15,14 @@
 
 use std::cell::RefCell;
 
-use stretch_core::{Calibration, Model, Provenance};
+use stretch_core::{Model, Provenance};
 use stretch_files::Checksum;
 
 use crate::{
     CalibrateError, Calibrated, FitReport, ModelKind, Options, Robust, SplitBy,
     blocks::{GrossErrors, LONGEST, Log},
     passes::Passes,
+    turns::holding,
     twice::fitted_twice,
 };
 
@@ -115,7 +116,7 @@ pub fn calibrate_long(
     let checksums: Vec<u32> = checksums.borrow().iter().map(Checksum::value).collect();
     notes.extend(fitted_twice(names.clone(), checksums.iter().copied().map(Some)));
     let provenance = Provenance::new(&options.date, names).with_checksums(checksums);
-    let mut spec = prepared.calibration(model, provenance)?.into_spec();
-    spec.turns = long.turns(&Calibration::new(spec.clone())?, &seen, &prepared)?;
-    Ok(Calibrated { calibration: Calibration::new(spec)?, fits, notes })
+    let calibration = prepared.calibration(model, provenance)?;
+    let turns = long.turns(&calibration, &seen, &prepared)?;
+    Ok(Calibrated { calibration: holding(calibration, turns)?, fits, notes })
 }

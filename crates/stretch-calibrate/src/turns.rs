@@ -37,6 +37,14 @@ pub(crate) fn with_turns(
     signals: &[&[f64]],
 ) -> Result<Calibration, DesignError> {
     let turns = turns(&calibration, signals);
+    holding(calibration, turns)
+}
+
+/// A calibration that holds these turns.
+pub(crate) fn holding(
+    calibration: Calibration,
+    turns: Option<Turns>,
+) -> Result<Calibration, DesignError> {
     Calibration::new(CalibrationSpec { turns, ..calibration.into_spec() })
 }
 

@@ -334,25 +334,17 @@ impl<'a> PreparedProblem<'a> {
     /// `of_closed` of what the first closes in each octave.
     pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis, of_closed: f64) -> f64 {
         let stages = 0..base.misfits.len();
-        stages.map(|s| self.rise_in(base, s, of_closed, |_| next.misfits[s].octaves)).sum()
+        stages.map(|s| self.rise_in(base, s, &next.misfits[s].octaves, of_closed)).sum()
     }
 
     /// The same in one stage, were noise alone left of it.
     pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize, of_closed: f64) -> f64 {
-        self.rise_in(base, stage, of_closed, Octaves::of_noise)
+        self.rise_in(base, stage, &base.misfits[stage].octaves.of_noise(), of_closed)
     }
 
-    fn rise_in(
-        &self,
-        base: &Hypothesis,
-        stage: usize,
-        of_closed: f64,
-        next: impl Fn(&Octaves) -> Octaves,
-    ) -> f64 {
-        let octaves = |set: &Hypothesis| set.misfits[stage].octaves;
-        let (nominal, base) = (octaves(&self.nominal), octaves(base));
-        let next = next(&base);
-        base.less_discrepancy(&nominal, &next, of_closed).rise(&next)
+    fn rise_in(&self, base: &Hypothesis, stage: usize, next: &Octaves, of_closed: f64) -> f64 {
+        let nominal = &self.nominal.misfits[stage].octaves;
+        base.misfits[stage].octaves.less_discrepancy(nominal, next, of_closed).rise(next)
     }
 
     /// Fall of a fit's cost that a gap stands for, nats: a block of the fitted samples counts as one.

@@ -23,6 +23,7 @@ use crate::{
         nuisance::Nuisance,
     },
     numerics::linear::dot,
+    problem::sample_roles::SampleRoles,
 };
 
 /// A parameter whose drift is rather a swing.
@@ -52,10 +53,10 @@ const PEAKS: usize = 6;
 
 impl Metric {
     /// The likeliest swing of every parameter that drifts; `clean` is a residual over all segments, nuisances taken out.
-    pub(crate) fn swings(&self, segments: &[(usize, usize)], clean: &[f64]) -> Vec<Swing> {
+    pub(crate) fn swings(&self, roles: &SampleRoles, clean: &[f64]) -> Vec<Swing> {
         let drifts = self.loose().iter().filter(|loose| loose.drift.is_some() && !loose.is_by_tick);
         let one = |(which, loose): (usize, &Loose)| {
-            let (hertz, share, probability) = self.likeliest(which, segments, clean)?;
+            let (hertz, share, probability) = self.likeliest(which, roles, clean)?;
             let sd = loose.drift.map_or(0.0, |drift| drift.sd) * loose.level.size;
             Some(Swing { parameter: loose.parameter, hertz, amplitude: share * sd, probability })
         };
@@ -66,13 +67,13 @@ impl Metric {
     fn likeliest(
         &self,
         which: usize,
-        segments: &[(usize, usize)],
+        roles: &SampleRoles,
         clean: &[f64],
     ) -> Option<(f64, f64, f64)> {
-        let there = self.nuisances().iter().zip(segments);
+        let there = self.nuisances().iter().zip(&roles.segments);
         let parts: Vec<Part<'_>> = there
-            .filter_map(|(nuisance, &(from, to))| {
-                Some(Part::of(nuisance.as_ref()?, which, &clean[from..to]))
+            .filter_map(|(nuisance, segment)| {
+                Some(Part::of(nuisance.as_ref()?, which, &clean[segment.from..segment.to]))
             })
             .collect();
         let longest = parts.iter().max_by(|a, b| a.lasts_s().total_cmp(&b.lasts_s()))?;
@@ -217,7 +218,7 @@ mod tests {
         fit::noise_level::NoiseLevel,
         numerics::random::RandomGenerator,
         problem::{
-            sample_roles::{Role, SampleRoles, Segment},
+            sample_roles::{Role, Segment},
             spec::SlowDrift,
         },
     };
@@ -250,14 +251,13 @@ mod tests {
             role: Role::Fit,
         };
         let segments: Vec<Segment> = (0..TRIALS).map(segment).collect();
-        let ranges: Vec<_> = segments.iter().map(|s| (s.from, s.to)).collect();
         let roles = SampleRoles { segments, block: 50, fit_trials: TRIALS, borrowed_test: false };
         let described = SlowDrift { sd: 3.0, correlation_s: 4.0 };
         let metric = Metric::with_drift(noise, drive, described, &roles, 0.01);
         let (adapted, _) = metric.adapted(&roles, &residual);
         let mut clean = residual;
         adapted.clean(&roles, &mut clean);
-        adapted.swings(&ranges, &clean)[0]
+        adapted.swings(&roles, &clean)[0]
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub struct Thresholds {
     pub faint_rise: f64,
     /// Least share of the gap left that an effect must close.
     pub share: f64,
-    /// Share of what was closed in an octave of a stage that model discrepancy may leave to a further effect.
+    /// Share of what was closed, in a stage and in each octave of it, that model discrepancy may leave to a further effect.
     pub model_discrepancy: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,

@@ -14,8 +14,6 @@ const TOLD: f64 = 0.95;
 /// A note for each parameter of each stage that swings.
 pub(crate) fn swinging(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<String> {
     let simulator = problem.simulator();
-    let segments: Vec<(usize, usize)> =
-        evidence.roles.segments.iter().map(|s| (s.from, s.to)).collect();
     let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
     let note = |swing: &Swing, stage: &str| {
         let spec = &simulator.parameters()[swing.parameter];
@@ -31,7 +29,7 @@ pub(crate) fn swinging(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Ve
     };
     stages
         .flat_map(|((metric, traces), stage)| {
-            let swings = metric.swings(&segments, &traces.residual_after);
+            let swings = metric.swings(&evidence.roles, &traces.residual_after);
             let told = swings.into_iter().filter(|swing| swing.probability > TOLD);
             told.map(|swing| note(&swing, &stage.name)).collect::<Vec<_>>()
         })

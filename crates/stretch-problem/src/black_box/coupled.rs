@@ -10,6 +10,7 @@
 //!
 //! A column that several stages share is passed over: each of them has wrappers of its own in front of it.
 
+use stretch_data::listed;
 use stretch_effects::Side;
 use stretch_gap::{Description, EffectSpec};
 
@@ -102,7 +103,7 @@ impl Coupled {
         let moves = |(probe, others): &(&Altered, Vec<usize>)| {
             let column = &stages[probe.stage].inputs[probe.which[0]];
             let others: Vec<&str> = others.iter().map(|s| stages[*s].name.as_str()).collect();
-            format!("{column} of {} moves {}", stages[probe.stage].name, others.join(" and "))
+            format!("{column} of {} moves {}", stages[probe.stage].name, listed(&others))
         };
         let all: Vec<String> = moved.iter().map(moves).collect();
         let end = if takes_several { LOOKED_AT } else { LEFT_OUT };

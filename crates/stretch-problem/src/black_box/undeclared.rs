@@ -12,6 +12,8 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use stretch_data::listed;
+
 use super::{
     checked::Checked,
     coupled::apart,
@@ -86,26 +88,17 @@ impl Alike<'_> {
     fn sentence(mut self) -> String {
         self.own.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (moves, most) = (self.moves, self.own[0].0);
-        let listed = self.own.iter().take(LISTED).map(|(_, name)| (*name).to_owned());
+        let shown = self.own.iter().take(LISTED).map(|(_, name)| (*name).to_owned());
         let left = self.own.len().saturating_sub(LISTED);
-        let names: Vec<String> = listed.chain((left > 0).then(|| format!("{left} more"))).collect();
+        let names: Vec<String> = shown.chain((left > 0).then(|| format!("{left} more"))).collect();
         let (are, each, up_to) = match self.own.len() {
             1 => ("is", "it", ""),
             _ => ("are", "each", "up to "),
         };
         format!(
             "{} {are} said to act on {} alone, but one tolerance of {each} moves {moves} by {up_to}{most:.1} times its noise: add {moves} to the `stages`",
-            joined(&names),
-            self.said.join(" and "),
+            listed(&names),
+            listed(&self.said),
         )
-    }
-}
-
-/// Names in a row: `a`, `a and b`, `a, b and c`.
-fn joined(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }

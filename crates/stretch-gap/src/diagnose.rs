@@ -194,7 +194,7 @@ fn search<'a>(
     from: &Hypothesis,
 ) -> Result<Searched<'a>, GapError> {
     let Task { options, depth, progress, .. } = task;
-    let mut search = Search::new(&problem, &options.thresholds, depth);
+    let mut search = Search::new(&problem, &options.thresholds, depth).quick();
     let best = search.best(from, progress)?;
     let least_gap = options.thresholds.least_gap;
     if let Some(other) = problem.begun_from(&best, least_gap, options.seed)? {
@@ -211,12 +211,13 @@ fn search<'a>(
     };
     let (problem, (found, eliminated, tried, looked)) = match other {
         Some((other, from)) => {
-            let mut search = Search::new(&other, &options.thresholds, depth);
+            let mut search = search.again(&other);
             let best = search.best(&from, progress)?;
             let rest = rivalled(search, best)?;
             (other, rest)
         }
         None => {
+            let best = search.thoroughly(best, progress)?;
             let rest = rivalled(search, best)?;
             (problem, rest)
         }

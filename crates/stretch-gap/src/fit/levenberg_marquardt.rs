@@ -49,6 +49,10 @@ pub(crate) struct Fitted {
     pub(crate) parameter_sd: Vec<(usize, f64)>,
     /// What the fit says of the nominal parameters, the effects' own held.
     pub(crate) information: Information,
+    /// Whether it stood still with sensitivities of where it stands, each simulated: a further fit from here would end at once.
+    pub(crate) is_settled: bool,
+    /// Fall of the cost in the last iteration, nats.
+    pub(crate) last_fall: f64,
 }
 
 /// How much work may go into a fit.
@@ -94,6 +98,7 @@ impl Comparison<'_> {
     ) -> Result<Fitted, GapError> {
         let near = effort.is_rough.then(|| start.parameters.clone());
         let mut descent = Descent::new(self, stages, start, near)?;
+        let (mut is_settled, mut last_fall) = (false, 0.0);
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
@@ -103,13 +108,15 @@ impl Comparison<'_> {
             }
             let before = descent.cost;
             let has_moved = descent.step()?;
-            let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            last_fall = before - descent.cost;
+            let is_still = last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            is_settled = is_still && renew && self.simulator().costly().is_none();
             // With old sensitivities a stand-still may only mean that they are old.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
             }
         }
-        Ok(descent.finish())
+        Ok(Fitted { is_settled, last_fall, ..descent.finish() })
     }
 }
 
@@ -353,7 +360,8 @@ impl<'a, 'b> Descent<'a, 'b> {
             }
         }
         let (model, cost) = (self.model, self.cost);
-        Fitted { model, cost, misfits, effect_sd, parameter_sd, information }
+        let (is_settled, last_fall) = (false, 0.0);
+        Fitted { model, cost, misfits, effect_sd, parameter_sd, information, is_settled, last_fall }
     }
 }
 

@@ -45,6 +45,8 @@ pub(crate) struct Search<'a> {
     pub(crate) sets: Sets<'a>,
     /// Most effects at once.
     depth: usize,
+    /// Whether, before a gap is left as it is, candidates are fitted of which a screen promises nothing.
+    is_thorough: bool,
     /// Screens that were made, by what they were made around: rivals of an effect alone come from the one that it was found by.
     looked: Vec<Arc<Looked>>,
 }
@@ -69,8 +71,32 @@ impl<'a> Search<'a> {
         thresholds: &'a Thresholds,
         depth: usize,
     ) -> Self {
-        let acceptance = Acceptance { problem, thresholds };
-        Self { problem, acceptance, sets: Sets::new(problem), depth, looked: Vec::new() }
+        let (acceptance, sets) = (Acceptance { problem, thresholds }, Sets::new(problem));
+        Self { problem, acceptance, sets, depth, is_thorough: true, looked: Vec::new() }
+    }
+
+    /// The same, fitting only what a screen promises: enough to size nuisances beside it.
+    pub(crate) fn quick(self) -> Self {
+        Self { is_thorough: false, ..self }
+    }
+
+    /// The same search of the same problem with other nuisances: fits begin where they ended before.
+    pub(crate) fn again<'b>(self, problem: &'b PreparedProblem<'b>) -> Search<'b>
+    where
+        'a: 'b,
+    {
+        let sets = Sets::after(problem, self.sets);
+        Search { sets, ..Search::new(problem, self.acceptance.thresholds, self.depth) }
+    }
+
+    /// A set of a quick search, grown thoroughly.
+    pub(crate) fn thoroughly(
+        &mut self,
+        from: Hypothesis,
+        progress: &dyn Fn(&str),
+    ) -> Result<Hypothesis, GapError> {
+        self.is_thorough = true;
+        self.grow(from, progress)
     }
 
     /// The best set that grows from one of this or another problem: effects are added as long as they meet the acceptance criterion.
@@ -163,10 +189,12 @@ impl<'a> Search<'a> {
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
             let mut next = self.first_accepted(&best, ground, &list)?;
             let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
-            if next.is_none() && is_open && !self.problem.is_spent() {
+            if next.is_none() && is_open && self.is_thorough && !self.problem.is_spent() {
                 // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
-                let others: Vec<Screened> = self.others(&best, screened, &list);
+                let others = self.others(&best, screened, &list);
+                let least = |effect| self.least_gain(&best, effect);
+                let others = self.sets.promising(&best, ground, others, least)?;
                 next = self.first_accepted(&best, ground, &others)?;
             }
             let Some(next) = next else { break };
@@ -249,13 +277,7 @@ impl<'a> Search<'a> {
             screened.iter().filter(|s| self.acceptance.is_promising(base, s)).collect();
         let specs = self.problem.simulator().effects();
         let best = screened.first().map_or(0.0, |s| s.gain());
-        // Gains count a block as one observation, scores the effective sample size.
-        let finest = self.problem.finest();
-        let least = |effect: usize| {
-            (FAINT * best).max(
-                PROMISE * self.acceptance.least_rise(self.acceptance.left(base, effect)) * finest,
-            )
-        };
+        let least = |effect| self.least_gain(base, effect).max(FAINT * best);
         let promising = screened.iter().take(kept).filter(|s| s.gain() >= least(s.effect));
         let mut list: Vec<Screened> = promising.copied().cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
@@ -269,6 +291,13 @@ impl<'a> Search<'a> {
             }
         }
         list
+    }
+
+    /// What of a gain must show at a first look at an effect on top of `base`.
+    fn least_gain(&self, base: &Hypothesis, effect: usize) -> f64 {
+        let rise = self.acceptance.least_rise(self.acceptance.left(base, effect));
+        // Gains count a block as one observation, scores the effective sample size.
+        PROMISE * rise * self.problem.finest()
     }
 
     /// Sets in which one effect of `best` is replaced by another, the replaced one named; fitted where a screen

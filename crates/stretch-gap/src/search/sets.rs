@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::{
     fit::{
         hypothesis::Hypothesis,
-        levenberg_marquardt::{COARSE, FINE, Fitted, GLANCE, possible},
+        levenberg_marquardt::{COARSE, Effort, FINE, Fitted, GLANCE, possible},
         prepared::PreparedProblem,
     },
     problem::{error::GapError, linked_stages::linked, simulator::Model},
@@ -30,6 +30,12 @@ const PROMISING_START: f64 = 0.3;
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
 
+/// A set with one effect more, and whether its fit [stood still](Fitted::is_settled).
+struct Extended {
+    set: Hypothesis,
+    is_settled: bool,
+}
+
 /// Sets of effects that were fitted.
 pub(crate) struct Sets<'a> {
     pub(crate) problem: &'a PreparedProblem<'a>,
@@ -37,11 +43,20 @@ pub(crate) struct Sets<'a> {
     pub(crate) tried: BTreeMap<Vec<usize>, Hypothesis>,
     /// Sets among the fitted ones that were fitted from a larger set.
     refitted: BTreeSet<Vec<usize>>,
+    /// Where sets ended that were fitted in the same problem with other nuisances: a fit begins there.
+    before: BTreeMap<Vec<usize>, Model>,
 }
 
 impl<'a> Sets<'a> {
     pub(crate) fn new(problem: &'a PreparedProblem<'a>) -> Self {
-        Self { problem, tried: BTreeMap::new(), refitted: BTreeSet::new() }
+        let (tried, refitted, before) = Default::default();
+        Self { problem, tried, refitted, before }
+    }
+
+    /// For the same problem as that of other sets, with other nuisances.
+    pub(crate) fn after(problem: &'a PreparedProblem<'a>, sets: Sets<'_>) -> Self {
+        let before = sets.tried.into_iter().map(|(key, set)| (key, set.model)).collect();
+        Self { before, ..Self::new(problem) }
     }
 
     /// Stages that hang together with some effects: those that they touch, and those that other effects of the set
@@ -80,9 +95,7 @@ impl<'a> Sets<'a> {
         let stages: Vec<usize> = (0..self.problem.simulator().stages().len()).collect();
         let fitted = self.problem.fit(&stages, set.model.clone(), &[], FINE)?;
         let own = self.join(&self.problem.nominal, set.effects.clone(), &stages, fitted);
-        let mut key = own.effects.clone();
-        key.sort_unstable();
-        self.tried.insert(key, own.clone());
+        self.tried.insert(key(&own.effects, None), own.clone());
         Ok(own)
     }
 
@@ -109,12 +122,13 @@ impl<'a> Sets<'a> {
         base: &Hypothesis,
         ground: &Ground,
         effect: usize,
-        model: Model,
-    ) -> Result<Hypothesis, GapError> {
+        (model, effort): (Model, Effort),
+    ) -> Result<Extended, GapError> {
         let (stages, model) = self.part(base, effect, model);
-        let fitted = self.problem.fit(&stages, model, &ground.known, COARSE)?;
+        let fitted = self.problem.fit(&stages, model, &ground.known, effort)?;
         let effects = base.effects.iter().copied().chain([effect]).collect();
-        Ok(self.join(base, effects, &stages, fitted))
+        let is_settled = fitted.is_settled;
+        Ok(Extended { set: self.join(base, effects, &stages, fitted), is_settled })
     }
 
     /// Replaces the part of a set that a fit renewed.
@@ -163,47 +177,75 @@ impl<'a> Sets<'a> {
         screened: &[Screened],
         aim: f64,
     ) -> Result<Vec<Hypothesis>, GapError> {
-        let key = |effect: usize| {
-            let mut key = base.effects.clone();
-            key.push(effect);
-            key.sort_unstable();
-            key
-        };
+        let key = |effect: usize| key(&base.effects, Some(effect));
         let is_fresh = |s: &&Screened| !self.tried.contains_key(&key(s.effect));
         let fresh: Vec<&Screened> = screened.iter().filter(is_fresh).collect();
-        let mut best = self.coarse(base, ground, &fresh)?;
-        let fine = self.fine(base, &best, aim)?;
-        best.extend(fine);
-        self.tried.extend(best.into_iter().map(|(effect, set)| (key(effect), set)));
+        let coarse = self.coarse(base, ground, &fresh)?;
+        let fine = self.fine(base, &coarse, aim)?;
+        let coarse = coarse.into_iter().map(|(effect, extended)| (effect, extended.set));
+        let best = coarse.chain(fine).map(|(effect, set)| (key(effect), set));
+        self.tried.extend(best);
         let mut found: Vec<Hypothesis> =
             screened.iter().filter_map(|s| self.tried.get(&key(s.effect)).cloned()).collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(found)
     }
 
-    /// The best coarse fit of every effect: where there are several starts, a glance at each says from which.
+    /// The best coarse fit of every effect: where there are several starts, a glance at each says from which. With nuisances that are a little
+    /// others a glance from where the set ended before is enough.
     fn coarse(
         &self,
         base: &Hypothesis,
         ground: &Ground,
         screened: &[&Screened],
-    ) -> Result<BTreeMap<usize, Hypothesis>, GapError> {
-        let starts: Vec<(usize, Vec<Model>)> = screened
-            .par_iter()
-            .map(|screen| {
-                let promising =
-                    screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
-                let mut models: Vec<Model> =
-                    promising.take(STARTS).map(|s| base.model.with(screen.effect, &s.0)).collect();
-                models.extend(unstrained(self.problem, &base.model, screen.effect)?);
-                Ok((screen.effect, models))
-            })
-            .collect::<Result<_, GapError>>()?;
+    ) -> Result<BTreeMap<usize, Extended>, GapError> {
+        let before = |s: &Screened| self.before.get(&key(&base.effects, Some(s.effect)));
+        let again: Vec<(usize, &Model)> =
+            screened.iter().filter_map(|s| Some((s.effect, before(s)?))).collect();
+        let again = possible(again.into_par_iter().map(|(effect, model)| {
+            Ok((effect, self.extend(base, ground, effect, (model.clone(), GLANCE))?))
+        }))?;
+        let fresh: Vec<&Screened> =
+            screened.iter().filter(|s| before(s).is_none()).copied().collect();
+        let starts = self.starts(base, &fresh)?;
         let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);
         let glances: Vec<(usize, Model)> = several
             .into_iter()
             .flat_map(|(e, starts)| starts.into_iter().map(move |s| (e, s)))
             .collect();
+        let best = self.glanced(base, ground, glances)?;
+        let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
+        let begun: Vec<(usize, Model)> =
+            begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
+        let fits = begun.into_par_iter().map(|(effect, model)| {
+            Ok((effect, self.extend(base, ground, effect, (model, COARSE))?))
+        });
+        Ok(possible(fits)?.into_iter().chain(again).collect())
+    }
+
+    /// Models from which a fit of each effect on top of `base` may begin.
+    fn starts(
+        &self,
+        base: &Hypothesis,
+        screened: &[&Screened],
+    ) -> Result<Vec<(usize, Vec<Model>)>, GapError> {
+        let of_one = |screen: &&Screened| {
+            let promising = screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
+            let mut models: Vec<Model> =
+                promising.take(STARTS).map(|s| base.model.with(screen.effect, &s.0)).collect();
+            models.extend(unstrained(self.problem, &base.model, screen.effect)?);
+            Ok((screen.effect, models))
+        };
+        screened.par_iter().map(of_one).collect()
+    }
+
+    /// The best of the glances at every effect.
+    fn glanced(
+        &self,
+        base: &Hypothesis,
+        ground: &Ground,
+        glances: Vec<(usize, Model)>,
+    ) -> Result<BTreeMap<usize, Fitted>, GapError> {
         let looked = glances.into_par_iter().map(|(effect, model)| {
             let (stages, model) = self.part(base, effect, model);
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
@@ -215,29 +257,51 @@ impl<'a> Sets<'a> {
                 best.insert(effect, fitted);
             }
         }
-        let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
-        let begun: Vec<(usize, Model)> =
-            begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
-        let fits = begun
-            .into_par_iter()
-            .map(|(effect, model)| Ok((effect, self.extend(base, ground, effect, model)?)));
-        Ok(possible(fits)?.into_iter().collect())
+        Ok(best)
+    }
+
+    /// Those of some effects of which a glance at a fit lowers the cost by what `least` asks of it, or still goes down by as much at its end, whatever
+    /// the screen said.
+    pub(crate) fn promising(
+        &self,
+        base: &Hypothesis,
+        ground: &Ground,
+        screened: Vec<Screened>,
+        least: impl Fn(usize) -> f64,
+    ) -> Result<Vec<Screened>, GapError> {
+        let starts = self.starts(base, &screened.iter().collect::<Vec<_>>())?;
+        let glances =
+            starts.into_iter().flat_map(|(e, models)| models.into_iter().map(move |m| (e, m)));
+        let glanced = self.glanced(base, ground, glances.collect())?;
+        let falls = |s: &Screened| {
+            let (stages, model) = self.part(base, s.effect, base.model.clone());
+            let residuals: Vec<Vec<f64>> =
+                stages.iter().map(|&s| ground.residuals[s].values.clone()).collect();
+            let before = self.problem.compare.cost(&stages, &model, &residuals);
+            let fall = |fitted: &Fitted| fitted.last_fall.max(before - fitted.cost);
+            glanced.get(&s.effect).is_some_and(|fitted| fall(fitted) >= least(s.effect))
+        };
+        Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
     /// Fits to the end of what may still win.
     fn fine(
         &self,
         base: &Hypothesis,
-        coarse: &BTreeMap<usize, Hypothesis>,
+        coarse: &BTreeMap<usize, Extended>,
         aim: f64,
     ) -> Result<Vec<(usize, Hypothesis)>, GapError> {
-        let top = coarse.values().map(|s| s.score).fold(aim, f64::max);
+        let score = |e: &Extended| e.set.score;
+        let top = coarse.values().map(score).fold(aim, f64::max);
         let near = top - (NEAR * (top - base.score) + NEAR_NATS);
         let specs = self.problem.simulator().effects();
-        let leader = coarse.iter().max_by(|a, b| a.1.score.total_cmp(&b.1.score)).map(|(e, _)| *e);
+        let leader = coarse.iter().max_by(|a, b| score(a.1).total_cmp(&score(b.1))).map(|l| *l.0);
         let is_twin = |e: usize| leader.is_some_and(|l| specs[l].twins.contains(&specs[e].name));
-        let close = coarse.iter().filter(|(e, s)| s.score >= near || is_twin(**e));
-        let close: Vec<(usize, &Hypothesis)> = close.map(|(e, s)| (*e, s)).collect();
+        let is_open = |e: &usize, extended: &Extended| {
+            !extended.is_settled && (score(extended) >= near || is_twin(*e))
+        };
+        let close = coarse.iter().filter(|(e, extended)| is_open(e, extended));
+        let close: Vec<(usize, &Hypothesis)> = close.map(|(e, s)| (*e, &s.set)).collect();
         possible(close.par_iter().map(|&(effect, set)| Ok((effect, self.polish(set, effect)?))))
     }
 
@@ -248,8 +312,7 @@ impl<'a> Sets<'a> {
         effect: usize,
     ) -> Result<Hypothesis, GapError> {
         let rest: Vec<usize> = set.effects.iter().copied().filter(|e| *e != effect).collect();
-        let mut key = rest.clone();
-        key.sort_unstable();
+        let key = key(&rest, None);
         if key.is_empty() {
             return Ok(self.problem.nominal.clone());
         }
@@ -270,4 +333,11 @@ impl<'a> Sets<'a> {
         self.tried.insert(key, better.clone());
         Ok(better)
     }
+}
+
+/// What a set is remembered by: its effects with one more, sorted.
+fn key(effects: &[usize], more: Option<usize>) -> Vec<usize> {
+    let mut key: Vec<usize> = effects.iter().copied().chain(more).collect();
+    key.sort_unstable();
+    key
 }

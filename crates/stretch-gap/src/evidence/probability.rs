@@ -217,16 +217,23 @@ impl Posterior {
     }
 }
 
+/// How many of some probabilities, the greatest first, hold 95 % of their sum.
+pub(crate) fn covering(probabilities: &[f64]) -> usize {
+    let all: f64 = probabilities.iter().sum();
+    let mut sum = 0.0;
+    let held = probabilities.iter().take_while(|p| {
+        let is_open = sum < COVERED * all;
+        sum += **p;
+        is_open
+    });
+    held.count()
+}
+
 /// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.
 pub(crate) fn covering_set(weighed: &[Weighed], simulator: &dyn Simulator) -> Vec<String> {
-    let mut sum = 0.0;
     let mut names: Vec<String> = Vec::new();
-    let all: f64 = weighed.iter().map(|w| w.probability).sum();
-    for Weighed { hypothesis, probability, .. } in weighed {
-        if sum >= COVERED * all {
-            break;
-        }
-        sum += probability;
+    let held = covering(&weighed.iter().map(|w| w.probability).collect::<Vec<_>>());
+    for Weighed { hypothesis, .. } in &weighed[..held] {
         for &e in &hypothesis.effects {
             let name = &simulator.effects()[e].name;
             if !names.contains(name) {

@@ -96,7 +96,7 @@ pub struct Diagnosis {
     pub sentence: String,
     /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
     pub named: Vec<String>,
-    /// Effects that these data cannot tell from one that is named.
+    /// Effects that may stand in the place of one that is named: in the smallest sets that hold 95 % of the probability.
     #[serde(default)]
     pub tied: Vec<String>,
     /// Effects that were found but close less than counts: `least_gap`.

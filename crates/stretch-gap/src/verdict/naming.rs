@@ -1,16 +1,14 @@
 //! Which names stand in the headline, which beside it, and which below.
 //!
 //! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So what a
-//! name closes in one of its stages, on trials that were not fitted, is itself a gap that counts, or the name is reported as faint. And names that the data tell apart no better than a coin does are a tie: two
-//! sets that differ in one effect, the probability of the second at least [`TIE`] of the first's.
+//! name closes in one of its stages, on trials that were not fitted, is itself a gap that counts, or the name is reported as faint. And a name stands
+//! alone where its probability suffices: of the smallest sets that hold 95 % of the probability, those that differ from the first in one effect are a
+//! declared tie with it.
 
 use crate::{
-    evidence::{candidates::Candidate, shares::EffectShare},
+    evidence::{candidates::Candidate, probability::covering, shares::EffectShare},
     problem::thresholds::Thresholds,
 };
-
-/// Ratio of probabilities from which two sets are reported as one or the other: one to three, less than a nat and a half.
-const TIE: f64 = 1.0 / 3.0;
 
 /// Effects of the first candidate by what may be said of them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -42,8 +40,9 @@ impl Naming {
         }
         // On a short record probabilities part what the held-out gap does not.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
-        let is_tied = |c: &&Candidate| c.probability >= TIE * first.probability || closes_alike(c);
-        let rivals = candidates[1..].iter().filter(is_tied);
+        let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
+        let rivals = candidates.iter().enumerate().skip(1);
+        let rivals = rivals.filter(|(i, c)| *i < held || closes_alike(c)).map(|(_, c)| c);
         let mut ties = Vec::new();
         for rival in rivals.filter(|c| c.effects.len() == first.effects.len()) {
             let lost: Vec<&String> =
@@ -107,11 +106,11 @@ mod tests {
     }
 
     #[test]
-    fn what_closes_nothing_is_faint_and_a_coin_is_a_tie() {
+    fn what_closes_nothing_is_faint_and_what_does_not_suffice_is_a_tie() {
         let candidates = [
-            candidate(&["slack", "sag"], 0.5),
-            candidate(&["saturation", "sag"], 0.4),
-            candidate(&["slack", "leak"], 0.1),
+            candidate(&["slack", "sag"], 0.8),
+            candidate(&["saturation", "sag"], 0.16),
+            candidate(&["slack", "leak"], 0.04),
         ];
         let shares = [share("slack", 0.95), share("sag", 0.0)];
         let naming = Naming::of(&candidates, &shares, &Thresholds::frozen(), false);

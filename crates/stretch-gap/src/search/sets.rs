@@ -209,11 +209,7 @@ impl<'a> Sets<'a> {
             screened.iter().filter(|s| before(s).is_none()).copied().collect();
         let starts = self.starts(base, &fresh)?;
         let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);
-        let glances: Vec<(usize, Model)> = several
-            .into_iter()
-            .flat_map(|(e, starts)| starts.into_iter().map(move |s| (e, s)))
-            .collect();
-        let best = self.glanced(base, ground, glances)?;
+        let best = self.glanced(base, ground, several)?;
         let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
         let begun: Vec<(usize, Model)> =
             begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
@@ -239,13 +235,15 @@ impl<'a> Sets<'a> {
         screened.par_iter().map(of_one).collect()
     }
 
-    /// The best of the glances at every effect.
+    /// The best of the glances at every effect, one from each of its starts.
     fn glanced(
         &self,
         base: &Hypothesis,
         ground: &Ground,
-        glances: Vec<(usize, Model)>,
+        starts: Vec<(usize, Vec<Model>)>,
     ) -> Result<BTreeMap<usize, Fitted>, GapError> {
+        let each = |(e, models): (usize, Vec<Model>)| models.into_iter().map(move |m| (e, m));
+        let glances: Vec<(usize, Model)> = starts.into_iter().flat_map(each).collect();
         let looked = glances.into_par_iter().map(|(effect, model)| {
             let (stages, model) = self.part(base, effect, model);
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
@@ -270,9 +268,7 @@ impl<'a> Sets<'a> {
         least: impl Fn(usize) -> f64,
     ) -> Result<Vec<Screened>, GapError> {
         let starts = self.starts(base, &screened.iter().collect::<Vec<_>>())?;
-        let glances =
-            starts.into_iter().flat_map(|(e, models)| models.into_iter().map(move |m| (e, m)));
-        let glanced = self.glanced(base, ground, glances.collect())?;
+        let glanced = self.glanced(base, ground, starts)?;
         let falls = |s: &Screened| {
             let (stages, model) = self.part(base, s.effect, base.model.clone());
             let residuals: Vec<Vec<f64>> =

@@ -211,8 +211,8 @@ fn partial(answer: Answer<'_>) -> String {
     let closes =
         |name: &String| answer.shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
     let in_words = |share: f64| match share < LEAST_SHARE_IN_WORDS {
-        true => " (below 1 %)".to_owned(),
-        false => format!(" ({:.0} %)", 100.0 * share),
+        true => "below 1 %".to_owned(),
+        false => format!("{:.0} %", 100.0 * share),
     };
     let is_bound = |name: &String| answer.shares.iter().any(|s| s.effect == *name && s.at_bound);
     let pairs = naming.named.iter().zip(naming.alternatives());
@@ -220,7 +220,7 @@ fn partial(answer: Answer<'_>) -> String {
         .map(|(name, words)| {
             let share = closes(name);
             let end = if is_bound(name) { ", at the end of its range" } else { "" };
-            (share, words + &in_words(share) + end)
+            (share, format!("{words} ({}{end})", in_words(share)))
         })
         .collect();
     names.sort_by(|a, b| b.0.total_cmp(&a.0));

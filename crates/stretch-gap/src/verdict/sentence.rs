@@ -249,7 +249,7 @@ fn partial(answer: Answer<'_>) -> String {
 fn beside(naming: &Naming) -> String {
     let mut out = String::new();
     if !naming.ties.is_empty() {
-        out += " These data cannot tell which.";
+        out += " These data cannot tell which with 95 % probability.";
     }
     if !naming.faint.is_empty() {
         out += &format!(" Also seen, faint: {}.", naming.faint.join(", "));

@@ -20,6 +20,8 @@
 //! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
 //! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
+use std::borrow::Borrow;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::iter::ParallelIterator;
 
@@ -85,7 +87,12 @@ impl Comparison<'_> {
     pub(crate) fn cost(&self, stages: &[usize], model: &Model, residuals: &[Vec<f64>]) -> f64 {
         let column = |(&s, r): (&usize, &Vec<f64>)| self.metrics[s].column(&self.roles, r.clone());
         let columns: Vec<Column> = stages.iter().zip(residuals).map(column).collect();
-        cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, &columns)
+        self.cost_of(stages, model, &columns.iter().collect::<Vec<_>>())
+    }
+
+    /// The same, from residuals that are ready for products.
+    pub(crate) fn cost_of(&self, stages: &[usize], model: &Model, residuals: &[&Column]) -> f64 {
+        cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, residuals)
     }
 
     /// Fits from a starting model. `known` holds sensitivities of the nominal parameters near the start, by stage.
@@ -98,7 +105,6 @@ impl Comparison<'_> {
     ) -> Result<Fitted, GapError> {
         let near = effort.is_rough.then(|| start.parameters.clone());
         let mut descent = Descent::new(self, stages, start, near)?;
-        let (mut is_settled, mut last_fall) = (false, 0.0);
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
@@ -108,15 +114,15 @@ impl Comparison<'_> {
             }
             let before = descent.cost;
             let has_moved = descent.step()?;
-            last_fall = before - descent.cost;
-            let is_still = last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
-            is_settled = is_still && renew && self.simulator().costly().is_none();
+            descent.last_fall = before - descent.cost;
+            let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            descent.is_settled = is_still && renew && self.simulator().costly().is_none();
             // With old sensitivities a stand-still may only mean that they are old.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
             }
         }
-        Ok(Fitted { is_settled, last_fall, ..descent.finish() })
+        Ok(descent.finish())
     }
 }
 
@@ -125,9 +131,10 @@ fn cost(
     compare: &Comparison<'_>,
     (stages, coordinates): (&[usize], &[(Coordinate, [f64; 2])]),
     model: &Model,
-    residuals: &[Column],
+    residuals: &[impl Borrow<Column>],
 ) -> f64 {
-    let data: f64 = stages.iter().zip(residuals).map(|(&s, r)| compare.product(s, r, r)).sum();
+    let squares = |(&s, r): (&usize, &Column)| compare.product(s, r, r);
+    let data: f64 = stages.iter().zip(residuals.iter().map(Borrow::borrow)).map(squares).sum();
     let prior: f64 = coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
     0.5 * compare.weight() * data + prior
 }
@@ -165,6 +172,9 @@ struct Descent<'a, 'b> {
     normal: DMatrix<f64>,
     gradient: Vec<f64>,
     lambda: f64,
+    /// As those of [`Fitted`].
+    is_settled: bool,
+    last_fall: f64,
 }
 
 impl<'a, 'b> Descent<'a, 'b> {
@@ -189,6 +199,8 @@ impl<'a, 'b> Descent<'a, 'b> {
             normal: DMatrix::zeros(n, n),
             gradient: vec![0.0; n],
             lambda: 1e-3,
+            is_settled: false,
+            last_fall: 0.0,
             coordinates,
             model,
             near,
@@ -359,8 +371,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        let (model, cost) = (self.model, self.cost);
-        let (is_settled, last_fall) = (false, 0.0);
+        let Self { model, cost, is_settled, last_fall, .. } = self;
         Fitted { model, cost, misfits, effect_sd, parameter_sd, information, is_settled, last_fall }
     }
 }

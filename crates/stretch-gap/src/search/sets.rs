@@ -14,6 +14,7 @@ use crate::{
     fit::{
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, Fitted, GLANCE, possible},
+        metric::Column,
         prepared::PreparedProblem,
     },
     problem::{error::GapError, linked_stages::linked, simulator::Model},
@@ -271,9 +272,8 @@ impl<'a> Sets<'a> {
         let glanced = self.glanced(base, ground, starts)?;
         let falls = |s: &Screened| {
             let (stages, model) = self.part(base, s.effect, base.model.clone());
-            let residuals: Vec<Vec<f64>> =
-                stages.iter().map(|&s| ground.residuals[s].values.clone()).collect();
-            let before = self.problem.compare.cost(&stages, &model, &residuals);
+            let residuals: Vec<&Column> = stages.iter().map(|&s| &ground.residuals[s]).collect();
+            let before = self.problem.compare.cost_of(&stages, &model, &residuals);
             let fall = |fitted: &Fitted| fitted.last_fall.max(before - fitted.cost);
             glanced.get(&s.effect).is_some_and(|fitted| fall(fitted) >= least(s.effect))
         };

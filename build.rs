@@ -15,10 +15,12 @@ fn main() {
         return;
     }
     println!("cargo::rerun-if-env-changed={ASKED}");
+    println!("cargo::rerun-if-env-changed=CARGO_TARGET_DIR");
     let asked = env::var_os(ASKED).map(PathBuf::from);
     let built = || {
         let root = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default();
-        Path::new(&root).join("web/target/page")
+        let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+        Path::new(&root).join(target).join("page")
     };
     let at = asked.clone().unwrap_or_else(built);
     let file =

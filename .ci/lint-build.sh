@@ -1,7 +1,7 @@
-# Sourced by gates of workspaces that are linted and tested: one build, by the compiler that lints as well, which makes the same code; lints
-# asked for on their own would compile everything that is depended on again.
+# Sourced by the gate and by the gates of the parts, so that one build lints and compiles: clippy-driver generates the code that rustc does, and
+# lints asked for on their own would compile every dependency again.
 if clippy=$(rustup which clippy-driver 2>/dev/null); then
     export RUSTC_WORKSPACE_WRAPPER=$clippy CLIPPY_ARGS="-Dwarnings"
 else
-    echo "SKIPPED lints of $(basename "$PWD"): rustup knows no clippy-driver"
+    echo "SKIPPED lints: rustup knows no clippy-driver"
 fi

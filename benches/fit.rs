@@ -11,7 +11,9 @@ use std::{hint::black_box, time::Duration};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{DMatrix, DVector};
 use stretch_core::Degree;
-use stretch_fit::{Factor, SurfaceAccumulator};
+use stretch_fit::{Factor, Sample, SurfaceAccumulator};
+
+const TERMS: usize = Degree::POLY13.terms();
 
 /// p00 p10 p01 p11 p02 p12 p03
 const TRUTH: [f64; 7] = [0.058, 0.001, 0.774, -0.121, 2.30, 0.094, -2.26];
@@ -40,10 +42,10 @@ fn surface(r: f64, v: f64) -> f64 {
 }
 
 fn streamed<const ROWS: usize>(log: &Log) -> [f64; 7] {
-    let mut sums: SurfaceAccumulator<f64, 7, ROWS> =
-        SurfaceAccumulator::new(Degree::POLY13).expect("seven terms");
+    let mut sums =
+        SurfaceAccumulator::<f64, TERMS, ROWS>::new(Degree::POLY13).expect("seven terms");
     for ((&rate, &volts), &value) in log.rates.iter().zip(&log.volts).zip(&log.values) {
-        sums.push(rate, volts, value).expect("a finite sample");
+        sums.push(Sample { rate, volts, value }).expect("a finite sample");
     }
     sums.fit().expect("full rank").coefficients().try_into().expect("seven coefficients")
 }
@@ -92,12 +94,12 @@ fn fits(criterion: &mut Criterion) {
 
 fn merges(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("merge_two_factors");
-    let halves: [Factor<f64, 7>; 2] = [1.24, 1.26].map(|centre| {
+    let halves: [Factor<f64, TERMS>; 2] = [1.24, 1.26].map(|centre| {
         let log = log(10_000, centre, 0.02);
-        let mut sums: SurfaceAccumulator<f64, 7, 64> =
-            SurfaceAccumulator::new(Degree::POLY13).expect("seven terms");
+        let mut sums =
+            SurfaceAccumulator::<f64, TERMS, 64>::new(Degree::POLY13).expect("seven terms");
         for ((&rate, &volts), &value) in log.rates.iter().zip(&log.volts).zip(&log.values) {
-            sums.push(rate, volts, value).expect("a finite sample");
+            sums.push(Sample { rate, volts, value }).expect("a finite sample");
         }
         sums.factor()
     });

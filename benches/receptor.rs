@@ -29,12 +29,12 @@ struct Limit {
 impl Limit {
     fn new() -> Self {
         let calibration = example_calibration();
-        let Model::Surfaces { inflation, deflation } = &calibration.model else {
+        let Model::Surfaces { inflation, deflation } = &calibration.spec().model else {
             unreachable!("the example has surfaces")
         };
         let poly = |s: &stretch_core::Surface| s.as_poly13().expect("poly13");
-        let (signal, target) = (calibration.signal_range, calibration.target_range);
-        let per_target = calibration.target.reference_per_target();
+        let (signal, target) = (calibration.spec().signal_range, calibration.spec().target_range);
+        let per_target = calibration.spec().target.reference_per_target();
         Self {
             taps: *SgRate::<f64, 11, 2>::new(SampleRate::new(100.0).expect("above zero"))
                 .expect("a design")
@@ -42,7 +42,10 @@ impl Limit {
             surfaces: [poly(&inflation.surface), poly(&deflation.surface)],
             signal: (signal.offset(), 1.0 / signal.span()),
             rate_scale: [1.0 / inflation.rate_range.span(), 1.0 / deflation.rate_range.span()],
-            target: (calibration.target.to_reference(target.offset()), per_target * target.span()),
+            target: (
+                calibration.spec().target.to_reference(target.offset()),
+                per_target * target.span(),
+            ),
         }
     }
 
@@ -71,7 +74,7 @@ fn live_step(c: &mut Criterion) {
     });
 
     let calibration = example_calibration();
-    let rate = SgRate::<f64, 11, 2>::new(calibration.sample_rate_hz).expect("a design");
+    let rate = SgRate::<f64, 11, 2>::new(calibration.spec().sample_rate_hz).expect("a design");
     let receptor = StretchReceptor::with_rate(&calibration, rate).expect("valid");
     group.bench_function("receptor, shape in the type, length", |b| {
         let mut memory = receptor.memory();

@@ -14,7 +14,7 @@ use stretch_core::{
     Runner, SampleRate, Schema, Stage, Target, Volts,
 };
 use stretch_filter::SgRate;
-use stretch_fit::SurfaceAccumulator;
+use stretch_fit::{Sample, SurfaceAccumulator};
 use stretch_metrics::{Agreement, Delta};
 use stretch_receptor::StretchReceptor;
 
@@ -57,13 +57,13 @@ fn calibrate(
     let rates: Vec<Option<f64>> = bridge_v.iter().map(|&v| rate.step(v)).collect();
 
     // 2. each sample belongs to the branch that its rate says
-    let mut branches: [Vec<(f64, f64, f64)>; 2] = [Vec::new(), Vec::new()];
+    let mut branches: [Vec<Sample<f64>>; 2] = [Vec::new(), Vec::new()];
     let mut branch = Branch::Inflation;
     let target = Target::Contraction { rest_length: REST_LENGTH_MM };
     for ((&length, &volts), rate) in length_mm.iter().zip(bridge_v).zip(&rates) {
         let Some(rate) = *rate else { continue };
         branch = branch.next(rate, dead_band);
-        let row = (rate, volts, target.from_reference(length));
+        let row = Sample { rate, volts, value: target.from_reference(length) };
         branches[usize::from(branch == Branch::Deflation)].push(row);
     }
 
@@ -71,17 +71,17 @@ fn calibrate(
     let signal_range = range(1.24, bridge_v)?;
     let contractions: Vec<f64> = length_mm.iter().map(|&l| target.from_reference(l)).collect();
     let target_range = range(0.0, &contractions)?;
-    let fit = |rows: &[(f64, f64, f64)]| -> Result<BranchSurface, Box<dyn std::error::Error>> {
-        let rates: Vec<f64> = rows.iter().map(|row| row.0).collect();
-        let volts: Vec<f64> = rows.iter().map(|row| row.1).collect();
+    let fit = |rows: &[Sample<f64>]| -> Result<BranchSurface, Box<dyn std::error::Error>> {
+        let rates: Vec<f64> = rows.iter().map(|row| row.rate).collect();
+        let volts: Vec<f64> = rows.iter().map(|row| row.volts).collect();
         let (rate_range, volts_range) = (range(0.0, &rates)?, range(0.0, &volts)?);
-        let mut sums: SurfaceAccumulator<f64, 7, 128> = SurfaceAccumulator::new(Degree::POLY13)?;
-        for &(rate, volts, contraction) in rows {
-            sums.push(
-                rate_range.normalise(rate),
-                signal_range.normalise(volts),
-                target_range.normalise(contraction),
-            )?;
+        let mut sums = SurfaceAccumulator::<f64>::new(Degree::POLY13)?;
+        for row in rows {
+            sums.push(Sample {
+                rate: rate_range.normalise(row.rate),
+                volts: signal_range.normalise(row.volts),
+                value: target_range.normalise(row.value),
+            })?;
         }
         let fit = sums.fit()?;
         Ok(BranchSurface {
@@ -112,7 +112,6 @@ fn calibrate(
         rate_source: RateSource::Voltage,
         dead_band,
         model: Model::Surfaces { inflation, deflation },
-        turns: None,
         provenance: Provenance::new("", ["simulated trial"]),
     })?)
 }
@@ -121,7 +120,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("seed {SEED}");
     let (length_mm, bridge_v) = record(SEED, 120.0);
     let calibration = calibrate(&length_mm, &bridge_v)?;
-    if let Model::Surfaces { inflation, deflation } = &calibration.model {
+    if let Model::Surfaces { inflation, deflation } = &calibration.spec().model {
         for (name, surface) in [("inflation", inflation), ("deflation", deflation)] {
             println!(
                 "{name}: {} samples, R^2 {:.4}, RMSE {:.2} % of the stroke",

@@ -9,7 +9,7 @@ cd "$(dirname "$0")"
 
 target_dir=${CARGO_TARGET_DIR:-target}
 if [ -z "${STRETCH:-}" ]; then
-    cargo build --quiet --locked --manifest-path ../Cargo.toml --bin stretch
+    (cd .. && cargo build --quiet --locked -p stretch-cli)
     STRETCH=${CARGO_TARGET_DIR:-../target}/debug/stretch
 fi
 

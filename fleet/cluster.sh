@@ -3,11 +3,11 @@
 #
 #   fleet/cluster.sh lake "select sensor, linear_fit(bridge_v, contraction) as fit from trials group by sensor"
 #
-# The programs are those of fleet/target/release, or of the folder that BIN names.
+# The programs are those of target/release, or of the folder that BIN names.
 set -eu
 lake=$1
 query=$2
-bin=${BIN:-$(dirname "$0")/target/release}
+bin=${BIN:-$(dirname "$0")/../target/release}
 
 work=$(mktemp -d)
 pids=""

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# The gate of the Python package, the same on a desk and in CI: format and lints, a wheel built and installed into a fresh
+# The gate of the Python package, the same on a desk and in CI: lints, a wheel built and installed into a fresh
 # environment, its tests, its types, and the notebook from top to bottom. It says SKIPPED and why where there is no Python.
-# PYTHON names another interpreter, PROFILE another profile than dev.
+# PYTHON names another interpreter, PROFILE another profile than dev. MODULE names a module that is built already: it is
+# then tested instead of a wheel.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -9,7 +10,6 @@ skip() { printf 'SKIPPED: the Python package: %s\n' "$1"; exit 0; }
 python=${PYTHON:-python3}
 profile=${PROFILE:-dev}
 
-cargo fmt --check
 . ../.ci/lint-build.sh
 
 command -v "$python" >/dev/null 2>&1 || skip "there is no $python"
@@ -23,13 +23,25 @@ trap 'rm -rf "$fresh"' EXIT
 "$fresh/build/bin/ruff" format --quiet --check --config pyproject.toml package tests examples ../examples/machines
 "$fresh/build/bin/mypy" --no-error-summary package/stretch_gap
 
-# a build of its own each time would compile numpy and all again: the target folder stays
-"$fresh/build/bin/maturin" build --quiet --profile "$profile" --interpreter "$python" --out "$fresh/wheels"
 "$python" -m venv "$fresh/use"
-"$fresh/use/bin/pip" install --quiet --disable-pip-version-check "$fresh"/wheels/*.whl pytest pandas
+pip() { "$fresh/use/bin/pip" install --quiet --disable-pip-version-check "$@"; }
+if [ -n "${MODULE:-}" ]; then
+    pip numpy pytest pandas
+    installed=$("$fresh/use/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/stretch_gap
+    # one of its files is a link into the crates
+    cp -rL package/stretch_gap "$installed"
+    cp "$MODULE" "$installed/_stretch.abi3.so"
+else
+    "$fresh/build/bin/maturin" build --quiet --profile "$profile" --interpreter "$python" --out "$fresh/wheels"
+    pip "$fresh"/wheels/*.whl pytest pandas
+    ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
+fi
 # without these their tests say SKIPPED
-"$fresh/use/bin/pip" install --quiet --disable-pip-version-check mujoco rerun-sdk 2>/dev/null || echo "SKIPPED: tests that need mujoco and rerun-sdk"
-ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
+pip mujoco rerun-sdk 2>/dev/null || echo "SKIPPED: tests that need mujoco and rerun-sdk"
+# the libraries of the formats of recordings, by the extras of pyproject.toml
+pip mcap mcap-ros2-support mcap-protobuf-support rosbags 2>/dev/null || echo "SKIPPED: tests of recordings that need stretch-gap[ros]"
+pip scipy h5py 2>/dev/null || echo "SKIPPED: tests of recordings that need stretch-gap[matlab]"
+pip pyarrow 2>/dev/null || echo "SKIPPED: tests of recordings that need stretch-gap[parquet]"
 
 # from elsewhere, so that it is the installed package that is tested
 tests=$PWD/tests notebook=$PWD/examples

@@ -4,7 +4,8 @@
 #     release/build.sh                     all of it, one after the other
 #     release/build.sh tools               cargo-zigbuild, zig and maturin into a virtual environment of its own, and the targets
 #     release/build.sh page                the page that `stretch page` writes, which the programs carry
-#     release/build.sh program TARGET...   an archive with one static program, the licences and the README
+#     release/build.sh manual              man pages and what shells complete, which the archives hold
+#     release/build.sh program TARGET...   an archive with one static program, the manual, the licences and the README
 #     release/build.sh wheel TARGET...     a wheel for every Python from 3.10 on
 #     release/build.sh sdist               the source distribution of the Python package
 #     release/build.sh sums                SHA256SUMS of all that lies there
@@ -44,22 +45,27 @@ tools() {
     rustup target add wasm32-unknown-unknown $(printf '%s\n' $PROGRAMS $WHEELS | sort -u)
     # before paths are remapped, so that every folder of sources exists
     cargo fetch --locked
-    cargo fetch --locked --manifest-path python/Cargo.toml
 }
 
 page() { web/build.sh; }
+
+manual() {
+    rm -rf target/manual
+    cargo run --quiet --release --locked -p stretch-cli --example manual -- target/manual
+}
 
 program() {
     local target name folder ending
     for target in "$@"; do
         name=stretch-$version-$target
         folder=target/dist-folders/$name
-        STRETCH_PAGE=$PWD/web/target/page RUSTFLAGS=$(remapped) \
+        STRETCH_PAGE=$PWD/target/page RUSTFLAGS=$(remapped) \
             cargo zigbuild --release --locked -p stretch-cli --features page --target "$target"
         ending=
         [[ $target != *-windows-* ]] || ending=.exe
         rm -rf "$folder" && mkdir -p "$folder" "$dist"
         cp "target/$target/release/stretch$ending" release/README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
+        cp -r target/manual/man1 target/manual/completions "$folder"
         tar -C target/dist-folders --owner=0 --group=0 --numeric-owner --sort=name -czf "$dist/$name.tar.gz" "$name"
     done
 }
@@ -67,7 +73,7 @@ program() {
 wheel() {
     local target
     for target in "$@"; do
-        (cd python && CARGO_TARGET_DIR=$PWD/../target RUSTFLAGS=$(cd .. && remapped) \
+        (cd python && RUSTFLAGS=$(cd .. && remapped) \
             maturin build --release --zig --target "$target" --out "$dist")
     done
 }
@@ -81,11 +87,11 @@ what=${1:-all}
 case $what in
     all)
         # shellcheck disable=SC2086
-        tools && page && program $PROGRAMS && wheel $WHEELS && sdist && sums
+        tools && page && manual && program $PROGRAMS && wheel $WHEELS && sdist && sums
         ;;
-    tools | page | program | wheel | sdist | sums) "$what" "$@" ;;
+    tools | page | manual | program | wheel | sdist | sums) "$what" "$@" ;;
     *)
-        echo "usage: release/build.sh [tools|page|program TARGET...|wheel TARGET...|sdist|sums]" >&2
+        echo "usage: release/build.sh [tools|page|manual|program TARGET...|wheel TARGET...|sdist|sums]" >&2
         exit 2
         ;;
 esac

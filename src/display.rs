@@ -16,7 +16,7 @@ use std::{
 };
 
 use anyhow::ensure;
-use stretch_files::is_standard_output;
+use stretch_data::files::is_standard_output;
 
 use crate::terminal::{self, Ink, wrapped};
 

@@ -142,7 +142,7 @@ fn an_option_that_is_misspelt_says_what_is_understood() {
     for (option, value, hint) in [
         ("--model", "poly77", "poly55"),
         ("--rate", "savgol:11", "savgol:WINDOW,DEGREE"),
-        ("--normalise", "both", "min-max"),
+        ("--robust", "both", "bisquare"),
     ] {
         let output =
             calibrate(&trial, &scratch.path("cal.json")).args([option, value]).output().unwrap();

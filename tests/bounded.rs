@@ -23,25 +23,6 @@ fn told(scratch: &Scratch, arguments: &[&str]) -> (bool, String) {
 }
 
 #[test]
-#[ignore = "three million rows in bounded memory; ./ci.sh runs it"]
-fn a_long_log_is_calibrated_on_in_the_memory_of_a_block() {
-    let scratch = Scratch::new();
-    log(&scratch.path("long.csv"), 3_000_000, 0.01);
-    // 300 MB of data; as a whole the log takes a third more
-    let limited = "ulimit -d 300000; exec \"$0\" calibrate long.csv --out cal.json";
-    let mut shell = Command::new("sh");
-    shell.current_dir(scratch.path("")).args(["-c", limited]).arg(program());
-    let out = shell.output().unwrap();
-    let said = String::from_utf8_lossy(&out.stdout);
-    assert!(out.status.success(), "{said}{}", String::from_utf8_lossy(&out.stderr));
-    assert!(
-        said.contains("3000000 rows are more than 1500000: they were read block by block"),
-        "{said}"
-    );
-    assert!(scratch.path("cal.json").exists());
-}
-
-#[test]
 fn times_that_nobody_means_are_refused() {
     let scratch = Scratch::new();
     log(&scratch.path("ps.csv"), 500, 1e-12);

@@ -64,7 +64,7 @@ fn told(reader: &str, folder: &Path, name: &str) -> String {
         }
         "record" => {
             put(name);
-            command.args(["record", "check", name]);
+            command.args(["export", "--calibration", name]);
         }
         "rig" => {
             put(name);

@@ -37,9 +37,9 @@ fn the_demo_does_the_whole_job_without_anybody_s_data() {
     let scratch = Scratch::new();
     let out = scratch.path("demo");
     let mut command = stretch();
-    command.env("STRETCH_DATA", scratch.path("nothing")).args(["demo", "--seed", "4", "--json"]);
+    command.env("STRETCH_DATA", scratch.path("nothing")).args(["demo", "--json"]);
     let said: Value = serde_json::from_str(&runs(command.arg("--out").arg(&out))).unwrap();
-    assert_eq!(said["seed"], 4);
+    assert_eq!(said["seed"], 3);
     // memory is what the rig has and the paper's surfaces lack
     for kind in [0, 1] {
         let [_, linear, surfaces, chosen] = rmse(&said["kinds"][kind][1]);
@@ -80,7 +80,7 @@ fn with_data_measured_sessions_take_the_same_way() {
     let scratch = Scratch::new();
     let out = scratch.path("demo");
     let mut command = stretch();
-    command.args(["demo", "--sessions", "heel_curl_90", "--data"]).arg(&sleeve).arg("--out");
+    command.args(["demo", "--data"]).arg(sleeve.join("heel_curl_90")).arg("--out");
     let text = runs(command.arg(&out).arg("--json"));
     let said: Value = serde_json::from_str(&text).unwrap();
     let [raw, linear, surfaces, chosen] = rmse(&said["evaluation"]["pooled"]);
@@ -91,7 +91,7 @@ fn with_data_measured_sessions_take_the_same_way() {
     assert!(said["diagnosis"]["unexplained"]["share"].as_f64().unwrap() > 0.05, "{text}");
     holds_both_parts(&out);
     let command = &mut stretch();
-    command.args(["demo", "--sessions", "heel", "--data"]).arg(&sleeve);
+    command.args(["demo", "--data"]).arg(sleeve.join("heel"));
     command.arg("--out").arg(scratch.path("other"));
     fails(command, &["no sessions heel", "heel_curl_45, heel_curl_90, lift_up"]);
 }

@@ -2,7 +2,7 @@
 
 use std::{fs, process::Command};
 
-use crate::support::{Scratch, fails, runs, stretch};
+use crate::support::{Scratch, fails, json_to, runs, stretch};
 
 /// A data set of the paper's protocol with an effect of the gauge.
 fn bench(scratch: &Scratch, effect: &str) -> std::path::PathBuf {
@@ -67,7 +67,7 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     assert!(last[5].parse::<f64>().unwrap() > 0.0, "{last:?}");
 
     // On a diagnosis of the whole rig, and as C.
-    runs(stretch().arg("diagnose").arg(&bench).arg("--no-next").arg("--json-out").arg(&d));
+    runs(stretch().arg("diagnose").arg(&bench).arg("--no-next").arg(json_to(&d)));
     let said = runs(
         stretch()
             .arg("calibrate")
@@ -108,13 +108,13 @@ fn a_diagnosis_that_cannot_help_is_refused_with_what_to_do() {
         fails(command.arg("--out").arg(&out), says);
         assert!(!out.exists());
     };
-    ask("no.json", "{\"rows\": 3}", &["no.json", "stretch diagnose --json-out"]);
+    ask("no.json", "{\"rows\": 3}", &["no.json", "stretch diagnose --json="]);
     ask("newer.json", "{\"schema\": 7}", &["newer.json", "schema 7", "newer"]);
     // A diagnosis without any effect, and one of another stage alone.
     let folder = scratch.path("quiet");
     runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&folder));
     let d = scratch.path("quiet.json");
-    runs(stretch().arg("diagnose").arg(&folder).arg("--json-out").arg(&d));
+    runs(stretch().arg("diagnose").arg(&folder).arg(json_to(&d)));
     let quiet = fs::read_to_string(&d).unwrap();
     ask("none.json", &quiet, &["none.json", "no effect of the gauge", "--model observer"]);
 }

@@ -121,7 +121,7 @@ fn set_of_two(random: &mut Random) -> [&'static Effect; 2] {
 #[ignore = "twenty sets of two effects, minutes; ./ci.sh runs it"]
 fn a_set_of_two_is_agreed_with_once_it_is_written_into_the_rig_file() {
     let scratch = Scratch::new();
-    let mut random = Random(26);
+    let mut random = Random::new(26);
     let mut wrong = Vec::new();
     for _ in 0..SETS_OF_TWO {
         let pair = set_of_two(&mut random).map(spelled);

@@ -6,8 +6,7 @@ use std::{
     process::Command,
 };
 
-use stretch_calibrate::array_bytes;
-use stretch_receptor::example_array;
+use stretch_sleeve::{array_bytes, example_array};
 
 use crate::support::{Scratch, calibrate, fails, runs, stdout, stretch};
 
@@ -174,9 +173,8 @@ fn named_defects_are_exported_in_float_alone() {
 #[test]
 fn what_has_no_form_in_c_says_so_and_writes_nothing() {
     for (arguments, form, parts) in [
-        (["--model", "blended"], "fixed", ["blended", "observer+rest"]),
         (["--model", "poly22"], "float", ["poly22", "linear, poly13"]),
-        (["--model", "relaxation"], "fixed", ["remembers", "--model"]),
+        (["--model", "history"], "fixed", ["remembers", "--model"]),
         (["--rate", "tracker:0.1"], "fixed", ["Tracker", "savgol:11,2"]),
     ] {
         let scratch = Scratch::new();

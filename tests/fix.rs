@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use crate::support::{
-    Scratch, fails,
+    Scratch, fails, json_to,
     round_trip::{diagnosed, is_agreed, replayed},
     runs, stretch,
 };
@@ -138,7 +138,7 @@ fn a_gauge_alone_is_written_and_agrees() {
     let text = fs::read_to_string(&fixed).unwrap();
     assert!(text.contains("kind = \"gauge\"") && text.contains("skew_s = 0.0"), "{text}");
     let json = scratch.path("d.json");
-    runs(run(&["--rig"]).arg(&fixed).arg("--json-out").arg(&json));
+    runs(run(&["--rig"]).arg(&fixed).arg(json_to(&json)));
     let again: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     assert!(is_agreed(&again), "{}", again["sentence"]);
 }

@@ -1,8 +1,8 @@
-//! `stretch calibrate --fixed`: the record that a board reads, run on converter codes.
+//! `stretch export --fixed`: the record that a board reads, run on converter codes.
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{Scratch, calibrate, fails, stdout};
+use crate::support::{Scratch, calibrate, fails, runs, stretch};
 use stretch_calibrate::{parse_adc, read_calibration};
 use stretch_core::{Calibration, Design, Runner, Stage, Volts, record::load};
 use stretch_filter::RateFilter;
@@ -20,15 +20,16 @@ fn adc() -> Adc {
 /// Calibrates on a trial, and reads both records back.
 fn records(scratch: &Scratch, trial: &Path, model: &str, read_as: &str) -> (Calibration, Vec<u8>) {
     let (float, fixed) = (scratch.path("cal.json"), scratch.path("cal.fixed.postcard"));
-    let mut command = calibrate(trial, &float);
-    let output = command
-        .args(["--model", model, "--adc", ADC, "--fixed"])
-        .arg(&fixed)
-        .output()
-        .expect("the program runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(stdout(&output).contains(&format!("a board reads it as {read_as}")));
+    runs(calibrate(trial, &float).args(["--model", model]));
+    let text = runs(export(&float, &fixed).args(["--adc", ADC]));
+    assert!(text.contains(&format!("a board reads it as {read_as}")), "{text}");
     (read_calibration(&float).unwrap(), std::fs::read(fixed).unwrap())
+}
+
+fn export(calibration: &Path, fixed: &Path) -> assert_cmd::Command {
+    let mut command = stretch();
+    command.arg("export").arg("--calibration").arg(calibration).arg("--fixed").arg(fixed);
+    command
 }
 
 /// The signal of a trial, as the converter gives it.
@@ -70,8 +71,8 @@ fn an_observer_runs_from_its_record_as_it_does_in_floats() {
         let float = ObserverReceptor::<f64>::new(&calibration).unwrap();
         let errors = apart(fixed, float, &codes(&test));
         assert_eq!(errors.len(), 4000, "an observer needs no warm-up");
-        let per_target = calibration.target.reference_per_target().abs();
-        let span_mm = calibration.target_range.span() * per_target;
+        let per_target = calibration.spec().target.reference_per_target().abs();
+        let span_mm = calibration.spec().target_range.span() * per_target;
         // a thousandth for the last rounding
         let bound = testkit::tolerance::FIXED_OBSERVER * span_mm + 1e-3;
         let largest = largest(&errors);
@@ -86,7 +87,10 @@ fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
     for model in ["linear", "poly13"] {
         let (calibration, bytes) = records(&scratch, &fit, model, "FixedCalibration<11, 2>");
         let fixed: FixedCalibration<11, 2> = load(&bytes).unwrap();
-        let rate = RateFilter::<f64>::new(calibration.rate_estimator, calibration.sample_rate_hz);
+        let rate = RateFilter::<f64>::new(
+            calibration.spec().rate_estimator,
+            calibration.spec().sample_rate_hz,
+        );
         let float = StretchReceptor::with_rate(&calibration, rate.unwrap()).unwrap();
         let errors = apart(FixedReceptor::new(fixed), float, &codes(&test));
         assert_eq!(errors.len(), 3990, "all after the warm-up");
@@ -100,27 +104,22 @@ fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
 fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
     let scratch = Scratch::new();
     let trial = scratch.loops("a.csv", 20.0, 1.1);
-    let before = scratch.names();
-    for (arguments, parts) in [
-        (["--model", "blended"], ["blended", "observer+rest"]),
-        (["--model", "poly22"], ["poly22", "linear, poly13"]),
-        (["--model", "relaxation"], ["--model relaxation", "observer"]),
-        (["--rate", "tracker:0.1"], ["Tracker", "savgol:WINDOW,DEGREE"]),
-        (["--adc", "12,0,1"], ["from 1.2", "sees 0 to 1"]),
-        (["--adc", "12,0,1000000"], ["does not fit", "fixed.error"]),
+    let float = scratch.path("cal.json");
+    let plain: &[&str] = &[];
+    for (fitted, exported, parts) in [
+        (["--model", "poly22"].as_slice(), plain, ["poly22", "linear, poly13"]),
+        (&["--model", "history"], plain, ["that remembers", "observer"]),
+        (&["--rate", "tracker:0.1"], plain, ["Tracker", "savgol:WINDOW,DEGREE"]),
+        (plain, &["--adc", "12,0,1"], ["from 1.2", "sees 0 to 1"]),
+        (plain, &["--adc", "12,0,1000000"], ["does not fit", "fixed.error"]),
     ] {
-        let mut command = calibrate(&trial, &scratch.path("cal.json"));
-        command.args(arguments).arg("--fixed").arg(scratch.path("cal.fixed.postcard"));
-        fails(&mut command, &parts);
-        assert_eq!(scratch.names(), before, "{arguments:?}");
+        runs(calibrate(&trial, &float).args(fitted));
+        let before = scratch.names();
+        fails(export(&float, &scratch.path("cal.fixed.postcard")).args(exported), &parts);
+        assert_eq!(scratch.names(), before, "{fitted:?} {exported:?}");
     }
-    for (arguments, part) in [
-        (["--fixed", "cal.fixed.postcard", "--adc", "12,3.3,0"].as_slice(), "BITS,ZERO_V"),
-        (["--adc", ADC].as_slice(), "--fixed"),
-    ] {
-        let mut command = calibrate(&trial, &scratch.path("cal.json"));
-        let output = command.args(arguments).output().expect("the program runs");
-        assert_eq!(output.status.code(), Some(2));
-        assert!(String::from_utf8_lossy(&output.stderr).contains(part), "{arguments:?}");
-    }
+    let mut command = export(&float, &scratch.path("cal.fixed.postcard"));
+    let output = command.args(["--adc", "12,3.3,0"]).output().expect("the program runs");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("BITS,ZERO_V"));
 }

@@ -29,22 +29,23 @@ const fn writing(line: &'static str, weight: usize, at_once: bool) -> Writing {
     Writing { line, weight, at_once }
 }
 
-const WRITING: [Writing; 13] = [
+const WRITING: [Writing; 14] = [
     writing("simulate --protocol pulses --out new", 4, true),
     writing("simulate --protocol paper --out bench --force", 8, true),
     writing("simulate --protocol pulses --out bench --force", 8, true),
     writing("export --calibration board.json --c c --arduino", 3, true),
     writing("demo --paper --out demo", 1, true),
     writing("demo --paper --out bench --force", 1, true),
-    writing("calibrate a.csv --out cal.json --report cal.html --fixed cal.postcard", 8, false),
+    writing("calibrate a.csv --out cal.json --report cal.html", 8, false),
+    writing("export --calibration board.json --fixed cal.postcard --c c", 3, false),
     writing(
-        "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out d.json --report d.html --fix fixed.toml",
+        "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=d.json --report d.html --fix fixed.toml",
         3,
         false,
     ),
     writing("apply --calibration cal.json a.csv --out out.csv", 3, true),
     writing("convert a.csv --out out.csv", 3, true),
-    writing("record seal cal.json", 3, true),
+    writing("export --calibration cal.json --seal", 3, true),
     writing("init logs --force", 3, true),
     writing("evaluate --calibration cal.json a.csv", 1, true),
 ];
@@ -86,7 +87,7 @@ fn killed_at_random(kills: usize, seed: u64) -> usize {
     let old = tree(&before.path(""));
     let turns: Vec<usize> =
         WRITING.iter().enumerate().flat_map(|(i, w)| vec![i; w.weight]).collect();
-    let (mut random, mut hit, mut new_ones) = (Random(seed), 0, 0);
+    let (mut random, mut hit, mut new_ones) = (Random::new(seed), 0, 0);
     for kill in 0..kills {
         let at = if kill < WRITING.len() {
             kill

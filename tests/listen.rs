@@ -241,8 +241,8 @@ fn a_start_that_fails_leaves_nothing_behind() {
         (["--port", "-", "--calibration", "broken.json"].as_slice(), ["broken.json", "schema"]),
         (&["--port", "none", "--calibration", "cal.postcard"], ["none", "No such file"]),
         (
-            &["--port", "-", "--calibration", "cal.postcard", "--adc-bits", "16"],
-            ["12 bits", "--adc-bits 12"],
+            &["--port", "-", "--calibration", "cal.postcard", "--adc", "16,0,3.3"],
+            ["12 bits", "--adc 12,"],
         ),
     ] {
         let mut command = crate::support::stretch();
@@ -274,10 +274,7 @@ fn codes_beyond_the_converter_are_counted_and_nothing_is_called_compared() {
     let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
     let (notes, recorded) = heard(&bytes);
     assert!(notes.contains("198 codes up to"), "{notes}");
-    assert!(
-        notes.contains("beyond a converter of 12 bits") && notes.contains("--adc-bits"),
-        "{notes}"
-    );
+    assert!(notes.contains("beyond a converter of 12 bits") && notes.contains("--adc"), "{notes}");
     assert!(notes.contains("2 samples that the board did not get"), "{notes}");
     assert!(notes.contains("no estimate was compared") && !notes.contains("differs"), "{notes}");
     assert!(recorded.is_empty());
@@ -426,16 +423,16 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     assert_eq!(fs::read_to_string(folder.path().join("trial.csv")).unwrap(), recorded);
 }
 
-#[test]
-fn on_a_terminal_it_plots() {
+/// Everything that a terminal of 24 rows shows while `listen` runs on it, and how it ended.
+fn seen_on_a_terminal(out: &[&str]) -> (ExitStatus, String, Vec<PathBuf>) {
     let folder = tempfile::tempdir().unwrap();
     let calibration = calibration_to_json(&example_calibration()).unwrap();
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let mut port = plug(&folder.path().join("port"));
-    let mut terminal = plug(&folder.path().join("terminal"));
-    let tty = |write: bool| {
+    let mut eyes = plug(&folder.path().join("terminal"));
+    let tty = || {
         let path = folder.path().join("terminal");
-        let file = File::options().read(true).write(write).open(path).unwrap();
+        let file = File::options().read(true).write(true).open(path).unwrap();
         let size = termios::Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
         termios::tcsetwinsize(&file, size).unwrap();
         file
@@ -443,13 +440,13 @@ fn on_a_terminal_it_plots() {
     let mut child = Command::new(program())
         .current_dir(folder.path())
         .args(["listen", "--port", "port", "--calibration", "cal.json"])
+        .args(out)
         .env("TERM", "xterm")
-        .stdin(tty(false))
-        .stdout(tty(true))
-        .stderr(Stdio::null())
+        .stdin(tty())
+        .stdout(tty())
+        .stderr(tty())
         .spawn()
         .unwrap();
-    let mut eyes = terminal.try_clone().unwrap();
     let seen = thread::spawn(move || {
         let (mut seen, mut buffer) = (Vec::new(), [0; 4096]);
         // the terminal's end is an error on this side
@@ -466,14 +463,31 @@ fn on_a_terminal_it_plots() {
         thread::sleep(Duration::from_millis(2));
     }
     thread::sleep(Duration::from_millis(300));
-    terminal.write_all(b"q").unwrap();
-    assert!(child.wait().unwrap().success());
-    let seen = seen.join().unwrap();
-    let seen = String::from_utf8_lossy(&seen);
-    let braille = seen.chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count();
-    assert!(braille > 20, "no curve: {braille}");
-    assert!(seen.contains("mm") && seen.contains("frames"), "{seen}");
-    assert!(seen.contains("\u{1b}[?1049l"), "the terminal was not given back");
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let status = child.wait().unwrap();
+    let seen = String::from_utf8_lossy(&seen.join().unwrap()).into_owned();
+    let recorded = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    (status, seen, recorded.filter(|path| path.extension().is_some_and(|e| e == "csv")).collect())
+}
+
+#[test]
+fn a_terminal_shows_one_line_that_is_renewed() {
+    let (status, seen, recorded) = seen_on_a_terminal(&["--out", "trial.csv"]);
+    assert!(status.success(), "{seen}");
+    // drawn again and again in place: far fewer lines than samples
+    assert!(seen.matches("mm; ").count() > 3 && seen.lines().count() < 12, "{seen}");
+    assert!(seen.contains("frames, 0 lost") && !seen.contains("time_s,"), "{seen}");
+    assert!(seen.contains("198 rows recorded"), "{seen}");
+    assert_eq!(recorded.len(), 1, "Ctrl-C keeps the recording");
+}
+
+#[test]
+fn a_dash_sends_the_samples_to_standard_output() {
+    let (status, seen, recorded) = seen_on_a_terminal(&["--out", "-"]);
+    assert!(status.success() && recorded.is_empty(), "{seen}");
+    let rows = seen.lines().filter(|line| line.split(',').count() == 6).count();
+    assert_eq!(rows, 201, "a header and a row a sample: {seen}");
+    assert!(!seen.contains("mm; "), "no status line between the rows: {seen}");
 }
 
 #[test]

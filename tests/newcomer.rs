@@ -84,7 +84,7 @@ fn a_folder_of_csv_files_is_told_what_to_do() {
         "calibrate logs --out x.json",
         "evaluate --calibration cal.json logs",
         "diagnose logs",
-        "simulate --commands logs --out x",
+        "simulate --protocol logs --out x",
     ] {
         let says = ["logs: there is no dataset.toml in it", "it holds monday.csv", "logs/*.csv"];
         fails(&mut with(line), &says);
@@ -140,11 +140,9 @@ fn a_diagnosis_says_what_its_page_says() {
     let told =
         runs(command.arg("diagnose").arg(&bench).arg("--no-next").arg("--report").arg(&page));
     let html = std::fs::read_to_string(&page).unwrap().replace('\u{a0}', " ");
-    assert!(!told.contains("floors") && html.contains("\u{b1} one standard deviation"));
-    // what is left stands first, the numbers of every candidate behind a line that opens them
+    // what is left comes first
     let at = |part: &str| html.find(part).unwrap_or_else(|| panic!("no {part}"));
     assert!(at("measured \u{2212} simulated") < at("<table"));
-    assert!(at("<summary>Every candidate and its numbers") < at(">Stability<"));
     assert!(!told.contains("Stability"), "the numbers of rivals are for -v: {told}");
     let rows: Vec<&str> = told.lines().filter(|l| l.starts_with("| sensing ")).collect();
     let cells = rows[0].split('|').map(str::trim).filter(|cell| cell.contains('\u{d7}'));

@@ -1,33 +1,32 @@
 //! `stretch page`: written whole from where it was built, or a sentence.
 
-use std::fs;
+use std::{fs, path::Path};
 
 use crate::support::{Scratch, fails, runs, stretch};
 
 const PAGE: &str = "<!DOCTYPE html>\n<html><body>a page</body></html>\n";
 
 #[test]
-fn a_page_that_was_built_is_written_and_never_replaced_unasked() {
+fn a_page_that_was_built_is_written() {
     let scratch = Scratch::new();
-    let (built, out) = (scratch.path("built"), scratch.path("out"));
+    let (built, out) = (scratch.path("built"), scratch.path("page.html"));
     fs::create_dir(&built).unwrap();
     fs::write(built.join("index.html"), PAGE).unwrap();
-    let command = || {
+    let command = |out: &Path| {
         let mut command = stretch();
-        command.env("STRETCH_PAGE", &built).arg("page").arg("--out").arg(&out);
+        command.env("STRETCH_PAGE", &built).arg("page").arg("--out").arg(out);
         command
     };
-    let said = runs(&mut command());
-    assert!(said.contains("index.html"), "{said}");
-    assert_eq!(fs::read_to_string(out.join("index.html")).unwrap(), PAGE);
-    fails(&mut command(), &["--force"]);
-    runs(command().arg("--force"));
+    let said = runs(&mut command(&out));
+    assert!(said.contains("page.html"), "{said}");
+    assert_eq!(fs::read_to_string(&out).unwrap(), PAGE);
+    fails(&mut command(&built), &["it is a folder"]);
 }
 
 #[test]
 fn what_is_no_page_is_refused_and_nothing_is_left() {
     let scratch = Scratch::new();
-    let (built, out) = (scratch.path("other.html"), scratch.path("out"));
+    let (built, out) = (scratch.path("other.html"), scratch.path("out.html"));
     fs::write(&built, &PAGE[..20]).unwrap();
     for (from, says) in [(&built, "no page of stretch"), (&scratch.path("none"), "no such file")] {
         let mut command = stretch();
@@ -40,11 +39,11 @@ fn what_is_no_page_is_refused_and_nothing_is_left() {
 #[cfg(has_page)]
 fn a_program_that_carries_the_page_needs_nothing_beside_it() {
     let scratch = Scratch::new();
-    let (alone, out) = (scratch.path("stretch"), scratch.path("out"));
+    let (alone, out) = (scratch.path("stretch"), scratch.path("out.html"));
     // away from the source tree, where it would find the page
     fs::copy(env!("CARGO_BIN_EXE_stretch"), &alone).unwrap();
     runs(assert_cmd::Command::new(&alone).env_clear().arg("page").arg("--out").arg(&out));
-    let written = fs::read(out.join("index.html")).unwrap();
+    let written = fs::read(&out).unwrap();
     assert!(written == fs::read(env!("STRETCH_PAGE_FILE")).unwrap());
     assert!(written.ends_with(b"</html>\n"));
 }

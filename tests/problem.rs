@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, fs, path::Path};
 
-use crate::support::stretch;
+use crate::support::{json_to, stretch};
 
 /// A servo whose brake holds 2 degrees, commanded every 0.6 s.
 fn recording(path: &Path) {
@@ -74,7 +74,8 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     fs::copy(servo, folder.path().join("servo.py")).unwrap();
     let json = folder.path().join("d.json");
     let page = folder.path().join("d.html");
-    let files = ["--json-out", json.to_str().unwrap(), "--report", page.to_str().unwrap()];
+    let to_json = json_to(&json);
+    let files = [to_json.as_str(), "--report", page.to_str().unwrap()];
     let (is_good, text) = said(folder.path(), &files);
     assert!(is_good && text.starts_with("The simulator lacks brake"), "{text}");
     assert!(text.contains("these data determine 2 to a third of their tolerance"), "{text}");
@@ -96,26 +97,27 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     assert!(!is_good && text.contains("--fix would replace a file that is read"), "{text}");
     assert!(fs::read_to_string(&fixed).unwrap().contains("value = "));
     let json = folder.path().join("again.json");
-    let (is_good, text) = said(&fixed, &["--json-out", json.to_str().unwrap()]);
+    let (is_good, text) = said(&fixed, &[json_to(&json).as_str()]);
     let again: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     let agrees = ["no_gap", "parameters"].contains(&again["verdict"].as_str().unwrap());
     assert!(is_good && agrees, "{text}");
 
-    // It foretells a recording that was not fitted, and what was not excited is said.
+    // It predicts a recording that was not fitted.
     recording_from(&folder.path().join("b.csv"), 8);
     let (b, page) = (folder.path().join("b.csv"), folder.path().join("f.html"));
     let json = folder.path().join("f.json");
-    let foretold = |more: &[&str]| {
+    let predicted = |more: &[&str]| {
         let mut command = stretch();
-        command.arg("foretell").arg(&fixed).arg(&b).args(more);
+        command.arg("predict").arg(&fixed).arg(&b).args(more);
         command.output().unwrap()
     };
-    let files = ["--report", page.to_str().unwrap(), "--json-out", json.to_str().unwrap()];
-    let out = foretold(&files);
+    let to_json = json_to(&json);
+    let files = ["--report", page.to_str().unwrap(), to_json.as_str()];
+    let out = predicted(&files);
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(
-        out.status.success() && text.contains("with brake the simulator foretells 1 of 1"),
+        out.status.success() && text.contains("with brake the simulator predicts 1 of 1"),
         "{text}"
     );
     let value: serde_json::Value =
@@ -123,20 +125,24 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let output = &value["trials"][0]["outputs"][0];
     assert!(output["ratio"].as_f64().unwrap() < 0.7, "{output}");
     assert!(output["times_noise"].as_f64().unwrap() < 1.5, "{output}");
-    assert!(fs::read_to_string(page).unwrap().contains("foretold without the fix"));
-    assert_eq!(foretold(&["--fail-above", "3"]).status.code(), Some(0));
-    assert_eq!(foretold(&["--fail-above", "0.5", "--quiet"]).status.code(), Some(3));
-    assert_eq!(foretold(&["--fail-above", "0"]).status.code(), Some(1));
-    let bare = stretch().arg("foretell").arg(&file).arg(&b).output().unwrap();
+    assert!(fs::read_to_string(page).unwrap().contains("predicted without the fix"));
+    assert_eq!(predicted(&["--fail-above", "3"]).status.code(), Some(0));
+    assert_eq!(predicted(&["--fail-above", "0.5", "--quiet"]).status.code(), Some(3));
+    assert_eq!(predicted(&["--fail-above", "0"]).status.code(), Some(1));
+    let bare = stretch().arg("predict").arg(&file).arg(&b).output().unwrap();
     let text = String::from_utf8_lossy(&bare.stderr).into_owned();
     assert!(!bare.status.success() && text.contains("it holds no effect that was found"), "{text}");
+    // The command's old name.
+    let old = stretch().arg("foretell").arg(&fixed).arg(&b).output().unwrap();
+    let text = String::from_utf8_lossy(&old.stderr).into_owned();
+    assert!(old.status.code() == Some(2) && text.contains("stretch predict"), "{text}");
 
     // Both runs by themselves.
     let two = own.clone() + PARAMETERS + "[[trial]]\nfile = \"b.csv\"\n";
     let both = folder.path().join("both.toml");
     fs::write(&both, two).unwrap();
     let json = folder.path().join("by.json");
-    let (is_good, text) = said(&both, &["--by", "trial", "--json-out", json.to_str().unwrap()]);
+    let (is_good, text) = said(&both, &["--by", "trial", json_to(&json).as_str()]);
     assert!(is_good && text.contains("the 2 runs agree in every value that they tell"), "{text}");
     let value: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
@@ -163,11 +169,15 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         (
             "output = \"angle_deg\"",
             "outptu = \"angle_deg\"",
-            "key outptu: nothing reads it (did you mean output?)",
+            "row 3, key stage[0].outptu: nothing reads it (did you mean output?)",
         ),
         ("file = \"a.csv\"", "file = \"b.csv\"", "b.csv"),
         ("command_V", "comand_V", "there is no column comand_V (did you mean command_V?)"),
-        ("simulator = [\"no-such-program\"]", "simulator = []", "key simulator: it is empty"),
+        (
+            "simulator = [\"no-such-program\"]",
+            "simulator = []",
+            "key simulator.command: it is empty",
+        ),
         ("simulator = [\"no-such-program\"]", "simulator = { fmu = \"x.fmu\" }", "fmu"),
         ("[[trial]]", "[[trial]]\nsplit = \"tset\"", "\"tset\" is none of fit, test"),
         ("simulator", "simulator", "no-such-program could not be started"),
@@ -228,8 +238,10 @@ fn a_folder_runs_no_program_unasked() {
             let out = stretch().args(arguments).arg(&folder).output().unwrap();
             assert!(!out.status.success() && !ran.exists(), "{arguments:?} {name}");
             let text = String::from_utf8_lossy(&out.stderr).replace('\n', " ");
-            let tells =
-                ["it names a program to run (sh -c \"touch ran; exec cat\")", "--allow-commands"];
+            let tells = [
+                "it names a program to run (sh -c \"touch ran; exec cat\")",
+                "give the file itself",
+            ];
             let is_told = arguments[0] == "demo" || arguments[0] == "init";
             assert!(
                 is_told || tells.iter().all(|part| text.contains(part)),
@@ -245,21 +257,15 @@ fn what_runs_is_said_in_a_line_before() {
     let folder = tempfile::tempdir().unwrap();
     let ran = downloaded(folder.path());
     let file = folder.path().join("problem.toml");
-    let asked: [&[&Path]; 2] = [&[&file], &[folder.path(), Path::new("--allow-commands")]];
     for command in [&["diagnose"][..], &["effects", "--data"]] {
-        for path in asked {
-            let out = stretch().args(command).args(path).output().unwrap();
-            let text = String::from_utf8_lossy(&out.stderr).into_owned();
-            // a worker that answers with what it is asked says no hello
-            assert!(!out.status.success(), "{text}");
-            fs::remove_file(&ran).unwrap_or_else(|_| panic!("it did not run: {text}"));
-            let lines: Vec<_> =
-                text.lines().filter(|line| line.contains("problem.toml runs")).collect();
-            assert!(
-                lines.len() == 1 && lines[0].ends_with("sh -c \"touch ran; exec cat\""),
-                "{text}"
-            );
-        }
+        let out = stretch().args(command).arg(&file).output().unwrap();
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        // a worker that answers with what it is asked says no hello
+        assert!(!out.status.success(), "{text}");
+        fs::remove_file(&ran).unwrap_or_else(|_| panic!("it did not run: {text}"));
+        let lines: Vec<_> =
+            text.lines().filter(|line| line.contains("problem.toml runs")).collect();
+        assert!(lines.len() == 1 && lines[0].ends_with("sh -c \"touch ran; exec cat\""), "{text}");
     }
 }
 

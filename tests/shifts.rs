@@ -1,14 +1,15 @@
 //! Gauges that sit elsewhere than at calibration: hours of simulated movement without a shift, and gauges that were put
 //! on again 8 mm off.
 
-use stretch_calibrate::{
-    ArrayOptions, LiveReceptor, Options, ROOM, SleeveCalibration, apply, apply_array, calibrate,
-    calibrate_array,
-};
-use stretch_core::{ArrayCalibration, Calibration};
+use stretch_calibrate::{Options, calibrate};
+use stretch_core::Degree;
 use stretch_data::{Channel, Trial};
-use stretch_fit::LineAccumulator;
+use stretch_fit::{Sample, SurfaceAccumulator};
 use stretch_sim::{Key, Rig, RunSettings, Session, TrialPlan};
+use stretch_sleeve::{
+    ArrayCalibration, ArrayOptions, GaugeCalibration, LiveGauge, MAX_CHANNELS, SleeveCalibration,
+    apply_array, apply_gauge, calibrate_array, calibrate_gauge,
+};
 
 const GAUGES: usize = 3;
 /// Trials of a minute that a calibration is made of.
@@ -57,13 +58,14 @@ impl Worn {
     }
 
     /// A calibration of the first gauge alone.
-    fn one_calibrated(&mut self) -> Calibration {
+    fn one_calibrated(&mut self) -> GaugeCalibration {
         let trials: Vec<Trial> = (0..FITTED_ONE).map(|_| self.next()).collect();
         let options = Options { signal: name(0), ..Options::default() };
-        calibrate(&trials, &options).expect("a calibration").calibration
+        let made = calibrate(&trials, &options).expect("a calibration");
+        calibrate_gauge(made.calibration, &trials, &options).expect("a calibration")
     }
 
-    fn calibrated(&mut self) -> ArrayCalibration<ROOM> {
+    fn calibrated(&mut self) -> ArrayCalibration<MAX_CHANNELS> {
         let trials: Vec<Trial> = (0..FITTED).map(|_| self.next()).collect();
         let options = ArrayOptions {
             signals: (0..GAUGES).map(name).collect(),
@@ -90,11 +92,11 @@ fn gauge(k: usize, trial: &Trial) -> Channel {
 fn volts_per_mm(trial: &Trial, k: usize) -> f64 {
     let length = trial.channel("length_mm").expect("recorded");
     let volts = trial.channel(&name(k)).expect("recorded");
-    let mut line = LineAccumulator::new();
-    for (&length, &volts) in length.iter().zip(volts) {
-        line.push(length, volts).expect("numbers");
-    }
-    line.fit().expect("the length moves").slope()
+    // the volts are the value here, over the length
+    let row = |(&length, &volts)| Sample { rate: 0.0, volts: length, value: volts };
+    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE).expect("room for a line");
+    line.extend(length.iter().zip(volts).map(row)).expect("numbers");
+    line.fit().expect("the length moves").coefficients()[1]
 }
 
 const RIGS: u64 = 8;
@@ -108,7 +110,12 @@ fn hours_without_a_shift_have_no_more_alarms_than_is_stated() {
     for seed in 1..=RIGS {
         let mut worn = Worn::new(seed);
         let calibration = worn.calibrated();
-        rate = calibration.shifts.as_ref().expect("three minutes are enough").false_alarms_an_hour;
+        rate = calibration
+            .spec()
+            .shifts
+            .as_ref()
+            .expect("three minutes are enough")
+            .false_alarms_an_hour;
         let mut before = 0;
         for _ in 0..MINUTES {
             let trial = worn.next();
@@ -129,7 +136,7 @@ fn a_gauge_that_was_put_on_8_mm_off_is_told_within_two_blocks() {
     for seed in 1..=RIGS {
         let mut worn = Worn::new(seed);
         let calibration = worn.calibrated();
-        let limits = calibration.shifts.clone().expect("three minutes are enough");
+        let limits = calibration.spec().shifts.clone().expect("three minutes are enough");
         for k in 0..GAUGES {
             let mut trial = worn.next();
             let moved_v = 8.0 * volts_per_mm(&trial, k);
@@ -156,17 +163,17 @@ fn one_gauge_alarms_seldom_and_tells_8_mm() {
     for seed in 1..=RIGS {
         let mut worn = Worn::new(seed);
         let calibration = worn.one_calibrated();
-        assert!(calibration.turns.is_some(), "five minutes are enough");
+        assert!(calibration.turns().is_some(), "five minutes are enough");
         let mut before = false;
         for _ in 0..MINUTES {
             let trial = worn.next();
             hours += trial.duration_s() / 3600.0;
-            for (_, zero) in apply(&calibration, &trial).expect("applies").zeros {
+            for (_, zero) in apply_gauge(&calibration, &trial, false).expect("applies").zeros {
                 alarms += usize::from(zero.has_shifted && !before);
                 before = zero.has_shifted;
             }
         }
-        let mut live = LiveReceptor::new(&calibration).expect("runs live");
+        let mut live = LiveGauge::new(&calibration).expect("runs live");
         let mut told = None;
         for minute in 0..3 {
             let trial = worn.next();

@@ -42,7 +42,7 @@ fn a_run_is_repeated_from_its_own_rig_file() {
 #[test]
 fn a_rig_of_ones_own_is_named_without_its_effects() {
     let scratch = Scratch::new();
-    let text = prints(stretch().arg("rig"));
+    let text = prints(stretch().args(["simulate", "--print-rig"]));
     assert!(text.contains("tau_m") && text.contains("# Lag of the muscle (s)"));
     let text =
         text.replace("value = 180.0", "value = 200.0") + "[[effect]]\nname = \"leak\"\nc = 1e-10\n";
@@ -76,7 +76,7 @@ fn replayed_commands_give_the_trial_again() {
     runs(
         stretch()
             .arg("simulate")
-            .arg("--commands")
+            .arg("--protocol")
             .arg(&trial)
             .args(quiet)
             .arg("--out")
@@ -95,7 +95,7 @@ fn a_replayed_session_is_the_session_again() {
         stretch()
             .arg("simulate")
             .args(effect)
-            .arg("--commands")
+            .arg("--protocol")
             .arg(&out)
             .arg("--out")
             .arg(&replay),
@@ -129,7 +129,7 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
         let (file, out) = (scratch.write("next.csv", text), scratch.path(&format!("out_{count}")));
         let mut command = stretch();
         command.args(["simulate", "--noise", "off", "--effect", "amplifier_lowpass:tau=0.1"]);
-        command.arg("--commands").arg(&file).arg("--out").arg(&out);
+        command.arg("--protocol").arg(&file).arg("--out").arg(&out);
         (command, out.join("next.csv"))
     };
     let fills = |i: usize| if (100..160).contains(&i) { "1,0" } else { "0,0" };
@@ -200,7 +200,7 @@ fn wrong_input_is_named() {
     let out = scratch.path("out");
     let commands = |text: &str, parts: &[&str]| {
         let file = scratch.write("commands.csv", text);
-        fails(stretch().arg("simulate").arg("--commands").arg(&file).arg("--out").arg(&out), parts);
+        fails(stretch().arg("simulate").arg("--protocol").arg(&file).arg("--out").arg(&out), parts);
         assert!(!out.exists());
     };
     let header = "time_s,inlet,outlet\n";
@@ -208,7 +208,7 @@ fn wrong_input_is_named() {
     commands(&format!("{header}0,0,0\n0.01,1.2,0\n"), &["commands.csv", "inlet", "1.2", "0 .. 1"]);
     let gap = format!("{header}0,0,0\n0.01,0,0\n0.02,0,0\n0.05,0,0\n0.06,0,0\n");
     commands(&gap, &["commands.csv", "sample 3", "0.01 s"]);
-    let rig = prints(stretch().arg("rig"));
+    let rig = prints(stretch().args(["simulate", "--print-rig"]));
     let file = scratch.write("rig.toml", rig.replace("value = 0.35", "value = -0.35"));
     let with = |file: &std::path::Path, parts: &[&str]| {
         fails(stretch().args(["simulate", "--rig"]).arg(file).arg("--out").arg(&out), parts);

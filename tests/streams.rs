@@ -77,7 +77,7 @@ fn frames(samples: u32) -> Vec<u8> {
 
 /// Every command, with what it reads from standard input.
 const COMMANDS: [(&str, Option<&str>); 12] = [
-    ("calibrate a_1.csv --out new.json --fixed new.postcard --report new.html", None),
+    ("calibrate a_1.csv --out new.json --report new.html", None),
     ("apply --calibration cal.json a_1.csv --out out.csv", None),
     ("apply --calibration cal.json - --out out.csv", Some("live.csv")),
     ("apply --calibration cal.json -", Some("live.csv")),
@@ -86,9 +86,9 @@ const COMMANDS: [(&str, Option<&str>); 12] = [
     ("simulate --protocol pulses --out simulated", None),
     ("diagnose a_1.csv --reference length_mm --signal bridge_v --fix fixed.toml --no-next", None),
     ("effects", None),
-    ("rig", None),
+    ("simulate --print-rig", None),
     ("listen --port frames --calibration board.json --out trial.csv", None),
-    ("export --calibration board.json --c c", None),
+    ("export --calibration board.json --c c --fixed new.postcard", None),
 ];
 
 fn run(scratch: &Scratch, (line, input): (&str, Option<&str>), out: End, err: End) -> ExitStatus {

@@ -54,15 +54,16 @@ fn a_report_that_fails_leaves_no_record_behind() {
     let before = tree(&scratch.path(""));
     for (line, part) in [
         ("calibrate a.csv --out new.json --report none/r.html", "none/r.html"),
-        ("calibrate a.csv --out cal.json --report none/r.html --fixed cal.postcard", "none/r.html"),
+        ("calibrate a.csv --out cal.json --report none/r.html", "none/r.html"),
+        ("export --calibration board.json --fixed cal.postcard --c bench", "bench"),
         ("calibrate a.csv --out cal.json --report logs", "logs"),
         ("calibrate a.csv --out new.json --report new.json", "two files of this command"),
         (
-            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out new.json --report logs",
+            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=new.json --report logs",
             "logs",
         ),
         (
-            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out new.json --fix /proc/none",
+            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=new.json --fix /proc/none",
             "/proc/none",
         ),
     ] {
@@ -218,7 +219,7 @@ const ONTO_A_DISK: [&str; 8] = [
     "demo --paper --out disk/demo",
     "export --calibration board.json --c disk/c",
     "calibrate a.csv --out disk/cal.json --report disk/cal.html",
-    "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out disk/d.json --report disk/d.html",
+    "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=disk/d.json --report disk/d.html",
     "apply --calibration cal.json a.csv --out disk/out.csv",
     "init disk/logs --force",
 ];

@@ -5,6 +5,7 @@
 # CHROMIUM names another browser, STRETCH another program than a fresh build, SHOTS a folder for pictures of the pages.
 set -euo pipefail
 cd "$(dirname "$0")"
+target=${CARGO_TARGET_DIR:-$PWD/../target}
 
 skip() { printf 'SKIPPED: %s: %s\n' "${part:-the reports in a browser}" "$1"; }
 has_wasm() { [ -d "$(rustc --print sysroot)/lib/rustlib/wasm32-unknown-unknown" ]; }
@@ -13,10 +14,9 @@ size=$(wc -c <report/report.js)
 [ "$size" -lt 60000 ] || { echo "the script has $size bytes, more than 60000"; exit 1; }
 echo "$size bytes: the script"
 
-cargo fmt --check
 if has_wasm; then
     (. ../.ci/lint-build.sh && ./build.sh)
-    size=$(gzip -9 -c target/page/index.html | wc -c)
+    size=$(gzip -9 -c "$target/page/index.html" | wc -c)
     [ "$size" -lt 3000000 ] || { echo "the page has $size bytes compressed, more than 3000000"; exit 1; }
 else
     part="the page" skip "there is no standard library of wasm32-unknown-unknown: rustup target add wasm32-unknown-unknown"
@@ -44,23 +44,23 @@ export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
 if [ -n "${STRETCH:-}" ]; then
     stretch() { "$STRETCH" "$@"; }
 else
-    cargo build --quiet --locked --manifest-path ../Cargo.toml
-    stretch() { ../target/debug/stretch "$@"; }
+    cargo build --quiet --locked -p stretch-cli
+    stretch() { "$target/debug/stretch" "$@"; }
 fi
 bench=$fresh/bench
-stretch simulate --protocol paper --preset paper --out "$bench" >/dev/null
+stretch simulate --protocol paper --rig paper --out "$bench" >/dev/null
 # a name that would run, were it not written as text
 named="$fresh/<img src=x onerror=window.injected=1>.csv"
 cp "$bench"/arbitrary_1.csv "$named"
 trials=("$bench"/inflation_50.csv "$bench"/deflation_50.csv "$named")
 stretch calibrate "${trials[@]}" --model poly13 --out "$fresh/surface.json" --report "$fresh/surface.html" >/dev/null
 stretch calibrate "${trials[@]}" --model observer --out "$fresh/memory.json" --report "$fresh/memory.html" >/dev/null
-stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json-out "$fresh/diagnosis.json" >"$fresh/diagnosis.txt"
+stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json="$fresh/diagnosis.json" >"$fresh/diagnosis.txt"
 stretch demo --out "$fresh/demo" >/dev/null
 stretch demo --paper --out "$fresh/paper" >/dev/null
 reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html "$fresh"/paper/paper.html)
 # the page that challenge/gate.sh wrote last
-challenge=../target/challenge-check/report.html
+challenge=$target/challenge-check/report.html
 if [ -f "$challenge" ]; then reports+=("$challenge"); else skip "the challenge's page: challenge/gate.sh writes one"; fi
 ls -l "${reports[@]}" | awk '{ n = split($9, part, "/"); print $5 " bytes: " part[n] }'
 node "$fresh/report.mjs" ${SHOTS:+--shots "$SHOTS"} "${reports[@]}"
@@ -73,4 +73,4 @@ stretch export --calibration "$fresh/observer.json" --c "$fresh/header" >/dev/nu
 node "$fresh/frames.mjs" >"$fresh/linked.txt"
 stretch listen --port - --calibration "$fresh/poly13.json" --out "$fresh/linked.csv" \
     <"$fresh/linked.txt" >/dev/null 2>"$fresh/linked.told"
-node "$fresh/page.mjs" ${SHOTS:+--shots "$SHOTS"} target/page/index.html "$bench" "$fresh" ../firmware/golden.txt
+node "$fresh/page.mjs" ${SHOTS:+--shots "$SHOTS"} "$target/page/index.html" "$bench" "$fresh" ../firmware/golden.txt

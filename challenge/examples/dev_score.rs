@@ -1,5 +1,5 @@
-//! Diagnoses a folder of labelled cases, leaves the answer beside each, and scores:
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example dev_score -- FOLDER [case-000 ...]`.
+//! Diagnoses a folder of labelled cases, writes the answer into each, and scores: `cargo run
+//! --release -p stretch-challenge --example dev_score -- FOLDER [case-000 ...]`.
 
 use std::{fs, path::Path, time::Instant};
 

@@ -1,9 +1,10 @@
-//! How often slack and saturation are parted with and without one trial at 0.7 of the excitation.
+//! How often slack and saturation are distinguished with and without one trial at 0.7 of the
+//! excitation.
 //!
-//! Twenty simulated sessions, ten of each effect, in the catalogue's own forms; each is diagnosed as it stands, without its pressure,
-//! and with the further trial.
+//! Twenty simulated sessions, ten of each effect, in the catalogue's forms. Each is diagnosed
+//! unchanged, without its pressure, and with the further trial.
 //!
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example excitation`
+//! `cargo run --release -p stretch-challenge --example excitation`
 
 #[path = "attainable/simulated.rs"]
 mod simulated;

@@ -1,12 +1,14 @@
-//! What a calibration gains that uses the diagnosis, beside one that knows the truth:
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example inverting -- FOLDER [CASES]`.
+//! What a calibration gains from the diagnosis, compared with one that knows the truth: `cargo run
+//! --release -p stretch-challenge --example inverting -- FOLDER [CASES]`.
 //!
-//! FOLDER holds sealed cases (`challenge make`). Of them the first CASES (20) are taken whose effects are one to three of the sensing
-//! stage with an excess of 5 or more. Each is calibrated on its fit trials with the published method, poly13, the observer and
-//! on what a diagnosis of the gauge alone names, and judged on its test trials.
+//! FOLDER holds sealed cases (`challenge make`). The first CASES (20) whose effects are one to
+//! three of the sensing stage with an excess of 5 or more are used. Each is calibrated on its fit
+//! trials with the published method, poly13, the observer and the effects that a diagnosis of the
+//! gauge alone names, and judged on its test trials.
 //!
-//! The **oracle** knows the true effects, their numbers from fit and test trials together, and inverts them with a thousand particles: what is
-//! left of its error no filter of that motion prior could know.
+//! The **oracle** knows the true effects, their numbers from fit and test trials together, and
+//! inverts them with a thousand particles. No filter with that motion prior could remove its
+//! remaining error.
 
 use std::path::Path;
 
@@ -23,14 +25,14 @@ use stretch_sim::{Catalogue, RigStage, effect_named};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Cases unless said otherwise, and the least excess of one.
+/// Default number of cases, and the smallest excess of one.
 const CASES: usize = 20;
 const LEAST_EXCESS: f64 = 5.0;
 /// Densities of the random walk of the rate that the oracle tries, in 1/s^3; the best on the test trials counts.
 const AGILITIES: [f64; 3] = [3.0, 30.0, 300.0];
 /// Particles of the oracle.
 const PARTICLES: usize = 1000;
-/// Samples at a trial's start that nobody is judged on.
+/// Samples at a trial's start that are not judged.
 const SETTLE: usize = 20;
 
 fn main() -> Result<(), Failure> {
@@ -124,7 +126,8 @@ fn row(folder: &Path, name: &str, label: &Label) -> Result<Row, Failure> {
     })
 }
 
-/// What a diagnosis of the gauge alone names, as `stretch calibrate --model diagnosed` asks it.
+/// The effects that a diagnosis of the gauge alone names, as `stretch calibrate --model diagnosed`
+/// requests it.
 fn named(trials: &[Trial]) -> Result<Vec<Cause>, Failure> {
     let session: Vec<SessionTrial> = trials.iter().cloned().map(SessionTrial::new).collect();
     let gauge = GaugeSimulator::new(&GaugeSetup {
@@ -186,8 +189,10 @@ const LEAP: f64 = 10.0;
 
 /// Estimated length at every sample, mm.
 fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<Vec<f64>, Failure> {
-    let Model::Diagnosed(map) = &calibration.model else { return Err("no diagnosed map".into()) };
-    let dt_s = calibration.sample_rate_hz.period_s();
+    let Model::Diagnosed(map) = &calibration.spec().model else {
+        return Err("no diagnosed map".into());
+    };
+    let dt_s = calibration.spec().sample_rate_hz.period_s();
     let defects = Defects::<f64>::new(map, dt_s);
     let (kept, wander) = ((-dt_s / map.steady_s).exp(), (agility * dt_s).sqrt());
     let ahead_s = match map.skew_s > 0.0 {
@@ -206,8 +211,8 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
     let mut weights = vec![1.0 / PARTICLES as f64; PARTICLES];
     let mut estimates = Vec::with_capacity(volts.len());
     // a baseline is followed as live
-    let (polarity, rate) = (calibration.polarity, calibration.sample_rate_hz);
-    let level = RestLevel::<f64>::new(map.rest, polarity, calibration.signal_range, rate);
+    let (polarity, rate) = (calibration.spec().polarity, calibration.spec().sample_rate_hz);
+    let level = RestLevel::<f64>::new(map.rest, polarity, calibration.spec().signal_range, rate);
     let mut baseline = level.memory();
     for (i, v) in volts.iter().enumerate() {
         let v = polarity.sign() * level.step(&mut baseline, polarity.sign() * v, 0.0);
@@ -224,8 +229,8 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
         }
         weights.iter_mut().for_each(|w| *w /= total);
         let mean: f64 = cloud.iter().zip(&weights).map(|(p, w)| w * (p.y + ahead_s * p.rate)).sum();
-        let y = calibration.target_range.denormalise(mean);
-        estimates.push(calibration.target.to_reference(y));
+        let y = calibration.spec().target_range.denormalise(mean);
+        estimates.push(calibration.spec().target.to_reference(y));
         if 1.0 / weights.iter().map(|w| w * w).sum::<f64>() < 0.5 * PARTICLES as f64 {
             cloud = resampled(&cloud, &weights, random.unit());
             weights.fill(1.0 / PARTICLES as f64);

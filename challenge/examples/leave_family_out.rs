@@ -1,8 +1,9 @@
 //! Every family of forms judged by a diagnosis that was calibrated without it:
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example leave_family_out -- FOLDER`.
+//! `cargo run --release -p stretch-challenge --example leave_family_out -- FOLDER`.
 //!
-//! FOLDER holds cases of several families (`challenge make --family all`) that were diagnosed once (`challenge run`). For each
-//! family temperature and borders are calibrated on the answers of the others, and its own cases are diagnosed anew with them.
+//! FOLDER holds cases of several families (`challenge make --family all`) that were diagnosed once
+//! (`challenge run`). For each family temperature and borders are calibrated on the answers of the
+//! others, and its own cases are diagnosed again with them.
 
 use std::{collections::BTreeMap, fs, path::Path};
 

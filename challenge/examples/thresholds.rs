@@ -1,8 +1,10 @@
-//! Calibrates what turns scores into probabilities and gaps into `unknown`, on labelled cases that were diagnosed:
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example thresholds -- [--write] FOLDER...`.
+//! Calibrates the numbers that turn scores into probabilities and gaps into `unknown`, on labelled
+//! cases that were diagnosed: `cargo run --release -p stretch-challenge --example thresholds --
+//! [--write] FOLDER...`.
 //!
-//! `challenge make` and `challenge run` make such folders, `dev_score` too. The thresholds that steer the search
-//! itself (`null_excess`, `rise`, `share`, `model_discrepancy`) act while a case is diagnosed: they are kept as they are.
+//! `challenge make` and `challenge run` make such folders, `dev_score` too. The thresholds that
+//! control the search itself (`null_excess`, `rise`, `share`, `model_discrepancy`) act while a case
+//! is diagnosed, so they are not changed.
 
 use std::{fs, path::Path};
 
@@ -35,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let after = calibrated(&cases.iter().collect::<Vec<_>>());
     let text = format!(
         "# unknown_excess, unknown_share and unknown_odds: calibrated on {} development cases, seeds {}, with\n\
-         #   cargo run --release --manifest-path challenge/Cargo.toml --example thresholds -- --write FOLDER...\n\
+         #   cargo run --release -p stretch-challenge --example thresholds -- --write FOLDER...\n\
          # temperature and rho: on 760 cases of the seeds 11, 12 and 1000001; unknown_soft: on 135 of 2101, 2102 and 2103. The sizes that count are stated, not calibrated:\n\
          # least_gap. The others steer the search; they were set while such cases were looked at.\n{}",
         cases.len(),

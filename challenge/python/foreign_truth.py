@@ -3,7 +3,7 @@
     python3 foreign_truth.py truth.json REPORTS RIG_SET OUT
 
 `truth.json` holds {"seed", "cases": {name: {"kind", "effects", "stages", "excess"}}}, REPORTS what
-`stretch diagnose --json-out` wrote for each case, RIG_SET any rig set of the challenge (for the names of candidates).
+`stretch diagnose --json=FILE` wrote for each case, RIG_SET any rig set of the challenge (for the names of candidates).
 Writes OUT, OUT-sealed and OUT.json, the submission. A kind is single, null, compound or out_of_catalogue. 
 """
 import hashlib

@@ -28,7 +28,7 @@ def answer(case, program, places):
     """Runs one diagnosis; hands back the answer in the layout of a submission."""
     with tempfile.TemporaryDirectory() as folder:
         out, began = Path(folder) / "d.json", used_s()
-        command = [program, "diagnose", str(case / "problem.toml"), "--json-out", str(out), "--quiet", "--threads", "1"]
+        command = [program, "diagnose", str(case / "problem.toml"), f"--json={out}", "--quiet", "--threads", "1"]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         seconds = used_s() - began
         if not out.is_file():

@@ -1,4 +1,4 @@
-//! The cases of a check and their answers, as they lie in its folder.
+//! The cases of a check and their answers, as stored in its folder.
 
 use std::{
     fs,
@@ -26,7 +26,7 @@ impl Answers {
     /// Opens the labels and reads the answers.
     ///
     /// # Errors
-    /// A seal that is broken, a folder without a case, an answer that is none.
+    /// A broken seal, a folder without a case, an invalid answer.
     pub fn read(folder: &Path) -> anyhow::Result<Self> {
         let (seal, truth) = Seal::open(folder)?;
         let mut verdicts = Vec::new();

@@ -4,12 +4,14 @@ use std::{collections::BTreeMap, fmt::Write as _};
 
 use anyhow::ensure;
 use stretch_blind::{Figures, OpenScore, Outcome};
+use stretch_report::kit::escape;
 
 use crate::open::{cell, figure_rows};
 
 /// The page of scores: a row for each method and plant, a row for each method over all its plants, and reliability diagrams.
 ///
-/// Methods over several plants stand beside each other only if each was asked the same cases; the page says of which sets a row is.
+/// Methods over several plants are compared only if each was asked the same cases; the page states
+/// the sets of each row.
 ///
 /// # Errors
 /// No score, or two of one method on one set.
@@ -39,7 +41,7 @@ pub fn board(scores: &[OpenScore]) -> anyhow::Result<String> {
         let _ = write!(
             table,
             "<tr><td>{plant}</td><td>{}</td><td data-v={cases}>{cases}</td>",
-            escaped(method)
+            escape(method)
         );
         for (_, figure) in figure_rows(figures) {
             let key = figure.value.map_or(String::new(), |v| v.to_string());
@@ -56,7 +58,7 @@ pub fn board(scores: &[OpenScore]) -> anyhow::Result<String> {
         scores.iter().map(|s| (s.method.as_str(), s.setup.as_str())).collect();
     let setups: String = setups
         .iter()
-        .map(|(method, setup)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(method), escaped(setup)))
+        .map(|(method, setup)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(method), escape(setup)))
         .collect();
     let sets: BTreeMap<&str, String> = scores
         .iter()
@@ -66,7 +68,7 @@ pub fn board(scores: &[OpenScore]) -> anyhow::Result<String> {
         .collect();
     let sets: String = sets
         .iter()
-        .map(|(hash, what)| format!("<li>{}: <code>{hash}</code></li>\n", escaped(what)))
+        .map(|(hash, what)| format!("<li>{}: <code>{hash}</code></li>\n", escape(what)))
         .collect();
     Ok(format!(
         "{HEAD}{table}{MIDDLE}{diagrams}<h2>Set up</h2><dl>\n{setups}</dl><h2>Sets</h2><ul>\n{sets}</ul>{TAIL}"
@@ -100,13 +102,9 @@ fn diagram(method: &str, cases: usize, figures: &Figures) -> String {
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"#36c\" fill-opacity=\".6\"><title>{n} cases</title></circle>"
         );
     }
-    let name = escaped(method);
+    let name = escape(method);
     format!(
         "<figure><svg width=\"200\" height=\"200\" role=\"img\" aria-label=\"reliability of {name}\"><rect x=\"20\" y=\"20\" width=\"160\" \
          height=\"160\" fill=\"none\" stroke=\"#999\"/><path d=\"M20 180L180 20\" stroke=\"#999\"/>{dots}</svg><figcaption>{name}</figcaption></figure>\n"
     )
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,10 +1,13 @@
-//! Calibration of the posterior: the thresholds under which the sealed truths are likeliest.
+//! Calibration of the posterior: the thresholds under which the sealed truths are most likely.
 //!
-//! A diagnosis lists every hypothesis with its score and with what it leaves, so that its probabilities under other thresholds are known without
-//! another diagnosis. The mean of ln P(truth) over labelled cases is raised one threshold at a time: nothing, one effect, two, and
-//! what the catalogue lacks weigh the same, whatever their number of cases, and nothing three times as much, for a false alarm costs more than a
-//! cause that is overlooked. Calibrated is what parts the catalogue from something else. The temperature and the softness of that border stay: they
-//! were calibrated on more cases and seeds than one run has, and a border that is as sharp as one generator's forms would be too sure of another's.
+//! A diagnosis lists every hypothesis with its score and what it leaves, so its probabilities under
+//! other thresholds are known without another diagnosis. The mean of ln P(truth) over labelled
+//! cases is maximised one threshold at a time. Nothing, one effect, two, and causes outside the
+//! catalogue have the same weight, whatever their number of cases, except that nothing has three
+//! times the weight, because a false alarm costs more than a cause that is overlooked. The
+//! calibrated thresholds are those that separate the catalogue from something else. The temperature
+//! and the softness of that border stay, because they were calibrated on more cases and seeds than
+//! one run has. A border as sharp as one generator's forms would be too sure of another's.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,20 +16,21 @@ use stretch_gap::{Candidate, Diagnosis, Thresholds, VerdictKind};
 
 /// Probability of a truth that is no candidate.
 const NOT_LISTED: f64 = 1e-3;
-/// What a null weighs beside the other kinds.
+/// Weight of a null relative to the other kinds.
 const NULL: f64 = 3.0;
-/// Factors that a threshold is multiplied by in turn, the finest last, and rounds over all thresholds with each.
+/// Factors by which a threshold is multiplied in turn, the finest last, and rounds over all
+/// thresholds with each.
 const FACTORS: [f64; 3] = [2.0, 1.3, 1.1];
 const ROUNDS: usize = 8;
 
 /// A label, and what the diagnosis said of its case.
 pub type Case = (Label, Diagnosis);
 
-/// Thresholds of labelled cases that were diagnosed; those that steer the search stay as they are.
+/// Calibrates thresholds on labelled cases that were diagnosed; those that control the search stay.
 pub fn calibrated(cases: &[&Case]) -> Thresholds {
     let mut kinds: BTreeMap<CaseKind, Vec<(&Diagnosis, Vec<usize>)>> = BTreeMap::new();
     for (label, diagnosis) in cases.iter().filter(|(label, d)| is_counted(label, d)) {
-        // An entry that was struck out is something that the catalogue lacks.
+        // An entry that was removed from the catalogue is a cause outside the catalogue.
         let kind = match label.kind {
             CaseKind::Struck => CaseKind::OutOfCatalogue,
             kind => kind,
@@ -81,13 +85,14 @@ fn odds(t: &mut Thresholds) -> &mut f64 {
     &mut t.unknown_odds
 }
 
-/// Whether a case says something of the sum: its cause shows and is one set of effects, and the record is not what is wrong.
+/// Whether a case contributes: its cause is visible and is one set of effects, and the record is
+/// not wrong.
 fn is_counted(label: &Label, diagnosis: &Diagnosis) -> bool {
     let shows = label.kind == CaseKind::Null || label.excess >= COUNTED_EXCESS;
     shows && label.kind != CaseKind::Dominant && diagnosis.verdict != VerdictKind::Record
 }
 
-/// Indices of the candidates that are the truth; none where it is not listed.
+/// Indices of the candidates that are the truth; empty if it is not listed.
 fn truth(label: &Label, diagnosis: &Diagnosis) -> Vec<usize> {
     let named: BTreeSet<&String> = label.effects.iter().collect();
     let is_twin = |c: &Candidate| {

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use stretch_files::write_whole;
+use stretch_data::files::write_whole;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{Problem, Reading, RigSimulator};
 use stretch_sim::Catalogue;
 
-/// What is asked of a diagnosis beside its data.
+/// What a diagnosis is asked, in addition to its data.
 #[derive(Debug, Clone, Default)]
 pub struct Asked {
     /// Effects that the catalogue must do without.
@@ -27,12 +27,13 @@ pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Res
         Problem::read(folder, &Reading { without: &asked.without, ..Reading::default() })?;
     let Asked { threads, baselines, .. } = *asked;
     let options = Options { threads, baselines, ..Options::default() };
-    let examined = problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?;
+    let examined = problem.examine(&options, false, &|_| (), &|| false)?;
     let text = serde_json::to_string_pretty(&examined.to_json())? + "\n";
     Ok(write_whole(file, |out| out.write_all(text.as_bytes()))?)
 }
 
-/// The diagnosis of a case in this process, by an engine with options of its own: for instruments that know the label.
+/// The diagnosis of a case in this process, by an engine with the given options: for tools that
+/// know the label.
 ///
 /// # Errors
 /// Data that the diagnosis refuses, an effect to strike out that there is none.
@@ -43,6 +44,6 @@ pub fn diagnosed(
     progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<(Diagnosis, Evidence)> {
     let catalogue = Catalogue::default().without(without)?;
-    let simulator = RigSimulator::read(folder, None, &catalogue)?;
-    Ok(diagnose(&simulator, options, progress, &stretch_files::interrupted)?)
+    let simulator = RigSimulator::read(folder, None, &catalogue, Default::default())?;
+    Ok(diagnose(&simulator, options, progress, &|| false)?)
 }

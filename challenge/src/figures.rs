@@ -1,4 +1,4 @@
-//! Figures of a blind check: calibration, time, and what was said for what.
+//! Figures of a blind check: calibration, time, and truth against answers.
 
 use plotters::{
     prelude::*,
@@ -10,7 +10,7 @@ use stretch_report::kit::{
     Area, Axes, Drawn, Figure, FigureSize, Ink, STEPS, TEXT_PX, dot, plot, px, stroke, words,
 };
 
-/// Probability stated against how often it came true, with Wilson's interval.
+/// Stated probability against how often it came true, with Wilson's interval.
 pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
     let bins: Vec<_> = calibration.bins.iter().filter(|b| b.right.cases > 0).collect();
     if bins.is_empty() {
@@ -77,7 +77,8 @@ pub(crate) fn time_figure(times: &[f64]) -> Figure {
         .draw(FigureSize { height: 220, ..FigureSize::WIDE }, draw)
 }
 
-/// Truth against the first name given: a matrix where there is room, the wrong answers in words on a phone.
+/// Truth against the first name given: a matrix if there is room, the wrong answers in words on a
+/// phone.
 pub(crate) fn confusion_figure(score: &Score) -> Figure {
     let rows: Vec<&String> = score.confusion.keys().collect();
     if rows.is_empty() {

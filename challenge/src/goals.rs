@@ -3,7 +3,7 @@
 use serde::Serialize;
 use stretch_blind::{Rate, Score};
 
-/// A figure, the goal it is held against, and whether it is reached.
+/// A figure, its goal, and whether it is reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Goal {
     /// What is counted.
@@ -14,12 +14,12 @@ pub struct Goal {
     pub value: Option<f64>,
     /// Hits and cases, where it is a rate.
     pub rate: Option<Rate>,
-    /// Whether that is good enough; none without a case, or where a single one decides.
+    /// Whether the goal is reached; `None` without a case, or if a single case decides.
     pub met: Option<bool>,
 }
 
 impl Goal {
-    /// Whether it is reached, in a word: where a single case decides, there are too few to say.
+    /// Whether it is reached, in one word; if a single case decides, there are too few to say.
     pub fn verdict(&self) -> &'static str {
         match (self.met, self.value) {
             (Some(true), _) => "yes",
@@ -29,7 +29,8 @@ impl Goal {
         }
     }
 
-    /// What a table says of it: what is counted, the goal, what was reached, the count, Wilson's interval, whether that is met.
+    /// Its row of the table: what is counted, the goal, what was reached, the count, Wilson's
+    /// interval, whether the goal is met.
     pub fn cells(&self) -> [String; 6] {
         let interval = self.rate.and_then(|rate| rate.wilson());
         [
@@ -43,14 +44,14 @@ impl Goal {
     }
 }
 
-/// Whether so many cases, of which some missed, say anything of a goal that lets a share of them miss: one may miss, or more
-/// than one did.
+/// Whether this many cases, of which some missed, are enough for a goal that lets a share of them
+/// miss: one may miss, or more than one did.
 fn is_telling(cases: usize, missed: usize, may_miss: f64) -> bool {
     // a share of 1 - 0.95 is a little less than a twentieth
     may_miss * cases as f64 >= 1.0 - 1e-9 || missed > 1
 }
 
-/// What a blind check is meant to reach, and what it did.
+/// The goals of a blind check, and its results.
 pub fn goals(score: &Score) -> Vec<Goal> {
     let s = &score.singles;
     let least = |what, rate: Rate, least: f64| Goal {

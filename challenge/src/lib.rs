@@ -23,7 +23,7 @@ pub use goals::{Goal, goals};
 pub use make::make_cases;
 pub use open::{make_open, read_scores, score_open};
 pub use page::{Subject, page};
-pub use run::{RunOptions, on_ctrl_c, run_cases};
+pub use run::{RunOptions, is_stopped, on_ctrl_c, run_cases};
 pub use score::score_answers;
 pub use shared_out::shared_out;
 pub use text::{Progress, aligned, say};

@@ -5,8 +5,8 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Parser;
 use stretch_blind::{Disturbances, Family, Plan, PlantName, Protocol};
 use stretch_challenge::{
-    Asked, RunOptions, aligned, board, make_cases, make_open, on_ctrl_c, read_scores, run_cases,
-    say, score_answers, score_open, write_diagnosis,
+    Asked, RunOptions, aligned, board, is_stopped, make_cases, make_open, on_ctrl_c, read_scores,
+    run_cases, say, score_answers, score_open, write_diagnosis,
 };
 
 /// Check the diagnosis on cases whose causes are sealed until it has answered
@@ -14,10 +14,10 @@ use stretch_challenge::{
 ///   challenge --cases 360 --seed 7 --out check
 ///
 /// makes the cases, prints the hash of the sealed labels, diagnoses a copy of every case in a
-/// temporary folder and a process of its own that does not know where the labels are, and only then
+/// temporary folder, in a separate process that does not know where the labels are, and only then
 /// opens the seal, scores and writes a page. The cases come from a second simulator that shares no
-/// code with the first and draws other forms of every effect, and what is around each rig. The
-/// three steps can be run one by one; `run` goes on where it was stopped.
+/// code with the first. It draws other forms of every effect and other disturbances of each rig.
+/// The three steps can be run one by one; `run` continues where it was stopped.
 #[derive(clap::Parser)]
 #[command(
     name = "challenge",
@@ -74,7 +74,7 @@ enum Step {
         #[arg(long, value_name = "FILE.html", default_value = "leaderboard.html")]
         out: PathBuf,
     },
-    /// Diagnose one folder, as `run` has it done in a process of its own
+    /// Diagnose one folder, as `run` does in a separate process
     #[command(hide = true)]
     Diagnose(Diagnose),
 }
@@ -82,7 +82,8 @@ enum Step {
 /// What is made, and where.
 #[derive(clap::Args)]
 struct Make {
-    /// How many cases: single effects, none, several, foreign ones and ones struck out
+    /// How many cases: single effects, none, several, causes outside the catalogue and effects
+    /// whose entry is removed
     #[arg(long, value_name = "N", value_parser = count)]
     cases: usize,
     /// Seed; those below 1000000 are for development
@@ -108,7 +109,7 @@ struct Make {
     /// Keep the labels of a set apart from it, in DIR-sealed; a set always does
     #[arg(long, requires = "plant")]
     seal: bool,
-    /// Family of forms and noise beside the published ones, a JSON file that is kept back
+    /// Family of forms and noise in addition to the published ones, a JSON file that is kept back
     #[arg(long, value_name = "FILE.json", requires = "plant")]
     private: Option<PathBuf>,
     /// Record of the seeds whose labels were opened, none of which is made again
@@ -123,7 +124,7 @@ const SPENT: &str = "spent_seeds.csv";
 struct Diagnose {
     folder: PathBuf,
     #[arg(long)]
-    json_out: PathBuf,
+    json: PathBuf,
     #[arg(long)]
     without: Vec<String>,
     #[arg(long, default_value_t = 0)]
@@ -160,11 +161,11 @@ fn main() -> ExitCode {
     let _ = ctrlc::set_handler(on_ctrl_c);
     match run(Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if stretch_files::interrupted() => ExitCode::from(130),
+        Err(_) if is_stopped() => ExitCode::from(130),
         Err(error) => {
             eprintln!(
                 "challenge: {}",
-                stretch_files::without_temporary_names(&format!("{error:#}"))
+                stretch_data::files::without_temporary_names(&format!("{error:#}"))
             );
             ExitCode::FAILURE
         }
@@ -182,13 +183,13 @@ fn run(args: Args) -> anyhow::Result<()> {
         (Some(Step::Score { folder, no_oracle, .. }), _) => scored(&folder, !no_oracle),
         (Some(Step::Board { scores, out }), _) => {
             let page = board(&read_scores(&scores)?)?;
-            stretch_files::write_whole(&out, |file| file.write_all(page.as_bytes()))?;
+            stretch_data::files::write_whole(&out, |file| file.write_all(page.as_bytes()))?;
             say(format!("wrote {}", out.display()));
             Ok(())
         }
         (Some(Step::Diagnose(asked)), _) => {
             let Diagnose { without, threads, baselines, .. } = asked;
-            write_diagnosis(&asked.folder, &Asked { without, threads, baselines }, &asked.json_out)
+            write_diagnosis(&asked.folder, &Asked { without, threads, baselines }, &asked.json)
         }
         (None, Some(make)) => {
             made(&make)?;

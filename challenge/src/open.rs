@@ -1,4 +1,4 @@
-//! Sets that strangers solve: made, answered by a file, scored, and their seeds written down.
+//! Sets that strangers solve: making them, scoring submissions, and recording their seeds.
 
 use std::{
     fs,
@@ -10,12 +10,12 @@ use stretch_blind::{
     Figures, FormFamily, Interval, OpenScore, OpenTruth, PlantName, Submission, make_set_apart,
     sealed_beside,
 };
-use stretch_files::{recover, write_folder, write_whole};
+use stretch_data::files::{write_folder, write_whole};
 
-/// Makes a set of cases of a plant, whole or not at all; refuses a seed that is spent.
+/// Makes a set of cases of a plant, completely or not at all; refuses a spent seed.
 ///
 /// # Errors
-/// A spent seed, a folder that holds something, a private family that cannot be read.
+/// A spent seed, a folder that is not empty, a private family that cannot be read.
 pub fn make_open(
     plant: PlantName,
     set: &Path,
@@ -32,9 +32,6 @@ pub fn make_open(
     );
     let private = private.map(FormFamily::read).transpose()?;
     let (sealed, mut hash) = (sealed_beside(set), None);
-    for folder in [set, &sealed] {
-        recover(folder)?;
-    }
     let made = write_folder(set, false, |cases_draft| {
         write_folder(&sealed, false, |labels_draft| {
             let folders = (cases_draft, labels_draft);
@@ -50,11 +47,12 @@ pub fn make_open(
     hash.context("no set was made")
 }
 
-/// Scores a submission against the set beside whose labels it was made, writes `SUBMISSION.score.json`, and records the seed.
-/// `first` leaves all but so many of the first cases out, of the set and of the submission.
+/// Scores a submission against the set next to whose labels it was made, writes
+/// `SUBMISSION.score.json`, and records the seed. `first` limits the set and the submission to that
+/// many of the first cases.
 ///
 /// # Errors
-/// A submission that cannot be read or names what the set does not have, a broken seal.
+/// A submission that cannot be read or uses names that the set does not have, a broken seal.
 pub fn score_open(
     submission: &Path,
     set: &Path,

@@ -1,4 +1,5 @@
-//! The report of a blind check: how often the diagnosis was right, and every case in which it was not.
+//! The report of a blind check: how often the diagnosis was right, and every case in which it was
+//! not.
 
 use stretch_blind::{
     Baseline, COUNTED_EXCESS, CaseKind, Label, Miss, Rate, Score, Verdict, method_in_words,

@@ -1,4 +1,4 @@
-//! Where a case is diagnosed: a folder of its own that holds its data and nothing else.
+//! Where a case is diagnosed: a folder that holds its data and nothing else.
 
 use std::{
     fs,
@@ -9,17 +9,18 @@ use std::{
 use anyhow::Context;
 use tempfile::TempDir;
 
-/// A copy of one case's data in a new temporary folder, gone when this is dropped.
+/// A copy of one case's data in a new temporary folder, which is removed on drop.
 ///
-/// The process that diagnoses works in it: neither its working folder nor an argument nor its environment leads to the labels.
-/// A program that went looking for them could still find them, as any program of the same user could.
+/// The diagnosing process works in it: neither its working folder nor an argument nor its
+/// environment leads to the labels. A program that searched for them could still find them, as any
+/// program of the same user could.
 pub(crate) struct Room {
     dir: TempDir,
     folder: PathBuf,
 }
 
 impl Room {
-    /// Copies a case's files, but not those called in `without`.
+    /// Copies a case's files, except those named in `without`.
     pub(crate) fn of(case: &Path, without: &[&str]) -> anyhow::Result<Self> {
         let dir =
             tempfile::Builder::new().prefix("stretch-").tempdir().context("temporary folder")?;
@@ -45,7 +46,7 @@ impl Room {
     pub(crate) fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.folder).env("PWD", &self.folder).env_remove("OLDPWD");
-        // The shell's own record of what was typed, with the folder's name.
+        // The shell's record of the last command, which contains the folder's name.
         command.env_remove("_");
         command
     }
@@ -87,7 +88,7 @@ mod tests {
             names
         };
         assert_eq!(listed(&room.folder), ["a.csv", "dataset.toml"]);
-        // Nothing lies beside the case, and nothing above it is of the check.
+        // The case is the only entry of its folder, and no parent folder belongs to the check.
         let above = room.folder.parent().unwrap();
         assert_eq!(listed(above), ["case-000"]);
         assert!(!room.folder.starts_with(check.path()));

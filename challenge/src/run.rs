@@ -1,4 +1,4 @@
-//! Every case diagnosed in a process and a folder that hold no label.
+//! Diagnoses every case in a process and a folder that hold no label.
 
 use std::{
     fs,
@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, ensure};
-use stretch_files::write_whole;
+use stretch_data::files::{clean_up_and_exit, write_whole};
 
 use crate::{
     answers::{ANSWER, case_folders},
@@ -18,7 +18,7 @@ use crate::{
 
 /// Why there is no answer.
 const REFUSAL: &str = "refusal.txt";
-/// What the diagnosis may know beside the data.
+/// What the diagnosis may know in addition to the data.
 const HINT: &str = "hint.toml";
 
 /// How the cases are diagnosed.
@@ -30,31 +30,37 @@ pub struct RunOptions {
     /// Answer again where there is an answer
     #[arg(long)]
     pub again: bool,
-    /// Leave out the simpler methods that are run beside for comparison
+    /// Leave out the simpler methods that are run for comparison
     #[arg(long)]
     pub no_baselines: bool,
-    /// Program that is asked in place of this one, as `PROGRAM diagnose . --json-out diagnosis.json --no-next`,
+    /// Program that is asked in place of this one, as `PROGRAM diagnose . --json=diagnosis.json --no-next`,
     /// with --without EFFECT, --threads 1 and --baselines behind it; `stretch` is one
     #[arg(long, value_name = "PROGRAM")]
     pub program: Option<PathBuf>,
 }
 
-/// Whether rooms may be open, which a Ctrl-C lets close.
+/// Whether case folders may exist, which are removed after a Ctrl-C.
 static RUNNING: AtomicBool = AtomicBool::new(false);
+static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// What the handler of Ctrl-C does: while cases are diagnosed the first one lets their rooms be taken away, any other ends the program.
+/// Handler of Ctrl-C: while cases are diagnosed the first one removes their folders, any other ends
+/// the program.
 pub fn on_ctrl_c() {
-    let was = stretch_files::interrupted();
-    let open = stretch_files::interrupt();
-    if was || open == 0 && !RUNNING.load(SeqCst) {
-        std::process::exit(130);
+    if STOPPED.swap(true, SeqCst) || !RUNNING.load(SeqCst) {
+        clean_up_and_exit(130);
     }
 }
 
-/// Diagnoses every case of a folder that has no answer yet; hands back how many are answered, of how many.
+/// Whether Ctrl-C asked to stop.
+pub fn is_stopped() -> bool {
+    STOPPED.load(SeqCst)
+}
+
+/// Diagnoses every case of a folder that has no answer yet; returns how many are answered, of how
+/// many.
 ///
 /// # Errors
-/// Labels that are not sealed, a diagnosis that broke off, Ctrl-C.
+/// Labels that are not sealed, an interrupted diagnosis, Ctrl-C.
 pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, usize)> {
     ensure!(
         folder.join("seal.sha256").is_file(),
@@ -73,7 +79,7 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
     let jobs = options.jobs.unwrap_or_else(cores).clamp(1, waiting.len().max(1));
     shared_out(jobs, waiting.len(), |at| {
         let (name, path) = waiting[at];
-        ensure!(!stretch_files::interrupted(), "interrupted");
+        ensure!(!is_stopped(), "interrupted");
         answer(&program, path, jobs > 1, options).with_context(|| name.clone())?;
         progress.step();
         Ok(())
@@ -86,7 +92,7 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
 fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> anyhow::Result<()> {
     let room = Room::of(case, &[ANSWER, REFUSAL, HINT])?;
     let mut command = room.command(program);
-    command.args(["diagnose", ".", "--json-out", ANSWER, "--no-next"]);
+    command.args(["diagnose", ".", &format!("--json={ANSWER}"), "--no-next"]);
     for name in struck(case)? {
         command.args(["--without", &name]);
     }

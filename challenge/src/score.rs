@@ -1,10 +1,9 @@
-//! The seal opened: answers against labels, the goals, and fits that know the labels beside.
+//! Opens the seal: compares answers with labels and goals, and fits that know the labels.
 
 use std::{fmt::Write as _, path::Path};
 
-use anyhow::ensure;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score};
-use stretch_files::Outputs;
+use stretch_data::files::Outputs;
 use stretch_gap::Options;
 
 use crate::{
@@ -16,13 +15,14 @@ use crate::{
     text::Progress,
 };
 
-/// Scores the answers of a folder, writes `score.json` and `report.html` beside them, and hands back the score as text.
+/// Scores the answers of a folder, writes `score.json` and `report.html` into it, and returns the
+/// score as text.
 ///
-/// `with_oracle` fits every counted single effect with a catalogue of that effect alone: what it closes is the most that could be
-/// closed.
+/// `with_oracle` fits every counted single effect with a catalogue of only that effect: what it
+/// closes is the upper limit.
 ///
 /// # Errors
-/// A seal that is broken, answers that are none, a file that cannot be written, Ctrl-C.
+/// A broken seal, invalid answers, a file that cannot be written, Ctrl-C.
 pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String> {
     let mut answers = Answers::read(folder)?;
     if with_oracle {
@@ -54,7 +54,8 @@ fn text(score: &Score, goals: &[Goal], sha256: &str) -> String {
     text + "too few: a single case decides.\n\n" + &score.to_string()
 }
 
-/// Adds to every counted single effect what a fit closes whose catalogue holds the true effect alone.
+/// Adds to every counted single effect what a fit closes whose catalogue holds only the true
+/// effect.
 fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
     let is_counted =
         |label: &&Label| label.kind == CaseKind::Single && label.excess >= COUNTED_EXCESS;
@@ -65,7 +66,6 @@ fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
     let progress = Progress::new("fits that know the label", wanted.len());
     let found = shared_out(cores(), wanted.len(), |at| {
         let (i, label) = wanted[at];
-        ensure!(!stretch_files::interrupted(), "interrupted");
         let closed = closed_by(&folder.join(&answers.verdicts[i].case), &label.effects);
         progress.step();
         Ok((i, closed))
@@ -76,7 +76,7 @@ fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The share of the gap that these effects close where the catalogue has no other.
+/// The share of the gap that these effects close if the catalogue has no other.
 fn closed_by(case: &Path, effects: &[String]) -> Option<f64> {
     let names = stretch_sim::CATALOGUE.iter().map(|e| e.name);
     let without: Vec<&str> = names.filter(|name| effects.iter().all(|e| e != name)).collect();

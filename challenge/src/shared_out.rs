@@ -8,11 +8,12 @@ use std::{
     thread,
 };
 
-/// The results of `count` jobs, in order, by so many threads. These are not rayon's: a diagnosis has a pool of its own, and a worker that
-/// waits for one would begin the next job meanwhile, one inside the other.
+/// The results of `count` jobs, in order, by so many threads. These are not rayon's threads,
+/// because a diagnosis has its own pool, and a waiting rayon worker would begin the next job inside
+/// the first.
 ///
 /// # Errors
-/// The first of a job, in order; no job begins after one has failed.
+/// The error of the first failed job, in order; no job begins after one has failed.
 ///
 /// ```
 /// let squares = stretch_challenge::shared_out(2, 4, |i| Ok(i * i))?;

@@ -1,4 +1,4 @@
-//! What the program says: lines, tables, and how far it is.
+//! Output of the program: lines, tables, and progress.
 
 use std::{
     fmt::Display,
@@ -6,12 +6,12 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering::Relaxed},
 };
 
-/// A text and a line end to standard output; where nobody reads any more the work goes on.
+/// Writes a text and a newline to standard output; the work continues if standard output is closed.
 pub fn say(text: impl Display) {
     let _ = writeln!(stdout(), "{text}");
 }
 
-/// How many of a number of steps are done, on a terminal only.
+/// Progress: how many of a number of steps are done, only on a terminal.
 #[derive(Debug)]
 pub struct Progress {
     what: &'static str,

@@ -103,7 +103,7 @@ fn another_program_is_asked_in_the_same_room() {
     let scratch = tempdir().unwrap();
     let here = scratch.path();
     runs(&mut challenge(here, &["make", "--cases", "1", "--out", "check"]));
-    let script = "#!/bin/sh\n[ \"$1 $2 $3 $4\" = 'diagnose . --json-out diagnosis.json' ] || exit 2\n\
+    let script = "#!/bin/sh\n[ \"$1 $2 $3\" = 'diagnose . --json=diagnosis.json' ] || exit 2\n\
                   ls .. * >listed.txt\necho '{\"verdict\": \"no_gap\"}' >diagnosis.json\n";
     let program = here.join("other.sh");
     fs::write(&program, script).unwrap();

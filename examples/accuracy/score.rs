@@ -23,7 +23,7 @@ impl Blocks {
             let readings = apply(calibration, trial)?.readings;
             let values: Vec<f64> =
                 readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
-            blocks.push(trial.require(calibration.reference.as_str())?, &values);
+            blocks.push(trial.require(calibration.spec().reference.as_str())?, &values);
         }
         Ok(blocks)
     }

@@ -37,7 +37,7 @@ enum After {
 fn mended(calibration: &Calibration, trials: &[Trial], after: After) -> anyhow::Result<Blocks> {
     let mut blocks = Blocks::default();
     for trial in trials {
-        let truth = trial.require(calibration.reference.as_str())?;
+        let truth = trial.require(calibration.spec().reference.as_str())?;
         let readings = apply(calibration, trial)?.readings;
         let mut last = truth[0];
         let mut values = Vec::new();
@@ -121,7 +121,7 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<ResultTable> {
     let mut base = Blocks::default();
     let mut of_rigs = vec![Blocks::default(); rigs.len()];
     let mut of_calibrations = vec![Blocks::default(); calibrations.len()];
-    let mut others = vec![Blocks::default(); 6];
+    let mut others = vec![Blocks::default(); 5];
     for &seed in seeds {
         let session = Simulated::new(&paper_preset()?, seed, true)?;
         let tests = session.arbitrary();
@@ -135,14 +135,11 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<ResultTable> {
             blocks.extend(&Blocks::of(&calibrate(session.ramps(), options)?.calibration, tests)?);
         }
         others[0].extend(&own_ranges(&paper, tests)?);
-        let jumpless = Options { dead_band: None, ..Options::paper() };
-        let jumpless = fitted("blended", session.ramps(), &jumpless)?.calibration;
-        others[1].extend(&Blocks::of(&jumpless, tests)?);
-        others[2].extend(&mended(&paper, tests, After::Delay)?);
-        others[3].extend(&mended(&paper, tests, After::Drift)?);
+        others[1].extend(&mended(&paper, tests, After::Delay)?);
+        others[2].extend(&mended(&paper, tests, After::Drift)?);
         let taught = Options { split: SplitBy::Rate, ..Options::paper() };
-        others[4].extend(&Blocks::of(&calibrate(&session.fit, &taught)?.calibration, tests)?);
-        others[5].extend(&Blocks::of(
+        others[3].extend(&Blocks::of(&calibrate(&session.fit, &taught)?.calibration, tests)?);
+        others[4].extend(&Blocks::of(
             &fitted("observer", session.ramps(), &Options::default())?.calibration,
             tests,
         )?);
@@ -156,15 +153,14 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<ResultTable> {
     for ((cause, how, _), blocks) in calibrations.iter().zip(&of_calibrations) {
         row(cause, how, blocks);
     }
-    row("jump between surfaces", "blended across the dead band", &others[1]);
     row("frozen range", "each trial's own ranges, as the paper applied it", &others[0]);
-    row("delay", "each trial shifted by its lag", &others[2]);
-    row("drift", "a line in time taken off each trial's error", &others[3]);
-    row("ramps only", "arbitrary and pulse trials fitted too", &others[4]);
+    row("delay", "each trial shifted by its lag", &others[1]);
+    row("drift", "a line in time taken off each trial's error", &others[2]);
+    row("ramps only", "arbitrary and pulse trials fitted too", &others[3]);
     for ((cause, how, _), blocks) in rigs.iter().zip(&of_rigs) {
         row(cause, how, blocks);
     }
-    row("memory, by the model", "observer, calibrated on the same ramps", &others[5]);
+    row("memory, by the model", "observer, calibrated on the same ramps", &others[4]);
     Ok(table)
 }
 
@@ -173,7 +169,7 @@ fn measured_causes(pairs: &[Pair]) -> anyhow::Result<ResultTable> {
     let title =
         "Why it fails: poly13 from one measured session on another of the same sleeve (six pairs)";
     let mut table = ResultTable::new("why_measured.csv", title, &header);
-    let mut all = vec![Blocks::default(); 9];
+    let mut all = vec![Blocks::default(); 8];
     for pair in pairs {
         let tests = std::slice::from_ref(&pair.test);
         let of = |model: &str, options: &Options| -> anyhow::Result<Calibration> {
@@ -186,7 +182,6 @@ fn measured_causes(pairs: &[Pair]) -> anyhow::Result<ResultTable> {
             Blocks::of(&base, tests)?,
             Blocks::of(&of("poly13", &central)?, tests)?,
             Blocks::of(&of("poly13", &strain)?, tests)?,
-            Blocks::of(&of("blended", &pair.options)?, tests)?,
             own_ranges(&base, tests)?,
             mended(&base, tests, After::Delay)?,
             mended(&base, tests, After::Drift)?,
@@ -199,7 +194,6 @@ fn measured_causes(pairs: &[Pair]) -> anyhow::Result<ResultTable> {
         ("none", "poly13, matched"),
         ("(worse) rate noise", "central difference in place of the 11-point rate"),
         ("(worse) mismatch", "fitted on the reference's rate"),
-        ("jump between surfaces", "blended across the dead band"),
         ("frozen range", "the trial's own ranges"),
         ("delay", "the trial shifted by its lag"),
         ("drift", "a line in time taken off the error"),

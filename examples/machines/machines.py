@@ -56,7 +56,7 @@ def diagnose(problem: Path, program: str = "stretch", arguments: tuple[str, ...]
     """What the program says of a problem, with the seconds that it took."""
     answer, page = problem.parent / "diagnosis.json", problem.parent / "report.html"
     begun = time.monotonic()
-    command = [program, "diagnose", str(problem), "--quiet", "--json-out", str(answer), "--report", str(page), *arguments]
+    command = [program, "diagnose", str(problem), "--quiet", f"--json={answer}", "--report", str(page), *arguments]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode not in (0, 4):
         raise SystemExit(f"{' '.join(command)}\n{done.stderr.strip()}")

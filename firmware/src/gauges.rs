@@ -1,7 +1,8 @@
 //! Four gauges that follow the trial, each with a gain of its own.
 
 use stretch_core::Branch;
-use stretch_receptor::{ArrayReading, ArrayWithheld, Domain, Withheld, code::CodeReading};
+use stretch_receptor::{Domain, Withheld, code::CodeReading};
+use stretch_sleeve::{ArrayReading, ArrayWithheld};
 
 /// Number of gauges.
 pub const GAUGES: usize = 4;

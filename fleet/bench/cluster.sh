@@ -3,7 +3,7 @@
 # LAKE is a lake of stretch-fleet (stretch-fleet make); BIN holds the three programs.
 set -eu
 lake=$1
-bin=${2:-"$(dirname "$0")/../target/release"}
+bin=${2:-"$(dirname "$0")/../../target/release"}
 query="select sensor, poly13_fit(rate, bridge_v, contraction)['rmse'] from trials group by sensor"
 work=$(mktemp -d)
 trap 'kill $(cat "$work"/*.pid) 2>/dev/null; rm -rf "$work"' EXIT

@@ -6,7 +6,7 @@ cd "$(dirname "$0")"
 
 skip() { printf 'SKIPPED: the functions in datafusion-python: %s\n' "$1"; exit 0; }
 python=${PYTHON:-python3}
-module=${MODULE:-../target/debug/libstretch_datafusion.so}
+module=${MODULE:-${CARGO_TARGET_DIR:-../../target}/debug/libstretch_datafusion.so}
 
 command -v "$python" >/dev/null 2>&1 || skip "there is no $python"
 [ "$(uname -s)" = Linux ] || skip "a module has another name on this system"
@@ -15,6 +15,6 @@ trap 'rm -rf "$fresh"' EXIT
 "$python" -m venv "$fresh/use" 2>/dev/null || skip "$python has no venv"
 "$fresh/use/bin/pip" install --quiet --disable-pip-version-check 'datafusion>=55,<56' numpy pyarrow pytest 2>/dev/null \
     || skip "pip cannot install datafusion 55, numpy, pyarrow and pytest"
-[ -e "$module" ] || (cd .. && cargo build --quiet --locked --workspace)
+[ -e "$module" ] || cargo build --quiet --locked -p stretch-fleet-python
 cp "$module" "$fresh/stretch_datafusion.abi3.so"
 PYTHONPATH=$fresh "$fresh/use/bin/pytest" -q -p no:cacheprovider tests

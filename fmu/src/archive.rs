@@ -1,4 +1,4 @@
-//! An FMU as a file: unpacked, read and looked through before anything of it is run.
+//! An FMU as a file: unpacked, read and checked before any of its code runs.
 
 use std::{
     fs,
@@ -29,7 +29,7 @@ pub struct Fmu {
 }
 
 impl Fmu {
-    /// Unpacks an FMU and reads what it says of itself; nothing of it is run.
+    /// Unpacks an FMU and reads its description; none of its code runs.
     ///
     /// # Errors
     /// Files that are no FMU for co-simulation, or none for this machine.

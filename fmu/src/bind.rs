@@ -1,4 +1,4 @@
-//! Names of a problem beside variables of an FMU.
+//! Matches names of a problem with variables of an FMU.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ const LISTED: usize = 12;
 /// What a problem says of names beyond the session.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Names {
-    /// Variable of the FMU for a parameter, an effect's value or a column, where it is called otherwise there.
+    /// Variable of the FMU for a parameter, an effect's value or a column, if its name differs.
     pub variables: BTreeMap<String, String>,
     /// Units of parameters and effects' values in the problem; those of columns are in the session.
     pub units: BTreeMap<String, String>,
@@ -140,7 +140,8 @@ impl Asked<'_> {
     fn of<'m>(&self, model: &'m Model, names: &Names) -> Result<&'m Variable, FmuError> {
         let mapped = names.variables.get(self.name).map(String::as_str);
         let named = |name: &str| model.variables.iter().find(|v| v.name == name);
-        // A column says its unit in its name, as angle_deg; a variable of an FMU has it beside its name.
+        // A column has its unit in its name, as angle_deg; a variable of an FMU has it in a
+        // separate attribute.
         let bare = || self.name.strip_suffix(self.unit)?.strip_suffix('_').and_then(named);
         let found = match mapped {
             Some(name) => named(name),
@@ -199,7 +200,7 @@ impl Asked<'_> {
         let fits =
             |v: &&Variable| self.roles.contains(&v.role) && !matches!(v.kind, Kind::Other(_));
         let all: Vec<&str> = model.variables.iter().filter(fits).map(|v| v.name.as_str()).collect();
-        // Names have several parts in most FMUs: the last one, or a part of it, is what a person remembers.
+        // Names have several parts in most FMUs: users remember the last one, or a part of it.
         let lower = variable.to_lowercase();
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let is_near = |name: &str| {

@@ -1,13 +1,14 @@
 //! A place on the stack that stays as it is.
 //!
-//! `fmi2Instantiate` takes its callbacks as a pointer to a struct. Of FMUs in use some keep the pointer and follow it for as long as they live.
-//! The library that calls it here keeps the struct on its stack, and what is called next would write over it. So an instance is made at the
-//! bottom of a deep stack, and everything else is called from its top: between them lies more than the whole stack that a program usually
-//! has.
+//! `fmi2Instantiate` takes its callbacks as a pointer to a struct. Some FMUs keep the pointer and
+//! follow it as long as they live. The library that calls it here keeps the struct on its stack,
+//! and the next calls would overwrite it. Therefore an instance is made at the bottom of a deep
+//! stack, and everything else is called from its top. The distance is larger than the whole stack
+//! of a usual program.
 
 use std::{hint::black_box, mem::MaybeUninit};
 
-/// Between what is called deep and what is called from the top, bytes: the usual stack of a whole program.
+/// Distance between deep calls and calls from the top, bytes: the usual stack of a whole program.
 const DEPTH: usize = 8 << 20;
 /// Stack of a thread that calls deep, bytes.
 pub(crate) const STACK: usize = 3 * DEPTH;
@@ -30,7 +31,8 @@ fn sink(frames: usize, call: &mut dyn FnMut()) {
         0 => call(),
         _ => sink(frames - 1, call),
     }
-    // Something is left to do behind the call, else it would be a jump and take no stack.
+    // Something has to be done after the call, because otherwise it would be a tail call and take
+    // no stack.
     black_box(&frame);
 }
 

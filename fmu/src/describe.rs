@@ -7,9 +7,10 @@ use crate::{
     model::{Kind, Role, Variable},
 };
 
-/// A `problem.toml` to begin with: a stage for every output, driven by all inputs, and every parameter, exact until a tolerance is given.
+/// A first `problem.toml`: a stage for every output, driven by all inputs, and every parameter,
+/// exact until a tolerance is given.
 ///
-/// Columns are called as the variables are; the recordings stay to be named.
+/// Columns have the names of the variables; the recordings have to be added.
 pub fn describe(fmu: &Fmu) -> String {
     let model = fmu.model();
     let with = |role: Role| {

@@ -84,7 +84,7 @@ pub enum FmuError {
         /// What it says of that.
         said: String,
     },
-    /// A name that stands for no variable.
+    /// A name that matches no variable.
     #[error("{what} {name}: the FMU has no variable {variable}{near}; it has {known}")]
     Unknown {
         /// Parameter, effect, input or output.

@@ -93,7 +93,7 @@ impl fmi3::log::Logger for Said {
     }
 }
 
-/// Variables that are set or read together, by how their numbers are held.
+/// Variables that are set or read together, by the type of their numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Slots {
     count: usize,
@@ -143,7 +143,7 @@ enum Native {
     Three(Arc<FMU3>),
 }
 
-/// An instance; it is freed with this, unless it must not be called any more.
+/// An instance. Dropping it frees it, unless it must not be called any more.
 pub(crate) struct Instance {
     native: Option<Native>,
     said: Arc<Said>,

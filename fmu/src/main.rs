@@ -55,7 +55,7 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
     Ok(if describes { Asked::Describe(file) } else { Asked::Serve(file, names) })
 }
 
-/// Standard output for frames alone: what the FMU prints there goes to standard error.
+/// Standard output carries only frames: what the FMU prints there goes to standard error.
 #[cfg(unix)]
 fn frames() -> io::Result<File> {
     let own = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stdout(), 3)?;

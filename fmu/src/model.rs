@@ -1,4 +1,4 @@
-//! What an FMU says of itself, the same for both versions of the standard.
+//! Description of an FMU, the same for both versions of the standard.
 
 use fmi_rs::model_description::{fmi2, fmi3};
 
@@ -86,7 +86,7 @@ pub struct Model {
     pub name: String,
     /// Its variables.
     pub variables: Vec<Variable>,
-    /// Length of the steps that it takes inside, s, where they are fixed.
+    /// Length of its internal steps, s, if they are fixed.
     pub inner_step_s: Option<f64>,
     pub(crate) identifier: String,
     /// GUID, or instantiation token.
@@ -101,7 +101,7 @@ fn number(text: Option<&String>) -> Option<f64> {
 }
 
 impl Model {
-    /// None where it is not for co-simulation.
+    /// `None` if it is not for co-simulation.
     pub(crate) fn of_fmi2(description: &fmi2::ModelDescription) -> Option<Self> {
         use fmi2::{Causality, VariableType};
         let about = description.coSimulation.as_ref()?;
@@ -122,7 +122,8 @@ impl Model {
             start: number(v.variableType.start().as_ref()),
             reference: v.valueReference,
         };
-        // FMI 2 says nothing of steps inside. One that takes communication steps of one length only is as good as fixed.
+        // FMI 2 does not describe internal steps. An FMU that takes communication steps of one
+        // length only practically has fixed steps.
         let step = description.defaultExperiment.as_ref().and_then(|e| number(e.stepSize.as_ref()));
         Some(Self {
             version: Version::Fmi2,
@@ -136,7 +137,7 @@ impl Model {
         })
     }
 
-    /// None where it is not for co-simulation.
+    /// `None` if it is not for co-simulation.
     pub(crate) fn of_fmi3(description: &fmi3::ModelDescription) -> Option<Self> {
         use fmi3::{Causality, VariableType};
         let about = description.coSimulation.as_ref()?;

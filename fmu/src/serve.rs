@@ -34,12 +34,13 @@ fn wrong(what: &str) -> ServeError {
     ServeError::Protocol(format!("the {what} cannot be read; do both programs belong together?"))
 }
 
-/// Answers frames until the other side says bye or is gone; `begin` makes the simulator of a session.
+/// Answers frames until the other side says bye or closes; `begin` makes the simulator of a
+/// session.
 ///
 /// Errors are sent to the other side before the worker ends.
 ///
 /// # Errors
-/// What cannot be read or written, and simulators that do not begin or are gone.
+/// Frames that cannot be read or written, and simulators that do not start or have ended.
 pub fn serve<S, E>(
     mut from: impl Read,
     mut to: impl Write,
@@ -97,7 +98,7 @@ where
     Ok(())
 }
 
-/// The next frame; none where the other side is gone.
+/// The next frame; `None` if the other side has closed.
 fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
     let mut prefix = [0; PREFIX];
     match from.read_exact(&mut prefix) {
@@ -105,7 +106,7 @@ fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
         read => read?,
     }
     let Prefix { header, body } = Prefix::parse(&prefix)?;
-    // The lengths are only what it says: what is read decides how much memory is taken.
+    // The lengths are only claims: memory is allocated for what is actually read.
     let mut part = |bytes: usize| {
         let mut out = Vec::new();
         let read = from.take(bytes as u64).read_to_end(&mut out)?;

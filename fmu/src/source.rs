@@ -18,12 +18,15 @@ use crate::{
 
 /// An FMU that answers the asks of a session.
 ///
-/// Each trial of each model is run by an instance of its own: parameters and effects are set before its initialization, the first sample of
-/// the inputs in it, and the others at every sample, where they are held until the next. An output is read at every sample, before the step
-/// to the next one. Time begins with 0 in every trial.
+/// A new instance runs each trial of each model. Parameters and effects are set before its
+/// initialization, and the first sample of the inputs during it. The other samples are set one by
+/// one and held until the next one. Outputs are read at every sample, before the step to the next
+/// one. Time begins at 0 in every trial.
 ///
-/// Runs of one source follow one another: the library of an FMU may hold numbers that all its instances share. What is to run at the same
-/// time runs in processes of its own, as the worker `stretch-fmu` does. There a crash or a hang takes nothing else with it; here it does.
+/// Runs of one source are sequential, because the library of an FMU may hold numbers that all its
+/// instances share. To run models at the same time, use separate processes, as the worker
+/// `stretch-fmu` does. A crash or a hang then affects only its process; here it affects the whole
+/// program.
 #[derive(Debug)]
 pub struct FmuSource {
     fmu: Fmu,
@@ -37,7 +40,8 @@ impl FmuSource {
     /// Binds the names of a session to variables, and makes one instance to see that it can be made.
     ///
     /// # Errors
-    /// Names without a variable, variables that cannot be used so, units that differ, and libraries that cannot be loaded.
+    /// Names without a variable, variables that cannot be used in this way, different units, and
+    /// libraries that cannot be loaded.
     pub fn new(fmu: Fmu, session: RecordedSession, names: &Names) -> Result<Self, FmuError> {
         let bound = Bound::new(fmu.model(), &session, names)?;
         let gone =
@@ -64,7 +68,7 @@ impl FmuSource {
         Ok(out)
     }
 
-    /// Columns that drive it: those that the ask alters as the ask has them, all others as measured.
+    /// Columns that drive it: altered ones as requested, all others as measured.
     fn inputs<'a>(&'a self, ask: &Ask<'a>) -> Result<Vec<Cow<'a, [f64]>>, SourceError> {
         let inputs = |stage: usize| &self.session.stages[stage].inputs;
         let samples = self.session.samples(ask.trials);
@@ -116,7 +120,8 @@ impl FmuSource {
     }
 }
 
-/// Runs something on a thread with room for [`deep`](crate::deep::deep); none where there is no thread to be had.
+/// Runs something on a thread with enough stack for [`deep`](crate::deep::deep); `None` if no
+/// thread can be started.
 fn apart<T: Send>(run: impl FnOnce() -> T + Send) -> Option<T> {
     thread::scope(|scope| {
         let begun = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);

@@ -5,7 +5,7 @@ mod support;
 use std::{env, fmt::Write, fs};
 
 use stretch_fmu::{Fmu, describe};
-use stretch_problem::{Ask, Checked, ProblemFile, Source, worker::Workers};
+use stretch_problem::{Ask, Checked, ProblemSpec, Source, worker::Workers};
 use support::{SAMPLES, Wrong, answer, servo, spec};
 
 const TEXT: &str = r#"
@@ -53,12 +53,12 @@ fn a_problem_is_read_and_its_fmu_found_and_run() {
     }
     let file = folder.join("problem.toml");
     fs::write(&file, TEXT).unwrap();
-    // The program is looked for beside the one that asks.
+    // The program is searched in the folder of the caller.
     let beside = env::current_exe().unwrap().with_file_name("stretch-fmu");
     let _ = fs::remove_file(&beside);
     fs::hard_link(env!("CARGO_BIN_EXE_stretch-fmu"), &beside).unwrap();
 
-    let file = ProblemFile::read(&file).unwrap();
+    let file = ProblemSpec::read(&file).unwrap();
     let problem = Checked::new(file.load().unwrap()).unwrap();
     let spec = file.workers(1).unwrap().unwrap();
     assert_eq!((spec.jobs, spec.deadline_s), (1, 20.0));
@@ -82,14 +82,14 @@ fn what_an_fmu_offers_is_a_problem_to_begin_with() {
     for fmi in [2, 3] {
         let Some(built) = servo(fmi, Wrong::Nothing) else { return };
         let text = describe(&Fmu::open(&built.file).unwrap());
-        let file = ProblemFile::parse("described", &text).unwrap();
-        let stage = &file.spec.stages[0];
+        let file = ProblemSpec::parse("described", &text).unwrap();
+        let stage = &file.stages[0];
         assert_eq!((stage.output.as_str(), stage.unit.as_str()), ("angle", "deg"));
         assert_eq!(stage.inputs, ["command", "load"]);
         let parameters: Vec<_> =
-            file.spec.parameters.iter().map(|p| (p.name.as_str(), p.value)).collect();
+            file.parameters.iter().map(|p| (p.name.as_str(), p.value)).collect();
         let own = [("servo.gain", 10.0), ("servo.tau", 0.1), ("brake", 0.0), ("trouble", 0.0)];
         assert_eq!(parameters, own);
-        assert_eq!(file.spec.inputs[0].unit, "V");
+        assert_eq!(file.inputs[0].unit, "V");
     }
 }

@@ -1,4 +1,4 @@
-//! What is wrong with an FMU is told in a sentence, and takes nothing else with it.
+//! An error in an FMU is reported in one sentence and affects nothing else.
 
 mod support;
 
@@ -93,7 +93,7 @@ fn troubled(fmi: u8, trouble: f64) -> Option<(Answer, Vec<String>)> {
     let known = Parameter { name: "trouble".into(), value: trouble, ..Parameter::default() };
     spec.parameters.push(known);
     let problem = Checked::new(spec).unwrap();
-    // Whoever hangs is waited for no longer than a test has time; all others may wait for a busy machine.
+    // The run that hangs gets a short deadline; all others may wait for a busy machine.
     let deadline_s = if trouble == 2.0 { 1.0 } else { 60.0 };
     let workers = WorkersSpec { deadline_s, ..worker(&built.file, &[]) };
     let workers = Workers::start(workers, problem.session()).unwrap();

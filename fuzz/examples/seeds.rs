@@ -54,7 +54,6 @@ fn records() -> Result<Vec<(&'static str, Calibration)>, Box<dyn Error>> {
     let remembering = |kind, rest| ModelKind::Remembering { kind, rest };
     for (name, model) in [
         ("line", ModelKind::Linear),
-        ("blended", "blended".parse()?),
         ("poly55", "poly55".parse()?),
         ("history_rest", remembering(Memory::History, true)),
     ] {

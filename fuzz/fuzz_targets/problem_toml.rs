@@ -2,10 +2,11 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use stretch_problem::ProblemFile;
+use stretch_problem::ProblemSpec;
 
 fuzz_target!(|text: &str| {
-    if let Ok(file) = ProblemFile::parse("fuzz", text) {
+    if let Ok(file) = ProblemSpec::parse("fuzz", text) {
         let _ = file.workers(1);
+        assert_eq!(ProblemSpec::parse("own", &file.to_toml()).expect("own output"), file);
     }
 });

@@ -2,16 +2,18 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use stretch_recording::{ReadOptions, Recording};
+use stretch_recording::{DateOrder, ReadOptions, Recording};
 
 fuzz_target!(|bytes: &[u8]| {
-    let options = ReadOptions::new().sample_rate_hz(100.0);
-    if let Ok(recording) = Recording::from_reader(bytes, "fuzz", &options) {
-        assert!(recording.trial.check().is_ok());
-    }
-    if let Ok(mut rows) = stretch_recording::RowReader::new(bytes, "fuzz", &options) {
-        while let Some(row) = rows.next_row() {
-            assert!(row.map_or(true, |row| row.time_s.is_finite()));
+    let named = ReadOptions::new().columns(["tag", "time_ms", "a"]).date_order(DateOrder::DayFirst);
+    for options in [ReadOptions::new().sample_rate_hz(100.0), ReadOptions::new(), named] {
+        if let Ok(recording) = Recording::from_reader(bytes, "fuzz", &options) {
+            assert!(recording.trial.check().is_ok());
+        }
+        if let Ok(mut rows) = stretch_recording::RowReader::new(bytes, "fuzz", &options) {
+            while let Some(row) = rows.next_row() {
+                assert!(row.map_or(true, |row| row.time_s.is_finite()));
+            }
         }
     }
 });

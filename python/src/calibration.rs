@@ -7,13 +7,13 @@ use pyo3::{prelude::*, types::PyDict};
 use serde::Serialize;
 use stretch_calibrate::{
     CalibrateError, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust, SpellingError,
-    calibration_from_json, calibration_to_json, choose_model, parse_rate, pressure_column,
-    read_calibration, write_calibration,
+    choose_model, parse_rate, pressure_column,
 };
 use stretch_core::{Calibration, Target};
 use stretch_data::{Channel, Trial};
 use stretch_gap::Diagnosis;
 use stretch_problem::causes;
+use stretch_sleeve::{GaugeCalibration, calibrate_gauge};
 
 use crate::{
     error::said,
@@ -26,7 +26,13 @@ use crate::{
 #[pyclass(frozen, module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct CalibrationRecord {
-    calibration: Calibration,
+    gauge: GaugeCalibration,
+}
+
+impl CalibrationRecord {
+    fn calibration(&self) -> &Calibration {
+        self.gauge.calibration()
+    }
 }
 
 /// Options of a calibration, under the names of the package.
@@ -127,10 +133,10 @@ pub(crate) fn calibrate(
             models: choice.as_ref().map_or(&[], |choice| &choice.rows),
             notes: &made.notes,
         });
-        Ok((made.calibration, said))
+        Ok((calibrate_gauge(made.calibration, &trials, &options)?, said))
     };
-    let (calibration, made) = watched(py, work)?.map_err(said)?;
-    Ok((CalibrationRecord { calibration }, made.map_err(said)?))
+    let (gauge, made) = watched(py, work)?.map_err(said)?;
+    Ok((CalibrationRecord { gauge }, made.map_err(said)?))
 }
 
 /// Evaluates calibrations beside the raw signal; the answer is JSON.
@@ -142,7 +148,7 @@ pub(crate) fn evaluate(
 ) -> PyResult<String> {
     let trials = trials(&recordings);
     let calibrations: Vec<(String, Calibration)> =
-        calibrations.iter().map(|(name, r)| (name.clone(), r.calibration.clone())).collect();
+        calibrations.iter().map(|(name, r)| (name.clone(), r.calibration().clone())).collect();
     let work = move || {
         let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
         stretch_calibrate::evaluate(&named, &trials)
@@ -156,54 +162,54 @@ impl CalibrationRecord {
     /// Reads the JSON that `stretch calibrate` writes.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
-        Ok(Self { calibration: calibration_from_json(text, "the text").map_err(said)? })
+        Ok(Self { gauge: GaugeCalibration::from_json(text, "the text").map_err(said)? })
     }
 
     /// Reads a file: postcard where its name ends in `.postcard`, else JSON.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        Ok(Self { calibration: read_calibration(&path).map_err(said)? })
+        Ok(Self { gauge: GaugeCalibration::read(&path).map_err(said)? })
     }
 
     /// Writes a file, whole or not at all.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        write_calibration(&path, &self.calibration).map_err(said)
+        self.gauge.write(&path).map_err(said)
     }
 
     /// The record as the JSON that the program reads.
     fn to_json(&self) -> PyResult<String> {
-        calibration_to_json(&self.calibration).map_err(said)
+        self.gauge.to_json().map_err(said)
     }
 
     /// Column of the signal.
     #[getter]
     fn signal(&self) -> &str {
-        self.calibration.signal.as_str()
+        self.calibration().spec().signal.as_str()
     }
 
     /// Column of the reference.
     #[getter]
     fn reference(&self) -> &str {
-        self.calibration.reference.as_str()
+        self.calibration().spec().reference.as_str()
     }
 
     /// Unit of the estimate.
     #[getter]
     fn unit(&self) -> &str {
-        self.calibration.reference.unit()
+        self.calibration().spec().reference.unit()
     }
 
     /// Sample rate of the calibration, Hz.
     #[getter]
     fn rate_hz(&self) -> f64 {
-        self.calibration.sample_rate_hz.hz()
+        self.calibration().spec().sample_rate_hz.hz()
     }
 
     /// Least and greatest estimate of the recordings that were fitted.
     #[getter]
     fn range(&self) -> (f64, f64) {
-        let range = &self.calibration.target_range;
-        match self.calibration.target {
+        let range = &self.calibration().spec().target_range;
+        match self.calibration().spec().target {
             Target::Contraction { rest_length } => {
                 (rest_length * (1.0 - range.max()), rest_length * (1.0 - range.min()))
             }
@@ -214,12 +220,12 @@ impl CalibrationRecord {
     /// Whether the calibration needs the pressure beside the signal.
     #[getter]
     fn needs_pressure(&self) -> bool {
-        pressure_column(&self.calibration).is_some()
+        pressure_column(self.calibration()).is_some()
     }
 
     /// A receptor that runs the calibration live.
     fn receptor(&self) -> PyResult<Receptor> {
-        LiveReceptor::new(&self.calibration).map(Receptor::new).map_err(said)
+        LiveReceptor::new(self.calibration()).map(Receptor::new).map_err(said)
     }
 
     /// Estimates of a whole recording, as the receptor gives them live: NaN where a sample has no estimate.
@@ -235,11 +241,11 @@ impl CalibrationRecord {
             values: values.as_array().to_vec(),
         };
         let mut channels = vec![channel(self.signal(), &signal)];
-        let column = pressure_column(&self.calibration);
+        let column = pressure_column(self.calibration());
         channels.extend(column.zip(pressure.as_ref()).map(|(name, p)| channel(name, p)));
         let time_s = time_s.as_array().to_vec();
         let trial = Trial { name: "the recording".into(), time_s, channels };
-        let calibration = self.calibration.clone();
+        let calibration = self.calibration().clone();
         let applied =
             watched(py, move || stretch_calibrate::apply(&calibration, &trial))?.map_err(said)?;
         let column = |of: &dyn Fn(&stretch_receptor::Reading) -> f64| {

@@ -25,6 +25,8 @@ mod _stretch {
     #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
     #[pymodule_export]
+    use crate::recording::{read_arrays, read_file, tidy_column, unit_of};
+    #[pymodule_export]
     use crate::source::Refused;
 
     use super::*;

@@ -1,6 +1,7 @@
 //! A simulator beside recordings: its problem is checked and diagnosed.
 
 use std::{
+    num::NonZeroUsize,
     path::PathBuf,
     sync::{
         Arc,
@@ -16,7 +17,7 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Language, Problem, ProblemFile, ProblemSpec, Source,
+    BlackBox, Checked, Examined, Language, Problem, ProblemSpec, Source,
     worker::{Workers, WorkersSpec, session_header},
 };
 use stretch_report::{Subject, diagnosis_page};
@@ -58,7 +59,7 @@ fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
 pub(crate) struct Entries {
     checked: Checked,
     /// The file that the problem was read from.
-    file: Option<ProblemFile>,
+    file: Option<ProblemSpec>,
 }
 
 /// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the named effects, and the next experiment.
@@ -80,7 +81,8 @@ impl Entries {
     /// From the entries of a problem as JSON, and its recordings.
     #[new]
     fn new(entries: &str, recordings: Vec<Entry<'_>>) -> PyResult<Self> {
-        let mut spec: ProblemSpec = serde_json::from_str(entries).map_err(said)?;
+        let entries: serde_json::Value = serde_json::from_str(entries).map_err(said)?;
+        let mut spec: ProblemSpec = serde_json::from_value(entries).map_err(said)?;
         spec.trials = recordings.iter().map(session_trial).collect();
         Ok(Self { checked: Checked::new(spec).map_err(said)?, file: None })
     }
@@ -88,13 +90,10 @@ impl Entries {
     /// From a problem.toml; `is_driven` says whether altered inputs can drive the simulator.
     #[staticmethod]
     fn read(path: PathBuf, is_driven: bool) -> PyResult<Self> {
-        let file = ProblemFile::read(&path).map_err(said)?;
+        let file = ProblemSpec::read(&path).map_err(said)?;
         let mut spec = file.load().map_err(said)?;
-        if !is_driven {
-            for one in spec.wrap.iter_mut().filter(|one| *one == "all") {
-                *one = "output.all".to_owned();
-            }
-            spec.inputs.iter_mut().for_each(|input| input.noise = 0.0);
+        if let Some(behind) = spec.only_behind().filter(|_| !is_driven) {
+            spec = behind;
         }
         Ok(Self { checked: Checked::new(spec).map_err(said)?, file: Some(file) })
     }
@@ -102,7 +101,7 @@ impl Entries {
     /// Name of the problem.
     #[getter]
     fn name(&self) -> &str {
-        self.file.as_ref().map_or("data", |file| file.name.as_str())
+        self.file.as_ref().map_or("data", ProblemSpec::shown_name)
     }
 
     /// The session as JSON, without the columns.
@@ -176,7 +175,7 @@ impl Entries {
 /// Everything that the working thread needs.
 struct Work {
     checked: Checked,
-    file: Option<ProblemFile>,
+    file: Option<ProblemSpec>,
     workers: Option<WorkersSpec>,
     how: How,
     /// Messages to the main thread.
@@ -204,12 +203,9 @@ impl Work {
                 Arc::new(Asked { main_thread, answers_all, batch, takes_inputs })
             }
         };
-        let budget = how.budget.or(file.as_ref().and_then(|file| file.budget));
+        let budget =
+            how.budget.or(file.as_ref().and_then(|file| file.budget).map(NonZeroUsize::get));
         let own = BlackBox::within(checked.clone(), source, budget);
-        let own = match file {
-            Some(file) => own.from_file(file.clone()),
-            None => own,
-        };
         let problem = Problem::from(own).named(&how.name);
         let options = Options {
             depth: how.depth,

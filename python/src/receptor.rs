@@ -10,7 +10,7 @@ use stretch_core::Branch;
 pub(crate) struct Reading {
     /// The estimate, in the reference's unit.
     estimate: f64,
-    /// Its rate, in that unit per second.
+    /// Its rate, in that unit per second; NaN of a line or a curve while the rate estimator warms up.
     rate: f64,
     /// Which way it moves: `rising` or `falling`.
     branch: &'static str,

@@ -1,8 +1,13 @@
-//! Recordings as Python hands them over.
+//! Recordings as Python hands them over, and as files hold them.
 
-use numpy::PyReadonlyArray1;
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use stretch_data::{Channel, Trial};
+use stretch_recording::{Array, Clock, ReadOptions, Recording as FileRecording};
+
+use crate::{error::said, watched::watched};
 
 /// A name, time stamps in seconds, and named channels of the same length; checked by the package.
 #[derive(Debug, FromPyObject)]
@@ -33,4 +38,93 @@ impl Recording<'_> {
 /// Copies of all recordings.
 pub(crate) fn trials(recordings: &[Recording<'_>]) -> Vec<Trial> {
     recordings.iter().map(Recording::trial).collect()
+}
+
+/// What is asked of a file, under the names of the package.
+#[derive(Debug, FromPyObject)]
+pub(crate) struct Asked {
+    #[pyo3(item)]
+    columns: Vec<String>,
+    #[pyo3(item)]
+    time: String,
+    #[pyo3(item)]
+    rate_hz: Option<f64>,
+    #[pyo3(item)]
+    grid_hz: Option<f64>,
+}
+
+impl Asked {
+    fn options(self) -> ReadOptions {
+        let options = self.columns.into_iter().fold(ReadOptions::new(), ReadOptions::require);
+        let options = options.time(self.time);
+        let options = match self.rate_hz {
+            Some(rate_hz) => options.sample_rate_hz(rate_hz),
+            None => options,
+        };
+        match self.grid_hz {
+            Some(rate_hz) => options.grid_hz(rate_hz),
+            None => options,
+        }
+    }
+}
+
+/// Columns by name, the time among them.
+type Columns<'py> = Vec<(String, Bound<'py, PyArray1<f64>>)>;
+/// The columns of each clock, by its name.
+type Clocks<'py> = Vec<(String, Columns<'py>)>;
+
+fn columns(py: Python<'_>, time_s: Vec<f64>, channels: Vec<Channel>) -> Columns<'_> {
+    let time = ("time_s".to_owned(), PyArray1::from_vec(py, time_s));
+    let channels = channels.into_iter().map(|c| (c.name, PyArray1::from_vec(py, c.values)));
+    std::iter::once(time).chain(channels).collect()
+}
+
+/// Reads a file that the program reads itself: its columns, and notes.
+#[pyfunction]
+pub(crate) fn read_file<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    asked: Asked,
+) -> PyResult<(Columns<'py>, Vec<String>)> {
+    let options = asked.options();
+    let read = watched(py, move || FileRecording::read(path, &options))?;
+    let FileRecording { trial, notes } = read.map_err(said)?;
+    Ok((columns(py, trial.time_s, trial.channels), notes))
+}
+
+/// Reads named arrays as those of an NPZ file: their columns on one clock, the columns of each clock, and notes.
+#[pyfunction]
+pub(crate) fn read_arrays<'py>(
+    py: Python<'py>,
+    name: String,
+    arrays: Vec<(String, Vec<usize>, PyReadonlyArray1<'py, f64>)>,
+    notes: Vec<String>,
+    asked: Asked,
+) -> PyResult<(Columns<'py>, Clocks<'py>, Vec<String>)> {
+    let array = |(name, shape, values): (String, _, PyReadonlyArray1<'_, f64>)| Array {
+        name,
+        shape,
+        values: values.as_array().to_vec(),
+    };
+    let arrays = arrays.into_iter().map(array).collect();
+    let options = asked.options();
+    let read = watched(py, move || FileRecording::from_arrays(&name, arrays, notes, &options))?;
+    let (FileRecording { trial, notes }, clocks) = read.map_err(said)?;
+    let clocks = clocks
+        .into_iter()
+        .map(|Clock { name, time_s, channels }| (name, columns(py, time_s, channels)))
+        .collect();
+    Ok((columns(py, trial.time_s, trial.channels), clocks, notes))
+}
+
+/// A column's name in the project's way, its unit as the last part.
+#[pyfunction]
+pub(crate) fn tidy_column(name: &str) -> String {
+    stretch_recording::tidy_column(name)
+}
+
+/// The unit that a column's name says, as it is written; empty where it says none.
+#[pyfunction]
+pub(crate) fn unit_of(column: &str) -> String {
+    stretch_data::unit_of(column)
 }

@@ -45,7 +45,7 @@ def test_the_axis_lacks_the_coulomb_friction_that_was_published(every: int, tmp_
 
 
 @pytest.mark.parametrize("every", [1, 2])
-def test_a_play_in_the_elbow_foretells_a_motion_that_was_not_fitted(every: int, tmp_path: Path) -> None:
+def test_a_play_in_the_elbow_predicts_a_motion_that_was_not_fitted(every: int, tmp_path: Path) -> None:
     diagnosis = diagnosed("hobby_arm", "so101", tmp_path, every=every, joint="elbow")
     assert diagnosis.named == ["input.backlash"]
     assert diagnosis.how_far["closed"] > 0.9

@@ -5,15 +5,13 @@ use std::{
     path::PathBuf,
 };
 
-use stretch_calibrate::{
-    Applied, LiveReceptor, Reach, SleeveCalibration, apply, apply_following, not_its_own,
-    pressure_column,
-};
+use stretch_calibrate::{Applied, Reach, not_its_own, pressure_column};
 use stretch_core::{Calibration, Model};
+use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
-use stretch_files::{is_standard_output, write_whole};
 use stretch_receptor::{Domain, Reading, Withheld};
 use stretch_recording::{ReadOptions, Recording, RowReader};
+use stretch_sleeve::{AppliedGauge, GaugeCalibration, LiveGauge, SleeveCalibration, apply_gauge};
 
 use super::{
     apply_several::apply_several,
@@ -29,7 +27,8 @@ use crate::display::{Output, warn};
 /// Writes time_s, the estimate, its rate, the branch and the domain, a line a
 /// sample. Where nothing can be said (the rate estimator warms up, a sample is
 /// missing) the numbers are empty and the domain says why. Inputs outside the
-/// calibrated domain are clamped, and the domain says so.
+/// calibrated domain are clamped, and the domain says so. A line and a curve
+/// need no rate: they answer from the first sample, with an empty rate at first.
 ///
 /// From standard input each line is answered as it comes; a malformed line is
 /// noted on standard error and passed over:
@@ -61,8 +60,8 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let calibration = match SleeveCalibration::read(&args.calibration)? {
-        SleeveCalibration::One(calibration) => *calibration,
+    let gauge = match SleeveCalibration::read(&args.calibration)? {
+        SleeveCalibration::One(gauge) => *gauge,
         SleeveCalibration::Many(several) => {
             let options = args.recorded.options();
             anyhow::ensure!(
@@ -72,19 +71,23 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             return apply_several(&several, &args.trial, args.out.as_deref(), options);
         }
     };
-    let mut options = args.recorded.options().require(calibration.signal.as_str());
-    if let Some(pressure) = pressure_column(&calibration) {
+    let calibration = gauge.calibration();
+    let record_hz = calibration.spec().sample_rate_hz.hz();
+    let options = args.recorded.options().untimed_hz(record_hz);
+    let mut options = options.require(calibration.spec().signal.as_str());
+    if let Some(pressure) = pressure_column(calibration) {
         options = options.require(pressure);
     }
     let follow = args.follow_zero;
     if args.trial.as_os_str() == "-" {
         let path = args.out.as_ref().filter(|path| !is_standard_output(path));
+        let gauge = at_rate(&gauge, args.recorded.rate_hz().unwrap_or(record_hz))?;
         return match path {
-            None => live(&calibration, follow, io::stdin(), &options, &mut Output),
+            None => live(&gauge, follow, io::stdin(), &options, &mut Output),
             Some(path) => {
                 let mut result = Ok(());
                 write_whole(path, |out| {
-                    result = live(&calibration, follow, RecordedInput::new(), &options, out);
+                    result = live(&gauge, follow, RecordedInput::new(), &options, out);
                     result.as_ref().map(|_| ()).map_err(|e| io::Error::other(format!("{e:#}")))
                 })?;
                 result
@@ -92,33 +95,40 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
     }
     let trial = read_recording(&args.trial, &options)?;
-    let applied = applied(&calibration, &trial, follow)?;
-    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+    let gauge = at_rate(&gauge, trial.rate_hz().unwrap_or(record_hz))?;
+    let calibration = gauge.calibration();
+    let applied = apply_gauge(&gauge, &trial, follow)?;
+    let mut pace = Pace::of(calibration);
     let warning = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
     match args.out.as_ref().filter(|path| !is_standard_output(path)) {
-        Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
+        Some(path) => {
+            write_whole(path, |out| write_all(calibration, &trial, &applied.applied, out))?;
+        }
         None => {
             let mut out = BufWriter::new(Output);
-            write_all(&calibration, &trial, &applied, &mut out)?;
+            write_all(calibration, &trial, &applied.applied, &mut out)?;
             out.flush()?;
         }
     }
-    report(&calibration, &trial, &applied);
+    report(&gauge, &trial, &applied);
     if let Some(warning) = warning {
         warn(format!("stretch: {}: {warning}", trial.name));
     }
     Ok(())
 }
 
-fn applied(calibration: &Calibration, trial: &Trial, follow: bool) -> anyhow::Result<Applied> {
-    Ok(if follow { apply_following(calibration, trial)? } else { apply(calibration, trial)? })
+/// The calibration at another sample rate, where its estimates need none.
+fn at_rate(gauge: &GaugeCalibration, rate_hz: f64) -> anyhow::Result<GaugeCalibration> {
+    let calibration = stretch_calibrate::at_rate(gauge.calibration(), rate_hz)?;
+    Ok(GaugeCalibration::new(calibration, gauge.turns().copied())?)
 }
 
 /// Reports on a trial on standard error.
-fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
+fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
+    let (calibration, applied) = (gauge.calibration(), &found.applied);
     let faults = applied.faults;
     let mut seen = Seen::of(calibration);
-    let signal = trial.channel(calibration.signal.as_str()).into_iter().flatten();
+    let signal = trial.channel(calibration.spec().signal.as_str()).into_iter().flatten();
     applied.readings.iter().zip(signal).for_each(|(reading, signal)| seen.take(reading, *signal));
     // a gap is counted up to what its count can hold
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
@@ -129,8 +139,8 @@ fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
         faults.jittered,
     ));
     seen.doubt();
-    let mut told = Told::of(calibration, &trial.name);
-    applied.zeros.iter().for_each(|(time_s, zero)| told.take(*time_s, zero));
+    let mut told = Told::of(gauge, &trial.name);
+    found.zeros.iter().for_each(|(time_s, zero)| told.take(*time_s, zero));
     told.end();
 }
 
@@ -175,31 +185,37 @@ impl Seen {
 
 /// Answers each line as it comes.
 fn live(
-    calibration: &Calibration,
+    gauge: &GaugeCalibration,
     follow: bool,
     input: impl Read,
     options: &ReadOptions,
     out: &mut dyn Write,
 ) -> anyhow::Result<()> {
+    let calibration = gauge.calibration();
     let mut input = BufReader::new(input);
     if !Recording::is_text(input.fill_buf()?) {
         // Packed rows and arrays come whole.
         let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
-        let applied = applied(calibration, &trial, follow)?;
-        write_all(calibration, &trial, &applied, out)?;
-        report(calibration, &trial, &applied);
+        let found = apply_gauge(gauge, &trial, follow)?;
+        write_all(calibration, &trial, &found.applied, out)?;
+        report(gauge, &trial, &found);
         return Ok(());
     }
-    let mut receptor = LiveReceptor::new(calibration)?;
+    let mut receptor = LiveGauge::new(gauge)?;
     if follow {
-        receptor = receptor.following(calibration)?;
+        receptor = receptor.following(gauge)?;
     }
-    let mut rows = RowReader::new(input, "standard input", options)?;
+    // A program that reads the answers may wait for their header before sending a row.
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
+    let mut rows = RowReader::new(input, "standard input", options)?;
+    let say = |notes: Vec<String>| {
+        notes.iter().for_each(|note| warn(format!("note: standard input: {note}")));
+    };
+    say(rows.take_notes());
     let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));
-    let mut told = Told::of(calibration, "");
-    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+    let mut told = Told::of(gauge, "");
+    let mut pace = Pace::of(calibration);
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -222,6 +238,7 @@ fn live(
             Err(error) if error.is_row() => warn(format!("stretch: {error}")),
             Err(error) => return Err(error.into()),
         }
+        say(rows.take_notes());
     }
     seen.doubt();
     told.end();
@@ -247,14 +264,14 @@ fn write_all(
 /// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference; `sd_mm` behind it where the model knows how sure
 /// it is.
 pub(super) fn header(calibration: &Calibration) -> String {
-    let unit =
-        unit(calibration.reference.as_str()).map_or(String::new(), |unit| format!("_{unit}"));
+    let unit = unit(calibration.spec().reference.as_str())
+        .map_or(String::new(), |unit| format!("_{unit}"));
     let sd = if knows_sd(calibration) { format!(",sd{unit}") } else { String::new() };
     format!("time_s,estimate{unit},rate{unit}_per_s,branch,domain{sd}\n")
 }
 
 fn knows_sd(calibration: &Calibration) -> bool {
-    matches!(calibration.model, Model::Diagnosed(_))
+    matches!(calibration.spec().model, Model::Diagnosed(_))
 }
 
 fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld>, with_sd: bool) {
@@ -262,7 +279,10 @@ fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld
     // writing to memory cannot fail
     let _ = match reading {
         Ok(Reading { estimate, rate, branch, domain, sd }) => {
-            let written = write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}");
+            let written = match rate.is_nan() {
+                true => write!(line, ",{estimate:.6},,{branch},{domain}"),
+                false => write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}"),
+            };
             match sd.filter(|_| with_sd) {
                 Some(sd) => written.and_then(|()| write!(line, ",{sd:.6}")),
                 None => written,

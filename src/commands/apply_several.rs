@@ -5,11 +5,10 @@ use std::{
     path::Path,
 };
 
-use stretch_calibrate::{AppliedArray, ROOM, apply_array};
-use stretch_core::ArrayCalibration;
+use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
-use stretch_files::{is_standard_output, write_whole};
 use stretch_recording::ReadOptions;
+use stretch_sleeve::{AppliedArray, ArrayCalibration, MAX_CHANNELS, apply_array};
 
 use super::reading::read_recording;
 use crate::{
@@ -19,12 +18,12 @@ use crate::{
 
 /// Writes time, estimate, standard deviation, the channels that are left out, and whether a state was clamped.
 pub(super) fn apply_several(
-    calibration: &ArrayCalibration<ROOM>,
+    calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Path,
     out: Option<&Path>,
     mut options: ReadOptions,
 ) -> anyhow::Result<()> {
-    for channel in &calibration.channels {
+    for channel in &calibration.spec().channels {
         options = options.require(channel.signal.as_str());
     }
     let trial = read_recording(trial, &options)?;
@@ -38,7 +37,7 @@ pub(super) fn apply_several(
         }
     }
     for (channel, time_s, loss) in &applied.losses {
-        let name = calibration.channels[*channel].signal.as_str();
+        let name = calibration.spec().channels[*channel].signal.as_str();
         warn(format!("stretch: {}: {name} is left out from {time_s:.2} s on: {loss}", trial.name));
     }
     tell_shifts(calibration, &trial.name, &applied);
@@ -48,16 +47,16 @@ pub(super) fn apply_several(
 }
 
 /// A line for each time that a gauge begins to be off from what the others say.
-fn tell_shifts(calibration: &ArrayCalibration<ROOM>, trial: &str, applied: &AppliedArray) {
-    let Some(usual) = &calibration.shifts else { return };
-    let unit = unit(calibration.reference.as_str()).unwrap_or_default();
+fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applied: &AppliedArray) {
+    let Some(usual) = &calibration.spec().shifts else { return };
+    let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
     let mut before = 0;
     for (time_s, shifts) in &applied.shifts {
         if shifts.shifted != 0 && before == 0 {
             let first = shifts.shifted.trailing_zeros() as usize;
             let k = shifts.most.unwrap_or(first);
-            let name = calibration.channels[k].signal.as_str();
-            let others = match calibration.channels.len() {
+            let name = calibration.spec().channels[k].signal.as_str();
+            let others = match calibration.spec().channels.len() {
                 2 => "the other gauge says (which of the two has moved cannot be told)",
                 _ => "the other gauges say",
             };
@@ -73,13 +72,13 @@ fn tell_shifts(calibration: &ArrayCalibration<ROOM>, trial: &str, applied: &Appl
 }
 
 fn write_all(
-    calibration: &ArrayCalibration<ROOM>,
+    calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Trial,
     applied: &AppliedArray,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let unit =
-        unit(calibration.reference.as_str()).map_or(String::new(), |unit| format!("_{unit}"));
+    let unit = unit(calibration.spec().reference.as_str())
+        .map_or(String::new(), |unit| format!("_{unit}"));
     writeln!(out, "time_s,estimate{unit},sd{unit},lost,domain")?;
     let mut line = Vec::with_capacity(64);
     for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
@@ -87,7 +86,7 @@ fn write_all(
         push_number(&mut line, time_s);
         match reading {
             Ok(reading) => {
-                let lost: Vec<&str> = (calibration.channels.iter().enumerate())
+                let lost: Vec<&str> = (calibration.spec().channels.iter().enumerate())
                     .filter(|(k, _)| reading.is_lost(*k))
                     .map(|(_, channel)| channel.signal.as_str())
                     .collect();

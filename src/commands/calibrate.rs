@@ -2,36 +2,34 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, FitReport, MODELS_IN_WORDS, Memory, ModelChoice,
-    ModelKind, ModelRow, Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes,
-    choose_model, evaluate, explains_little, explains_nothing, fixed_record, is_plain, parse_adc,
-    parse_rate, rank_signals, without_gross_errors,
+    ModelKind, ModelRow, Options, Robust, SpellingError, calibrate, choose_model, evaluate,
+    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
 };
-use stretch_core::{Normalisation, RateEstimator, RateSource};
+use stretch_core::RateEstimator;
+use stretch_data::files::Outputs;
 use stretch_data::{Split, Trial};
-use stretch_files::Outputs;
 use stretch_problem::Causes;
-use stretch_receptor::code::Adc;
-use stretch_recording::{ReadOptions, tidy_column};
+use stretch_recording::{ReadOptions, RecordingError, tidy_column};
 use stretch_report::{Context, Judged, calibration_page};
+use stretch_sleeve::calibrate_gauge;
 
 use super::{
+    calibrate_sleeve::{Asked, Sleeve},
     calibration_text::{print, print_models},
     causes,
     json::Json,
-    long::Long,
     reading::{Recorded, read_trials, with_columns_to_name},
     shared::{detail, of_files, stage_text, tell},
-    sleeve::{Asked, Sleeve},
 };
 
 /// Fit a calibration to logged trials
 ///
-/// Each trial is a recording (CSV in any dialect, NPZ, MAT, ...) with the
+/// Each trial is a recording (CSV in any dialect, NPY, NPZ) with the
 /// time, the signal and the reference, - is standard input; a folder with a dataset.toml stands for its fit trials. The
 /// record that is written holds all that `apply` or a board needs: surfaces,
 /// ranges, rate estimator, dead band, domain, and where it comes from.
@@ -40,8 +38,9 @@ use super::{
 ///
 ///   stretch calibrate ramps/*.csv --out cal.json --report cal.html
 ///   stretch calibrate knee.csv --reference angle_deg --signal auto --out cal.json
+///   stretch calibrate weights.csv --reference load_g --signal raw --model curve --out cal.json
 ///   stretch calibrate ramps/*.csv --paper --out published.json
-///   stretch calibrate ramps/*.csv --model observer --out cal.json --fixed cal.fixed.postcard
+///   stretch calibrate ramps/*.csv --model observer --out cal.json
 ///   stretch calibrate knee.csv --reference angle_deg --signals s1,s2,s3 --out cal.json
 ///   stretch calibrate wrist.csv --reference bend_deg,turn_deg --signals all --out wrist.json
 ///   stretch calibrate --prior prior.json --of left/anna half_a_minute.csv --out cal.json
@@ -51,82 +50,69 @@ pub(crate) struct Args {
     /// Trials to fit, or a folder with a dataset.toml
     #[arg(required_unless_present = "prior", value_name = "TRIAL.csv")]
     trials: Vec<PathBuf>,
-    /// What to fit: linear; polyIJ of degree I in the rate and J in the signal; blended (poly13
-    /// without the jump at a reversal); hysteresis, relaxation, both, history or observer, which
-    /// remember, also with +rest to follow a drifting baseline; auto: the best on trials left out
+    /// Where the record goes
+    ///
+    /// It is JSON, or postcard for a board when the name ends in .postcard.
+    #[arg(long, value_name = "cal.json")]
+    out: PathBuf,
+    /// Where a report with pictures goes
+    #[arg(long, value_name = "r.html")]
+    report: Option<PathBuf>,
+    /// Trials that the report judges on [default: those that were fitted]
+    #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
+    test: Vec<PathBuf>,
+    /// linear, curve, polyIJ, observer, history, diagnosed, or auto
+    ///
+    /// curve is a polynomial of the signal alone, its degree by cross-validation; curve and linear also take a table of weights and
+    /// readings without a time. polyIJ is of degree I in the rate and J in the signal. observer, history and diagnosed remember; +rest behind observer or
+    /// history follows a drifting baseline. auto takes the best on trials left out.
     #[arg(long, default_value = "poly13")]
     model: Model,
-    /// How channels are normalised: divided by their range, or minimum to maximum
-    #[arg(long, value_enum, default_value_t = Normalise::Range)]
-    normalise: Normalise,
-    /// Estimator of the signal's rate: savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in
-    /// samples), difference:CUTOFF_HZ, tracker:INDEX, central
-    #[arg(long, default_value = "savgol:11,2", value_parser = parse_rate)]
-    rate: RateEstimator,
-    /// Rate that surfaces are fitted on: the signal's, as it will run, or the reference's, as in
-    /// the paper
-    #[arg(long, value_enum, default_value_t = Source::Voltage)]
-    rate_source: Source,
-    /// How samples are given to the branches: by the sign of the rate, or a trial each
-    #[arg(long, value_enum, default_value_t = BranchBy::Rate)]
-    branch_by: BranchBy,
-    /// The method as published: central differences, strain rate, a branch a trial, no dead band
-    #[arg(long, conflicts_with_all = ["rate", "rate_source", "branch_by", "dead_band"])]
-    paper: bool,
-    /// Column of the reference; its last part is the unit of the estimate (`Pos (mm)` is pos_mm). With --signals several with
-    /// commas, such as the angles of a wrist: each gets a record of its own
+    /// Column of the reference, whose last part is the unit
+    ///
+    /// `Pos (mm)` is pos_mm. With --signals several with commas, such as the angles of a wrist: each gets a record of its own.
     #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = columns)]
     reference: String,
-    /// Column of the signal, several with commas, or `auto`: the best by cross-validation
+    /// Column of the signal, or auto: the best of all columns
+    ///
+    /// Several with commas, too: the best of them by cross-validation.
     #[arg(long, default_value = "bridge_v", value_name = "COL", value_parser = columns)]
     signal: String,
     #[command(flatten)]
     recorded: Recorded,
-    /// Zero of the signal, subtracted before it is divided by its range [default: 1.24 for
-    /// bridge_v, else 0]
-    #[arg(long, value_name = "X", allow_hyphen_values = true)]
-    signal_zero: Option<f64>,
-    /// Resting length: the target is then the contraction [default: the greatest value of a
-    /// reference called length..., else the reference itself is the target]
-    #[arg(long, value_name = "X")]
-    rest_length: Option<f64>,
-    /// Rates this close to zero keep the branch, in signal units per second [default: three
-    /// standard deviations of the rate's noise]
-    #[arg(long, value_name = "X")]
-    dead_band: Option<f64>,
-    /// Weigh outliers down: bisquare, or least absolute residuals
+    /// Estimator of the signal's rate
+    ///
+    /// savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in samples), difference:CUTOFF_HZ, tracker:INDEX, central.
+    #[arg(long, default_value = "savgol:11,2", value_parser = parse_rate)]
+    rate: RateEstimator,
+    /// The method as published
+    ///
+    /// Central differences, strain rate, a branch a trial, no dead band.
+    #[arg(long, conflicts_with = "rate")]
+    paper: bool,
+    /// Weigh outliers down
     #[arg(long, value_enum)]
     robust: Option<Loss>,
-    /// Date for the record, as free text
-    #[arg(long, default_value = "", hide_default_value = true)]
-    date: String,
-    /// Trials that the report judges the calibration on [default: those that were fitted]
-    #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
-    test: Vec<PathBuf>,
-    /// A diagnosis (`stretch diagnose --json-out d.json`) whose named effects --model diagnosed and auto build on [default: the
-    /// trials are diagnosed as a gauge alone]
+    /// Zero of the signal [default: 1.24 for bridge_v, else 0]
+    ///
+    /// It is subtracted before the signal is divided by its range.
+    #[arg(long, value_name = "X", allow_hyphen_values = true)]
+    signal_zero: Option<f64>,
+    /// Resting length, from which contraction is counted
+    ///
+    /// By default it is the greatest value of a reference called length...; any other reference is the target itself.
+    #[arg(long, value_name = "X")]
+    rest_length: Option<f64>,
+    /// Diagnosis whose effects --model diagnosed and auto build on
+    ///
+    /// `stretch diagnose --json=d.json` writes it. By default the trials are diagnosed as a gauge alone.
     #[arg(long, value_name = "d.json")]
     from: Option<PathBuf>,
-    /// Where the record goes: JSON, or postcard for a board when the name ends in .postcard
-    #[arg(long, value_name = "cal.json")]
-    out: PathBuf,
-    /// Where the record goes that a board without floating point runs, in postcard: converter
-    /// codes in, thousandths of the reference's unit out. For linear, poly13, observer and
-    /// observer+rest
-    #[arg(long, value_name = "cal.fixed.postcard")]
-    fixed: Option<PathBuf>,
-    /// The board's converter: bits, and the signal at code 0 and at the last code
-    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
-          value_parser = parse_adc, requires = "fixed")]
-    adc: Adc,
     #[command(flatten)]
     sleeve: Sleeve,
     /// Write a calibration that explains nothing, too
     #[arg(long)]
     force: bool,
-    /// Where a report with pictures goes
-    #[arg(long, value_name = "r.html")]
-    report: Option<PathBuf>,
     #[command(flatten)]
     json: Json,
 }
@@ -152,26 +138,9 @@ impl std::str::FromStr for Model {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Normalise {
-    Range,
-    MinMax,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Source {
-    Strain,
-    Voltage,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum BranchBy {
-    Rate,
-    Trial,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum Loss {
     Bisquare,
+    /// Least absolute residuals
     Lar,
 }
 
@@ -180,19 +149,7 @@ impl Args {
         let base = if self.paper {
             Options::paper()
         } else {
-            Options {
-                rate: self.rate,
-                rate_source: match self.rate_source {
-                    Source::Strain => RateSource::Strain,
-                    Source::Voltage => RateSource::Voltage,
-                },
-                split: match self.branch_by {
-                    BranchBy::Rate => SplitBy::Rate,
-                    BranchBy::Trial => SplitBy::Trial,
-                },
-                dead_band: self.dead_band,
-                ..Options::default()
-            }
+            Options { rate: self.rate, ..Options::default() }
         };
         Options {
             signal: self.signal.clone(),
@@ -202,10 +159,6 @@ impl Args {
                 Model::Auto => base.model,
                 Model::One(kind) => kind,
             },
-            normalisation: match self.normalise {
-                Normalise::Range => Normalisation::Range,
-                Normalise::MinMax => Normalisation::MinMax,
-            },
             robust: match self.robust {
                 None => Robust::Off,
                 Some(Loss::Bisquare) => Robust::Bisquare,
@@ -213,9 +166,28 @@ impl Args {
             },
             signal_zero: self.signal_zero,
             rest_length: self.rest_length,
-            date: self.date.clone(),
             ..base
         }
+    }
+
+    /// The trials, and whether they are tables without a time, to which a line or a curve can be fitted.
+    fn read(&self, columns: &mut ReadOptions) -> anyhow::Result<(Vec<Trial>, bool)> {
+        let own = "name the columns of yours with --reference and --signal";
+        let error = match read_trials(&self.trials, Split::Fit, columns) {
+            Ok(trials) => return Ok((trials, false)),
+            Err(error) => error,
+        };
+        if !matches!(error.downcast_ref(), Some(RecordingError::MissingTime { .. })) {
+            return Err(with_columns_to_name(error, own));
+        }
+        let models = [Model::Auto, Model::One(ModelKind::Linear), Model::One(ModelKind::Curve)];
+        anyhow::ensure!(
+            models.contains(&self.model),
+            "{error}; weights and readings without a time are calibrated with --model curve or --model linear"
+        );
+        // the time of a table is the number of the row
+        *columns = columns.clone().untimed_hz(1.0);
+        Ok((read_trials(&self.trials, Split::Fit, columns)?, true))
     }
 
     /// What a diagnosis names, where the model asks for it.
@@ -262,15 +234,14 @@ struct Output<'a> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let files = [Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()];
-    args.json.share_stdout(files.into_iter().chain(args.sleeve.files()))?;
+    let files = [Some(args.out.as_path()), args.report.as_deref()];
+    args.json.share_stdout(files.into_iter().chain([args.sleeve.file()]))?;
     if args.sleeve.is_asked() {
         return args.sleeve.run(&Asked {
             trials: &args.trials,
             signal: &args.signal,
             reference: &args.reference,
             rest_length: args.rest_length,
-            date: &args.date,
             columns: args.recorded.options(),
             out: &args.out,
             json: &args.json,
@@ -288,20 +259,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             columns = columns.require(signal.trim());
         }
     }
-    let is_plain = args.model != Model::Auto
-        && args.signal != "auto"
-        && !args.signal.contains(',')
-        && is_plain(&options);
-    let long = Long::of(&args.trials, &columns, is_plain)?;
-    let trials = match &long {
-        Some(long) => long.beginnings(),
-        None => read_trials(&args.trials, Split::Fit, &columns),
-    };
-    let own = "name the columns of yours with --reference and --signal";
-    let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
-    // signals that are only candidates may be anything
+    let (trials, is_table) = args.read(&mut columns)?;
+    options.is_table = is_table;
+    // signals that are only candidates may be anything, and the rows of a table may be far apart
     let named = [args.reference.as_str(), args.signal.as_str()];
-    let (trials, gross_errors) = without_gross_errors(&trials, &named);
+    let named = if is_table { &[][..] } else { &named[..] };
+    let (trials, gross_errors) = without_gross_errors(&trials, named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {
@@ -313,7 +276,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options.signal.clone_from(&best.signal);
         detail(format!("chose the signal {} of {}", best.signal, ranking.len()));
     }
-    let causes = args.causes(&trials, &options)?.without_missing_pressure(&trials, &options);
+    let causes = match is_table {
+        true => Causes::default(),
+        false => args.causes(&trials, &options)?.without_missing_pressure(&trials, &options),
+    };
     options.causes.clone_from(&causes.found);
     let choice = match args.model {
         Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),
@@ -323,17 +289,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options.model = choice.model;
         detail(format!("chose a model: {}", choice.why));
     }
-    let fit = |options: &Options| {
-        let fitted = match &long {
-            Some(long) => long.calibrate(options),
-            None => calibrate(&trials, options),
-        };
-        fitted.map_err(named)
-    };
-    let mut calibrated = fit(&options)?;
+    let mut calibrated = calibrate(&trials, &options).map_err(named)?;
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
-    // the passes over a long log report its gross errors themselves
-    calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { gross_errors });
+    calibrated.notes.splice(0..0, gross_errors);
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
         Some(why) => {
@@ -344,26 +302,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
-    // nothing is written when a part of what was asked for cannot be
-    let fixed = args.fixed.as_ref().map(|path| {
-        let record = fixed_record(&calibrated.calibration, &args.adc);
-        let made = record.with_context(|| format!("{}: --model {}", path.display(), options.model));
-        made.map(|record| (path, record))
-    });
-    let fixed = fixed.transpose()?;
     let mut outputs = Outputs::default();
-    let record = calibration_bytes(&args.out, &calibrated.calibration)?;
+    let gauge = calibrate_gauge(calibrated.calibration.clone(), &trials, &options);
+    let record = gauge.map_err(named)?.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
-    if let Some((path, record)) = &fixed {
-        outputs.file(path, |out| out.write_all(&record.bytes))?;
-    }
     if let Some(path) = &args.report {
-        if let Some(trial) = trials.first().filter(|_| long.is_some() && args.test.is_empty()) {
-            let rows = trial.len();
-            calibrated.notes.push(format!("the report judges the first {rows} rows of each trial"));
-        }
         // the line is the yardstick that every surface is held against
-        let linear = fit(&Options { model: ModelKind::Linear, ..options.clone() })?;
+        let linear = Options { model: ModelKind::Linear, ..options.clone() };
+        let linear = calibrate(&trials, &linear).map_err(named)?;
         let fitted = [&linear, &calibrated];
         let page = report(&args, &trials, &columns, fitted, (&ranking, choice.as_ref()), &options)?;
         stage_text(&mut outputs, path, &page)?;
@@ -385,13 +331,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
         print(&calibrated, &ranking)?;
         tell(format!("wrote {}", args.out.display()))?;
-        if let Some((path, record)) = &fixed {
-            let (bytes, read_as) = (record.bytes.len(), &record.read_as);
-            tell(format!(
-                "wrote {}: {bytes} bytes, a board reads it as {read_as}",
-                path.display()
-            ))?;
-        }
         args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
     })
 }

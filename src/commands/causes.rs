@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use stretch_calibrate::Options;
 use stretch_data::Trial;
-use stretch_files::read_whole;
+use stretch_data::files::read_whole;
 use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes, name_of};
 
@@ -19,7 +19,7 @@ pub(super) fn read(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let name = || path.display().to_string();
     let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
     let schema: Schema = serde_json::from_str(&text).with_context(|| {
-        format!("{}: this is no diagnosis; make one with stretch diagnose --json-out", name())
+        format!("{}: this is no diagnosis; make one with stretch diagnose --json=d.json", name())
     })?;
     if schema.schema > SCHEMA {
         bail!(
@@ -57,7 +57,7 @@ pub(super) fn of(trials: &[Trial], options: &Options) -> Causes {
     let bar = spinner();
     bar.set_message("diagnosing the gauge");
     let show = |text: &str| bar.set_message(text.to_owned());
-    let causes = Causes::of(trials, options, &show, &stretch_files::interrupted);
+    let causes = Causes::of(trials, options, &show, &|| false);
     bar.finish_and_clear();
     causes
 }

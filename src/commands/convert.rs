@@ -2,24 +2,28 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use stretch_data::{Channel, Trial, tidy_time};
 
 use super::{
-    reading::{Recorded, read_recording},
+    reading::{Recorded, rate, read_recording},
     shared::{give_stdout, tell},
 };
 
 /// Bring a foreign log into the format of the other commands
 ///
-/// Reads any recording (CSV in any dialect, NPZ, MAT, ...),
+/// Reads any recording (CSV in any dialect, NPY, NPZ),
 /// takes the time from a column of seconds, milliseconds, microseconds or
-/// nanoseconds, renames and scales columns, and writes a trial:
+/// nanoseconds, renames and scales columns, resamples, and writes a trial:
 ///
 ///   stretch convert log.csv --time t_ms --column length_mm=pos*1000 \
 ///     --column bridge_v=adc*0.000805861-0.2 --out trial.csv
 ///
 /// A column is NEW=OLD, NEW=OLD*FACTOR, or NEW=OLD*FACTOR+OFFSET.
+///
+/// Of MCAP, ROS bags, MATLAB, HDF5 and Parquet the Python package makes an NPZ file first:
+///
+///   python -m stretch_gap convert run.mcap run.npz
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -31,6 +35,11 @@ pub(crate) struct Args {
     /// Column to write, as NEW=OLD*FACTOR+OFFSET [default: all, as they are]
     #[arg(long = "column", value_name = "NEW=OLD", value_parser = parse_column)]
     columns: Vec<Column>,
+    /// Bring the recording onto an even grid of so many samples a second [default: as it was recorded]
+    ///
+    /// By default several clocks are brought to the fastest.
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    grid: Option<f64>,
     /// Let the time begin at zero
     #[arg(long)]
     from_zero: bool,
@@ -71,6 +80,9 @@ fn parse_column(text: &str) -> Result<Column, String> {
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     give_stdout([Some(args.out.as_path())])?;
     let mut options = args.recorded.options();
+    if let Some(rate_hz) = args.grid {
+        options = options.grid_hz(rate_hz);
+    }
     for column in &args.columns {
         options = options.require(&column.old);
     }
@@ -86,6 +98,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
         args.columns.iter().map(convert).collect::<anyhow::Result<_>>()?
     };
+    if channels.is_empty() {
+        bail!("{}: nothing was written: it has no channel of numbers beside the time", log.name);
+    }
     let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
     let largest_s = log.time_s.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
     log.time_s.iter_mut().for_each(|t| *t = tidy_time(*t - start_s, largest_s));

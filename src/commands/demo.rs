@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use stretch_calibrate::{MODELS_IN_WORDS, apply, write_calibration};
+use stretch_data::files::write_folder;
 use stretch_data::{Trial, TrialKind, listed};
-use stretch_files::write_folder;
 use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
@@ -20,7 +20,7 @@ use super::{
     evaluate::print_errors,
     json::Json,
     reading::column,
-    shared::{or_force, recover, say, tell, write_text},
+    shared::{or_force, say, tell, write_text},
     simulate,
 };
 use crate::display::is_verbose;
@@ -39,7 +39,7 @@ use sessions::{Sessions, Wanted};
 ///   stretch demo --data bench          a folder with a dataset.toml
 ///   stretch demo --data knit_sleeve    CSV files with time_s, a reference, signals;
 ///                                      a_1.csv and a_2.csv are sessions of one group
-///   stretch demo --data HC_90 --sessions S15_16_HC90
+///   stretch demo --data HC_90/S15_16_HC90
 ///                                      files as their authors published them
 ///
 /// The last are knees in a knitted sleeve with motion capture (MIT licence),
@@ -57,12 +57,11 @@ pub(crate) struct Args {
     /// Folder for the report, the calibrations, the estimates and the simulated data set
     #[arg(long, default_value = "stretch-demo", value_name = "DIR")]
     out: PathBuf,
-    /// Measured sessions in place of simulated ones: a folder, or a file with several
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["paper", "seed"])]
+    /// Measured sessions in place of simulated ones: a folder, FOLDER/GROUP, or a file with several
+    ///
+    /// Without a group the first by name is taken.
+    #[arg(long, value_name = "DIR", conflicts_with = "paper")]
     data: Option<PathBuf>,
-    /// Which sessions of the folder [default: the first by name]
-    #[arg(long, requires = "data", value_name = "NAME")]
-    sessions: Option<String>,
     /// Column of the reference [default: length_mm or angle_deg]
     #[arg(long, requires = "data", value_name = "COL", value_parser = column)]
     reference: Option<String>,
@@ -75,17 +74,16 @@ pub(crate) struct Args {
     /// The paper's tables instead: every figure of its experiment, simulated, beside the published
     #[arg(long)]
     paper: bool,
-    /// Seed of the simulated experiment
-    #[arg(long, default_value_t = 3, value_name = "N")]
-    seed: u64,
     #[command(flatten)]
     json: Json,
 }
 
+/// Seed of the simulated experiment.
+const SEED: u64 = 3;
+
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    recover(&args.out)?;
     if args.paper {
-        return super::paper::run(&args.out, args.force, args.seed, &args.json);
+        return super::paper::run(&args.out, args.force, SEED, &args.json);
     }
     let mut done = None;
     let written = write_folder(&args.out, args.force, |folder| {
@@ -95,7 +93,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     written.map_err(or_force)?;
     let Some((sessions, job)) = done else { return Ok(()) };
     let answer = serde_json::json!({
-        "seed": args.data.is_none().then_some(args.seed),
+        "seed": args.data.is_none().then_some(SEED),
         "evaluation": job.calibrations.evaluation,
         "kinds": job.calibrations.kinds,
         "diagnosis": job.examined.to_json(),
@@ -115,17 +113,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
     let (title, sessions) = match &args.data {
         Some(path) => {
-            let wanted = Wanted {
-                sessions: args.sessions.as_deref(),
-                reference: args.reference.as_deref(),
-                signal: args.signal.as_deref(),
-            };
+            let wanted =
+                Wanted { reference: args.reference.as_deref(), signal: args.signal.as_deref() };
             let sessions = Sessions::read(path, &wanted)?;
             (format!("{}: {} from a stretch sensor", sessions.name, sessions.reference), sessions)
         }
         None => {
-            let sessions = simulated(&out.join("bench"), args.seed)?;
-            (format!("The paper's experiment, simulated (seed {})", args.seed), sessions)
+            let sessions = simulated(&out.join("bench"))?;
+            (format!("The paper's experiment, simulated (seed {SEED})"), sessions)
         }
     };
     if !args.json.is_printed() {
@@ -137,17 +132,17 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
 }
 
 /// The paper's session on the rig of the demonstration, written as a data set and read back as one.
-fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
+fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     let rig = demo_preset()?;
-    let settings = RunSettings { seed, ..RunSettings::default() };
-    simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(seed))?;
+    let settings = RunSettings { seed: SEED, ..RunSettings::default() };
+    simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(SEED))?;
     let mut sessions = Sessions::read(folder, &Wanted::default())?;
     let in_words = |e: &ActiveEffect| {
         effect_named(e.name()).map_or(e.name(), |effect| effect.title).to_owned()
     };
     let effects: Vec<String> = rig.effects.iter().map(in_words).collect();
     sessions.notes = vec![format!(
-        "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator has none of these effects, \
+        "Simulated: the paper's session, seed {SEED}, on a rig with {}. The simulator has none of these effects, \
          and the diagnosis does not know them.",
         listed(&effects)
     )];
@@ -165,7 +160,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     if let Some((_, trial)) = sessions.test.first() {
         let chosen = &calibrations.chosen.calibration;
         let estimates = estimates_csv(chosen, trial, &apply(chosen, trial)?)?;
-        stretch_files::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
+        stretch_data::files::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
     }
     let names =
         |trials: &[(TrialKind, Trial)]| trials.iter().map(|(_, t)| t.name.clone()).collect();

@@ -15,23 +15,14 @@ use super::{
 };
 
 /// Diagnoses the data and shows the detection limits of the effects with some names, of all without a name.
-pub(super) fn run(
-    data: &Path,
-    names: &[String],
-    json: &Json,
-    allow_commands: bool,
-) -> anyhow::Result<()> {
+pub(super) fn run(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()> {
     ensure!(data.exists(), "{}: there is no such file or folder", data.display());
     let bar = spinner();
     bar.set_message("reading; a simulator of your own is started");
-    let problem = open(
-        data,
-        &Reading { jobs: 1, allow_commands, announce: Some(announce), ..Reading::default() },
-    )?;
+    let problem = open(data, &Reading { announce: Some(announce), ..Reading::default() })?;
     detail(format!("read {}", data.display()));
     let options = Options { detection_limits: true, ..Options::default() };
-    let stop = &stretch_files::interrupted;
-    let (diagnosis, _) = diagnose(problem.simulator(), &options, &told_on(&bar), stop)
+    let (diagnosis, _) = diagnose(problem.simulator(), &options, &told_on(&bar), &|| false)
         .with_context(|| data.display().to_string())?;
     bar.finish_and_clear();
     let mut limits = diagnosis.detection_limits;

@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use indicatif::ProgressBar;
-use stretch_files::{FileError, Outputs};
+use stretch_data::files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
 use stretch_report::{Subject, diagnosis_page};
@@ -19,14 +19,14 @@ use super::{
     diagnosis_text::text,
     fail_on::FailOn,
     json::Json,
-    reading::{column, columns},
+    reading::{TimeColumn, column, columns},
     shared::{detail, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
 /// What is said where there are rivals, and still no experiment.
 const NOT_FORETOLD: &str =
-    " that the simulator could foretell: it takes no altered inputs, or its runs are spent";
+    " that the simulator could predict: it takes no altered inputs, or its runs are spent";
 /// Status of a diagnosis whose verdict is one that `--fail-on` names.
 const FAILED_ON: u8 = 3;
 /// Status of a diagnosis that stands on less than it asked for, because the budget of runs was spent.
@@ -51,11 +51,12 @@ const SPENT: u8 = 4;
 /// A simulator of your own, in any language, stands in a problem.toml with its parameters, the
 /// recordings, and what may wrap it (stretch init FOLDER writes a first one):
 ///
-///   stretch diagnose problem.toml --jobs 4 --budget 400 --fix fixed.toml
+///   stretch diagnose problem.toml --fix fixed.toml
 ///   stretch diagnose fixed.toml
 ///
 /// A problem file is a program: its simulator runs with your rights. It runs where the file itself is
-/// named, not where its folder is, unless --allow-commands is given; what runs is said before it runs.
+/// named, not where its folder is; what runs is said before it runs. The keys jobs and budget of the file say how many
+/// workers run at once, and how many runs there are at most (exit status 4 where they are spent).
 ///
 /// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it does not):
 ///
@@ -70,7 +71,9 @@ pub(crate) struct Args {
     /// Folder with dataset.toml, a trial in any format, - for standard input, or problem.toml
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
-    /// Rig file: nominal parameters with their tolerances, and effects that it has already
+    /// Rig file of the simulator
+    ///
+    /// Nominal parameters with their tolerances, and effects that it has already.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -78,28 +81,33 @@ pub(crate) struct Args {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
-    /// Write a rig file, or a problem's file, with what was found: parameters re-tuned, effects added; a file that exists is replaced
+    /// Write a rig or problem file with what was found
+    ///
+    /// Parameters are re-tuned, effects added; a file that exists is replaced.
     #[arg(long, value_name = "fixed.toml")]
     fix: Option<PathBuf>,
-    /// Write the code of each named effect in C, Python and MATLAB into a new folder
+    /// Write code of each named effect into a new folder
+    ///
+    /// In C, Python and MATLAB.
     #[arg(long, value_name = "DIR")]
     snippets: Option<PathBuf>,
-    /// Leave an effect out of the catalogue; may be given several times
+    /// Column of the time; COL:ms in ms; 100hz instead of it
+    #[arg(long, value_name = "COL")]
+    time: Option<TimeColumn>,
+    /// Leave an effect out of the catalogue; several times
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Most effects named at once
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
-    depth: u8,
     /// Threads, 0 for all; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Seed of the intervals
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Reference column of a gauge alone, or what an output of your own simulator senses
+    /// Reference column of a gauge alone
+    ///
+    /// Or what an output of your own simulator senses.
     #[arg(long, value_name = "COLUMN", requires = "signal", value_parser = column)]
     reference: Option<String>,
-    /// Signal column of a gauge alone, several of one recorder with commas, or that output
+    /// Signal column of a gauge alone
+    ///
+    /// Several of one recorder with commas, or that output of your own simulator.
     #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = columns)]
     signal: Option<String>,
     /// Write the recommended experiment as a trial file
@@ -108,27 +116,21 @@ pub(crate) struct Args {
     /// Do not look for the experiment that would tell rivals apart
     #[arg(long, hide = true, conflicts_with = "experiment")]
     no_next: bool,
-    /// Fit every run by itself, too, and say which runs disagree, in what, and which values the data tell; a run is a trial, or with
-    /// the name of a column all samples in which it has one value, such as a load
+    /// Fit every run by itself, too, and say which disagree
+    ///
+    /// A run is a trial, or with the name of a column all samples in which it has one value, such as a load. It is also said in what
+    /// runs disagree, and which values the data tell.
     #[arg(long, value_name = "trial|COLUMN")]
     by: Option<By>,
     /// Say what simpler methods would have named, too
     #[arg(long)]
     baselines: bool,
-    /// Workers of a simulator of your own that run at once, where its file does not say
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: u16,
-    /// Run the program that the problem.toml of a folder names; a problem.toml that is named itself runs its program without it
-    #[arg(long)]
-    allow_commands: bool,
-    /// Most runs of a simulator of your own; where they are spent before the search is over, what was found is the answer, and the exit
-    /// status is 4
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    budget: Option<u32>,
-    /// Exit with status 3 where the verdict is one of these, several with commas: effect (one is named, wholly or in part),
+    /// Exit with status 3 for these verdicts: gap, any, ...
+    ///
+    /// Several with commas: effect (one is named, wholly or in part),
     /// unknown (a gap, or a part of one, that nothing explains), record (a column or the rig file is wrong), faint (more
     /// than noise, too little to name), parameters (they agree once re-tuned), gap (effect, unknown or record), any (all
-    /// but plain agreement)
+    /// but plain agreement).
     #[arg(
         long,
         value_name = "VERDICT",
@@ -162,9 +164,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
     }
     let options = Options {
-        depth: args.depth.into(),
         threads: args.threads,
-        seed: args.seed,
         baselines: args.baselines,
         responses: args.report.is_some(),
         ..Options::default()
@@ -172,14 +172,13 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let bar = spinner();
     bar.set_message("reading; a simulator of your own is started");
     let shown = || args.data_set.display().to_string();
+    let recorded = args.time.as_ref().map(TimeColumn::options);
     let reading = Reading {
+        recorded: recorded.as_ref(),
         rig: args.rig.as_deref(),
         columns: args.reference.as_deref().zip(args.signal.as_deref()),
         by: args.by.as_ref().and_then(By::column),
         without: &args.without,
-        jobs: args.jobs.into(),
-        budget: args.budget.map(|n| n as usize),
-        allow_commands: args.allow_commands,
         announce: Some(announce),
     };
     let problem = open(&args.data_set, &reading)?;
@@ -197,7 +196,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         Some(_) => args.experiment.is_some(),
         None => !args.no_next,
     };
-    let stop = &stretch_files::interrupted;
+    let stop = &|| false;
     let examined =
         problem.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
     let by_trial = args.by.as_ref().map(|by| match by {

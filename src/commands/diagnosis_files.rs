@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use stretch_data::files::{Outputs, write_whole};
 use stretch_data::listed;
-use stretch_files::{Outputs, write_whole};
 use stretch_problem::{Examined, Fixed, Implementation};
 use stretch_sim::Language;
 

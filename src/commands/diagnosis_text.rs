@@ -10,7 +10,6 @@ use stretch_report::{
     transfer_in_words, transfer_table,
 };
 
-use super::fail_on::is_faint;
 use crate::table::{number, table};
 
 /// Most slices that are listed.
@@ -127,7 +126,7 @@ fn stages(out: &mut String, diagnosis: &Diagnosis) {
 fn slices(out: &mut String, diagnosis: &Diagnosis) {
     // of those that agree one in twenty stands out by chance
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    if agrees && !is_faint(diagnosis) {
+    if agrees && !diagnosis.is_faint() {
         return;
     }
     let mut loud: Vec<&SliceGap> =

@@ -48,9 +48,6 @@ pub(crate) struct Args {
     /// List what would be named on these data instead: a folder with dataset.toml, a trial, or problem.toml
     #[arg(long, value_name = "DATASET", conflicts_with_all = ["kinds", "code"])]
     data: Option<PathBuf>,
-    /// Run the program that the problem.toml of a folder names; a problem.toml that is named itself runs its program without it
-    #[arg(long, requires = "data")]
-    allow_commands: bool,
     #[command(flatten)]
     json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
@@ -59,7 +56,7 @@ pub(crate) struct Args {
         value_enum,
         value_name = "c|python|matlab",
         hide_possible_values = true,
-        conflicts_with_all = ["json", "json_out"],
+        conflicts_with = "json",
         requires = "names"
     )]
     code: Option<Code>,
@@ -127,7 +124,7 @@ const CHANNEL: Extent = Extent::between(0.0, 1.0);
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(data) = &args.data {
-        return detectable::run(data, &args.names, &args.json, args.allow_commands);
+        return detectable::run(data, &args.names, &args.json);
     }
     let chosen: Vec<Entry> = match (args.names.is_empty(), args.kinds) {
         (true, true) => KINDS.iter().copied().map(Entry::Kind).collect(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use stretch_calibrate::{
-    Evaluation, MethodErrors, Reach, beside_a_constant, evaluate, fitted_on, not_its_own,
+    Evaluation, MethodErrors, Reach, at_rate, beside_a_constant, evaluate, fitted_on, not_its_own,
     off_throughout, read_calibration, worse_than_the_mean,
 };
 use stretch_data::Split;
@@ -46,9 +46,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         calibrations.push((short_name(path), read_calibration(path)?));
     }
     let mut columns = args.recorded.options();
+    if let Some((_, first)) = calibrations.first() {
+        columns = columns.untimed_hz(first.spec().sample_rate_hz.hz());
+    }
     for (_, calibration) in &calibrations {
-        columns = columns.require(calibration.signal.as_str());
-        columns = columns.require(calibration.reference.as_str());
+        columns = columns.require(calibration.spec().signal.as_str());
+        columns = columns.require(calibration.spec().reference.as_str());
     }
     let renamed =
         "a calibration needs the columns that it was fitted on: stretch convert renames columns";
@@ -59,7 +62,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     // on standard error, so that a table and JSON are what they were
     for (name, calibration) in &calibrations {
         let paces = trials.iter().filter_map(|trial| {
-            let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+            // a line and a curve are applied at the trial's own rate
+            let mut pace = Pace::of(&at_rate(calibration, trial.rate_hz()?).ok()?);
             let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s))?;
             Some(format!("{}: {told}", trial.name))
         });
@@ -69,7 +73,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let own = evaluation.pooled.iter().filter(|errors| errors.method != "raw");
     for (errors, (_, calibration)) in own.zip(&calibrations) {
         let mut reach = Reach::of(calibration);
-        let signals = trials.iter().filter_map(|trial| trial.channel(calibration.signal.as_str()));
+        let signals =
+            trials.iter().filter_map(|trial| trial.channel(calibration.spec().signal.as_str()));
         signals.flatten().for_each(|value| reach.take(*value));
         let outside = reach.doubt().or_else(|| not_its_own(errors.clamped, errors.samples));
         for doubt in [

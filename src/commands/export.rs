@@ -1,20 +1,22 @@
-//! `stretch export`: a calibration in C, for a board.
+//! `stretch export`: a calibration for a board, and the seal of a record.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow, ensure};
-use stretch_calibrate::{SleeveCalibration, parse_adc};
+use anyhow::{Context, anyhow, bail, ensure};
+use stretch_calibrate::{FixedRecord, fixed_record, parse_adc};
+use stretch_data::files::{FileError, Outputs, is_standard_output, write_whole};
 use stretch_export::{
-    File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header, header,
+    File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header,
+    gauge_header,
 };
-use stretch_files::{FileError, is_standard_output, write_folder, write_whole};
 use stretch_receptor::code::Adc;
+use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_record};
 
-use super::shared::tell;
+use super::shared::{give_stdout, say, tell};
 
-/// Write a calibration in C, for a board
+/// Write a calibration for a board, in C or as a record of integers; check or renew a record's seal
 ///
-/// One C99 header that C++ takes as well: the record as constants, stretch_init(), stretch_step() for
+/// In C it is one C99 header that C++ takes as well: the record as constants, stretch_init(), stretch_step() for
 /// a sample, stretch_lost() for one that did not come, and stretch_self_test(), which runs 200 samples
 /// and compares the answers with the computer's. No allocation, no library; the same bits as on the computer.
 ///
@@ -22,6 +24,16 @@ use super::shared::tell;
 ///
 /// makes a folder for the libraries of the Arduino IDE, with an example that reads A0. Of several gauges
 /// (`stretch calibrate --signals`) a step takes a sample of each, and the example reads A0, A1 and so on.
+///
+/// For a board with firmware in Rust and without floating point, as a record in postcard:
+///
+///   stretch export --calibration cal.json --fixed cal.postcard --adc 12,0,3.3
+///
+/// Every record carries a checksum, its seal. Without any other option the command says what a record is and
+/// whether its seal holds. Whoever edits a record in JSON by hand renews the seal:
+///
+///   stretch export --calibration cal.json
+///   stretch export --calibration cal.json --seal
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -30,66 +42,133 @@ pub(crate) struct Args {
     calibration: PathBuf,
     /// Folder for the header; it must not hold anything; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
-    c: PathBuf,
+    c: Option<PathBuf>,
     /// Make the folder a library that the Arduino IDE takes
-    #[arg(long)]
+    #[arg(long, requires = "c")]
     arduino: bool,
+    /// Write C in this form, fixed or float [default: fixed where the model has such a form]
+    ///
     /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
-    /// signal's unit to the reference's [default: fixed where the model has such a form]
-    #[arg(long, value_name = "FORM")]
+    /// signal's unit to the reference's.
+    #[arg(long, value_name = "FORM", requires = "c")]
     form: Option<Form>,
+    /// Where the record of integers goes: converter codes in, thousandths of the reference's unit out
+    ///
+    /// linear, poly13, observer and observer+rest have such a form.
+    #[arg(long, value_name = "cal.postcard")]
+    fixed: Option<PathBuf>,
     /// The board's converter: bits, and the signal at code 0 and at the last code
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
           value_parser = parse_adc)]
     adc: Adc,
+    /// Renew the seal after a hand edit, or of an earlier release's record, once all else was checked
+    #[arg(long, conflicts_with_all = ["c", "fixed"])]
+    seal: bool,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let options = Options { form: args.form, adc: args.adc };
-    let made = match SleeveCalibration::read(&args.calibration)? {
-        SleeveCalibration::One(one) => header(&one, &options),
-        SleeveCalibration::Many(several) => array_header(&several, &options),
-    };
-    let made = made.with_context(|| args.calibration.display().to_string())?;
-    let Header { text, form, model, pressure, .. } = &made;
-    if is_standard_output(&args.c) {
-        ensure!(!args.arduino, "-: a library is several files; name a folder");
-        return Ok(write_whole(&args.c, |out| out.write_all(text.as_bytes()))?);
+    give_stdout([args.c.as_deref(), args.fixed.as_deref()])?;
+    if args.c.is_none() && args.fixed.is_none() {
+        return describe(&args.calibration, args.seal);
     }
-    let files = if args.arduino {
-        arduino_library(&made)
-    } else {
-        vec![File { path: HEADER.into(), text: text.clone() }]
+    let named = || args.calibration.display().to_string();
+    let calibration = SleeveCalibration::read(&args.calibration)?;
+    let mut outputs = Outputs::default();
+    let fixed = args.fixed.as_deref().map(|path| {
+        let SleeveCalibration::One(one) = &calibration else {
+            bail!("--fixed: a calibration of several gauges has no such record; write it in C");
+        };
+        let record = fixed_record(one.calibration(), &args.adc)
+            .with_context(|| path.display().to_string())?;
+        outputs.file(path, |out| out.write_all(&record.bytes))?;
+        Ok((path, record))
+    });
+    let fixed = fixed.transpose().with_context(named)?;
+    let c = args.c.as_deref().map(|out| {
+        let options = Options { form: args.form, adc: args.adc };
+        let made = match &calibration {
+            SleeveCalibration::One(one) => gauge_header(one, &options),
+            SleeveCalibration::Many(several) => array_header(several, &options),
+        };
+        let made = made.with_context(named)?;
+        let files = stage(&mut outputs, out, &made, args.arduino)?;
+        anyhow::Ok((out, made, files))
+    });
+    let c = c.transpose()?;
+    outputs.keep()?;
+    if let Some((path, FixedRecord { bytes, read_as, .. })) = &fixed {
+        let (out, count) = (path.display(), bytes.len());
+        tell(format!("wrote {out}: {count} bytes, a board reads it as {read_as}"))?;
+    }
+    match &c {
+        Some((out, made, files)) if !is_standard_output(out) => {
+            explain(out, made, files, args.arduino)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says what a record is and whether its seal holds, once that was renewed if `is_sealing`.
+fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
+    if is_sealing {
+        seal_record(path)?;
+    }
+    let RecordSummary { kind, seal, is_sealed } = describe_record(path)?;
+    let state = match (is_sealing, is_sealed) {
+        (true, _) => "sealed",
+        (false, true) => "its seal holds",
+        (false, false) => "of an earlier release, without a seal: --seal makes one",
     };
-    write_folder(&args.c, false, |folder| {
+    say(format!("{}: {kind}, {seal:08x}, {state}", path.display()))
+}
+
+/// Puts the header, or the library around it, among the files of the command.
+fn stage(
+    outputs: &mut Outputs,
+    out: &Path,
+    made: &Header,
+    is_library: bool,
+) -> anyhow::Result<Vec<File>> {
+    if is_standard_output(out) {
+        ensure!(!is_library, "-: a library is several files; name a folder");
+        outputs.file(out, |file| file.write_all(made.text.as_bytes()))?;
+        return Ok(Vec::new());
+    }
+    let files = if is_library {
+        arduino_library(made)
+    } else {
+        vec![File { path: HEADER.into(), text: made.text.clone() }]
+    };
+    let written = outputs.folder(out, false, |folder| {
         for File { path, text } in &files {
             let path = folder.join(path);
             if let Some(parent) = path.parent() {
-                std::fs::create_dir_all(parent).map_err(|cause| FileError::Io {
-                    path: parent.display().to_string(),
-                    action: "make it",
-                    cause,
-                })?;
+                let made = std::fs::create_dir_all(parent);
+                made.map_err(|cause| FileError::io(parent.display(), "make it", cause))?;
             }
             write_whole(path, |out| out.write_all(text.as_bytes()))?;
         }
         Ok(())
-    })
-    .map_err(|error| match error {
+    });
+    written.map_err(|error| match error {
         FileError::Exists { path } => {
             anyhow!("{path}: it exists; name a folder that does not, or an empty one: nothing is overwritten")
         }
         other => other.into(),
     })?;
-    let out = args.c.display();
+    Ok(files)
+}
+
+fn explain(out: &Path, made: &Header, files: &[File], is_library: bool) -> anyhow::Result<()> {
+    let (out, Header { form, model, pressure, .. }) = (out.display(), made);
     tell(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
-    for File { path, .. } in &files {
+    for File { path, .. } in files {
         tell(format!("  {path}"))?;
     }
     if *pressure {
         tell("tell it the pressure with stretch_set_pressure() before each sample")?;
     }
-    tell(if args.arduino {
+    tell(if is_library {
         "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"
     } else {
         "include it in one file of the program; stretch_self_test() is 0 where the board computes as the computer does"

@@ -24,16 +24,10 @@ impl FailOn {
             Self::Effect => matches!(verdict, Effect | Partial),
             Self::Unknown => matches!(verdict, Unknown | Partial),
             Self::Record => verdict == Record,
-            Self::Faint => is_faint(diagnosis),
+            Self::Faint => diagnosis.is_faint(),
             Self::Parameters => verdict == Parameters,
             Self::Gap => matches!(verdict, Effect | Partial | Unknown | Record),
-            Self::Any => verdict != NoGap || is_faint(diagnosis),
+            Self::Any => verdict != NoGap || diagnosis.is_faint(),
         }
     }
-}
-
-/// Whether more is left than noise as it is described, and too little to name.
-pub(super) fn is_faint(diagnosis: &Diagnosis) -> bool {
-    let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    agrees && diagnosis.gap.retuned > diagnosis.null_band
 }

@@ -1,32 +1,37 @@
-//! Results as JSON: the same two options in every command that has a result.
+//! Results as JSON: the same option in every command that has a result.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use serde::Serialize;
-use stretch_files::{Outputs, is_standard_output};
+use stretch_data::files::{Outputs, is_standard_output};
 
 use super::shared::{give_stdout, say_as_is, stage_text, tell};
 
 /// Where JSON goes.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Json {
-    /// Print JSON to standard output in place of text
-    #[arg(long)]
-    json: bool,
-    /// Write the same JSON into a file, too; - is standard output, as --json
-    #[arg(long, value_name = "FILE.json")]
-    json_out: Option<PathBuf>,
+    /// Print JSON in place of text; =FILE writes it into a file
+    ///
+    /// With a file text is printed as well.
+    #[arg(
+        long,
+        value_name = "FILE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "-"
+    )]
+    json: Option<PathBuf>,
 }
 
 impl Json {
     /// Whether it stands on standard output, in place of text.
     pub(crate) fn is_printed(&self) -> bool {
-        self.json || self.json_out.as_deref().is_some_and(is_standard_output)
+        self.json.as_deref().is_some_and(is_standard_output)
     }
 
     fn file(&self) -> Option<&Path> {
-        self.json_out.as_deref().filter(|path| !is_standard_output(path))
+        self.json.as_deref().filter(|path| !is_standard_output(path))
     }
 
     /// Gives standard output to the JSON, or to the one of some files that is called `-`.
@@ -41,7 +46,7 @@ impl Json {
         let is_taken = files.iter().flatten().any(is_standard_output);
         ensure!(
             !(is_taken && self.is_printed()),
-            "a file and JSON cannot both go to standard output; write --json-out FILE.json, or name the file"
+            "a file and JSON cannot both go to standard output; write --json=FILE.json, or name the file"
         );
         give_stdout(files)
     }
@@ -95,20 +100,15 @@ impl Json {
 
 /// What to write in place of `--json FILE`, where that is what was meant.
 pub(crate) fn meant_a_file(arguments: &[String]) -> Option<String> {
-    let glued = arguments.iter().find_map(|argument| argument.strip_prefix("--json="));
-    let behind = || {
-        let at = arguments.iter().position(|argument| argument == "--json")?;
-        let next = arguments.get(at + 1)?;
-        (next == "-" || next.ends_with(".json")).then_some(next.as_str())
-    };
-    let file = glued.or_else(behind)?;
-    Some(match file {
-        "-" => "--json is a flag and prints to standard output by itself: write --json alone"
-            .to_owned(),
-        file => format!(
-            "--json is a flag and prints to standard output: write --json-out {file} for a file"
-        ),
-    })
+    let at = arguments.iter().position(|argument| argument == "--json")?;
+    let file = arguments.get(at + 1)?;
+    match file.as_str() {
+        "-" => Some("--json prints to standard output by itself: write --json alone".to_owned()),
+        file if file.ends_with(".json") => {
+            Some(format!("--json prints to standard output: write --json={file} for a file"))
+        }
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -116,15 +116,13 @@ mod tests {
     use super::meant_a_file;
 
     #[test]
-    fn a_path_behind_the_flag_gets_the_right_flag_named() {
+    fn a_path_behind_the_flag_gets_the_right_spelling_named() {
         let meant =
             |line: &str| meant_a_file(&line.split(' ').map(str::to_owned).collect::<Vec<_>>());
-        assert!(
-            meant("diagnose bench --json d.json").unwrap().contains("--json-out d.json for a file")
-        );
-        assert!(meant("diagnose bench --json=d.txt").unwrap().contains("--json-out d.txt"));
+        let said = meant("diagnose bench --json d.json").unwrap();
+        assert!(said.contains("--json=d.json for a file"));
         assert!(meant("diagnose --json - bench").unwrap().contains("--json alone"));
         assert_eq!(meant("diagnose --json bench --bogus"), None);
-        assert_eq!(meant("diagnose bench --json-out d.json"), None);
+        assert_eq!(meant("diagnose bench --json=d.json"), None);
     }
 }

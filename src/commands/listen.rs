@@ -1,22 +1,23 @@
 //! `stretch listen`: a board's live link, shown and recorded.
 
-mod plot;
 mod port;
-mod screen;
 mod status;
 mod trial_file;
 mod twin;
 mod view;
 
 use std::{
+    io::{self, IsTerminal},
     path::{Path, PathBuf},
     sync::mpsc::RecvTimeoutError,
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
+use stretch_calibrate::parse_adc;
+use stretch_data::files::is_standard_output;
 use stretch_link::{Answer, Decoder, Event, TimeLine};
-use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
+use stretch_receptor::code::{Adc, AdcCode};
 
 use self::{
     port::Heard,
@@ -31,67 +32,64 @@ use crate::display::warn;
 /// Show and record what a board sends over its serial port
 ///
 /// Reads the lines of the live link: a frame a sample, with a counter and a
-/// checksum. A lost or damaged line is counted and skipped. On a terminal the
-/// estimate is plotted as it comes; elsewhere each sample is a line of CSV. A
-/// port that goes away is opened again when it comes back. Ctrl-C (or q) ends it.
+/// checksum. A lost or damaged line is counted and skipped. A terminal shows one
+/// line: the newest estimate and the counts. A port that goes away is opened again
+/// when it comes back. Ctrl-C ends it, and what was recorded stays.
 ///
 ///   stretch listen --port /dev/ttyACM0 --calibration cal.json --out trial.csv
 ///
-/// What is recorded does not depend on what is shown: a reader of standard output that is slow or
-/// goes away costs no row of --out. A code that the converter of --adc-bits cannot give is counted.
+/// Samples can be plotted as they come: each is a line of CSV on standard output, if
+/// that is a pipe or a file, or with --out -.
+///
+///   stretch listen --port /dev/ttyACM0 --calibration cal.json | your_plotter
+///
+/// What is recorded does not depend on what is shown: if the reader of standard output is
+/// slow or goes away, --out loses no row. Codes that the converter of --adc cannot give are counted.
 ///
 /// The board's estimates are compared with those of the calibration here, and
 /// the largest difference is reported: it shows whether the board runs this
 /// calibration. The record may be a calibration of any model, or the record that
-/// --fixed wrote for the board, which holds neither names nor units.
+/// `stretch export --fixed` wrote for the board, which holds neither names nor units.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Serial port, or - for standard input
     #[arg(long, value_name = "PATH|-")]
     port: PathBuf,
-    /// Record from `stretch calibrate`: of --out, or of --fixed
+    /// Record from `stretch calibrate`, or from `stretch export --fixed`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Trial that is recorded, a line a sample as it comes; must not exist
-    #[arg(long, value_name = "trial.csv")]
+    /// Trial to record, a line a sample as it comes; must not exist; - for standard output
+    #[arg(long, value_name = "trial.csv|-")]
     out: Option<PathBuf>,
     /// Speed of the port
     #[arg(long, default_value_t = 115_200, value_name = "BAUD")]
     baud: u32,
-    /// Bits of the board's converter
-    #[arg(long, default_value_t = 12, value_name = "N")]
-    adc_bits: u8,
-    /// Volts at the converter's code 0
-    #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
-    adc_zero_v: f64,
-    /// Volts at the converter's largest code
-    #[arg(long, default_value_t = 3.3, value_name = "V")]
-    adc_full_scale_v: f64,
+    /// The board's converter: bits, and the signal at code 0 and at the last code
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
+          value_parser = parse_adc)]
+    adc: Adc,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let adc = Adc::new(AdcSpec {
-        bits: args.adc_bits,
-        zero_v: args.adc_zero_v,
-        full_scale_v: args.adc_full_scale_v,
-    })?;
-    let twin = Twin::read(&args.calibration, args.adc_bits)?;
+    let twin = Twin::read(&args.calibration, args.adc.spec().bits)?;
     let shown_port = args.port.display();
     let heard = port::listen(&args.port, args.baud).with_context(|| format!("{shown_port}"))?;
     let header = trial_file::header(&twin);
     // last of what can fail: a start that fails leaves nothing behind
-    let create = |path| TrialFile::create(path, &header);
-    let recording = args.out.as_deref().map(create).transpose();
-    let mut recording = recording.with_context(|| cannot_record(args.out.as_deref()))?;
+    let out = args.out.as_deref();
+    let file = out.filter(|out| !is_standard_output(out));
+    let recording = file.map(|path| TrialFile::create(path, &header)).transpose();
+    let mut recording = recording.with_context(|| cannot_record(file))?;
     stop::record();
-    let mut view = View::open(&twin, &header, recording.is_some())?;
+    let has_rows = out.is_some_and(is_standard_output) || !io::stdout().is_terminal();
+    let mut view = View::open(&header, has_rows, recording.is_none());
     if !twin.answers() {
         view.note("the calibration's rate looks a sample ahead: estimates are not compared");
     }
-    let mut session = Samples::new(twin, adc);
+    let mut session = Samples::new(twin, args.adc);
     let mut result = Ok(());
-    while !stop::ended() && !view.asked_to_stop() {
+    while !stop::ended() {
         let is_last = match heard.recv_timeout(Duration::from_millis(50)) {
             Ok(Heard::Bytes(bytes)) => {
                 let samples = session.take(&bytes);
@@ -116,13 +114,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             }
             Err(RecvTimeoutError::Timeout) => false,
         };
-        view.draw(&session.status);
-        // without a recording, what nobody sees is for nobody
+        view.refresh(&session.status);
+        // without a recording and without a reader there is nothing left to do
         if is_last || result.is_err() || (recording.is_none() && view.is_gone()) {
             break;
         }
     }
-    // safe on the disk before anybody is waited for
+    // the recording is on the disk before a slow reader is waited for
     session.status.rows = recording.as_ref().map(TrialFile::rows);
     let finished = recording.map_or(Ok(()), TrialFile::finish);
     let unseen = view.close();
@@ -133,7 +131,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             "stretch: {unseen} rows were recorded and not shown: standard output is not read"
         ));
     }
-    result.and(finished).with_context(|| cannot_record(args.out.as_deref()))
+    result.and(finished).with_context(|| cannot_record(file))
 }
 
 /// What came is recorded before it is shown.
@@ -207,6 +205,7 @@ impl Samples {
             _ => {}
         }
         self.compare(&sample);
+        self.status.newest = sample.estimate.or(self.status.newest);
         // a sample whose time nobody knows is no row of a trial
         self.status.standing += u64::from(time_s.is_none());
         time_s.map(|_| sample)

@@ -1,6 +1,7 @@
 //! Whether samples come as often as a calibration takes them to.
 
 use stretch_calibrate::PACE_TOLERANCE;
+use stretch_core::Calibration;
 
 /// Number of intervals that determine the pace.
 const INTERVALS: usize = 51;
@@ -9,14 +10,17 @@ const INTERVALS: usize = 51;
 #[derive(Debug)]
 pub(super) struct Pace {
     rate_hz: f64,
+    needs_signal_only: bool,
     last_s: Option<f64>,
     intervals_s: Vec<f64>,
     is_told: bool,
 }
 
 impl Pace {
-    pub(super) fn of(rate_hz: f64) -> Self {
-        Self { rate_hz, last_s: None, intervals_s: Vec::new(), is_told: false }
+    pub(super) fn of(calibration: &Calibration) -> Self {
+        let rate_hz = calibration.spec().sample_rate_hz.hz();
+        let needs_signal_only = calibration.spec().model.needs_signal_only();
+        Self { rate_hz, needs_signal_only, last_s: None, intervals_s: Vec::new(), is_told: false }
     }
 
     /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
@@ -39,14 +43,16 @@ impl Pace {
         if (share - 1.0).abs() <= PACE_TOLERANCE {
             return None;
         }
-        let what = if share < 1.0 {
+        let what = if self.needs_signal_only {
+            "its estimates are right, the rates are not"
+        } else if share < 1.0 {
             "its rates, and estimates that rest on them, are wrong"
         } else {
             "the samples in between count as missing"
         };
         Some(format!(
             "{:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
-             the log there with --grid {rate_hz}",
+             the log there with stretch convert --grid {rate_hz}",
             1.0 / usual_s
         ))
     }

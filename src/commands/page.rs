@@ -8,12 +8,12 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_files::{write_folder, write_whole};
+use stretch_data::files::write_whole;
 
-use super::shared::{or_force, recover, say};
+use super::shared::say;
 use crate::display::warn;
 
-/// The page's one file.
+/// The page's one file in the folder where it is built.
 const FILE: &str = "index.html";
 
 /// The page that was built before this program (`build.rs`).
@@ -27,7 +27,7 @@ const CARRIED: Option<&[u8]> = None;
 /// One HTML file with the same crates in it, compiled to WASM. It opens from a disk, works offline,
 /// and sends nothing anywhere: give it to whoever has recordings and a browser.
 ///
-///   stretch page --out page
+///   stretch page --out stretch.html
 ///
 /// A program of a release carries the page. One that was built without the feature page takes it
 /// from where STRETCH_PAGE says, or builds it in the source tree that it stands in (rustup target
@@ -35,24 +35,17 @@ const CARRIED: Option<&[u8]> = None;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Folder for index.html
-    #[arg(long, value_name = "DIR")]
+    /// Where the page goes; a file that exists is replaced
+    #[arg(long, default_value = "stretch.html", value_name = "page.html")]
     out: PathBuf,
-    /// Replace a page that exists; files of your own in its folder are kept
-    #[arg(long)]
-    force: bool,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    recover(&args.out)?;
     let page = page()?;
-    write_folder(&args.out, args.force, |folder| {
-        Ok(write_whole(folder.join(FILE), |out| out.write_all(&page))?)
-    })
-    .map_err(or_force)?;
+    write_whole(&args.out, |out| out.write_all(&page))?;
     say(format!(
         "wrote {}: open it in a browser; {:.1} MB, and nothing else is needed",
-        args.out.join(FILE).display(),
+        args.out.display(),
         page.len() as f64 / 1e6
     ))
 }
@@ -78,23 +71,23 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
 /// Builds the page in the source tree that this program stands in.
 fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
-    let Some(web) = program.as_deref().and_then(sources) else {
+    let Some((target, script)) = program.as_deref().and_then(sources) else {
         bail!(
             "this program carries no page, and it does not stand in its source tree: take the program of a release, \
-             or set STRETCH_PAGE to the folder that web/build.sh made (web/target/page)"
+             or set STRETCH_PAGE to the folder that web/build.sh made (target/page)"
         );
     };
-    let script = web.join("build.sh");
     warn("stretch: building the page, some minutes the first time");
-    let built = Command::new(&script).status();
+    let built = Command::new(&script).env("CARGO_TARGET_DIR", &target).status();
     let built = built.with_context(|| format!("{}: it could not be run", script.display()))?;
     ensure!(built.success(), "{}: it did not build the page", script.display());
-    Ok(web.join("target/page").join(FILE))
+    Ok(target.join("page").join(FILE))
 }
 
-/// The folder of the page's sources, where a program stands in the folder target of its source tree, as cargo builds it.
-fn sources(program: &Path) -> Option<PathBuf> {
+/// Cargo's target folder and the script that builds the page, if the program is in the source tree, where Cargo puts it.
+fn sources(program: &Path) -> Option<(PathBuf, PathBuf)> {
     let target = program.ancestors().find(|folder| folder.ends_with("target"))?;
-    let web = target.parent()?.join("web");
-    (target.join("CACHEDIR.TAG").is_file() && web.join("build.sh").is_file()).then_some(web)
+    let script = target.parent()?.join("web/build.sh");
+    let is_built_here = target.join("CACHEDIR.TAG").is_file() && script.is_file();
+    is_built_here.then(|| (target.to_owned(), script))
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_files::write_folder;
+use stretch_data::files::write_folder;
 use stretch_sim::paper_preset;
 
 use super::{

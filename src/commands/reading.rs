@@ -1,10 +1,12 @@
 //! How recordings are read: what the commands that take them share.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
-use clap::ValueEnum;
 use stretch_data::{DataError, DataSet, Split, Trial};
-use stretch_recording::{ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
+use stretch_recording::{DateOrder, ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
 use super::shared::progress;
 use crate::display::{detail, warn};
@@ -12,33 +14,75 @@ use crate::display::{detail, warn};
 /// Options for recordings that do not say all of themselves.
 #[derive(clap::Args)]
 pub(crate) struct Recorded {
-    /// Column of the time; its last part may be ms, us or ns
+    /// Column of the time; COL:ms in ms; 100hz instead of it
+    ///
+    /// A unit may follow the column: :s, :ms, :us, :ns, :min, :h or :d; otherwise its name says it, as in t_ms, or its numbers
+    /// do. A rate replaces a column of time, also one that is there. For
+    /// dates such as 05/01/2024 it is :dmy if the day comes first, :mdy if the month does.
     #[arg(long, default_value = "time_s", value_name = "COL")]
-    time: String,
-    /// What the time counts, whatever its name says
-    #[arg(long, value_enum, value_name = "UNIT")]
-    time_unit: Option<Unit>,
-    /// Names of the columns where the recording has none: time_s,bridge_v,...
+    time: TimeColumn,
+    /// Names of the columns if it has none: time_s,bridge_v
     #[arg(long = "columns", value_name = "NAMES", value_delimiter = ',')]
     named: Option<Vec<String>>,
-    /// Samples a second of a recording without any time
-    #[arg(long, value_name = "HZ", value_parser = rate)]
-    sample_rate: Option<f64>,
-    /// Bring the recording onto an even grid of so many samples a second [default: as it was
-    /// recorded; several clocks to the fastest]
-    #[arg(long, value_name = "HZ", value_parser = rate)]
-    grid: Option<f64>,
+    /// Refuse a recording with a row that cannot be read
+    ///
+    /// Otherwise such rows are left out with a note, up to one in five.
+    #[arg(long)]
+    pub(crate) strict: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Unit {
-    S,
-    Ms,
-    Us,
-    Ns,
+/// Where the time of a recording is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum TimeColumn {
+    Named(String, Option<TimeUnit>),
+    /// With the order of its dates.
+    Dated(String, DateOrder),
+    /// Not read: samples a second.
+    Rate(f64),
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+impl FromStr for TimeColumn {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = text.to_ascii_lowercase();
+        if let Some(Ok(_)) = number.strip_suffix("hz").map(str::parse::<f64>) {
+            return rate(number.trim_end_matches("hz")).map(Self::Rate);
+        }
+        let order = |end: &str| match end {
+            "dmy" => Some(DateOrder::DayFirst),
+            "mdy" => Some(DateOrder::MonthFirst),
+            _ => None,
+        };
+        let dated = text.rsplit_once(':').and_then(|(name, end)| Some((name, order(end)?)));
+        if let Some((name, order)) = dated {
+            return Ok(Self::Dated(name.to_owned(), order));
+        }
+        let text = if text.starts_with(':') { format!("time_s{text}") } else { text.to_owned() };
+        let split =
+            text.rsplit_once(':').and_then(|(name, end)| Some((name, TimeUnit::abbreviated(end)?)));
+        Ok(match split {
+            Some((name, unit)) => Self::Named(name.to_owned(), Some(unit)),
+            None => Self::Named(text.to_owned(), None),
+        })
+    }
+}
+
+impl TimeColumn {
+    /// What is asked of a recording with such a time.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let options = ReadOptions::new();
+        match self {
+            Self::Named(name, None) => options.time(name),
+            Self::Named(name, Some(unit)) => options.time(name).time_unit(*unit),
+            Self::Dated(name, order) => options.time(name).date_order(*order),
+            Self::Rate(rate_hz) => options.sample_rate_hz(*rate_hz),
+        }
+    }
+}
+
+/// Samples a second.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate_hz = text.parse::<f64>().ok().filter(|hz| (1e-3..=1e7).contains(hz));
     rate_hz.ok_or_else(|| format!("\"{text}\" is not a rate between 1e-3 and 1e7 Hz"))
 }
@@ -54,25 +98,19 @@ pub(crate) fn columns(names: &str) -> Result<String, std::convert::Infallible> {
 }
 
 impl Recorded {
+    /// The samples a second of recordings without a time, where the command line says it.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        match self.time {
+            TimeColumn::Rate(rate_hz) => Some(rate_hz),
+            _ => None,
+        }
+    }
+
     /// What is asked of each recording.
     pub(crate) fn options(&self) -> ReadOptions {
-        let mut options = ReadOptions::new().time(&self.time);
-        if let Some(unit) = self.time_unit {
-            options = options.time_unit(match unit {
-                Unit::S => TimeUnit::Seconds,
-                Unit::Ms => TimeUnit::Milliseconds,
-                Unit::Us => TimeUnit::Microseconds,
-                Unit::Ns => TimeUnit::Nanoseconds,
-            });
-        }
-        if let Some(names) = &self.named {
-            options = options.columns(names.iter().map(|name| name.trim()));
-        }
-        if let Some(rate_hz) = self.sample_rate {
-            options = options.sample_rate_hz(rate_hz);
-        }
-        match self.grid {
-            Some(rate_hz) => options.grid_hz(rate_hz),
+        let options = self.time.options().strict(self.strict);
+        match &self.named {
+            Some(names) => options.columns(names.iter().map(|name| name.trim())),
             None => options,
         }
     }
@@ -125,7 +163,6 @@ pub(crate) fn read_trials(
             let wrong = trials[before..].iter().find_map(|trial| set.rate_mismatch(trial));
             wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
             if trials.len() == before {
-                let split = split.name();
                 anyhow::bail!(
                     "{}: no trial of the data set has split = \"{split}\"; name files instead",
                     path.display()
@@ -138,4 +175,22 @@ pub(crate) fn read_trials(
     }
     bar.finish_and_clear();
     Ok(trials)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DateOrder, TimeColumn, TimeUnit};
+
+    #[test]
+    fn a_time_is_a_column_with_or_without_a_unit_or_a_rate() {
+        let named = |name: &str, unit| Ok(TimeColumn::Named(name.to_owned(), unit));
+        assert_eq!("t_ms".parse(), named("t_ms", None));
+        assert_eq!("stamp:us".parse(), named("stamp", Some(TimeUnit::Microseconds)));
+        assert_eq!("ros:stamp".parse(), named("ros:stamp", None));
+        let dated = TimeColumn::Dated("Datum".to_owned(), DateOrder::MonthFirst);
+        assert_eq!("Datum:mdy".parse(), Ok(dated));
+        assert_eq!("12.5Hz".parse(), Ok(TimeColumn::Rate(12.5)));
+        assert_eq!("hz".parse(), named("hz", None));
+        assert!("1e9hz".parse::<TimeColumn>().unwrap_err().contains("between 1e-3 and 1e7"));
+    }
 }

@@ -5,12 +5,11 @@ use std::{
     time::Duration,
 };
 
-use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use stretch_files::{FileError, Outputs};
+use stretch_data::files::{FileError, Outputs};
 
+use crate::display::shows_progress;
 pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_first, tell};
-use crate::display::{shows_progress, warn};
 
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
@@ -39,13 +38,6 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     bar
-}
-
-/// Repairs a folder that a killed run left half-replaced, and reports the repair.
-pub(crate) fn recover(folder: &Path) -> anyhow::Result<()> {
-    let sentence = stretch_files::recover(folder).with_context(|| folder.display().to_string())?;
-    sentence.into_iter().for_each(warn);
-    Ok(())
 }
 
 /// Says how a folder that is in the way can be replaced.
@@ -83,7 +75,7 @@ pub(crate) fn stage_text(outputs: &mut Outputs, path: &Path, text: &str) -> anyh
 
 /// Writes a text file, whole or not at all.
 pub(crate) fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(stretch_files::write_whole(path, |out| out.write_all(text.as_bytes()))?)
+    Ok(stretch_data::files::write_whole(path, |out| out.write_all(text.as_bytes()))?)
 }
 
 /// A file's name without folder and ending, for a table.

@@ -3,29 +3,28 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
+use stretch_data::files::{FileError, is_standard_output, write_folder};
 use stretch_data::{DataError, DataSet, RigFile, TrialEntry};
-use stretch_files::{FileError, is_standard_output, write_folder};
 use stretch_recording::{ReadOptions, Recording};
-use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
+use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, default_rig_text, paper_preset};
 
 use super::{
-    json::Json,
     reading::read_recording,
-    shared::{detail, of_files, or_force, progress, recover, tell},
+    shared::{detail, give_stdout, of_files, or_force, progress, say_as_is, tell},
 };
 
 /// Simulate trials of the rig and write them as a data set
 ///
 ///   stretch simulate --protocol paper --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
 ///
-/// Without --rig it is the stock rig (`stretch rig` prints it); `stretch effects`
+/// Without --rig it is the stock rig, which --print-rig prints; `stretch effects`
 /// lists what can be added to it. The folder gets the trials, dataset.toml, and
 /// rig.toml with every parameter, effect and the seed: from it the run can be
 /// repeated to the bit, on any machine:
 ///
 ///   stretch simulate --protocol paper --rig bench/rig.toml --out again
 ///
-/// --commands replays what a recorded or recommended trial does: its openings,
+/// --protocol next.csv replays what a recorded or recommended trial does: its openings,
 /// excitation_share, set_length_mm and shunt_share; a column that asks for more is
 /// refused by name. A trial alone begins the session, so that nothing is remembered
 /// of before; a folder is replayed as one session.
@@ -35,51 +34,53 @@ use super::{
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Rig file [default: the stock rig]
-    #[arg(long, value_name = "rig.toml")]
+    /// Rig file, or `paper`: a rig with effects of the paper's order [default: the stock rig]
+    #[arg(long, value_name = "rig.toml|paper")]
     rig: Option<PathBuf>,
-    /// A rig that comes along, with effects: paper, whose figures are of the paper's order
-    #[arg(long, value_enum, conflicts_with = "rig")]
-    preset: Option<Preset>,
-    /// What the valves do
-    #[arg(long, value_enum, default_value = "paper")]
+    /// What the valves do: paper (17 trials), arbitrary or pulses (a minute each), or what a trial or data set did
+    ///
+    /// paper: six inflations, six deflations, arbitrary, pulses, and three test trials. arbitrary: one minute of random segments.
+    /// pulses: one minute of pulse pairs.
+    #[arg(long, default_value = "paper", value_name = "NAME|trial.csv")]
     protocol: Protocol,
-    /// Replay what a trial does instead (openings, excitation, what is set from outside), or all trials of a data set
-    #[arg(long, value_name = "trial.csv", conflicts_with = "protocol")]
-    commands: Option<PathBuf>,
     /// Add an effect, as NAME:PARAMETER=VALUE,...
     #[arg(long = "effect", value_name = "NAME:P=X", value_parser = parse_effect)]
     effects: Vec<EffectArg>,
-    /// Noise and converter rounding [default: on]
+    /// Noise and converter rounding [default: the rig file's, or on]
     #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true)]
     noise: Option<Switch>,
     /// Seed of noise and random commands [default: the rig file's, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=RunSettings::MOST_SEED))]
     seed: Option<u64>,
     /// Folder that the data set goes to; - for standard output, where one trial alone is simulated
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present = "print_rig")]
+    out: Option<PathBuf>,
     /// Replace a data set that exists, in one step; files of your own in its folder are kept
     #[arg(long)]
     force: bool,
-    #[command(flatten)]
-    json: Json,
+    /// Print the stock rig as a rig file, with units and meanings, and simulate nothing
+    #[arg(long, exclusive = true)]
+    print_rig: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum Protocol {
-    /// Six inflations, six deflations, arbitrary, pulses, and three test trials
     Paper,
-    /// One minute of random segments
     Arbitrary,
-    /// One minute of pulse pairs
     Pulses,
+    /// A trial, or a folder with a data set.
+    Recorded(PathBuf),
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Preset {
-    /// Hysteresis, slip, overshoot and cross-talk of the paper's order
-    Paper,
+impl From<&str> for Protocol {
+    fn from(text: &str) -> Self {
+        match text {
+            "paper" => Self::Paper,
+            "arbitrary" => Self::Arbitrary,
+            "pulses" => Self::Pulses,
+            path => Self::Recorded(path.into()),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -124,8 +125,12 @@ impl EffectArg {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let (mut rig, written) = match (&args.rig, args.preset) {
-        (Some(path), _) => {
+    let Some(out) = args.out.as_deref().filter(|_| !args.print_rig) else {
+        return say_as_is(default_rig_text().trim_end());
+    };
+    let (mut rig, written) = match &args.rig {
+        Some(path) if path.as_os_str() == "paper" => (paper_preset()?, None),
+        Some(path) => {
             let file = RigFile::read(path)?;
             let name = || path.display().to_string();
             (
@@ -133,8 +138,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 RunSettings::from_file(&file).with_context(name)?,
             )
         }
-        (None, Some(Preset::Paper)) => (paper_preset()?, None),
-        (None, None) => (Rig::default(), None),
+        None => (Rig::default(), None),
     };
     for effect in &args.effects {
         effect.add_to(&mut rig)?;
@@ -142,13 +146,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let mut settings = written.unwrap_or_default();
     settings.seed = args.seed.unwrap_or(settings.seed);
     settings.noise = args.noise.map_or(settings.noise, |noise| noise == Switch::On);
-    args.json.share_stdout([Some(args.out.as_path())])?;
-    let plans = plans(&args, &rig, settings.seed)?;
-    if is_standard_output(&args.out) {
-        return alone(&args.out, &rig, &settings, &plans);
+    give_stdout([Some(out)])?;
+    let plans = plans(&args.protocol, &rig, settings.seed)?;
+    if is_standard_output(out) {
+        return alone(out, &rig, &settings, &plans);
     }
-    recover(&args.out)?;
-    let written = write(&args.out, args.force, &rig, &settings, &plans);
+    let written = write(out, args.force, &rig, &settings, &plans);
     written.map_err(|error| match error.downcast_ref::<DataError>() {
         Some(DataError::File(_)) => error,
         _ if error.is::<FileError>() => or_force(error),
@@ -158,23 +161,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let seconds: f64 = plans.iter().map(|p| p.inlet.len() as f64 / p.rate_hz).sum();
     let effects: Vec<&str> = rig.effects.iter().map(|e| e.name()).collect();
     let (trials, seed) = (plans.len(), settings.seed);
-    let answer = serde_json::json!({
-        "data_set": args.out.display().to_string(), "trials": trials, "duration_s": seconds, "effects": effects, "seed": seed,
-    });
     let effects = if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") };
-    let sentence = format!(
+    tell(format!(
         "wrote {}: {trials} trials, {seconds:.0} s, {effects}, seed {seed}",
-        args.out.display()
-    );
-    args.json.answer(&answer, || tell(sentence))
+        out.display()
+    ))
 }
 
 /// One trial as a stream: a folder cannot be one.
 fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> anyhow::Result<()> {
     let [plan] = plans else {
         bail!(
-            "-: these are {} trials, and only one can go to standard output; --protocol arbitrary or pulses, or --commands \
-             with one trial, give one",
+            "-: these are {} trials, and only one can go to standard output; --protocol arbitrary, pulses \
+             or a trial's name gives one",
             plans.len()
         );
     };
@@ -184,15 +183,19 @@ fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> 
     Ok(())
 }
 
-fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
-    let Some(path) = &args.commands else {
-        return Ok(match args.protocol {
-            Protocol::Paper => TrialPlan::paper(seed),
-            Protocol::Arbitrary => vec![TrialPlan::arbitrary(1, seed)],
-            Protocol::Pulses => vec![TrialPlan::pulses(1, seed)],
-        });
+fn plans(protocol: &Protocol, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
+    let path = match protocol {
+        Protocol::Paper => return Ok(TrialPlan::paper(seed)),
+        Protocol::Arbitrary => return Ok(vec![TrialPlan::arbitrary(1, seed)]),
+        Protocol::Pulses => return Ok(vec![TrialPlan::pulses(1, seed)]),
+        Protocol::Recorded(path) => path.as_path(),
     };
     let named = |path: &Path| path.display().to_string();
+    ensure!(
+        path.exists() || path.as_os_str() == "-",
+        "--protocol {}: it is none of paper, arbitrary, pulses, and there is no such trial or data set",
+        path.display()
+    );
     if !path.is_dir() {
         let trial = read_recording(path, &ReadOptions::new())?;
         let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(path))?;

@@ -21,9 +21,7 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     if RECORDING.load(SeqCst) && !ENDED.swap(true, SeqCst) {
         return;
     }
-    if stretch_files::interrupt() == 0 {
-        std::process::exit(exit_code.into());
-    }
+    stretch_data::files::clean_up_and_exit(exit_code)
 }
 
 /// From now on the first Ctrl-C only sets the flag of [`ended`].

@@ -1,8 +1,7 @@
 //! What `stretch apply` tells of the zero of a single gauge.
 
-use stretch_core::{Calibration, Turns};
 use stretch_data::unit;
-use stretch_receptor::Zero;
+use stretch_sleeve::{GaugeCalibration, Turns, Zero};
 
 use crate::{display::warn, table::number};
 
@@ -14,17 +13,20 @@ pub(super) struct Told {
     /// The name of the trial, with a colon; empty of a stream.
     trial: String,
     shifted: bool,
+    needs_signal_only: bool,
     last: Option<Zero<f64>>,
 }
 
 impl Told {
-    pub(super) fn of(calibration: &Calibration, trial: &str) -> Self {
+    pub(super) fn of(gauge: &GaugeCalibration, trial: &str) -> Self {
+        let calibration = gauge.calibration();
         Self {
-            turns: calibration.turns,
-            period_s: calibration.sample_rate_hz.period_s(),
-            unit: unit(calibration.reference.as_str()).unwrap_or_default().to_string(),
+            turns: gauge.turns().copied(),
+            period_s: calibration.spec().sample_rate_hz.period_s(),
+            unit: unit(calibration.spec().reference.as_str()).unwrap_or_default().to_string(),
             trial: if trial.is_empty() { String::new() } else { format!("{trial}: ") },
             shifted: false,
+            needs_signal_only: calibration.spec().model.needs_signal_only(),
             last: None,
         }
     }
@@ -52,6 +54,10 @@ impl Told {
     /// How far the zero was followed, and that a record tells no shifts.
     pub(super) fn end(&self) {
         let Some(turns) = self.turns else {
+            // a load cell need not move
+            if self.needs_signal_only {
+                return;
+            }
             return warn(
                 "the calibration does not hold where movements turn: whether the gauge was put on again is not told",
             );

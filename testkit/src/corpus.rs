@@ -2,8 +2,6 @@
 
 use std::{fs, path::Path};
 
-use snapbox::{Assert, Data, assert::DEFAULT_ACTION_ENV};
-
 /// Compares what `told` makes of every file of a folder with its line in `sentences.txt` there. `SNAPSHOTS=overwrite` writes that
 /// file anew: then look at what git says has changed.
 ///
@@ -19,6 +17,29 @@ pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     names.sort();
     assert!(!names.is_empty(), "{}: no file", folder.display());
     let all: String = names.iter().map(|name| told(name) + "\n").collect();
-    let expected = Data::read_from(&folder.join("sentences.txt"), None).raw();
-    Assert::new().action_env(DEFAULT_ACTION_ENV).eq(all, expected);
+    is_in_file(&folder.join("sentences.txt"), &all);
+}
+
+/// Compares a text with a file, line by line. `SNAPSHOTS=overwrite` writes the file anew: then look at what git says has changed.
+///
+/// # Panics
+///
+/// If they differ, with the lines that do; if the file cannot be read or written.
+#[track_caller]
+pub fn is_in_file(file: &Path, text: &str) {
+    if std::env::var("SNAPSHOTS").is_ok_and(|what| what == "overwrite") {
+        return fs::write(file, text).expect("a file that can be written");
+    }
+    let expected = fs::read_to_string(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let without = |lines: &str, others: &str, sign: char| -> String {
+        let missing = lines.lines().filter(|line| !others.lines().any(|other| other == *line));
+        missing.map(|line| format!("{sign} {line}\n")).collect()
+    };
+    let gone = without(&expected, text, '-');
+    let new = without(text, &expected, '+');
+    assert!(
+        expected == text,
+        "{} has other lines, or the same in another order (SNAPSHOTS=overwrite writes it anew):\n{gone}{new}",
+        file.display()
+    );
 }

@@ -10,8 +10,8 @@ use crate::support::{Scratch, calibrate, prints, runs, stretch};
 const BEGIN: &str = "\
 # Files
 
-The program reads and writes four kinds of files beside recordings. Each example of this page is a file as the program writes it. In rig
-files, problems and records a key that is not known is an error that names the key.
+The program reads and writes four kinds of files in addition to recordings. Each example of this page is a file as the program writes
+it. In rig files, problems and records an unknown key is an error that names the key.
 
 ";
 
@@ -28,24 +28,24 @@ the simulator.
 const RIG: &str = "
 ## A rig file
 
-`stretch rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is on is an
+`stretch simulate --print-rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is on is an
 `[[effect]]` with its name and parameters, as `stretch effects` lists them. `stretch diagnose --fix` writes such a file.
 
 ";
 
 const PROBLEM: &str = "
-## A simulator of one's own: problem.toml
+## Your own simulator: problem.toml
 
-`stretch init FOLDER` writes a first one beside the recordings in a folder. [The tutorial](../tutorials/worker.md) fills it in, and
-[the worker protocol](worker.md) says what the command has to answer. The command runs with your rights.
+`stretch init FOLDER` writes a first version into a folder with recordings. [The tutorial](../tutorials/worker.md) fills it in, and
+[the worker protocol](worker.md) specifies what the command has to answer. The command runs with your rights.
 
 ";
 
 const RECORD: &str = "
 ## A calibration record
 
-`stretch calibrate --out cal.json` writes a record as JSON; a name that ends with `.postcard` gives the same as bytes for a board. `stretch record
-check` checks its digest, and `stretch record seal` renews the digest after a change by hand.
+`stretch calibrate --out cal.json` writes a record as JSON; a name that ends with `.postcard` gives the same as bytes for a board. `stretch export
+--calibration cal.json` checks its digest, and `--seal` renews the digest after a change by hand.
 
 | key | what |
 | --- | --- |
@@ -57,7 +57,7 @@ check` checks its digest, and `stretch record seal` renews the digest after a ch
 | `signal_range`, `target_range` | least and greatest value of the fitted trials, by which both are divided |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
 | `rate_source` | what the rate of the fit was taken from |
-| `turns` | the levels at which the fitted trials' movements turned, and how far later ones may be off; not where they held too few |
+| `turns` | the levels at which the fitted trials' movements turned, and how far later ones may be off; absent if there were too few |
 | `dead_band` | rate within which the direction of motion is kept, in units of the signal a second |
 | `model` | the model by its name, with its coefficients, time constants and domains |
 | `provenance` | date, number, names and checksums of the fitted trials |
@@ -86,7 +86,7 @@ fn the_files_are_such_as_the_program_writes() {
     let bench = scratch.path("bench");
     runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&bench));
     let set = fs::read_to_string(bench.join("dataset.toml")).expect("a data set");
-    let rig = prints(stretch().arg("rig"));
+    let rig = prints(stretch().args(["simulate", "--print-rig"]));
     let folder = scratch.path("servo");
     fs::create_dir(&folder).expect("a folder");
     let row = |n: u32| format!("{:.2},{},{}\n", 0.01 * f64::from(n), n / 50, n / 2);

@@ -34,13 +34,15 @@ fn a_log_at_another_rate_is_told_to_be_brought_onto_the_calibration_s() {
     let scratch = Scratch::new();
     let fast = scratch.loops("fast.csv", 30.0, 1.1);
     let record = scratch.path("cal.json");
-    runs(stretch().arg("calibrate").arg(&fast).args(["--model", "linear", "--out"]).arg(&record));
+    runs(stretch().arg("calibrate").arg(&fast).args(["--model", "poly13", "--out"]).arg(&record));
     let slow = scratch.write("slow.csv", own_trial("time_s,length_mm,bridge_v", 10.0));
     let mut evaluate = stretch();
     evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&slow);
-    let says = "it has 20.0000 samples a second, and the calibration is made for 100: bring it onto that rate (--grid 100)";
+    let says = "it has 20.0000 samples a second, and the calibration is made for 100: bring it onto that rate (stretch convert --grid 100)";
     fails(&mut evaluate, &["slow.csv: no sample has an estimate", says]);
-    runs(evaluate.args(["--grid", "100"]));
+    let even = scratch.path("even.csv");
+    runs(stretch().arg("convert").arg(&slow).args(["--grid", "100", "--out"]).arg(&even));
+    runs(stretch().args(["evaluate", "--calibration"]).arg(&record).arg(&even));
 }
 
 #[test]
@@ -115,9 +117,12 @@ fn with_python_a_worker_that_takes_no_other_inputs_is_diagnosed_as_init_proposes
     };
     let proposed = fs::read_to_string(&file).expect("the problem");
     assert!(proposed.contains("wrap = \"all\""), "{proposed}");
-    let whole = proposed + &parameter("gain", "deg/V", 10.0) + &parameter("tau", "s", 0.1);
+    let whole = "budget = 400\n".to_owned()
+        + &proposed
+        + &parameter("gain", "deg/V", 10.0)
+        + &parameter("tau", "s", 0.1);
     fs::write(&file, whole).expect("the problem");
-    let told = one_line(&runs(stretch().arg("diagnose").arg(&file).args(["--budget", "400"])));
+    let told = one_line(&runs(stretch().arg("diagnose").arg(&file)));
     assert!(told.contains("nothing was looked for on the input's side"), "{told}");
     // a brake in front of the servo is none of what can be behind it
     assert!(told.starts_with("There is a gap in plant"), "{told}");

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use super::markdown::root;
-use crate::support::{Scratch, runs, stretch};
+use crate::support::{Scratch, json_to, runs, stretch};
 
 /// Reads a schema and documents, and says what does not conform.
 const VALIDATOR: &str = r#"
@@ -31,7 +31,7 @@ fn with_jsonschema_a_diagnosis_conforms_to_its_schema() {
         {
             let json = scratch.path(&format!("{}.json", documents.len()));
             let mut diagnose = stretch();
-            diagnose.args(["diagnose", "--quiet", "--baselines", "--json-out"]).arg(&json);
+            diagnose.args(["diagnose", "--quiet", "--baselines"]).arg(json_to(&json));
             runs(diagnose.arg(place).args(columns));
             documents.push(json);
         }

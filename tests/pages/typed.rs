@@ -11,17 +11,18 @@ use super::markdown::{blocks, pages, read, root};
 use crate::support::{Scratch, program};
 
 /// Beginnings of lines that are not typed, and why.
-const NOT_TYPED: [(&str, &str); 10] = [
+const NOT_TYPED: [(&str, &str); 11] = [
     ("cargo test", "these are its tests"),
     ("cargo install", "it installs a program"),
     ("cargo build", "it builds the program anew"),
     ("cargo add", "it needs a project of the reader's"),
     ("pip install", "the Python package has a gate of its own"),
+    ("python -m stretch_gap", "the Python package has a gate of its own"),
     ("stretch listen", "it needs a board"),
     ("stretch page", "it needs the page that the program of a release carries"),
-    ("stretch fleet", "the fleet has a gate of its own"),
+    ("stretch-fleet", "the fleet has a gate of its own"),
     ("python examples/machines/", "it needs recordings of others"),
-    ("cargo run --release --manifest-path challenge/", "the challenge has a gate of its own"),
+    ("cargo run --release -p stretch-challenge", "the challenge has a gate of its own"),
 ];
 
 /// The shell of a page as one script: files are written where the page asks the reader to save them.
@@ -107,6 +108,11 @@ fn the_page_in_an_archive_is_typed() {
 #[ignore = "calibrations and a diagnosis; ./ci.sh runs it"]
 fn the_tutorial_of_the_laboratory_is_typed() {
     type_page("book/src/tutorials/lab.md");
+}
+
+#[test]
+fn the_tutorial_of_a_load_cell_is_typed() {
+    type_page("book/src/tutorials/load_cell.md");
 }
 
 #[test]

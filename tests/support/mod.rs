@@ -120,6 +120,11 @@ pub(crate) fn prints(command: &mut Command) -> String {
     stdout(&output)
 }
 
+/// The option that writes JSON into a file.
+pub(crate) fn json_to(file: &Path) -> String {
+    format!("--json={}", file.display())
+}
+
 /// A text in one line: how wide a terminal is says where its lines break.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

@@ -71,18 +71,6 @@ pub(crate) fn gzip(deflated: &[u8]) -> Vec<u8> {
     [&head[..], deflated, &[0; 8]].concat()
 }
 
-/// A MAT file with one packed variable.
-pub(crate) fn mat(deflated: &[u8]) -> Vec<u8> {
-    let mut out = b"MATLAB 5.0 MAT-file".to_vec();
-    out.resize(124, b' ');
-    out.extend([0, 1, b'I', b'M']);
-    let packed = [&[0x78, 0x9c][..], deflated, &[0; 4]].concat();
-    out.extend(15_u32.to_le_bytes());
-    out.extend((packed.len() as u32).to_le_bytes());
-    out.extend(packed);
-    out
-}
-
 /// An archive with one packed member.
 pub(crate) fn zip(name: &str, deflated: &[u8], unpacked_bytes: u32) -> Vec<u8> {
     archive(&[(name, deflated)], 8, |_| unpacked_bytes)

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde_json::Value;
 
-use super::{Scratch, runs, stretch};
+use super::{Scratch, json_to, runs, stretch};
 
 /// A diagnosis with a rig file, or with the data set's own; writes what was found where that is asked for.
 pub(crate) fn diagnosed(
@@ -15,7 +15,7 @@ pub(crate) fn diagnosed(
 ) -> Value {
     let json = scratch.path("round_trip.json");
     let mut command = stretch();
-    command.arg("diagnose").arg(folder).args(["--no-next", "--json-out"]).arg(&json);
+    command.arg("diagnose").arg(folder).arg("--no-next").arg(json_to(&json));
     for (option, path) in [("--rig", rig), ("--fix", fix)] {
         if let Some(path) = path {
             command.arg(option).arg(path);
@@ -42,7 +42,7 @@ pub(crate) fn replayed(
     let out = scratch.path("replayed");
     let mut command = stretch();
     command.args(["simulate", "--noise", "off", "--force", "--rig"]).arg(rig);
-    runs(command.arg("--commands").arg(commands).arg("--out").arg(&out));
+    runs(command.arg("--protocol").arg(commands).arg("--out").arg(&out));
     // Noise of the stock rig, and what its converters round.
     let noises = [("pressure_kpa", 1.2), ("length_mm", 0.0502), ("bridge_v", 0.00202)];
     let mut sums = [(0.0, 0.0); 3];

@@ -258,7 +258,7 @@ const dropped = {
     html("version").textContent = version;
     page.options("model", ["auto", ...models], "auto");
     /** @type {Record<string, string>} What a name alone does not say; a model that is not here remembers what the signal did. */
-    const words = { auto: "the best on trials left out", linear: "a line", poly13: "as published", blended: "poly13 without a jump at a reversal" };
+    const words = { auto: "the best on trials left out", linear: "a line", poly13: "as published" };
     for (const option of select("model").options) {
       const rest = option.value.endsWith("+rest") ? ", and follows a baseline that drifts" : "";
       option.text = `${option.value}: ${words[option.value] ?? "with memory"}${rest}`;

@@ -31,9 +31,9 @@ pub struct FamilyRow {
     pub strongest_named: Rate,
     /// Nulls on which an effect was named, the gap was called unknown, or the record wrong.
     pub false_alarms: Rate,
-    /// Effects out of the catalogue answered `unknown`: they are written in every family.
+    /// Causes outside the catalogue answered `unknown`: they are written in every family.
     pub foreign_caught: Rate,
-    /// Entries struck out: answered `unknown` or with a known twin.
+    /// Cases whose entry was removed from the catalogue: answered `unknown` or with a known twin.
     pub struck: Rate,
     /// Expected calibration error.
     pub ece: Option<f64>,

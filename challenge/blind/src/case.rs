@@ -24,7 +24,7 @@ pub(crate) struct Recording {
     pub(crate) pressure_kpa: Option<Vec<f64>>,
     pub(crate) length_mm: Vec<f64>,
     pub(crate) bridge_v: Vec<f64>,
-    /// When each sample was taken, where `time_s` says so and it is not the grid, s.
+    /// Time of each sample, if `time_s` states it and it is not on the grid, s.
     pub(crate) stamps: Option<Vec<f64>>,
     /// Samples that are missing; empty when none is.
     pub(crate) missing: Vec<bool>,
@@ -35,7 +35,7 @@ pub(crate) struct Recording {
 pub(crate) struct Case {
     pub(crate) label: Label,
     pub(crate) recordings: Vec<Recording>,
-    /// Noise of pressure in Pa, length in mm and voltage in V, where a rig file says it.
+    /// Noise of pressure in Pa, length in mm and voltage in V, if a rig file states it.
     pub(crate) noise: Option<[f64; 3]>,
 }
 
@@ -47,7 +47,8 @@ impl Case {
         plan: &Plan,
         order: Order,
     ) -> Result<Self, BlindError> {
-        // Streams of its own for every case: the order in which cases are made cannot matter.
+        // Separate random streams for every case, so that the order in which cases are made does
+        // not matter.
         let base = 16 * (number as u64 + 1);
         let mut protocol_random = RandomGenerator::new(seed, base);
         let mut rig_random = RandomGenerator::new(seed, base + 1);
@@ -92,7 +93,7 @@ impl Case {
     }
 }
 
-/// What a recorder makes of a trial: noise, converters, lost rows.
+/// Effects of a recorder on a trial: noise, converters, lost rows.
 fn record(
     script: &Script,
     trace: Trace,
@@ -170,7 +171,7 @@ fn choose(
             vec![tuned(Cause::draw(lead, family, random), least, most, yardstick, random)]
         }
         CaseKind::Compound => {
-            // Each visible on its own, and neither drowned by the other.
+            // Each is visible alone, and neither hides the other.
             let first =
                 tuned(Cause::draw(lead, family, random), 1.0, most.max(1.0), yardstick, random);
             let range = ((0.2 * first.1).max(0.5), 5.0 * first.1.max(1.0));

@@ -5,7 +5,7 @@ use crate::random::RandomGenerator;
 /// Intervals of a table: the curve between its knots is the truth itself, not an approximation.
 const INTERVALS: usize = 240;
 
-/// A function on 0..1, straight between knots; beyond the ends it goes on with the last slope.
+/// A function on 0..1, linear between knots; beyond the ends it continues with the last slope.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Curve(Vec<f64>);
 

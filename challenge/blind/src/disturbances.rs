@@ -1,4 +1,4 @@
-//! Disturbances: everything that is not the rig and not an effect, as it was or drawn for each rig.
+//! Disturbances: everything that is neither the rig nor an effect, fixed or drawn for each rig.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
 use crate::words::worded;
 
 worded! {
-    /// How supply, noise, clock, pauses and start pressures of a case come about.
+    /// How supply, noise, clock, pauses and start pressures of a case are determined.
     #[derive(Default)]
     Disturbances {
-        /// The same in every rig: white Gaussian noise as the data sheet says, a supply that wanders by
-        /// 0.25 % over 15 s, pauses of 15 s, samples on the grid.
+        /// The same in every rig: white Gaussian noise as in the data sheet, a supply that drifts
+        /// by 0.25 % over 15 s, pauses of 15 s, samples on the grid.
         Plain "plain",
         /// Drawn for each rig: levels, colours, tails, correlation times, jitter, dropped samples.
         #[default]
@@ -24,7 +24,7 @@ worded! {
 pub(crate) struct Noise {
     /// Standard deviation without outliers.
     pub(crate) sigma: f64,
-    /// Share of the variance that is remembered, and for how many samples.
+    /// Share of the variance that is correlated, and over how many samples.
     slow: f64,
     memory: f64,
     /// Degrees of freedom of Student's t; 0 for a Gaussian.
@@ -81,7 +81,7 @@ impl Noise {
     }
 }
 
-/// How the supply wanders.
+/// How the supply drifts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SupplyWander {
     /// Standard deviation as a share of the supply.
@@ -92,7 +92,7 @@ pub(crate) struct SupplyWander {
 }
 
 impl SupplyWander {
-    /// Shares by which the supply is off, at knots `step_s` apart.
+    /// Relative deviations of the supply, at knots `step_s` apart.
     pub(crate) fn knots(
         &self,
         count: usize,
@@ -120,7 +120,7 @@ impl SupplyWander {
     }
 }
 
-/// How far the pressures that trials start from are off.
+/// Deviations of the pressures from which trials start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StartErrors {
     /// Mean and standard deviation below the supply, as a share of it.
@@ -130,7 +130,7 @@ pub(crate) struct StartErrors {
 }
 
 impl StartErrors {
-    /// Share of the supply that a full start lacks (below 0: has too much).
+    /// Share of the supply that a full start lacks (negative: has too much).
     pub(crate) fn full(&self, random: &mut RandomGenerator) -> f64 {
         self.full.0 + self.full.1 * random.gauss()
     }
@@ -242,7 +242,7 @@ impl Drawn {
         ((mean + spread * random.gauss()).clamp(8.0, 25.0) * 100.0).round() / 100.0
     }
 
-    /// How much later than on the grid each sample is taken, s; empty when on the grid.
+    /// Delay of each sample relative to the grid, s; empty if all are on the grid.
     pub(crate) fn offsets(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         if self.jitter_s == 0.0 {
             return Vec::new();
@@ -252,7 +252,7 @@ impl Drawn {
         (0..count).map(late).map(|late: f64| late.clamp(-2e-3, 2e-3)).collect()
     }
 
-    /// Which samples are missing; empty when none is. The first one is always there.
+    /// Which samples are missing; empty if none is. The first one is always present.
     pub(crate) fn missing(&self, count: usize, random: &mut RandomGenerator) -> Vec<bool> {
         if self.dropped == 0.0 {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! What may be wrong with a rig: the vocabulary, and the forms each cause takes here.
+//! Causes that may be wrong with a rig: the vocabulary, and the forms of each cause here.
 
 use crate::family::Family;
 use crate::random::RandomGenerator;
@@ -18,7 +18,8 @@ worded! {
     }
 }
 
-/// A cause: its name, stage, forms, least and greatest strength, and what a negative sign does.
+/// A cause: its name, stage, forms, smallest and largest strength, and the meaning of a negative
+/// sign.
 #[derive(Debug)]
 pub(crate) struct Spec {
     pub(crate) name: &'static str,
@@ -26,7 +27,7 @@ pub(crate) struct Spec {
     pub(crate) forms: &'static [&'static str],
     pub(crate) least: f64,
     pub(crate) most: f64,
-    /// Share of `most` reached with a negative sign; 0 where the sign is fixed.
+    /// Share of `most` that is reached with a negative sign; 0 if the sign is fixed.
     pub(crate) negative: f64,
 }
 
@@ -85,7 +86,7 @@ causes! {
     PotStiction "pot_stiction" Reference ["stick_and_jump"] 1e-3 .. 3.0, 0.0;
 }
 
-/// How many kinds of the list above the catalogue of effects holds.
+/// Number of kinds of the list above in the catalogue of effects.
 pub(crate) const CATALOGUED: usize = 23;
 
 impl Kind {
@@ -114,25 +115,25 @@ impl Kind {
     }
 }
 
-/// A cause at work: a kind in one of its forms at one strength.
+/// An active cause: a kind in one of its forms at one strength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) kind: Kind,
-    /// Where its form is drawn from; what the catalogue lacks is always written.
+    /// Family of its form; causes outside the catalogue are always written.
     pub(crate) family: Family,
     /// Which of the written forms.
     pub(crate) form: usize,
     /// Leading parameter, without its sign; units as in the catalogue.
     pub(crate) strength: f64,
     pub(crate) sign: f64,
-    /// Uniform numbers that set what else the form leaves open.
+    /// Uniform numbers that determine the remaining freedom of the form.
     pub(crate) aux: [f64; 3],
     /// Seed of what is random inside the cause.
     pub(crate) seed: u64,
 }
 
 impl Cause {
-    /// A form, a sign and the secondary parameters drawn; the strength still at its most.
+    /// A drawn form, sign and secondary parameters; the strength is still at its maximum.
     pub(crate) fn draw(kind: Kind, family: Family, random: &mut RandomGenerator) -> Self {
         let form = random.below(kind.spec().forms.len());
         let negative = kind.spec().negative > 0.0 && random.unit() < 0.5;

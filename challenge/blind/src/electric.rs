@@ -1,4 +1,4 @@
-//! Laws of the electrical side that are drawn: knees, static laws, settling, softening, filters.
+//! Drawn laws of the electrical side: knees, static laws, settling, softening, filters.
 
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind};
@@ -11,7 +11,7 @@ use crate::random::RandomGenerator;
 /// Length of a session that a drift is tabled for, s.
 const SESSION_S: f64 = 735.0;
 
-/// What is drawn for the causes at work; `None` where a cause is absent or written.
+/// Drawn laws of the active causes; `None` if a cause is absent or written.
 #[derive(Debug, Clone)]
 pub(crate) struct Electric {
     pub(crate) slack: Option<Knee>,
@@ -38,7 +38,7 @@ pub(crate) struct Saturation {
 pub(crate) struct Softening {
     law: Curve,
     travel: f64,
-    /// What stretching counts; relaxing counts the rest of 2.
+    /// Weight of stretching; relaxing has the rest of 2.
     stretching: f64,
     /// Time in which travel is forgotten, s.
     memory_s: f64,
@@ -103,12 +103,12 @@ impl Electric {
         self.drift.as_ref().map_or(0.0, |law| SESSION_S * law.at(session.max(0.0) / SESSION_S))
     }
 
-    /// Share of the heating that is reached after so many time constants.
+    /// Share of the heating that is reached after this many time constants.
     pub(crate) fn warmth(&self, times: f64) -> f64 {
         self.heating.as_ref().map_or(0.0, |law| law.at(-(-times.max(0.0)).exp_m1()))
     }
 
-    /// A voltage clipped by `strength` inside the range it takes.
+    /// A voltage whose range is clipped by `strength`.
     pub(crate) fn clip(&self, volts: f64, strength: f64, bottom: f64, top: f64) -> f64 {
         let Some(Saturation { knee, top: above, bottom: below }) = &self.saturation else {
             return volts;

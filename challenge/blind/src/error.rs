@@ -1,4 +1,4 @@
-//! What can go wrong when cases are written, sealed or scored.
+//! Errors when cases are written, sealed or scored.
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ pub enum BlindError {
         /// The folder.
         path: PathBuf,
     },
-    /// No rig could be drawn whose sleeve stays stretched with the effect acting.
+    /// No rig could be drawn whose sleeve stays stretched with the active effect.
     #[error("case {case}: no rig drawn in {tries} tries keeps its sleeve stretched")]
     NoRig {
         /// Number of the case.
@@ -64,7 +64,7 @@ pub enum BlindError {
         /// What is wrong with it, and what to do.
         reason: String,
     },
-    /// A diagnosis lacks a field or holds a number that makes no sense.
+    /// A diagnosis lacks a field or holds an invalid number.
     #[error("{case}: {reason}")]
     BadVerdict {
         /// Name of the case.

@@ -1,4 +1,4 @@
-//! How strong a case is: the excess over the noise that re-tuning the nominal rig would leave.
+//! Strength of a case: the excess over the noise that re-tuning the nominal rig would leave.
 
 use crate::disturbances::Surroundings;
 use crate::effect::{Causes, Stage};
@@ -10,7 +10,7 @@ use crate::session::{COARSE, Conditions, Trace, run};
 /// samples to fit and samples to test on.
 type Channels = [Vec<f64>; 3];
 
-/// The nominal session of a rig, and what its parameters change in it, computed when needed.
+/// The nominal session of a rig, and its changes by parameters, computed when needed.
 #[derive(Debug)]
 pub(crate) struct Yardstick<'a> {
     rig: &'a Rig,
@@ -41,8 +41,8 @@ impl<'a> Yardstick<'a> {
         Self { rig, scripts, conditions, pressure_column, nominal, moved, noise }
     }
 
-    /// Excess summed over the channels on the test trials, after the nominal parameters took up
-    /// what they can of the gap in the fit trials; and the least strain met.
+    /// Excess summed over the channels on the test trials, after the nominal parameters explained
+    /// what they can of the gap in the fit trials; and the smallest strain that occurred.
     pub(crate) fn excess(&mut self, causes: &Causes) -> (f64, f64) {
         let truth = run(self.rig, causes, self.scripts, self.conditions, COARSE);
         let least = truth.iter().map(|t| t.least_strain).fold(f64::INFINITY, f64::min);
@@ -66,7 +66,7 @@ impl<'a> Yardstick<'a> {
         (excess, least)
     }
 
-    /// Sample numbers, all trials end to end, that belong to a split.
+    /// Sample numbers, with all trials concatenated, that belong to a split.
     fn samples(&self, split: Split) -> impl Iterator<Item = usize> + '_ {
         let mut begin = 0;
         self.scripts.iter().flat_map(move |script| {
@@ -91,7 +91,7 @@ impl<'a> Yardstick<'a> {
             .collect()
     }
 
-    /// Every stage fed with its measured input: what the nominal rig leaves in each channel.
+    /// Residual of the nominal rig in each channel, with every stage fed with its measured input.
     fn residual(&self, truth: &[Trace]) -> Channels {
         let pressure = if self.pressure_column {
             self.join(truth, self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i])
@@ -109,13 +109,13 @@ impl<'a> Yardstick<'a> {
         [pressure, length, volts]
     }
 
-    /// Whether a parameter can take up any of the residual.
+    /// Whether a parameter can explain any of the residual.
     fn shows(&self, stage: Stage, name: &str, residual: &Channels) -> bool {
         let alive = |c: usize| residual[c].iter().any(|r| r.abs() > 1e-3);
         match stage {
             Stage::Pneumatics if self.pressure_column => alive(0),
             Stage::Pneumatics | Stage::Muscle => alive(1),
-            // The trimmed arm scales with the resistance: R0 does not show.
+            // The trimmed arm scales with the resistance, so R0 has no effect.
             _ => alive(2) && name != "R0",
         }
     }
@@ -161,7 +161,7 @@ impl<'a> Yardstick<'a> {
         let n = columns.len();
         let mut normal = vec![vec![0.0; n]; n];
         let mut right = vec![0.0; n];
-        // Residuals are correlated over some 50 samples: that many count as one.
+        // Residuals are correlated over about 50 samples, which count as one.
         let weight = 1.0 / 50.0;
         for channel in 0..3 {
             if residual[channel].is_empty() {

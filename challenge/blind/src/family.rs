@@ -1,14 +1,14 @@
-//! Families of forms: where the functions that make up an effect are drawn from.
+//! Families of forms: sources of the functions that make up an effect.
 
 use std::fmt;
 
 use crate::words::worded;
 
 worded! {
-    /// Where the functional form of every effect of a case comes from.
+    /// Source of the functional form of every effect of a case.
     ///
-    /// The drawn families differ in kind, not only in numbers: a threshold that was set on some of them
-    /// can be judged on one left out.
+    /// The drawn families differ in kind, not only in numbers, so a threshold that was set on some
+    /// of them can be judged on one left out.
     ///
     /// ```
     /// use stretch_blind::Family;

@@ -1,11 +1,11 @@
-//! Low passes drawn: of any order, with a kernel of any shape, of spread poles, or uneven.
+//! Drawn low-pass filters: of any order, with a kernel of any shape, of spread poles, or uneven.
 
 use crate::curve::weights;
 use crate::family::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
-/// First-order lags in a row or side by side, and what of each is heard.
+/// First-order lags in series or in parallel, and the weight of each.
 #[derive(Debug, Clone)]
 pub(crate) struct LowPass {
     /// Time constants rising and falling, s.
@@ -20,7 +20,8 @@ impl LowPass {
     pub(crate) fn draw(family: Family, delay: f64, random: &mut RandomGenerator) -> Self {
         let mut filter = match family {
             Family::Written => Self::of(vec![1.0], vec![1.0], true),
-            // The kernel of four equal poles in a row, each heard with a weight of its own.
+            // The kernel of four equal poles in series, whose outputs are summed with separate
+            // weights.
             Family::Splines => Self::of(vec![1.0; 4], weights(4, 0.8, random), true),
             // Poles side by side over more than a decade.
             Family::Spectra => {

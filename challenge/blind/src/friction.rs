@@ -7,7 +7,7 @@ use crate::family::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
-/// One play: share of the whole, reach when it rises and when it falls, where it stands.
+/// One play: its share, its reach when rising and when falling, its position.
 #[derive(Debug, Clone, Copy)]
 struct Element {
     share: f64,
@@ -43,8 +43,9 @@ impl Friction {
         }
     }
 
-    /// Form 0 is Dahl's (1968), 1 Bouc's and Wen's (1976), else six slip elements; `reach` is where it
-    /// saturates. `spread` in 0..1 sets what the form leaves open; `sharp` loops turn within their reach.
+    /// Form 0 is Dahl's (1968), 1 Bouc's and Wen's (1976), otherwise six slip elements; `reach` is
+    /// where it saturates. `spread` in 0..1 sets the remaining freedom of the form; `sharp` loops
+    /// turn within their reach.
     fn written(form: usize, reach: f64, spread: f64, sharp: bool) -> Self {
         let rate = |dahl, exponent, share| Law::Rate {
             dahl,
@@ -102,7 +103,7 @@ impl Friction {
         Law::Rate { dahl, exponent, share, rest, speed, z: 0.0 }
     }
 
-    /// Feeds the next value, `h` seconds after the last; gives what the loop holds back.
+    /// Takes the next value, `h` seconds after the last; returns what the loop holds back.
     pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
         let dx = x - self.last.replace(x).unwrap_or(x);
         if self.reach <= 0.0 {

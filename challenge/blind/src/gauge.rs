@@ -1,4 +1,4 @@
-//! Sleeve, gauge, bridge and amplifier, and the potentiometer beside them.
+//! Sleeve, gauge, bridge and amplifier, and the potentiometer.
 
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind, Stage};
@@ -66,7 +66,7 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// Whether any cause acts here: without one the voltage is a function of contraction.
+    /// Whether any cause acts here; without one the voltage is a function of contraction.
     pub(crate) fn active(&self) -> bool {
         self.active
     }
@@ -220,7 +220,7 @@ impl<'a> Gauge<'a> {
         }
         if let Some(c) = self.causes.find(Kind::AmplifierSlew) {
             let last = self.slewed.unwrap_or(v);
-            // The strength is the inverse of the rate: more is slower.
+            // The strength is the inverse of the rate: a larger strength is slower.
             let most = h * 10.0 / c.strength;
             v = last + (v - last).clamp(-most, most);
             self.slewed = Some(v);
@@ -250,7 +250,7 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// What the converter makes of the samples: missing codes and frozen runs, V.
+/// Effects of the converter on the samples: missing codes and frozen runs, V.
 pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
     if let Some(c) = causes.find(Kind::MissingCodes) {
         let bit = 5 + (c.aux[0] * 3.0) as u32;

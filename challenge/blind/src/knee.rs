@@ -1,4 +1,4 @@
-//! Knees of any shape: what cannot fall below a floor, or almost cannot.
+//! Knees of any shape: functions that do not, or hardly, fall below a floor.
 
 use crate::curve::Curve;
 use crate::family::Family;
@@ -10,7 +10,7 @@ use crate::random::RandomGenerator;
 pub(crate) struct Knee {
     /// Integral of the slope over -1..1 in units of the half-width (x = (u + 1) / 2).
     turn: Curve,
-    /// How far the knee's middle stands off so that the far line passes through the floor.
+    /// Shift of the knee's middle with which the far line passes through the floor.
     offset: f64,
     width: f64,
     /// Slope that is left below the floor.

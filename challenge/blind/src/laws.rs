@@ -17,7 +17,7 @@ pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
             let slope = Wiggle::draw(4 + random.below(4), 0.6, random);
             Curve::risen(|x| slope.at(x).exp())
         }
-        // Elements that saturate or grow, each with a scale of its own.
+        // Elements that saturate or grow, each with a separate scale.
         Family::Spectra => {
             let count = 3 + random.below(4);
             let parts: Vec<(f64, f64)> = weights(count, 0.8, random)
@@ -118,7 +118,7 @@ pub(crate) fn bump(family: Family, random: &mut RandomGenerator) -> Curve {
     raw.times(1.0 / size)
 }
 
-/// What has been reached of a settling, over 1 - exp(-t/tau): rises from (0, 0) to (1, 1).
+/// Progress of a settling, over 1 - exp(-t/tau): rises from (0, 0) to (1, 1).
 ///
 /// A sum of exponentials is a sum of powers of exp(-t/tau).
 pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
@@ -144,7 +144,7 @@ pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
     }
 }
 
-/// A drift over 0..1 that goes from 0 to 1 by and large.
+/// A drift over 0..1 that mostly goes from 0 to 1.
 pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
     let raw = match family {
         Family::Written => Curve::table(|x| x),
@@ -155,7 +155,7 @@ pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
             Curve::table(|x| trend.at(x) + wiggle.at(x) - begin)
         }
         Family::Spectra => settling(family, random),
-        // Integrated Ornstein-Uhlenbeck: the rate of the drift wanders.
+        // Integrated Ornstein-Uhlenbeck: the rate of the drift is a random process.
         Family::RateLaws => {
             let (mut rate, decay) = (random.gauss(), random.between(0.9, 0.99));
             let rates: Vec<f64> = (0..200)
@@ -184,7 +184,7 @@ pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
         }
     };
     let end = raw.at(1.0);
-    // A path that comes back is scaled by its largest excursion.
+    // A path that returns is scaled by its largest excursion.
     let scale = if end.abs() > 0.4 * raw.size() { end } else { raw.size() };
     raw.times(1.0 / scale)
 }

@@ -11,9 +11,9 @@ use crate::verdict::Verdict;
 impl Score {
     /// Scores every family by the run that was calibrated without it.
     ///
-    /// `runs` holds, for each family, the verdicts of a diagnosis whose thresholds saw the other
-    /// families only; of each run only the cases of that family count. The rows of
-    /// [`Score::families`] are then the leave-family-out table, the other figures pool them.
+    /// `runs` holds, for each family, the verdicts of a diagnosis whose thresholds were calibrated
+    /// only on the other families; only the cases of that family count. The rows of
+    /// [`Score::families`] are then the leave-family-out table; the other figures pool them.
     ///
     /// # Errors
     /// As [`Score::of`].

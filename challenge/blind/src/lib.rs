@@ -1,4 +1,29 @@
-#![doc = include_str!("../README.md")]
+//! Makes data sets with a known, sealed cause, and scores diagnoses of them. The README of
+//! `challenge/` describes the cases.
+//!
+//! ```
+//! use stretch_blind::{Plan, Score, Seal, Verdict, make};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let dir = tempfile::tempdir()?;
+//! let plan = Plan { single: 1, ..Plan::of(0) };
+//! let seal = make(dir.path(), 7, &plan, &|done| eprintln!("{done} made"))?;
+//! println!("{}", seal.sha256()); // before anything is diagnosed
+//!
+//! // A diagnosis that never sees `sealed/` reads case-000 and answers:
+//! let answer = serde_json::json!({
+//!     "schema": 1, "verdict": "no_gap", "named": [], "ambiguous": [], "candidates": [], "runtime_s": 0.1
+//! });
+//! let verdict = Verdict::from_diagnosis("case-000", &answer)?;
+//!
+//! let (_, truth) = Seal::open(dir.path())?; // an error if a label was altered
+//! let score = Score::of(&truth, &[verdict])?;
+//! assert_eq!(score.misses.len(), usize::from(truth.cases["case-000"].excess >= 0.1));
+//! println!("{score}");
+//! # Ok(())
+//! # }
+//! ```
+
 mod by_family;
 mod case;
 mod curve;

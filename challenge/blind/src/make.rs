@@ -16,10 +16,11 @@ use crate::truth::{CaseKind, Truth};
 
 /// Makes the cases of a plan under `dir` and seals their labels.
 ///
-/// Writes `case-000/`, `case-001/`, ... (a data set each: `dataset.toml` and seventeen trials, or
-/// eighteen; where a rig file says how much noise there is also `rig.toml`; where an entry is struck out also `hint.toml` with `without = ["name"]`), `sealed/truth.json`
-/// and `seal.sha256`. Same seed and plan, same bytes, whatever the number of threads. `progress`
-/// is told how many cases are done; it may be called from several threads.
+/// Writes `case-000/`, `case-001/`, ..., `sealed/truth.json` and `seal.sha256`. Each case is a data
+/// set: `dataset.toml` and seventeen or eighteen trials. There is also `rig.toml` if a rig file
+/// states the noise, and `hint.toml` with `without = ["name"]` if an entry is removed from the
+/// catalogue. The same seed and plan give the same bytes, whatever the number of threads.
+/// `progress` is called with the number of finished cases, possibly from several threads.
 ///
 /// The hash in the [`Seal`] is to be shown before any diagnosis runs.
 ///

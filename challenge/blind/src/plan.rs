@@ -22,7 +22,7 @@ pub struct Plan {
     pub dominant: usize,
     /// An effect that the catalogue lacks, every one in turn.
     pub out_of_catalogue: usize,
-    /// One effect, its entry struck out, every effect in turn.
+    /// One effect whose entry is removed from the catalogue, every effect in turn.
     pub struck: usize,
     /// Least and greatest excess aimed at, log-uniform between them.
     pub excess: (f64, f64),
@@ -35,9 +35,9 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Shares out `cases` as 34 % single, 28 % null, 8 % compound, 6 % dominant, 10 % out of the
-    /// catalogue, the rest struck, with excesses from 0.05 to 100, every family of forms in turn,
-    /// drawn disturbances and the paper's trials.
+    /// Divides `cases` into 34 % single, 28 % null, 8 % compound, 6 % dominant, 10 % outside the
+    /// catalogue, and the rest with a removed entry. Excesses are 0.05 to 100; every family of
+    /// forms is used in turn, with random disturbances and the paper's trials.
     ///
     /// ```
     /// let plan = stretch_blind::Plan::of(360);

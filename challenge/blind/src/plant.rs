@@ -59,7 +59,7 @@ impl Drawn {
     }
 }
 
-/// What drives a step: conductance shares of the valves and the supply, Pa absolute.
+/// Inputs of a step: conductance shares of the valves and the supply, Pa absolute.
 #[derive(Debug, Clone, Copy)]
 struct Drive {
     inlet: f64,
@@ -108,7 +108,7 @@ impl<'a> Plant<'a> {
         self.shadow
     }
 
-    /// Sets the pressure, as a regulator would that holds it.
+    /// Sets the pressure, as a regulator that holds it would.
     pub(crate) fn regulate(&mut self, p: f64) {
         self.state[0] = p;
         self.state[4] = 0.0;
@@ -126,7 +126,7 @@ impl<'a> Plant<'a> {
         {
             u = law.pass(u, c.strength, side);
         } else if let Some(c) = self.causes.find(Kind::ValveDeadband) {
-            // The two valves differ a little; no stretching of what is left.
+            // The two valves differ a little; the rest is not stretched.
             let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
             u = match c.form {
                 0 => (u - band).max(0.0),
@@ -150,7 +150,7 @@ impl<'a> Plant<'a> {
             let (inlet, outlet) = command(time);
             self.share(if side == 0 { inlet } else { outlet }, side)
         };
-        // Commands change at samples only: at most one change falls into a step.
+        // Commands change only at samples, so there is at most one change in a step.
         let rate = crate::protocol::RATE_HZ as f64;
         let begin = t - late;
         let change = (((begin + 1e-9) * rate).floor() + 1.0) / rate;
@@ -297,7 +297,7 @@ impl<'a> Plant<'a> {
         if let Some(c) = self.causes.find(Kind::AdiabaticGas) {
             d[5] = 0.4 * d[0] / y[0] - y[5] / c.strength;
         }
-        // A drawn sag stands still within a step.
+        // A drawn sag is constant within a step.
         if let Some(c) = self.causes.find(Kind::SupplySag).filter(|c| !c.is_drawn()) {
             let tau = 0.25 + 0.5 * c.aux[0];
             let scale = c.strength * Q_REF;

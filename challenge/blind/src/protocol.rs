@@ -17,8 +17,8 @@ worded! {
         /// The seventeen trials of the paper.
         #[default]
         Paper "paper",
-        /// One more to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which parts a
-        /// sleeve that goes slack from an amplifier that saturates.
+        /// One more trial to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which
+        /// distinguishes a sleeve that goes slack from an amplifier that saturates.
         PaperPlus "paper+",
     }
 }
@@ -56,7 +56,7 @@ const RAMPS: [(f64, &str); 6] =
     [(0.0025, "0_25"), (0.125, "12_5"), (0.25, "25"), (0.5, "50"), (0.75, "75"), (1.0, "100")];
 
 /// The trials of a session: six inflations, six deflations, then two trials to fit and three to
-/// test on; then whatever more the protocol has.
+/// test; then the protocol's further trials.
 pub(crate) fn session(protocol: Protocol, random: &mut RandomGenerator) -> Vec<Script> {
     let mut scripts = Vec::new();
     let mut start_s = 0.0;

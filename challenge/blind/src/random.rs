@@ -1,4 +1,4 @@
-//! Random numbers of one purpose in one case: a ChaCha stream each.
+//! Random numbers of one purpose in one case: one ChaCha stream each.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -103,7 +103,7 @@ pub struct Bin {
     pub right: Rate,
 }
 
-/// Probabilities stated against how often they came true.
+/// Stated probabilities against how often they came true.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
     /// Ten bins of equal width.

@@ -7,7 +7,7 @@ use crate::family::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
-/// One lag: its share, its time constants rising and falling in s, where it stands.
+/// One lag: its share, its time constants rising and falling in s, its state.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     share: f64,
@@ -32,7 +32,7 @@ pub(crate) struct Relaxation {
 }
 
 impl Relaxation {
-    /// The lags of a cause around `tau` s; `scale` is the span of what is fed.
+    /// The lags of a cause around `tau` s; `scale` is the span of the input.
     pub(crate) fn of(cause: &Cause, tau: f64, scale: f64) -> Self {
         match cause.is_drawn() {
             true => Self::draw(cause.family, tau, scale, &mut cause.random(3)),
@@ -50,7 +50,7 @@ impl Relaxation {
         Self { parts: shape.iter().map(part).collect(), hurry: (0.0, 1.0), settled: false }
     }
 
-    /// Lags of a family around `tau` s; `scale` is the span of what is fed.
+    /// Lags of a family around `tau` s; `scale` is the span of the input.
     pub(crate) fn draw(family: Family, tau: f64, scale: f64, random: &mut RandomGenerator) -> Self {
         let mut hurry = (0.0, 1.0);
         let even = |parts: Vec<(f64, f64)>| -> Vec<Part> {

@@ -1,4 +1,4 @@
-//! A rig of its own: nominal parameters, their tolerances, and the static force law.
+//! An independently drawn rig: nominal parameters, their tolerances, and the static force law.
 
 use crate::effect::Stage;
 use crate::random::RandomGenerator;
@@ -88,7 +88,7 @@ impl Rig {
         let mut x = 0.0_f64;
         for knot in 0..=KNOTS {
             let ratio = RATIO_MAX * knot as f64 / KNOTS as f64;
-            // Newton from the knot before: the law is smooth and strictly rising.
+            // Newton from the previous knot, because the law is smooth and strictly rising.
             for _ in 0..6 {
                 let (decay, growth) = ((-a1 * x).exp(), (a3 * x * x).exp());
                 let law = a0 * (1.0 - decay) * growth;

@@ -13,13 +13,13 @@ use crate::verdict::Verdict;
 
 /// Least excess from which a single effect counts.
 pub const COUNTED_EXCESS: f64 = 0.1;
-/// A candidate that closes this share of the gap stands in for the effect struck out.
+/// A candidate that closes this share of the gap replaces the removed effect.
 pub const STAND_IN: f64 = 0.85;
 
 /// Answers to single effects with at least [`COUNTED_EXCESS`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Singles {
-    /// First name right, a declared tie that holds the truth counted right.
+    /// First name right; a declared tie that holds the truth counts as right.
     pub top1: Rate,
     /// The same for an excess above 10, 1 .. 10, 0.1 .. 1.
     pub top1_above_10: Rate,
@@ -32,7 +32,7 @@ pub struct Singles {
     /// First name right, whatever ties were declared.
     #[serde(default)]
     pub first_name: Rate,
-    /// Exactly the one effect named, a declared tie that holds the truth counted right.
+    /// Exactly the one effect named; a declared tie that holds the truth counts as right.
     pub exact: Rate,
     /// Called a part of the gap, by a `partial`.
     #[serde(default)]
@@ -50,7 +50,7 @@ pub struct Singles {
     pub stage: Rate,
     /// The effect is in the 95 % set (of cases whose set is not empty).
     pub set_covers: Rate,
-    /// The effect is in the 95 % set, an empty set counting as a miss.
+    /// The effect is in the 95 % set; an empty set counts as a miss.
     pub set_covers_all: Rate,
     /// Mean number of effects in the sets that are not empty.
     pub set_size: Option<f64>,
@@ -60,11 +60,12 @@ pub struct Singles {
     pub false_unknown: Rate,
     /// Called no gap or parameters.
     pub overlooked: Rate,
-    /// Fainter than [`COUNTED_EXCESS`]: named all the same, and right.
+    /// Fainter than [`COUNTED_EXCESS`], but named nevertheless, and right.
     pub faint_named: Rate,
 }
 
-/// Effects named and there, named and not there, there and not named, over a kind of cases.
+/// Numbers of effects that are named and present, named and absent, present and not named, over a
+/// kind of cases.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Several {
     /// Every effect named.
@@ -79,14 +80,15 @@ pub struct Several {
     pub recall: Rate,
 }
 
-/// Cases whose effect's own entry was struck out (excess at least [`COUNTED_EXCESS`]).
+/// Cases in which the effect's entry was removed from the catalogue (excess at least
+/// [`COUNTED_EXCESS`]).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Struck {
     /// Answered `unknown`, or with a known twin.
     pub unknown_or_twin: Rate,
-    /// Answered `unknown` where the effect has no known twin.
+    /// Answered `unknown`, of effects without a known twin.
     pub unknown_no_twin: Rate,
-    /// Answered `unknown` where the candidate put first does not close [`STAND_IN`] of the gap.
+    /// Answered `unknown`, of cases whose first candidate does not close [`STAND_IN`] of the gap.
     pub unknown_no_stand_in: Rate,
     /// A catalogued effect named that is no twin.
     pub wrong_name: Rate,
@@ -172,11 +174,11 @@ pub struct Score {
     pub foreign_by_effect: BTreeMap<String, Rate>,
     /// Effects out of the catalogue placed in their stage.
     pub foreign_stage: Rate,
-    /// Entries struck out.
+    /// Cases with a removed entry.
     pub struck: Struck,
     /// Median closed-gap fraction of singles counted and named rightly.
     pub closed: Option<f64>,
-    /// Median closed-gap fraction over all singles counted, whatever was named.
+    /// Median closed-gap fraction over all counted singles, whatever was named.
     pub closed_all: Option<f64>,
     /// Median of the fit that knows the label, over the cases of `closed_all` that have one.
     pub closed_oracle: Option<f64>,
@@ -189,7 +191,7 @@ pub struct Score {
     /// Simpler methods, by name.
     #[serde(default)]
     pub baselines: BTreeMap<String, Baseline>,
-    /// Figures by family of forms, where there is more than one.
+    /// Figures by family of forms, if there is more than one.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub families: BTreeMap<Family, FamilyRow>,
     /// Every wrong answer.
@@ -202,8 +204,8 @@ impl Score {
     /// Scores verdicts against the labels.
     ///
     /// # Errors
-    /// [`BlindError::UnknownCase`], [`BlindError::DuplicateCase`] when verdicts and labels do
-    /// not belong together.
+    /// [`BlindError::UnknownCase`], [`BlindError::DuplicateCase`] if verdicts and labels do not
+    /// match.
     pub fn of(truth: &Truth, verdicts: &[Verdict]) -> Result<Self, BlindError> {
         let mut tally = Tally::default();
         let mut families: BTreeMap<Family, Tally> = BTreeMap::new();
@@ -436,8 +438,7 @@ impl Tally {
     }
 }
 
-/// A name that is not there is excused by an effect that is there, was not named, and stands in the
-/// tie declared.
+/// A wrong name is excused if a true effect that was not named is in the declared tie.
 fn several(several: &mut Several, label: &Label, verdict: &Verdict) -> bool {
     let answer = verdict.answer();
     let named = label.effects.iter().filter(|e| answer.contains(e)).count();
@@ -458,7 +459,7 @@ fn several(several: &mut Several, label: &Label, verdict: &Verdict) -> bool {
     }
 }
 
-/// Whether the stage named is that of the first effect; without a pressure column pneumatics and
+/// Whether the named stage is that of the first effect; without a pressure column pneumatics and
 /// muscle are one stage, `actuation`.
 fn in_stage(label: &Label, verdict: &Verdict) -> bool {
     let Some(stage) = label.stages.first() else { return false };

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::error::BlindError;
 use crate::truth::Truth;
 
-/// The sealed labels of a set of cases: `sealed/truth.json` beside the case folders, and its
+/// The sealed labels of a set of cases: `sealed/truth.json` next to the case folders, and its
 /// SHA-256 in `seal.sha256`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seal {
@@ -45,11 +45,11 @@ impl Seal {
         &self.path
     }
 
-    /// Opens the labels under `dir`, if their hash is still the one that was written.
+    /// Opens the labels under `dir`, if their hash has not changed.
     ///
     /// # Errors
-    /// [`BlindError::SealBroken`] when it is not; [`BlindError::Io`], [`BlindError::Json`] when a
-    /// file is missing or not what it should be.
+    /// [`BlindError::SealBroken`] if it has; [`BlindError::Io`], [`BlindError::Json`] if a file is
+    /// missing or invalid.
     pub fn open(dir: &Path) -> Result<(Self, Truth), BlindError> {
         let path = dir.join("sealed").join("truth.json");
         let (truth, sha256) = open(&path, &dir.join("seal.sha256"))?;
@@ -67,7 +67,7 @@ pub(crate) fn close(path: &Path, labels: &impl Serialize) -> Result<String, Blin
     Ok(sha256_hex(text.as_bytes()))
 }
 
-/// Labels, if their SHA-256 is still the one that `mark` holds; hands it back, too.
+/// Labels, if their SHA-256 equals the one in `mark`; also returns the hash.
 pub(crate) fn open<T: DeserializeOwned>(
     path: &Path,
     mark: &Path,

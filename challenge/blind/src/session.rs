@@ -27,13 +27,13 @@ pub(crate) struct Conditions {
     supply: Vec<f64>,
     /// Of each trial: Pa above the atmosphere, or the share of the supply that it lacks.
     start_error: Vec<f64>,
-    /// How much later than on the grid each sample of a trial is taken, s; empty when on the grid.
+    /// Delay of each sample of a trial relative to the grid, s; empty if all are on the grid.
     offsets: Vec<Vec<f64>>,
 }
 
 impl Conditions {
-    /// A supply that wanders by 0.25 % (1 sd) over some 15 s, and start pressures 0.1 kPa above
-    /// the atmosphere or 0.1 % below the supply, roughly.
+    /// A supply that drifts by 0.25 % (1 sd) over about 15 s. Start pressures are about 0.1 kPa
+    /// above the atmosphere or 0.1 % below the supply.
     pub(crate) fn plain(scripts: &[Script], random: &mut RandomGenerator) -> Self {
         let knots = knots(scripts);
         let (slow_s, smooth_s) = (15.0, 1.5);
@@ -77,7 +77,7 @@ impl Conditions {
         Self { supply, start_error, offsets }
     }
 
-    /// How much later than on the grid the samples of a trial are taken, s.
+    /// Delay of the samples of a trial relative to the grid, s.
     pub(crate) fn offsets(&self, trial: usize) -> &[f64] {
         &self.offsets[trial]
     }
@@ -97,7 +97,7 @@ fn knots(scripts: &[Script]) -> usize {
     ((duration + PREPARE_S) / KNOT_S) as usize + 3
 }
 
-/// Values at the times that samples are taken at, from those on the grid.
+/// Interpolates values from the grid to the times of the samples.
 fn resampled(values: Vec<f64>, offsets: &[f64]) -> Vec<f64> {
     if offsets.is_empty() {
         return values;
@@ -112,7 +112,7 @@ fn resampled(values: Vec<f64>, offsets: &[f64]) -> Vec<f64> {
     offsets.iter().enumerate().map(value).collect()
 }
 
-/// What a trial shows before noise and rounding, 100 samples a second.
+/// Channels of a trial before noise and rounding, 100 samples a second.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Trace {
     /// Gauge pressure, Pa.
@@ -351,7 +351,8 @@ mod tests {
         }
     }
 
-    /// Sum of squares, over all channels, of what two sessions differ by, in units of the noise.
+    /// Sum of squares, over all channels, of the difference between two sessions, in units of the
+    /// noise.
     fn apart(a: &[Trace], b: &[Trace]) -> f64 {
         type Channel = fn(&Trace) -> &Vec<f64>;
         let channels: [(Channel, f64); 3] =

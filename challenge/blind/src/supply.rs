@@ -1,4 +1,4 @@
-//! A supply that sags under load, drawn: how much a load draws it down, and how it comes back.
+//! A drawn supply that sags under load: how much a load lowers it, and how it recovers.
 
 use crate::curve::{Curve, weights};
 use crate::family::Family;
@@ -15,7 +15,7 @@ pub(crate) struct Sag {
     scale: f64,
     /// Sag over flow; table over 0 .. 2 of the reference flow.
     load: Curve,
-    /// Share, time constants falling and recovering in s, where it stands in Pa.
+    /// Share, time constants falling and recovering in s, state in Pa.
     parts: Vec<(f64, f64, f64, f64)>,
     /// Power of the sag that drives the recovery.
     power: f64,

@@ -53,8 +53,8 @@ fn methods(f: &mut fmt::Formatter<'_>, score: &Score) -> fmt::Result {
 }
 
 impl fmt::Display for Score {
-    /// A Markdown table of every figure with Wilson's intervals, one of the methods where simpler ones ran beside, then
-    /// the misses.
+    /// A Markdown table of every figure with Wilson's intervals, then a table of the methods if
+    /// simpler ones ran, then the misses.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let s = &self.singles;
         writeln!(f, "| figure | value | count | 95 % interval |\n| --- | --- | --- | --- |")?;

@@ -1,14 +1,14 @@
-//! Clocks and mains: a skew that wanders, and hum.
+//! Clocks and mains: a drifting skew, and hum.
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
 use crate::family::Family;
 use crate::random::RandomGenerator;
 
-/// Longest session that a wandering skew is tabled for, s; it stands still from there on.
+/// Longest session for which a drifting skew is tabulated, s; it is constant afterwards.
 const LONGEST_S: f64 = 1000.0;
 
-/// How late the voltage is recorded, s: a mean, and how far it wanders from it.
+/// How late the voltage is recorded, s: a mean, and how far it drifts from it.
 #[derive(Debug, Clone)]
 pub(crate) struct Skew {
     law: Law,

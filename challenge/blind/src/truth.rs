@@ -21,7 +21,7 @@ worded! {
         Dominant "dominant",
         /// One effect that the catalogue lacks.
         OutOfCatalogue "out_of_catalogue",
-        /// One effect whose own entry is struck out of the catalogue at the diagnosis.
+        /// One effect whose entry is removed from the catalogue for the diagnosis.
         Struck "struck",
     }
 }
@@ -44,7 +44,8 @@ pub struct Acting {
 
 /// Label of one case.
 ///
-/// `kind`, `effects`, `stages`, `pressure_column` and `excess` suffice: the rest is detail.
+/// `kind`, `effects`, `stages`, `pressure_column` and `excess` suffice; the other fields are
+/// details.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Label {
     /// What kind of case it is.
@@ -56,7 +57,8 @@ pub struct Label {
     /// Whether the pressure was recorded.
     pub pressure_column: bool,
     /// Reduced chi-square minus one of the re-tuned nominal rig, summed over channels on the test
-    /// trials: a mean square in units of the variance of the noise; linear, good to a factor of two.
+    /// trials: a mean square in units of the variance of the noise; linear, accurate to a factor of
+    /// two.
     pub excess: f64,
     /// Entry that the diagnosis may not use.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -64,7 +66,7 @@ pub struct Label {
     /// The strong one of a dominant case.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dominant: Option<String>,
-    /// Family that its forms were drawn from (a null has it by lot); absent where they were written.
+    /// Family of its forms (drawn for a null); absent if they were written by hand.
     #[serde(default, skip_serializing_if = "is_written")]
     pub family: Family,
     /// How each effect was simulated.
@@ -73,8 +75,8 @@ pub struct Label {
     /// Nominal parameters of this rig, SI (V and mm as in rig files).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
-    /// Disturbances of the rig, where they were drawn: levels, times in s, shares. Labels write `clutter`, as those did whose hashes are
-    /// published.
+    /// Disturbances of the rig, if they were drawn: levels, times in s, shares. Labels write
+    /// `clutter`, as in the labels whose hashes are published.
     #[serde(rename = "clutter", alias = "disturbances")]
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub disturbances: BTreeMap<String, f64>,
@@ -96,7 +98,7 @@ pub struct Truth {
     pub cases: BTreeMap<String, Label>,
 }
 
-/// Pairs of effects that motion alone cannot always tell apart; the last one only without a
+/// Pairs of effects that motion alone cannot always distinguish; the last one only without a
 /// pressure column.
 pub const TWINS: [(&str, &str); 7] = [
     ("sleeve_slack", "amplifier_saturation"),

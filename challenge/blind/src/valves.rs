@@ -11,7 +11,7 @@ use crate::random::RandomGenerator;
 pub(crate) enum Delay {
     /// Later or earlier with the opening commanded: delay over opening, in units of the mean.
     Graded(Curve),
-    /// Several seats, each with a share and a delay of its own.
+    /// Several seats, each with a share and a delay.
     Spread(Vec<(f64, f64)>),
     /// A dead time, and a lag for the rest.
     Lagged { dead: f64 },
@@ -57,8 +57,8 @@ impl Delay {
         }
     }
 
-    /// Mean share of a valve over a step of `h` s: `opening` is what is commanded now, `late` the
-    /// mean share of the command so many seconds ago, `lag` what this valve remembers.
+    /// Mean share of a valve over a step of `h` s: `opening` is the current command, `late` the
+    /// mean share of the command that many seconds ago, `lag` the valve's memory.
     pub(crate) fn share(
         &self,
         strength: f64,
@@ -79,8 +79,8 @@ impl Delay {
             }
             Self::Sided(factors) => {
                 let [opens, closes] = factors[side].map(|f| late(f * strength));
-                // What is slower to open is open where both are, what is slower to close where
-                // either is.
+                // A valve that opens more slowly is open if both are; one that closes more slowly
+                // is open if either is.
                 if factors[side][0] > factors[side][1] {
                     opens.min(closes)
                 } else {

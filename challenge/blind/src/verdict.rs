@@ -1,4 +1,4 @@
-//! What a diagnosis said of a case, as far as it is scored.
+//! The scored part of a diagnosis of a case.
 
 use std::collections::BTreeMap;
 
@@ -24,25 +24,25 @@ pub struct Verdict {
     pub named: Vec<String>,
     /// Effects in the 95 % set.
     pub ambiguous: Vec<String>,
-    /// Names declared to be one with those named: the data cannot tell them.
+    /// Names in a declared tie with the named ones: the data cannot distinguish them.
     #[serde(default)]
     pub tied: Vec<String>,
-    /// Candidates with their probabilities, the best first; one whose only effect is `unknown`
-    /// stands for whatever the catalogue lacks.
+    /// Candidates with their probabilities, the best first. A candidate whose only effect is
+    /// `unknown` represents causes outside the catalogue.
     pub candidates: Vec<(Vec<String>, f64)>,
     /// Stage that the gap was placed in.
     pub stage: Option<String>,
-    /// Excess of the re-tuned nominal on the test trials, summed over channels.
+    /// Excess of the re-tuned nominal simulator on the test trials, summed over channels.
     pub gap_before: f64,
     /// Excess with the effects named.
     pub gap_after: f64,
     /// Closed-gap fraction of the effects named.
     pub closed: f64,
-    /// Closed-gap fraction of a fit that knows the label, where one was made.
+    /// Closed-gap fraction of a fit that knows the label, if one was made.
     pub closed_oracle: Option<f64>,
     /// Seconds the diagnosis took.
     pub runtime_s: f64,
-    /// What simpler methods that ran beside named, by method; `None` where one named nothing.
+    /// Names given by simpler methods that also ran, by method; `None` if a method named nothing.
     #[serde(default)]
     pub baselines: BTreeMap<String, Option<String>>,
 }
@@ -50,13 +50,13 @@ pub struct Verdict {
 impl Verdict {
     /// Reads a `diagnosis.json`, schema 1, of a case.
     ///
-    /// The stage is that of the first effect named if the catalogue knows it, else the one with
-    /// the greatest share of the gap. The gaps are those of the candidate named, else of the
-    /// first. `closed_oracle` is left empty.
+    /// The stage is that of the first named effect if the catalogue knows it, otherwise the one
+    /// with the largest share of the gap. The gaps are those of the named candidate, otherwise of
+    /// the first. `closed_oracle` is left empty.
     ///
     /// # Errors
-    /// [`BlindError::BadVerdict`] when the verdict, the names, or a probability are missing or
-    /// out of range.
+    /// [`BlindError::BadVerdict`] if the verdict, the names, or a probability are missing or out of
+    /// range.
     pub fn from_diagnosis(case: &str, diagnosis: &Value) -> Result<Self, BlindError> {
         let bad = |reason| BlindError::BadVerdict { case: case.to_owned(), reason };
         let names = |value: &Value| -> Option<Vec<String>> {
@@ -123,19 +123,19 @@ impl Verdict {
         if COMMITS.contains(&self.verdict.as_str()) { &self.named } else { &[] }
     }
 
-    /// The names declared to be one with those it commits to.
+    /// The names in a declared tie with those it commits to.
     pub(crate) fn ties(&self) -> &[String] {
         if self.answer().is_empty() { &[] } else { &self.tied }
     }
 
-    /// Probability that it gives to what the catalogue lacks; `None` where it gives none.
+    /// Its probability of a cause outside the catalogue; `None` if it states none.
     #[must_use]
     pub fn unknown(&self) -> Option<f64> {
         let alone = |c: &&(Vec<String>, f64)| c.0.len() == 1 && c.0[0] == "unknown";
         self.candidates.iter().find(alone).map(|c| c.1)
     }
 
-    /// What it holds most likely, the names tied with it, and the probability of them together.
+    /// Its most likely answer, the names tied with it, and their joint probability.
     pub(crate) fn belief(&self) -> Option<(Vec<&String>, f64)> {
         // Of equals the one that is listed first.
         let candidates = self.candidates.iter().rev();

@@ -1,6 +1,6 @@
 //! Enumerations whose members have a name in files, reports and options.
 
-/// An enumeration with a word for each member: as it is serialised, told and asked for.
+/// An enumeration with one word per member, used to serialise, to print and to parse it.
 macro_rules! worded {
     ($(#[$own:meta])* $name:ident { $($(#[$doc:meta])* $member:ident $word:literal),* $(,)? }) => {
         $(#[$own])*

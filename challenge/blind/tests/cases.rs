@@ -1,4 +1,4 @@
-//! Cases as they lie on the disk: same bits for the same seed, sealed, and shaped as agreed.
+//! Cases on the disk: same bits for the same seed, sealed, and with the documented layout.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,7 +39,7 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
     let first = files(dirs[0].path());
     assert_eq!(first, files(dirs[1].path()));
 
-    // Labels lie in the sealed folder only; a folder that has one is not written over.
+    // Labels are only in the sealed folder; a folder that has one is not overwritten.
     let (seal, truth) = Seal::open(dirs[0].path()).expect("an unbroken seal");
     assert_eq!((seal.sha256().len(), truth.cases.len()), (64, 4));
     let again = make(dirs[0].path(), 42, &small(), &|_| {});

@@ -1,4 +1,4 @@
-//! Sets that strangers solve: what is made, what a submission must hold, and what the score says of it.
+//! Sets that strangers solve: what is made, what a submission must hold, and its score.
 
 use std::{fs, path::Path, sync::OnceLock};
 
@@ -15,7 +15,7 @@ fn set(dir: &Path, plant: PlantName, seed: u64) -> (OpenTruth, String) {
     OpenTruth::open(&folder).expect("its labels")
 }
 
-/// Says the truth of every case with this probability, and nothing of the rest.
+/// States the truth of every case with this probability, and nothing of the rest.
 fn oracle(truth: &OpenTruth, hash: &str, p: f64) -> Submission {
     let answer = |label: &stretch_blind::OpenLabel| {
         let (effects, verdict) = match label.level {
@@ -60,7 +60,7 @@ fn labels_stand_apart_and_levels_come_in_turn() {
         };
         assert!(range.contains(&label.excess), "{label:?}");
     }
-    // no file of the set names what is missing beside the lists of candidates
+    // no file of the set names what is missing, except the lists of candidates
     let problems: Vec<String> = truth
         .cases
         .keys()
@@ -127,7 +127,7 @@ fn the_oracle_has_every_point_and_a_guess_does_not() {
     assert!(figures.exact.low <= figures.exact.value.expect("cases"));
 }
 
-/// Alters a good submission and hands back what is said of it.
+/// Alters a good submission and returns the resulting error.
 fn refused(alter: impl FnOnce(&mut Submission)) -> String {
     static SET: OnceLock<(OpenTruth, String)> = OnceLock::new();
     let (truth, hash) = SET.get_or_init(|| {

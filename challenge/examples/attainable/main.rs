@@ -1,11 +1,14 @@
-//! What the diagnosis finds at best: rigs of its own equations, effects in the catalogue's own forms, noise that is clean and known.
-//! What is missed or confounded here is missed for no form and no disturbance.
+//! What the diagnosis finds at best: simulated rigs with its own equations, effects in the
+//! catalogue's forms, clean noise of known size. What is missed or confounded here is not due to a
+//! form or a disturbance.
 //!
-//! Two tables: how far nulls stray, and which effects cannot be told apart, for the trials of the paper with and without a
-//! pressure column and for the paper's with one trial more at 0.7 of the excitation. `book/src/results/sealed_cases.md` says how to read them.
+//! Two tables: how far nulls scatter, and which effects cannot be distinguished. Each is made for
+//! the paper's trials with and without a pressure column, and for these with one more trial at 0.7
+//! of the excitation. `book/src/results/sealed_cases.md` explains how to read them.
 //!
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example attainable -- [NULLS [SEEDS]]`: nulls of each protocol (20), sessions of each effect
-//! and strength (1). As many at a time as `RAYON_NUM_THREADS` says, else as there are cores.
+//! `cargo run --release -p stretch-challenge --example attainable -- [NULLS [SEEDS]]`: nulls of
+//! each protocol (20), sessions of each effect and strength (1). `RAYON_NUM_THREADS` sets how many
+//! run at a time, otherwise the number of cores.
 
 mod nulls;
 mod simulated;
@@ -14,7 +17,7 @@ mod ties;
 
 use std::time::Instant;
 
-/// Seed of the first null; nulls and effects have seeds of their own.
+/// Seed of the first null; nulls and effects have separate seeds.
 const FIRST_NULL: u64 = 5001;
 /// Seed of the first session with an effect.
 const FIRST_EFFECT: u64 = 6001;

@@ -1,4 +1,4 @@
-//! How far nulls stray: rigs without any effect, parameters within their tolerances.
+//! Scatter of nulls: rigs without any effect, parameters within their tolerances.
 
 use std::{fmt::Write, ops::Range};
 
@@ -12,14 +12,15 @@ use crate::simulated::{Protocol, Source};
 struct Null {
     /// Excess of the re-tuned nominal.
     excess: f64,
-    /// Greatest score of a single effect, nats, and its name; none where no effect closes anything at all.
+    /// Highest score of a single effect, nats, and its name; `None` if no effect closes anything.
     best: Option<(f64, String)>,
     /// The answer as the program gives it.
     verdict: VerdictKind,
     named: Vec<String>,
 }
 
-/// Without acceptance criteria: the single effect with the greatest score is taken whatever it closes.
+/// Without acceptance criteria: the single effect with the highest score is taken whatever it
+/// closes.
 fn without_criteria() -> Thresholds {
     let none = f64::NEG_INFINITY;
     Thresholds {
@@ -61,7 +62,7 @@ pub(crate) fn band(seeds: Range<u64>) -> anyhow::Result<String> {
     text.push_str("|---|---|---|---|---|---|---|---|---|\n");
     for (protocol, nulls) in Protocol::ALL.iter().zip(all.chunks(each.max(1))) {
         let excess = quantiles(nulls.iter().map(|n| n.excess).collect());
-        // An effect that closes nothing has no score: it cannot be the greatest.
+        // An effect that closes nothing has no score, so it cannot be the largest.
         let scores = nulls.iter().map(|n| n.best.as_ref().map_or(f64::NEG_INFINITY, |b| b.0));
         let scores = quantiles(scores.collect());
         let is_none = |n: &&Null| matches!(n.verdict, VerdictKind::NoGap | VerdictKind::Parameters);

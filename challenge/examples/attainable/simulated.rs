@@ -77,7 +77,7 @@ impl Source {
         Ok(trials)
     }
 
-    /// What is said of it, the nominal rig beside it.
+    /// The diagnosis against the nominal rig.
     pub(crate) fn diagnosed(
         &self,
         protocol: Protocol,

@@ -14,9 +14,9 @@ const NEAR: f64 = 1.7;
 const LEAST: f64 = 1e-3;
 /// Factor by which one step of the search goes on at most.
 const STEP: f64 = 8.0;
-/// Shares nearer to each other than this factor leave nothing between them: the excess jumps.
+/// Shares closer to each other than this factor have nothing between them: the excess jumps.
 const JUMP: f64 = 1.003;
-/// Greatest share of the range: at its end an effect is announced by nobody.
+/// Largest share of the range; an effect at the end of its range is not announced.
 const END: f64 = 0.8;
 /// Share that is looked at first.
 const FIRST: f64 = 0.1;
@@ -28,7 +28,7 @@ struct Point {
     excess: f64,
 }
 
-/// The strengths of an effect on one rig, as far as they were looked at.
+/// The strengths of an effect on one rig that were tried.
 #[derive(Debug)]
 pub(crate) struct Strengths {
     effect: &'static Effect,
@@ -41,8 +41,9 @@ impl Strengths {
         Self { effect, seed, points: Vec::new() }
     }
 
-    /// The source whose excess on the trials of the paper comes near an aim, and that excess. Where the range ends before, what is at
-    /// its end; where the excess jumps over the aim, what is behind the jump.
+    /// The source whose excess on the trials of the paper is near an aim, and that excess. If the
+    /// range ends before the aim, the source at its end; if the excess jumps over the aim, the
+    /// source after the jump.
     pub(crate) fn near(&mut self, aim: f64) -> anyhow::Result<(Source, f64)> {
         let off_by = |p: &Point| (p.excess / aim).ln().abs();
         for step in 0..MOST {
@@ -73,12 +74,13 @@ impl Strengths {
         above.min_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    /// Where to look next; nowhere where nothing is left between, or beyond.
+    /// Where to look next; `None` if nothing is left between, or beyond.
     fn next(&self, aim: f64, halves: bool) -> Option<f64> {
         match (self.below(aim), self.above(aim)) {
             (None, None) => Some(FIRST),
             (Some(a), Some(b)) if b.share < JUMP * a.share => None,
-            // The middle and a straight line of logarithms in turn: a threshold bends the line.
+            // The middle and a linear interpolation of logarithms alternate, because a threshold
+            // bends the line.
             (Some(a), Some(b)) if halves => Some((a.share * b.share).sqrt()),
             (Some(a), Some(b)) => {
                 let way = (aim / a.excess).ln() / (b.excess / a.excess).ln();
@@ -94,7 +96,7 @@ impl Strengths {
     }
 
     fn excess(&self, share: f64) -> anyhow::Result<f64> {
-        // Nothing counts as unknown: only the excess is asked for, not what may be behind it.
+        // Nothing counts as unknown, because only the excess is needed, not its cause.
         let thresholds = Thresholds { unknown_excess: f64::INFINITY, ..Thresholds::frozen() };
         let diagnosis = self.source(share).diagnosed(Protocol::Paper, 0, thresholds)?;
         Ok(diagnosis.gap.retuned.max(LEAST))
@@ -105,8 +107,8 @@ impl Strengths {
     }
 }
 
-/// Values of an effect that goes a share of the way from off to the farther end of its (last) strength. Shapes are typical and forms
-/// usual: where a diagnosis begins, so that no form has to be paid for.
+/// Values of an effect at a share of the way from off to the farther end of its (last) strength.
+/// Shapes are typical and forms usual, where a diagnosis begins, so that no form costs anything.
 fn values(effect: &'static Effect, share: f64) -> Vec<f64> {
     let last = effect.parameters.iter().rposition(|p| p.off().is_some());
     let one = |(i, p): (usize, &EffectParameter)| match p.off() {

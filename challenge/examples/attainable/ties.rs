@@ -1,4 +1,4 @@
-//! Which effects cannot be answer apart: every effect of the catalogue at two strengths.
+//! Which effects cannot be distinguished: every effect of the catalogue at two strengths.
 
 use std::{
     fmt::{Display, Formatter, Write},
@@ -17,8 +17,9 @@ const AIMS: [f64; 2] = [0.55, 10.0];
 /// Protocols that are compared.
 const PROTOCOLS: [Protocol; 2] = [Protocol::Paper, Protocol::Plus];
 
-/// A rival so few nats behind the true effect, or beyond it, stands in the table: at the temperature of the probabilities, five nats, it has a
-/// four-hundredth of the true one's probability.
+/// The table lists an alternative that is at most so many nats behind the true effect, or ahead of
+/// it. At the temperature of the probabilities, five nats, it has a four-hundredth of the true
+/// one's probability.
 const NEAR_NATS: f64 = 30.0;
 
 /// What is said of one session.
@@ -26,7 +27,7 @@ const NEAR_NATS: f64 = 30.0;
 struct Said {
     /// In the words of the table.
     answer: String,
-    /// The best of the other effects, and how many nats it lies beyond the true one.
+    /// The best of the other effects, and by how many nats it exceeds the true one.
     nearest: Option<(String, f64)>,
 }
 
@@ -46,7 +47,7 @@ impl Said {
     }
 }
 
-/// Whether the true name stands alone, is tied, or is not there.
+/// Whether the true name is alone, tied, or absent.
 fn answer(truth: &str, diagnosis: &Diagnosis) -> String {
     let Diagnosis { verdict, named, tied, gross, .. } = diagnosis;
     let is_truth = |name: &&String| *name == truth;
@@ -66,12 +67,12 @@ fn answer(truth: &str, diagnosis: &Diagnosis) -> String {
 }
 
 fn nearest(truth: &str, diagnosis: &Diagnosis) -> Option<(String, f64)> {
-    // The last candidate stands for what the catalogue lacks, and has no parameters.
+    // The last candidate represents causes outside the catalogue, and has no parameters.
     let effects = diagnosis.candidates.iter().filter(|c| !c.parameters.is_empty());
     let (own, others): (Vec<_>, Vec<_>) =
         effects.partition(|c| c.effects.iter().any(|e| e == truth));
     let best = others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
-    // Where the true effect was not even fitted, it stands at nothing closed.
+    // If the true effect was not even fitted, it counts as closing nothing.
     let truth = own.first().map_or(0.0, |c| c.score);
     Some((best.effects.join(" + "), best.score - truth))
 }
@@ -95,7 +96,8 @@ fn row(effect: &'static Effect, seed: u64) -> anyhow::Result<Row> {
     Ok([weak?, strong?])
 }
 
-/// The table of ties, a row an effect; where sessions of several seeds differ, each has its part of a cell.
+/// The table of ties, one row per effect; if sessions of several seeds differ, each has its part of
+/// a cell.
 pub(crate) fn matrix(seeds: Range<u64>) -> anyhow::Result<String> {
     let effects: Vec<&'static Effect> = Catalogue::default().iter().collect();
     let each = seeds.clone().count();

@@ -1,4 +1,4 @@
-//! Effects in forms of their own, put into a signal that was measured.
+//! Effects in independent forms, added to a measured signal.
 
 use stretch_effects::play;
 
@@ -29,9 +29,9 @@ pub(crate) struct Injection {
     pub(crate) strengths: [f64; 3],
     /// What the catalogue calls it.
     pub(crate) name: &'static str,
-    /// Other names that a record of two minutes of alike strokes may well not tell from it.
+    /// Other names that a record of two minutes of similar strokes may not distinguish from it.
     pub(crate) kin: &'static [&'static str],
-    /// Its strength among the parameters of the effect, and how much of ours makes one of that.
+    /// Its strength among the parameters of the effect, and the conversion from our strength.
     pub(crate) size: Option<(&'static str, f64)>,
 }
 
@@ -84,7 +84,7 @@ pub(crate) const ALL: [Injection; 7] = [
     Injection { is_ahead: true, words: "lag, noise after it,", ..LAG },
     PLAY,
     Injection { is_ahead: true, words: "play, noise after it,", ..PLAY },
-    // Not looked for in a gauge alone, whose amplifier is unknown.
+    // Not searched in a gauge alone, whose amplifier is unknown.
     Injection {
         kind: Kind::Clip,
         is_ahead: false,
@@ -163,11 +163,11 @@ fn slip(w: f64, signal: &mut [f64]) {
 /// Samples to either side whose mean is taken for the signal without its noise: 0.11 s at 100 Hz.
 const BESIDE: usize = 5;
 
-/// Acts on the signal without its noise, which is added again: what slips or trails ahead of the sensor does not slow or stop
-/// the sensor's noise.
+/// Acts on the signal without its noise, which is added again, because what slips or trails before
+/// the sensor does not slow or stop the sensor's noise.
 fn ahead_of_noise(signal: &mut [f64], act: impl Fn(&mut [f64])) {
     let mean = |i: usize| {
-        // As many to either side, so that a slope is no bias at the ends.
+        // Equally many to either side, so that a slope is no bias at the ends.
         let beside = BESIDE.min(i).min(signal.len() - 1 - i);
         let window = &signal[i - beside..=i + beside];
         window.iter().sum::<f64>() / window.len() as f64

@@ -1,9 +1,9 @@
-//! What a diagnosis says once a known effect has been put into a measured record, beside what it said before.
+//! Compares a diagnosis before and after a known effect was added to a measured record.
 //!
-//! Eight records of a knitted sleeve on a knee, each with an unknown gap of its own; five effects, three strengths.
-//! `book/src/results/injections.md` has the tables and says how to read them.
+//! Eight records of a knitted sleeve on a knee, each with an unknown gap; five effects, three
+//! strengths. `book/src/results/injections.md` has the tables and explains how to read them.
 //!
-//! `cargo run --release --manifest-path challenge/Cargo.toml --example injections -- ../shared/data/knit_sleeve`
+//! `cargo run --release -p stretch-challenge --example injections -- ../shared/data/knit_sleeve`
 
 mod inject;
 mod tables;

@@ -54,7 +54,8 @@ impl Said {
         own.map(|p| p.value)
     }
 
-    /// Whether a name is neither what was put in, nor its kin, nor in the 95 % set of the record as it was.
+    /// Whether a name is neither the added effect, nor its kin, nor in the 95 % set of the
+    /// unchanged record.
     fn names_strangely(&self, injection: &Injection, before: &Said) -> bool {
         let is_known = |name: &String| {
             name == injection.name
@@ -64,7 +65,7 @@ impl Said {
         !self.diagnosis.named.iter().all(is_known)
     }
 
-    /// Whether it was noticed that the signal stands at its greatest value.
+    /// Whether the diagnosis noticed that the signal stays at its largest value.
     fn stands(&self) -> bool {
         self.noticed.iter().any(|n| n.contains("stands at its greatest"))
     }
@@ -75,7 +76,7 @@ const PLACES: [&str; 5] = ["named", "in a tie", "95 % set", "best set", "largest
 /// The verdicts, as they are counted.
 const VERDICTS: [&str; 5] = ["effect", "partial", "unknown", "record", "none"];
 
-/// The tables, from what was said of the records as they are and of each injection at each strength.
+/// The tables, from the diagnoses of the unchanged records and of each injection at each strength.
 pub(crate) fn tables(untouched: &[Said], injected: &[&[Said]]) -> String {
     let mut text = String::new();
     let rows = || ALL.iter().flat_map(|i| i.strengths.map(|s| (i, s))).zip(injected);
@@ -120,7 +121,7 @@ fn line(text: &mut String, what: &str, cells: &[String]) {
     let _ = writeln!(text, "| {what} | {} |", cells.join(" | "));
 }
 
-/// In how many records one of the names is in each place; in brackets, in how many it was before.
+/// In how many records one of the names is in each place; before the injection in brackets.
 fn found(names: &[&str], untouched: &[Said], said: &[Said]) -> [String; 5] {
     let count = |all: &[Said], at: usize| all.iter().filter(|one| one.places(names)[at]).count();
     std::array::from_fn(|at| format!("{} ({})", count(said, at), count(untouched, at)))
@@ -140,8 +141,9 @@ fn verdicts(said: &[Said]) -> [usize; 5] {
     counts
 }
 
-/// By how much the fitted strength grew, over how many records; by what factor the gap; in how many records the signal is
-/// noticed to stand at its top; in how many the largest part is another than before; in how many a name came up from nowhere.
+/// By how much the fitted strength grew, and over how many records; by what factor the gap grew; in
+/// how many records the signal is noticed to stay at its top; in how many the largest part changed;
+/// in how many a new name appeared.
 fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 6] {
     let pairs = || untouched.iter().zip(said);
     let mut grown: Vec<f64> = match injection.size {

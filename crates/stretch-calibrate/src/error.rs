@@ -3,6 +3,7 @@
 use stretch_core::DesignError;
 use stretch_filter::FilterError;
 use stretch_fit::FitError;
+use stretch_receptor::ReceptorError;
 
 /// Why trials could not be calibrated on, or a calibration could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -13,11 +14,11 @@ pub enum CalibrateError {
     NoTrials,
     /// No model can be judged on samples that were left out of its fit.
     #[error(
-        "no model can be judged on samples that are left out of its fit: these are too few; record more, or name one with --model"
+        "no model can be judged on samples that are left out of its fit: these are too few; record more, or calibrate with one of them"
     )]
     TooFewToJudge,
     /// The time stamps give no sample rate.
-    #[error("{trial}: {samples} samples are too few to tell a sample rate from; record more")]
+    #[error("{trial}: {samples} samples are too few to calibrate on; record more")]
     TooShort {
         /// The trial.
         trial: String,
@@ -50,7 +51,7 @@ pub enum CalibrateError {
     },
     /// The trials do not contain one of the directions.
     #[error(
-        "the {branch} branch has {samples} samples and the model has {terms} terms; add trials in which the muscle moves that way, or fit --model linear"
+        "the {branch} branch has {samples} samples and the model has {terms} terms; add trials that move that way, or fit --model curve or --model linear, which have no branches"
     )]
     OneBranch {
         /// The branch that is missing.
@@ -105,16 +106,28 @@ pub enum CalibrateError {
     /// An estimator cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),
+    /// The calibration gives no receptor.
+    #[error(transparent)]
+    Receptor(#[from] ReceptorError),
     /// A number is outside its possible range.
     #[error("the calibration is not possible: {0}")]
     Design(#[from] DesignError),
     /// The model has no form in integers.
     #[error(
-        "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: name one with --model"
+        "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: calibrate with one of them"
     )]
     NoFixedForm {
         /// The model.
         model: String,
+    },
+    /// The converter has too many bits for arithmetic in integers of 32 bits.
+    #[error(
+        "a converter of {bits} bits has no form in integers of 32 bits: write it in float (stretch export --c DIR --form float), or \
+         give the board the upper 16 bits of each code (--adc 16,ZERO_V,FULL_SCALE_V)"
+    )]
+    FixedBits {
+        /// Bits of the converter.
+        bits: u8,
     },
     /// The rate estimator has no form in integers in this program.
     #[error(
@@ -144,35 +157,7 @@ pub enum CalibrateError {
     #[error(
         "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
     )]
-    Fixed(#[source] DesignError),
-    /// More channels than a calibration can hold, or none.
-    #[error(
-        "{asked} signals were named; a calibration takes 1 to {most}: name the columns of the gauges with --signals s1,s2"
-    )]
-    Channels {
-        /// How many were named.
-        asked: usize,
-        /// The most that are possible.
-        most: usize,
-    },
-    /// Two channels are one and the same.
-    #[error(
-        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signals"
-    )]
-    Copies {
-        /// The first.
-        first: String,
-        /// The second.
-        second: String,
-    },
-    /// A prior, or a session for one, cannot be used for these data.
-    #[error("{file}: {problem}")]
-    Prior {
-        /// The file, or what it describes.
-        file: String,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
+    Fixed(#[source] ReceptorError),
     /// A calibration file does not load.
     #[error("{file}: {problem}")]
     Record {
@@ -181,26 +166,23 @@ pub enum CalibrateError {
         /// The fault of the file, and its place.
         problem: String,
     },
-    /// A log is too long to be held as a whole, and the model needs the whole log.
+    /// The trials have too many rows to be fitted in memory.
     #[error(
-        "{model} is fitted to a whole log, of at most {most} rows; fit a line or a surface by least squares (--model poly13), or \
-         give fewer rows (--grid HZ, a part of the log)"
+        "the trials have {rows} rows together, and at most {most} are fitted at once; thin them to fewer samples a second \
+         (stretch convert --grid HZ), or give a part of the log"
     )]
     TooLong {
-        /// The model that was to be fitted.
-        model: String,
-        /// Most rows that are held as a whole.
-        most: u64,
+        /// Rows of all trials.
+        rows: usize,
+        /// The most rows.
+        most: usize,
     },
     /// A trial is inconsistent, or lacks a column.
     #[error(transparent)]
     Data(#[from] stretch_data::DataError),
     /// A file cannot be read or written.
     #[error(transparent)]
-    File(#[from] stretch_files::FileError),
-    /// A log could not be read.
-    #[error(transparent)]
-    Log(Box<dyn std::error::Error + Send + Sync>),
+    File(#[from] stretch_data::files::FileError),
     /// There is nothing to compare, because every sample was withheld.
     #[error("{trial}: no sample has an estimate; {}", why_withheld(*.rate_hz, *.expected_hz))]
     NothingEstimated {
@@ -221,7 +203,7 @@ pub const PACE_TOLERANCE: f64 = 0.2;
 fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
     if (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         format!(
-            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: bring it onto that rate (--grid {expected_hz})"
+            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: bring it onto that rate (stretch convert --grid {expected_hz})"
         )
     } else {
         "it is shorter than the warm-up of the rate estimator".to_owned()

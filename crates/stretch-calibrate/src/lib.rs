@@ -1,87 +1,38 @@
 #![doc = include_str!("../README.md")]
 
-mod acceptance;
-mod apply;
-mod array;
-mod auto;
-mod auto_words;
-mod bank;
-mod blocks;
-mod calibrate;
-mod calibration_file;
-mod cause;
-mod channels;
-mod choose;
-mod clusters;
-mod cost;
-mod defects;
-mod diagnosed_fit;
-mod digest;
+// prepare <- fit <- judge; records stand on their own
 mod error;
-mod evaluate;
-mod fitting;
-mod fixed_record;
-mod gross_errors;
-mod history_fit;
-mod least_squares;
-mod levels;
-mod long;
-mod model_words;
-mod observer_bounds;
-mod observer_curve;
-mod observer_fit;
-mod observer_model;
+mod fit;
+mod judge;
 mod options;
-mod own_ranges;
-mod passes;
-mod positive;
-mod prepared;
-mod prior;
-mod rated;
-mod reach;
-mod rest;
-mod rising;
-mod series;
-mod split;
-mod turns;
-mod twice;
+mod prepare;
+mod record;
 
-pub use acceptance::{
-    beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,
-    worse_than_the_mean,
-};
-pub use apply::{
-    Applied, Faults, LiveReceptor, apply, apply_following, pressure_column, rate_delay_s,
-};
-pub use array::{
-    AppliedArray, ArrayFit, ArrayOptions, Carried, ROOM, SleeveCalibration, apply_array,
-    array_bytes, array_seal, calibrate_array,
-};
-pub use auto::{
-    Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
-};
-pub use blocks::{LONGEST, Log};
-pub use calibrate::{Calibrated, calibrate};
-pub use calibration_file::{
-    RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
-    describe_record, read_calibration, seal_calibration, write_calibration,
-};
-pub use cause::Cause;
-pub use channels::MAX_CHANNELS;
-pub use choose::{Candidate, rank_signals};
-pub use cost::{m3_instructions, m3_instructions_fixed};
 pub use error::{CalibrateError, PACE_TOLERANCE};
-pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
-pub use fitting::{Coefficient, FitReport, Order};
-pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
-pub use gross_errors::without_gross_errors;
-pub use long::{calibrate_long, is_plain};
-pub use model_words::MODELS_IN_WORDS;
-pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
-pub use own_ranges::on_own_ranges;
-pub use prior::{
-    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
-    SessionOptions, UpdateOptions, UpdateSummary, Updated,
+pub use fit::{Calibrated, Coefficient, FitReport, Order, calibrate};
+pub use judge::{
+    Applied, Candidate, Comparison, Evaluation, Faults, Judged, LiveReceptor, MethodErrors,
+    ModelChoice, ModelRow, Reach, TrialErrors, apply, at_rate, beside_a_constant, candidate_models,
+    choose_among, choose_model, evaluate, explains_little, explains_nothing, fitted_on,
+    judge_model, m3_instructions, m3_instructions_fixed, not_its_own, off_throughout,
+    on_own_ranges, pressure_column, rank_signals, rate_delay_s, worse_than_the_mean,
 };
-pub use rated::{Rated, RatedPart, rated};
-pub use reach::Reach;
+pub use options::{
+    Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate,
+};
+pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_gross_errors};
+pub use record::{
+    BoardReceptor, FixedRecord, RecordNumbers, calibration_bytes, calibration_from_edited_json,
+    calibration_from_json, calibration_seal, calibration_to_json, digest, fixed_record,
+    is_postcard, parse_adc, read_calibration, write_calibration,
+};
+
+/// What other crates build calibrations of their own from.
+pub mod toolkit {
+    pub use crate::{
+        fit::{
+            LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, TermRows, leave_one_out,
+        },
+        prepare::{SHORTEST, check_rows, even_signals, extent, noise, sample_rate_hz},
+    };
+}

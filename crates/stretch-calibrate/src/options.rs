@@ -2,8 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::cause::Cause;
-use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource};
+use stretch_core::{Degree, DesignError, Interval, Normalisation, RateEstimator, RateSource};
 
 /// The model that is fitted.
 ///
@@ -18,10 +17,10 @@ use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource
 pub enum ModelKind {
     /// One straight line for both directions.
     Linear,
+    /// One polynomial of the signal, whose degree cross-validation chooses.
+    Curve,
     /// A polynomial surface for each branch.
     Surface(Degree),
-    /// A polynomial surface for each branch, blended across the dead band in place of a jump.
-    Blended(Degree),
     /// A model with a memory of the signal.
     Remembering {
         /// The form of the memory.
@@ -41,13 +40,7 @@ pub enum ModelKind {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Memory {
-    /// Plays: the inverse of backlash and Prandtl-Ishlinskii hysteresis, on a cubic.
-    Hysteresis,
-    /// One or two relaxation states: the inverse of lag and lead, on a cubic.
-    Relaxation,
-    /// Plays and relaxation states.
-    Both,
-    /// Plays and relaxation states, with all products of states.
+    /// A polynomial of the signal, of relaxation states and of plays: the inverse of lag, lead and hysteresis.
     History,
     /// The gauge's forward model, inverted by a Kalman filter.
     Observer,
@@ -57,22 +50,12 @@ pub enum Memory {
 
 impl Memory {
     /// All forms, simplest first.
-    pub const ALL: [Self; 6] = [
-        Self::Hysteresis,
-        Self::Relaxation,
-        Self::Both,
-        Self::History,
-        Self::Observer,
-        Self::Diagnosed,
-    ];
+    pub const ALL: [Self; 3] = [Self::History, Self::Observer, Self::Diagnosed];
 }
 
 impl fmt::Display for Memory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
-            Self::Hysteresis => "hysteresis",
-            Self::Relaxation => "relaxation",
-            Self::Both => "both",
             Self::History => "history",
             Self::Observer => "observer",
             Self::Diagnosed => "diagnosed",
@@ -119,15 +102,14 @@ impl SpellingError {
 }
 
 impl ModelKind {
-    /// Every name that `--model` takes, simplest first; poly13 stands for all surfaces.
+    /// The names that `--model` takes for trials with a time, simplest first; poly13 stands for all surfaces.
     ///
     /// ```
     /// use stretch_calibrate::ModelKind;
     /// assert!(ModelKind::named().iter().all(|kind| kind.to_string().parse() == Ok(*kind)));
     /// ```
     pub fn named() -> Vec<Self> {
-        let mut kinds =
-            vec![Self::Linear, Self::Surface(Degree::POLY13), Self::Blended(Degree::POLY13)];
+        let mut kinds = vec![Self::Linear, Self::Surface(Degree::POLY13)];
         for rest in [false, true] {
             kinds.extend(Memory::ALL.map(|kind| Self::Remembering { kind, rest }));
         }
@@ -135,8 +117,8 @@ impl ModelKind {
     }
 }
 
-const MODELS: &str = "linear, poly13, polyIJ with degrees up to poly55, blended, hysteresis, \
-                      relaxation, both, history, observer or diagnosed, the last six also with +rest";
+const MODELS: &str = "linear, curve, poly13, polyIJ with degrees up to poly55, history, observer or \
+                      diagnosed, the last three also with +rest";
 
 impl FromStr for ModelKind {
     type Err = SpellingError;
@@ -146,8 +128,8 @@ impl FromStr for ModelKind {
         if text == "linear" {
             return Ok(Self::Linear);
         }
-        if text == "blended" {
-            return Ok(Self::Blended(Degree::POLY13));
+        if text == "curve" {
+            return Ok(Self::Curve);
         }
         let (name, rest) = match text.strip_suffix("+rest") {
             Some(name) => (name, true),
@@ -169,9 +151,8 @@ impl fmt::Display for ModelKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Linear => f.pad("linear"),
+            Self::Curve => f.pad("curve"),
             Self::Surface(degree) => f.pad(&degree.to_string()),
-            Self::Blended(Degree::POLY13) => f.pad("blended"),
-            Self::Blended(degree) => f.pad(&format!("blended {degree}")),
             Self::Remembering { kind, rest: false } => f.pad(&kind.to_string()),
             Self::Remembering { kind, rest: true } => f.pad(&format!("{kind}+rest")),
         }
@@ -235,8 +216,8 @@ pub struct Options {
     pub split: SplitBy,
     /// The weights of residuals.
     pub robust: Robust,
-    /// The signal's zero in [`Normalisation::Range`]; 1.24 V for `bridge_v`
-    /// and 0 for any other column when not given.
+    /// The signal's zero in [`Normalisation::Range`]. When not given it is 1.24 V for a `bridge_v` that runs near
+    /// 1.24 V, else the middle of the signal's range, because powers of a signal with a large offset cancel.
     pub signal_zero: Option<f64>,
     /// Resting length: the target is then the contraction. When not given, a
     /// reference whose name begins with `length` rests at its greatest value,
@@ -245,6 +226,9 @@ pub struct Options {
     /// Dead band of the branch decision in signal units per second; three
     /// standard deviations of the rate's noise when not given.
     pub dead_band: Option<f64>,
+    /// Whether the rows are weights and readings in any order, without a time: no model with a rate or a memory can be
+    /// fitted to such a table.
+    pub is_table: bool,
     /// Date of the calibration, as free text for the record.
     pub date: String,
     /// The effects that a diagnosis named, for [`Memory::Diagnosed`].
@@ -267,6 +251,7 @@ impl Default for Options {
             signal_zero: None,
             rest_length: None,
             dead_band: None,
+            is_table: false,
             date: String::new(),
             causes: Vec::new(),
             pressure: "pressure_kpa".into(),
@@ -292,7 +277,60 @@ impl Options {
         self.causes.iter().any(|cause| cause.effect == "pressure_crosstalk")
     }
 
-    pub(crate) fn zero(&self) -> f64 {
-        self.signal_zero.unwrap_or(if self.signal == "bridge_v" { 1.24 } else { 0.0 })
+    /// The zero of a signal that was seen in `seen`.
+    pub(crate) fn zero(&self, seen: Interval) -> f64 {
+        let span = seen.max - seen.min;
+        // near: no further from the signal than the signal's own range
+        let is_near = (seen.min - span..=seen.max + span).contains(&BRIDGE_ZERO_V);
+        let usual = match self.signal == "bridge_v" && is_near {
+            true => BRIDGE_ZERO_V,
+            false => seen.min + 0.5 * span,
+        };
+        self.signal_zero.unwrap_or(usual)
     }
 }
+
+/// Voltage of the published bridge at rest (paper section 2.5).
+const BRIDGE_ZERO_V: f64 = 1.24;
+
+/// An effect of the gauge or of its reference, with the parameter values that a diagnosis found.
+///
+/// Names are those of the catalogue (`stretch effects`). Strains, lengths and voltages are in shares of the reference's range over the
+/// calibrated trials, times in seconds. A fit begins at these values.
+///
+/// ```
+/// use stretch_calibrate::Cause;
+/// let cause = Cause::new("gauge_relaxation", &[("c", 0.2), ("tau", 0.4)]);
+/// assert_eq!((cause.value("tau"), cause.value("spread")), (Some(0.4), None));
+/// ```
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Cause {
+    /// The effect.
+    pub effect: String,
+    /// Its parameters by name.
+    pub values: Vec<(String, f64)>,
+}
+
+impl Cause {
+    /// An effect from its name and the values of its parameters.
+    pub fn new(effect: &str, values: &[(&str, f64)]) -> Self {
+        let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        Self { effect: effect.to_owned(), values }
+    }
+
+    /// The value of a parameter, if it was found.
+    pub fn value(&self, parameter: &str) -> Option<f64> {
+        self.values.iter().find(|(name, _)| name == parameter).map(|(_, value)| *value)
+    }
+}
+
+/// What the models of a choice are, in one sentence, for whoever sees their names for the first time.
+///
+/// ```
+/// use stretch_calibrate::{MODELS_IN_WORDS, Memory};
+/// for kind in Memory::ALL.into_iter().filter(|kind| *kind != Memory::Diagnosed) {
+///     assert!(MODELS_IN_WORDS.contains(&kind.to_string()), "{kind}");
+/// }
+/// ```
+pub const MODELS_IN_WORDS: &str = "linear is a line, curve a polynomial of the signal alone, poly13 the published surfaces over signal and rate; history and observer \
+    remember what the signal did before, and with +rest follow a baseline that drifts";

@@ -5,7 +5,7 @@ use stretch_calibrate::{
     CalibrateError, Cause, Memory, ModelKind, Options, apply, calibrate, choose_model, evaluate,
     read_calibration, write_calibration,
 };
-use stretch_core::{Model, play};
+use stretch_core::{Model, arithmetic::play};
 use stretch_data::{Channel, Trial};
 use testkit::tolerance as tol;
 
@@ -147,7 +147,7 @@ fn causes_without_numbers_are_calibrated() {
     for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {
         let bent = options(vec![Cause::new(name, &[])]);
         let calibrated = calibrate(&PLAIN.trials(), &bent).unwrap();
-        let Model::Diagnosed(map) = &calibrated.calibration.model else { unreachable!() };
+        let Model::Diagnosed(map) = &calibrated.calibration.spec().model else { unreachable!() };
         assert!(map.fit.rmse < 0.01, "{name}: {}", map.fit.rmse);
         assert_eq!(map.rest.is_some(), name == "thermal_drift");
     }
@@ -166,7 +166,7 @@ fn a_record_comes_back_and_asks_for_the_pressure_that_it_needs() {
         assert_eq!(read_calibration(&path).unwrap(), crate::as_held(&calibration, name));
     }
     std::fs::remove_dir_all(&folder).unwrap();
-    assert!(matches!(calibration.model, Model::Diagnosed(_)));
+    assert!(matches!(calibration.spec().model, Model::Diagnosed(_)));
     let mut unseen = gauge.trial("unseen.csv", 4.0);
     let applied = apply(&calibration, &unseen).unwrap();
     assert!(applied.readings.iter().all(|r| r.as_ref().is_ok_and(|r| r.sd.is_some())));

@@ -1,7 +1,7 @@
 //! The tests of stretch-calibrate from outside, one program: linking takes longer than most of them.
 
 mod diagnosed;
-mod long;
+mod offset;
 mod remembering;
 mod seal;
 
@@ -10,8 +10,8 @@ use stretch_core::Calibration;
 /// A calibration as its record holds it: checksums of trials stand in JSON alone.
 fn as_held(calibration: &Calibration, name: &str) -> Calibration {
     assert_eq!(
-        calibration.provenance.checksums().len(),
-        calibration.provenance.trial_count() as usize
+        calibration.spec().provenance.checksums().len(),
+        calibration.spec().provenance.trial_count() as usize
     );
     if name.ends_with(".json") {
         return calibration.clone();

@@ -1,7 +1,7 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
 use crate::{
-    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate, Turns,
+    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
     folded::{Scales, line_holds, surface_holds},
     sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
@@ -9,8 +9,8 @@ use crate::{
 /// The schema of calibration records that this release writes.
 ///
 /// 1: without a seal. 2: the same fields under a checksum, which whoever loads the bytes checks
-/// (`record::load`, or `stretch_calibrate::read_calibration`). 3, the newest it reads: in bytes, where movements turn behind
-/// the fields of schema 2; records without turns stay as they are.
+/// (`record::load`, or `stretch_calibrate::read_calibration`). Release 0.1.0 also wrote schema 3, in bytes, for calibrations
+/// that held where movements turn; these are records of `stretch-sleeve` now.
 pub const CALIBRATION_SCHEMA: u32 = 2;
 
 /// What is estimated, and how a normalised target becomes a number with a unit.
@@ -79,14 +79,12 @@ pub struct Schema(u32);
 impl Schema {
     /// The schema that this release writes.
     pub const CURRENT: Self = Self(CALIBRATION_SCHEMA);
-    /// That of records in bytes which hold turns, and the newest.
-    pub(crate) const WITH_TURNS: Self = Self(3);
 }
 
 impl TryFrom<u32> for Schema {
     type Error = DesignError;
     fn try_from(found: u32) -> Result<Self, DesignError> {
-        let newest = Self::WITH_TURNS.0;
+        let newest = CALIBRATION_SCHEMA;
         if (1..=newest).contains(&found) {
             Ok(Self(found))
         } else {
@@ -103,6 +101,8 @@ impl From<Schema> for u32 {
 
 /// The parts of a [`Calibration`], all public; [`Calibration::new`] checks them.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct CalibrationSpec {
     /// First in every record, so that a newer one is refused before the rest is read.
     pub schema: Schema,
@@ -128,9 +128,6 @@ pub struct CalibrationSpec {
     pub dead_band: f64,
     /// From signal and rate to the normalised target.
     pub model: Model,
-    /// Where the movements of the calibration turned, for a gauge that is to tell when it was put on again; `None` where too
-    /// few were recorded, and in earlier records.
-    pub turns: Option<Turns>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
@@ -164,11 +161,10 @@ pub struct CalibrationSpec {
 ///     rate_source: RateSource::Voltage,
 ///     dead_band: 0.05,
 ///     model: Model::Linear(line),
-///     turns: None,
 ///     provenance: Provenance::new("2026-11-21", ["ramp.csv"]),
 /// };
 /// let calibration = Calibration::new(spec.clone())?;
-/// assert_eq!(calibration.dead_band, 0.05);
+/// assert_eq!(calibration.spec().dead_band, 0.05);
 /// let error = Calibration::new(CalibrationSpec { dead_band: -1.0, ..spec }).unwrap_err();
 /// assert!(error.to_string().contains("dead_band"));
 /// # Ok::<(), DesignError>(())
@@ -197,9 +193,13 @@ impl Calibration {
         spec.rate_estimator.validate()?;
         DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
         spec.model.validate()?;
-        spec.turns.as_ref().map_or(Ok(()), Turns::validate)?;
         check_sizes(&spec)?;
         Ok(Self(spec))
+    }
+
+    /// The parts.
+    pub fn spec(&self) -> &CalibrationSpec {
+        &self.0
     }
 
     /// The parts, to change and check again.
@@ -228,18 +228,11 @@ fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     };
     match &spec.model {
         Model::Linear(line) => line_holds(&scales, line),
-        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
+        Model::Surfaces { inflation, deflation } => {
             surface_holds(&scales, inflation)?;
             surface_holds(&scales, deflation)
         }
         _ => Ok(()),
-    }
-}
-
-impl core::ops::Deref for Calibration {
-    type Target = CalibrationSpec;
-    fn deref(&self) -> &CalibrationSpec {
-        &self.0
     }
 }
 

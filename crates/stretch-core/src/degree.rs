@@ -31,6 +31,9 @@ pub struct Degree {
 }
 
 impl Degree {
+    /// A line over the voltage: `p00 + p01 volts`.
+    pub const LINE: Self = Self { rate: 0, volts: 1 };
+
     /// The paper's surface: degree 1 in rate, 3 in voltage.
     pub const POLY13: Self = Self { rate: 1, volts: 3 };
 

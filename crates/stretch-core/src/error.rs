@@ -38,6 +38,11 @@ pub enum DesignError {
         /// The newest schema that this release reads.
         newest: u32,
     },
+    /// A record of a model that this release does not have any more.
+    Removed {
+        /// The model.
+        model: &'static str,
+    },
     /// A calibration of another kind than what is made of it can use.
     Mismatch {
         /// What differs: `model`, `rate estimator`.
@@ -89,9 +94,19 @@ impl fmt::Display for DesignError {
             Self::NoRecord => {
                 write!(f, "the bytes are no record of this kind, or not one alone: calibrate again")
             }
+            Self::Schema { found: 3, .. } => write!(
+                f,
+                "schema is 3, bytes with where movements turn, which release 0.1.0 reads: make the record again from its \
+                 JSON, or calibrate again"
+            ),
             Self::Schema { found, newest } => write!(
                 f,
                 "schema is {found}, but this release reads up to schema {newest}: update stretch"
+            ),
+            Self::Removed { model } => write!(
+                f,
+                "this record holds a `{model}` model, which only builds of stretch 0.1.0 before 27 November 2026 read; calibrate \
+                 again with --model observer or history"
             ),
             Self::Mismatch { field, expected, found } => {
                 write!(f, "the calibration's {field} is {found}, but this takes {expected}")

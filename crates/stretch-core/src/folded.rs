@@ -2,7 +2,7 @@
 
 use crate::{
     BranchSurface, DesignError, Interval, LinearMap, MAX_DEGREE, Range,
-    power::power,
+    arithmetic::power,
     sizes::{MOST_PRODUCT, MOST_SLOPE, range, size},
 };
 

@@ -1,26 +1,20 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
-mod array;
+pub mod arithmetic;
 mod branch;
 mod calibration;
-#[cfg(feature = "serde")]
-mod calibration_forms;
 mod degree;
 mod diagnosed;
 mod error;
 pub mod fixed;
 mod folded;
 mod history;
-mod hysteresis;
 mod interval;
 mod label;
-mod lag;
 mod model;
 mod observer;
-mod play;
 mod polarity;
-mod power;
 mod provenance;
 mod range;
 mod rate;
@@ -29,19 +23,14 @@ mod real;
 pub mod record;
 mod rest;
 mod rest_level;
-mod sizes;
+pub mod sizes;
 mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 mod surface;
-mod turns;
 mod unit;
 mod values;
 
-pub use array::{
-    ARRAY_RELAXATIONS, ARRAY_STATES, ARRAY_TERMS, ArrayCalibration, ArrayChannel, ArrayGains,
-    ArrayShifts, ArraySpec, MAX_CHANNELS,
-};
 pub use branch::Branch;
 pub use calibration::{
     CALIBRATION_SCHEMA, Calibration, CalibrationSpec, RateSource, Schema, Target,
@@ -52,15 +41,11 @@ pub use error::DesignError;
 pub use history::{
     HistoryMap, HistoryShape, MAX_HISTORY_TERMS, MAX_PLAYS, MAX_RELAXATIONS, MAX_STATES,
 };
-pub use hysteresis::{Hysteresis, MAX_HYSTERESIS_PLAYS};
 pub use interval::Interval;
 pub use label::Label;
-pub use lag::{lag, lag_share, lag_weights};
 pub use model::{BranchSurface, LinearMap, Model};
 pub use observer::{MAX_KNOTS, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, ObserverMap};
-pub use play::play;
 pub use polarity::Polarity;
-pub use power::power;
 pub use provenance::{FitSummary, Provenance};
 pub use range::{Normalisation, Range, RangeSpec};
 pub use rate::RateEstimator;
@@ -69,6 +54,5 @@ pub use rest::RestTracker;
 pub use rest_level::{Baseline, RestLevel};
 pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
-pub use turns::Turns;
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};
 pub use values::Values;

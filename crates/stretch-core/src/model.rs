@@ -51,8 +51,8 @@ pub enum Model {
         /// For a falling target.
         deflation: BranchSurface,
     },
-    /// The same, mixed across the dead band in place of a jump: the inflation
-    /// surface weighs `(1 + rate/dead_band)/2`, held to 0..1.
+    /// Two surfaces mixed across the dead band, which builds of stretch 0.1.0 before 27 November 2026 ran.
+    /// [`Model::validate`] refuses them. The variant stays because records in bytes number the models.
     Blended {
         /// For a rising target.
         inflation: BranchSurface,
@@ -88,6 +88,26 @@ impl Model {
         }
     }
 
+    /// Whether an estimate needs one value of the signal and nothing else, no rate and no earlier sample: a line, and one
+    /// curve for both branches.
+    ///
+    /// ```
+    /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
+    /// let signal_domain = Interval { min: 1.0, max: 2.0 };
+    /// let fit = FitSummary { samples: 100, r_squared: 0.9, rmse: 0.1 };
+    /// let line = LinearMap { slope: 1.0, intercept: 0.0, signal_domain, fit };
+    /// assert!(Model::Linear(line).needs_signal_only());
+    /// ```
+    pub fn needs_signal_only(&self) -> bool {
+        match self {
+            Self::Linear(_) => true,
+            Self::Surfaces { inflation, deflation } => {
+                inflation == deflation && inflation.surface.degree().rate() == 0
+            }
+            _ => false,
+        }
+    }
+
     /// What a caller answers who takes models of kind `expected` only:
     /// [`DesignError::Mismatch`], with this model's name.
     pub fn instead_of(&self, expected: &'static str) -> DesignError {
@@ -112,7 +132,8 @@ impl Model {
                 size("linear.signal_domain", domain.max)?;
                 fit(&line.fit)?;
             }
-            Self::Surfaces { inflation, deflation } | Self::Blended { inflation, deflation } => {
+            Self::Blended { .. } => return Err(DesignError::Removed { model: self.name() }),
+            Self::Surfaces { inflation, deflation } => {
                 inflation.signal_domain.validate("inflation.signal_domain")?;
                 inflation.rate_domain.validate("inflation.rate_domain")?;
                 deflation.signal_domain.validate("deflation.signal_domain")?;

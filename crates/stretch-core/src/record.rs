@@ -14,10 +14,9 @@
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use crate::{DesignError, Schema};
+use crate::DesignError;
 
-/// The schema of the records that this release writes, of all kinds; [`CALIBRATION_SCHEMA`](crate::CALIBRATION_SCHEMA) tells of a
-/// newer one for calibrations that hold turns.
+/// The schema of the records that this release writes, of all kinds.
 pub const SCHEMA: u32 = crate::CALIBRATION_SCHEMA;
 
 /// Without a table: a kilobyte of flash for a few thousand instructions when the board starts.
@@ -96,9 +95,8 @@ fn body(bytes: &[u8]) -> Result<&[u8], DesignError> {
     if stored != computed {
         return Err(DesignError::Damaged { stored, computed });
     }
-    let newest = Schema::WITH_TURNS.into();
-    if found > newest {
-        return Err(DesignError::Schema { found, newest });
+    if found > SCHEMA {
+        return Err(DesignError::Schema { found, newest: SCHEMA });
     }
     Ok(body)
 }

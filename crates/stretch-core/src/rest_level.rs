@@ -1,6 +1,9 @@
 //! The resting baseline, stepped sample by sample.
 
-use crate::{Design, Polarity, Range, Real, RestTracker, SampleRate, lag, lag_share};
+use crate::{
+    Design, Polarity, Range, Real, RestTracker, SampleRate,
+    arithmetic::{lag, lag_share},
+};
 
 /// [`RestTracker`] with its rates folded to one sample.
 ///

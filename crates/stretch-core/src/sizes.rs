@@ -8,23 +8,29 @@
 use crate::{DesignError, Range};
 
 /// The largest number with a unit, and the largest that has none.
-pub(crate) const MOST: f64 = 1e9;
+pub const MOST: f64 = 1e9;
 /// The least that is divided by.
-pub(crate) const LEAST: f64 = 1e-9;
+pub const LEAST: f64 = 1e-9;
 /// The largest product on the way to an estimate.
 pub(crate) const MOST_PRODUCT: f64 = 1e30;
 /// The largest change of the reference per change of the signal.
-pub(crate) const MOST_SLOPE: f64 = 1e11;
+pub const MOST_SLOPE: f64 = 1e11;
 /// The least and the most samples a second.
-pub(crate) const RATES_HZ: core::ops::RangeInclusive<f64> = 1e-3..=1e7;
+pub const RATES_HZ: core::ops::RangeInclusive<f64> = 1e-3..=1e7;
 
 /// A number of a size that can be computed with.
-pub(crate) fn size(field: &'static str, x: f64) -> Result<f64, DesignError> {
+///
+/// # Errors
+/// [`DesignError`] that names the field.
+pub fn size(field: &'static str, x: f64) -> Result<f64, DesignError> {
     DesignError::check(field, x, x.abs() <= MOST)
 }
 
 /// A number above zero that can be divided by.
-pub(crate) fn extent(field: &'static str, x: f64) -> Result<f64, DesignError> {
+///
+/// # Errors
+/// [`DesignError`] that names the field.
+pub fn extent(field: &'static str, x: f64) -> Result<f64, DesignError> {
     DesignError::check(field, x, (LEAST..=MOST).contains(&x))
 }
 

@@ -19,8 +19,7 @@ use crate::{
     BranchSurface, Calibration, CalibrationSpec, Crosstalk, Degree, DiagnosedMap, Fading,
     FitSummary, HistoryMap, HistoryShape, Interval, Knee, Label, LinearMap, MAX_HISTORY_TERMS,
     Model, Normalisation, ObserverMap, Plays, Polarity, Provenance, Range, RangeSpec,
-    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Turns, Values,
-    Worn,
+    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Values, Worn,
 };
 
 /// Either way of normalising.
@@ -226,35 +225,11 @@ pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = Diagnosed
     )
 }
 
-/// Levels at which movements turn.
-pub fn turns() -> impl Strategy<Value = Turns> {
-    let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 1e-6..1e3, 1e-3..1e3];
-    (sizes, 0.0..1.0, -100.0..100.0, any::<u32>(), 0.0..0.2, -1e3..1e3).prop_map(
-        |(sizes, high_share, level, movements, follow, reference_per_signal)| {
-            let [least_span, scatter, limit, mean_limit, movements_an_hour] = sizes;
-            Turns {
-                level,
-                high_share,
-                least_span,
-                scatter,
-                movements,
-                limit,
-                mean_limit,
-                false_alarms_an_hour: 0.25,
-                movements_an_hour,
-                follow,
-                reference_per_signal,
-            }
-        },
-    )
-}
-
 /// Calibrations of every model, estimator, normalisation and polarity, for a
 /// signal of 1..2 V or so.
 pub fn calibration() -> impl Strategy<Value = Calibration> {
     prop_oneof![
         2 => paper_calibration(),
-        1 => blended_calibration(),
         1 => history_calibration(),
         1 => observer_calibration(),
         1 => diagnosed_calibration(),
@@ -272,16 +247,6 @@ pub fn paper_calibration() -> impl Strategy<Value = Calibration> {
         let surfaces = (branch_surface(domain), branch_surface(domain))
             .prop_map(|(inflation, deflation)| Model::Surfaces { inflation, deflation });
         prop_oneof![linear, surfaces].prop_map(move |model| frame.holding(model))
-    })
-}
-
-/// Calibrations of [`Model::Blended`].
-pub fn blended_calibration() -> impl Strategy<Value = Calibration> {
-    frame().prop_flat_map(|frame| {
-        let branch = || branch_surface(frame.domain());
-        (branch(), branch()).prop_map(move |(inflation, deflation)| {
-            frame.holding(Model::Blended { inflation, deflation })
-        })
     })
 }
 
@@ -360,7 +325,6 @@ impl Frame {
             rate_source: RateSource::Voltage,
             dead_band: self.dead_band,
             model,
-            turns: None,
             provenance: Provenance::new("", ["generated"]),
         })
         .expect("every part is in range")

@@ -1,6 +1,5 @@
 //! The tests of stretch-core from outside, one program: linking takes longer than most of them.
 
 mod fixed;
-mod hysteresis;
 mod properties;
 mod records;

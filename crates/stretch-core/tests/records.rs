@@ -2,14 +2,14 @@
 
 use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
-use stretch_core::{Calibration, Degree, Model, Surface, strategies};
+use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface, strategies};
 
 /// A calibration with surfaces, as JSON to spoil.
 fn record() -> Value {
     let mut runner = TestRunner::deterministic();
     loop {
         let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
-        if matches!(calibration.model, Model::Surfaces { .. }) {
+        if matches!(calibration.spec().model, Model::Surfaces { .. }) {
             return serde_json::to_value(calibration).unwrap();
         }
     }
@@ -73,6 +73,34 @@ fn a_newer_schema_says_so_before_anything_else() {
     refused("/schema", json!(0), "schema is 0");
 }
 
+/// Records in bytes number the models: those that are left keep their numbers.
+#[test]
+fn a_removed_model_is_refused_by_name_in_text_and_in_bytes() {
+    let mut record = record();
+    let surfaces = record["model"]["surfaces"].take();
+    record["model"] = json!({ "blended": surfaces });
+    let error = serde_json::from_value::<Calibration>(record.clone()).unwrap_err().to_string();
+    assert!(error.contains("a `blended` model, which only builds of stretch 0.1.0"), "{error}");
+    let spec: CalibrationSpec = serde_json::from_value(record).unwrap();
+    let mut buffer = [0; 4096];
+    let bytes = stretch_core::record::store(&spec, &mut buffer).unwrap();
+    let read = stretch_core::record::load::<CalibrationSpec>(bytes).unwrap();
+    assert_eq!(Calibration::new(read), Err(DesignError::Removed { model: "blended" }));
+    let mut runner = TestRunner::deterministic();
+    for _ in 0..64 {
+        let model = strategies::calibration().new_tree(&mut runner).unwrap().current().spec().model;
+        let number = match model {
+            Model::Linear(_) => 0,
+            Model::Surfaces { .. } => 1,
+            Model::History(_) => 3,
+            Model::Observer(_) => 4,
+            Model::Diagnosed(_) => 5,
+            _ => unreachable!(),
+        };
+        assert_eq!(postcard::to_slice(&model, &mut buffer).unwrap()[0], number, "{}", model.name());
+    }
+}
+
 #[test]
 fn an_unknown_or_missing_field_is_named() {
     let mut unknown = record();
@@ -85,59 +113,12 @@ fn an_unknown_or_missing_field_is_named() {
     assert!(error.contains("signal_range"), "{error}");
 }
 
+/// A record that an earlier release wrote.
 #[test]
-fn turns_may_be_missing_in_text_and_are_checked() {
-    let turns = json!({
-        "level": 1.24, "high_share": 0.0, "least_span": 0.3, "scatter": 0.01, "movements": 40, "limit": 0.03, "mean_limit": 0.012,
-        "false_alarms_an_hour": 0.25, "movements_an_hour": 1200.0, "follow": 0.025, "reference_per_signal": -30.0,
-    });
-    let mut with = record();
-    assert!(with.get("turns").is_none());
-    with["turns"] = turns;
-    let calibration: Calibration = serde_json::from_value(with.clone()).unwrap();
-    assert_eq!(calibration.turns.unwrap().movements, 40);
-    assert_eq!(serde_json::to_value(&calibration).unwrap(), with);
-    // the schema of bytes is none of text
-    let mut of_bytes = with.clone();
-    of_bytes["schema"] = json!(3);
-    assert!(serde_json::from_value::<Calibration>(of_bytes).is_err());
-    with["turns"]["limit"] = json!(-0.1);
-    let error = serde_json::from_value::<Calibration>(with).unwrap_err().to_string();
-    assert!(error.contains("turns.limit"), "{error}");
-}
-
-proptest! {
-    /// Records of bytes were written without turns before: such a one is what it was, and turns stand behind it.
-    #[test]
-    fn turns_stand_behind_what_a_record_without_them_is(
-        calibration in strategies::calibration(), turns in strategies::turns(),
-    ) {
-        let mut spec = calibration.clone().into_spec();
-        spec.turns = Some(turns);
-        let with = Calibration::new(spec).unwrap();
-        let mut buffers = [[0; 4096]; 3];
-        let [one, other, alone] = &mut buffers;
-        let bytes = postcard::to_slice(&with, one).unwrap();
-        let without = postcard::to_slice(&calibration, other).unwrap();
-        let alone = postcard::to_slice(&turns, alone).unwrap();
-        prop_assert_eq!((bytes[0], without[0]), (3, 2));
-        prop_assert_eq!(&bytes[1..without.len()], &without[1..]);
-        prop_assert_eq!(&bytes[without.len()..], alone);
-        prop_assert_eq!(postcard::from_bytes::<Calibration>(without).unwrap(), calibration);
-        for length in 0..bytes.len() {
-            prop_assert!(postcard::from_bytes::<Calibration>(&bytes[..length]).is_err());
-        }
-        prop_assert_eq!(postcard::from_bytes::<Calibration>(bytes).unwrap(), with);
-    }
-}
-
-/// A record that an earlier release wrote, which had no turns in bytes.
-#[test]
-fn an_earlier_record_loads_and_says_that_it_holds_no_turns() {
+fn an_earlier_record_loads_and_is_written_as_it_was() {
     let bytes = include_bytes!("../../../firmware/data/poly13.postcard");
     assert_eq!(bytes[0], 2);
     let calibration = stretch_core::record::load::<Calibration>(bytes).unwrap();
-    assert_eq!(calibration.turns, None);
     let mut buffer = [0; 4096];
     assert_eq!(stretch_core::record::store(&calibration, &mut buffer).unwrap(), bytes);
 }
@@ -157,7 +138,7 @@ fn two_poly13_surfaces_take_about_400_bytes() {
     let mut buffer = [0; 4096];
     loop {
         let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
-        if let Model::Surfaces { inflation, deflation } = calibration.model
+        if let Model::Surfaces { inflation, deflation } = calibration.spec().model
             && inflation.surface.degree() == Degree::POLY13
             && deflation.surface.degree() == Degree::POLY13
         {

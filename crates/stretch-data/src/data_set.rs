@@ -1,18 +1,18 @@
 //! A folder of trials and what `dataset.toml` says of them.
 
 use std::{
-    fmt::Write,
-    fs::File,
-    path::{Component, Path},
+    fmt,
+    fs::{self, File},
+    path::{Component, Path, PathBuf},
 };
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use stretch_files::{FileError, digest_of, is_digest, write_folder, write_whole};
-
 use crate::{
-    DataError, RigFile, TomlFile, TomlView, Trial, nearest,
-    toml_text::{number_text, string_text},
+    DataError, Remarks, RigFile, TomlFile, Trial, digest_of,
+    files::{FileError, write_folder, write_whole},
+    is_digest,
 };
 
 /// The contents of `dataset.toml`.
@@ -26,7 +26,7 @@ pub struct DataSet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<String>,
     /// The trials in the order in which they were recorded.
-    #[serde(rename = "trial", default)]
+    #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
     pub trials: Vec<TrialEntry>,
 }
 
@@ -67,10 +67,11 @@ pub enum TrialKind {
 }
 
 /// What a trial may be used for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
     /// May be fitted.
+    #[default]
     Fit,
     /// Tested on, never fitted.
     Test,
@@ -84,7 +85,7 @@ impl DataSet {
     /// files it names are there. Its trials are read by the crate `stretch-recording`.
     ///
     /// # Errors
-    /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with the key.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, DataError> {
         let folder = folder.as_ref();
         if folder.is_dir() && !folder.join(FILE).exists() {
@@ -92,14 +93,10 @@ impl DataSet {
         }
         let file = TomlFile::read(folder.join(FILE))?;
         let set = Self::from_file(&file)?;
-        for (i, entry) in set.trials.iter().enumerate() {
-            if !folder.join(&entry.file).is_file() {
-                let view = file.top().called(trial_name(i));
-                return view.fail("file", format!("there is no file {} in the folder", entry.file));
+        for (key, path) in set.files() {
+            if !folder.join(path).is_file() {
+                return Err(file.error(&key, format!("there is no file {path} in the folder")));
             }
-        }
-        if let Some(rig) = set.rig.as_ref().filter(|rig| !folder.join(rig).is_file()) {
-            return file.top().fail("rig", format!("there is no file {rig} in the folder"));
         }
         Ok(set)
     }
@@ -111,7 +108,7 @@ impl DataSet {
     /// over.
     ///
     /// # Errors
-    /// [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    /// [`DataError::NotToml`], or [`DataError::Key`] with the key.
     ///
     /// ```
     /// use stretch_data::{DataSet, Split};
@@ -121,12 +118,12 @@ impl DataSet {
     /// let error = DataSet::parse("dataset.toml", &text.replace("fit", "fitt")).unwrap_err();
     /// assert_eq!(
     ///     error.to_string(),
-    ///     "dataset.toml, [[trial]] 1, key split: \"fitt\" is none of fit, test (did you mean fit?)"
+    ///     "dataset.toml, row 6, key trial[0].split: \"fitt\" is none of fit, test (did you mean fit?)"
     /// );
     /// # Ok::<(), stretch_data::DataError>(())
     /// ```
     pub fn parse(name: &str, text: &str) -> Result<Self, DataError> {
-        Self::from_file(&TomlFile::parse(name, text)?)
+        Self::from_file(&TomlFile::new(name, text))
     }
 
     /// The trials of one split, in order.
@@ -191,10 +188,10 @@ impl DataSet {
     }
 
     /// Writes a folder with `dataset.toml`, the rig file, and each trial as `trial` makes it,
-    /// whole or not at all, as [`write_folder`](stretch_files::write_folder()).
+    /// whole or not at all, as [`write_folder`](crate::files::write_folder).
     ///
     /// # Errors
-    /// As [`write_folder`](stretch_files::write_folder()), or what `trial` says.
+    /// As [`write_folder`](crate::files::write_folder), or what `trial` says.
     pub fn write_folder<E: From<DataError> + From<FileError>>(
         &self,
         folder: impl AsRef<Path>,
@@ -216,101 +213,45 @@ impl DataSet {
 
     /// The text of `dataset.toml`.
     pub fn to_toml(&self) -> String {
-        let mut text = String::new();
-        self.write_toml(&mut text).expect("a String takes everything");
-        text
-    }
-
-    fn write_toml(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "name = {}", string_text(&self.name))?;
-        writeln!(out, "rate_hz = {}", number_text(self.rate_hz))?;
-        if let Some(rig) = &self.rig {
-            writeln!(out, "rig = {}", string_text(rig))?;
-        }
-        for entry in &self.trials {
-            writeln!(out, "\n[[trial]]\nfile = {}", string_text(&entry.file))?;
-            writeln!(out, "kind = {}", string_text(entry.kind.name()))?;
-            if let Some(opening) = entry.opening {
-                writeln!(out, "opening = {}", number_text(opening))?;
-            }
-            writeln!(out, "start_s = {}", number_text(entry.start_s))?;
-            writeln!(out, "split = {}", string_text(entry.split.name()))?;
-            if let Some(digest) = &entry.digest {
-                writeln!(out, "digest = {}", string_text(digest))?;
-            }
-        }
-        Ok(())
+        Remarks::default().write(self)
     }
 
     fn from_file(file: &TomlFile) -> Result<Self, DataError> {
-        let top = file.top();
-        let rate_hz = top.number("rate_hz")?;
-        if rate_hz <= 0.0 {
-            return top.fail("rate_hz", format!("{rate_hz} is not above 0 samples a second"));
-        }
-        let rig = top.optional_text("rig")?.map(str::to_owned);
-        if let Some(rig) = rig.as_deref().filter(|rig| !stands_in_folder(rig)) {
-            return top.fail("rig", outside(rig));
-        }
-        let name = top.text("name")?.to_owned();
-        let mut set = Self { name, rate_hz, rig, trials: Vec::new() };
-        for view in top.tables("trial")? {
-            let entry = entry(&view)?;
-            if let Some(k) = set.trials.iter().position(|other| other.file == entry.file) {
-                let earlier = trial_name(k);
-                return view.fail("file", format!("{} is the file of {earlier}, too", entry.file));
-            }
-            set.trials.push(entry);
+        let set: Self = file.parse()?;
+        let fail = |key: &str, problem: String| Err(file.error(key, problem));
+        if set.rate_hz <= 0.0 {
+            return fail("rate_hz", format!("{} is not above 0 samples a second", set.rate_hz));
         }
         if set.trials.is_empty() {
-            return top.fail("trial", "there is no [[trial]]; write a table for each file");
+            return fail("trial", "there is no [[trial]]; write a table for each file".into());
+        }
+        if let Some((key, path)) = set.files().find(|(_, path)| !stands_in_folder(path)) {
+            let problem =
+                format!("{path:?} does not stand in the data set's folder; put the file there");
+            return fail(&key, problem);
+        }
+        for (i, TrialEntry { file, opening, digest, .. }) in set.trials.iter().enumerate() {
+            let key = |key: &str| format!("trial[{i}].{key}");
+            if let Some(k) = set.trials[..i].iter().position(|other| other.file == *file) {
+                return fail(&key("file"), format!("{file} is the file of trial[{k}], too"));
+            }
+            if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
+                return fail(&key("opening"), format!("{opening} is not between 0 and 1"));
+            }
+            if let Some(digest) = digest.as_deref().filter(|digest| !is_digest(digest)) {
+                let form = "write crc32c and eight hexadecimal digits, or leave it out";
+                return fail(&key("digest"), format!("{digest:?} is no digest; {form}"));
+            }
         }
         Ok(set)
     }
-}
 
-fn trial_name(index: usize) -> String {
-    format!("[[trial]] {}", index + 1)
-}
-
-fn entry(view: &TomlView<'_>) -> Result<TrialEntry, DataError> {
-    let file = view.text("file")?.to_owned();
-    if !stands_in_folder(&file) {
-        return view.fail("file", outside(&file));
+    /// The files that it names, each with its key.
+    fn files(&self) -> impl Iterator<Item = (String, &str)> {
+        let trials = self.trials.iter().enumerate();
+        let trials = trials.map(|(i, entry)| (format!("trial[{i}].file"), entry.file.as_str()));
+        self.rig.as_deref().map(|rig| ("rig".to_owned(), rig)).into_iter().chain(trials)
     }
-    let opening = view.optional_number("opening")?;
-    if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
-        return view.fail("opening", format!("{opening} is not between 0 and 1"));
-    }
-    let digest = view.optional_text("digest")?.map(str::to_owned);
-    if let Some(digest) = digest.as_deref().filter(|digest| !is_digest(digest)) {
-        let form = "write crc32c and eight hexadecimal digits, or leave it out";
-        return view.fail("digest", format!("{digest:?} is no digest; {form}"));
-    }
-    Ok(TrialEntry {
-        digest,
-        file,
-        kind: choice(view, "kind", &TrialKind::ALL, TrialKind::name)?,
-        opening,
-        start_s: view.optional_number("start_s")?.unwrap_or(0.0),
-        split: choice(view, "split", &Split::ALL, Split::name)?,
-    })
-}
-
-fn choice<T: Copy>(
-    view: &TomlView<'_>,
-    key: &str,
-    all: &[T],
-    name: fn(T) -> &'static str,
-) -> Result<T, DataError> {
-    let text = view.text(key)?;
-    let names: Vec<&str> = all.iter().map(|&item| name(item)).collect();
-    if let Some(i) = names.iter().position(|n| *n == text) {
-        return Ok(all[i]);
-    }
-    let meant = nearest(text, names.iter().copied())
-        .map_or(String::new(), |other| format!(" (did you mean {other}?)"));
-    view.fail(key, format!("{text:?} is none of {}{meant}", names.join(", ")))
 }
 
 /// Whether a path can only lead to something inside the folder that it starts from.
@@ -319,8 +260,16 @@ fn stands_in_folder(path: &str) -> bool {
     parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
-fn outside(path: &str) -> String {
-    format!("{path:?} does not stand in the data set's folder; put the file there")
+/// The trials of a data set in a folder that are still what the program wrote, by their digests.
+pub(crate) fn unchanged_trials(folder: &Path) -> Vec<PathBuf> {
+    let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
+    let trials = DataSet::parse(FILE, &text).map_or(Vec::new(), |set| set.trials);
+    let unchanged = trials.into_iter().filter_map(|trial| {
+        let path = folder.join(&trial.file);
+        let digest = digest_of(File::open(&path).ok()?).ok()?;
+        (trial.digest? == digest).then_some(path)
+    });
+    unchanged.collect()
 }
 
 impl TrialEntry {
@@ -357,8 +306,8 @@ impl TrialEntry {
         let file = &self.file;
         Err(DataError::Key {
             file: description.display().to_string(),
-            table: format!("the [[trial]] of {file}"),
-            key: "digest".to_owned(),
+            row: None,
+            key: format!("digest of {file}"),
             problem: format!(
                 "{file} is not the file that this data set was written with ({found}): files of two data sets may be mixed in this folder; write it anew, or remove this line if {file} was changed on purpose"
             ),
@@ -370,28 +319,16 @@ impl TrialKind {
     /// All kinds.
     pub const ALL: [Self; 5] =
         [Self::Inflation, Self::Deflation, Self::Arbitrary, Self::Pulses, Self::Other];
+}
 
-    /// What it is called in a file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Inflation => "inflation",
-            Self::Deflation => "deflation",
-            Self::Arbitrary => "arbitrary",
-            Self::Pulses => "pulses",
-            Self::Other => "other",
-        }
+impl fmt::Display for TrialKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
     }
 }
 
-impl Split {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Fit, Self::Test];
-
-    /// What it is called in a file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Test => "test",
-        }
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
     }
 }

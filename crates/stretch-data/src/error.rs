@@ -2,9 +2,7 @@
 
 use std::{fmt, fs, io, path::Path};
 
-use stretch_files::FileError;
-
-use crate::nearest::nearest;
+use crate::{files::FileError, nearest::nearest};
 
 /// Where in a file something stands.
 ///
@@ -64,7 +62,7 @@ pub enum DataError {
         value: String,
     },
     /// Time that stands still or goes back.
-    #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: sort the rows or split the recordings", if .time_s == .previous_s { "stands still" } else { "goes back" })]
+    #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: leave that row out, or split the recording there", if .time_s == .previous_s { "stands still" } else { "goes back" })]
     TimeNotRising {
         /// Where.
         at: Place,
@@ -121,13 +119,13 @@ pub enum DataError {
         message: String,
     },
     /// A key that is missing or has an impossible value.
-    #[error("{file}, {table}, key {key}: {problem}")]
+    #[error("{file}{}, key {key}: {problem}", .row.map_or(String::new(), |row| format!(", row {row}")))]
     Key {
         /// The file.
         file: String,
-        /// The table, in words: `[[trial]] 3`.
-        table: String,
-        /// The key.
+        /// The row, where the key stands in one.
+        row: Option<u64>,
+        /// The key with the tables that it stands in: `trial[2].file`.
         key: String,
         /// What is wrong and what to do.
         problem: String,

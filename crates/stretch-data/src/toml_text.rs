@@ -1,23 +1,94 @@
-//! Keys, numbers and texts as TOML spells them.
+//! A value as the text of a TOML file, with comments.
 
-use toml::Value;
+use std::{collections::BTreeMap, mem};
 
-/// A key as TOML spells it.
-pub(crate) fn key_text(key: &str) -> String {
-    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !key.is_empty() && key.chars().all(bare) {
-        key.to_owned()
-    } else {
-        Value::String(key.to_owned()).to_string()
+use serde::Serialize;
+use toml_edit::{Item, Table};
+
+/// Comments for the entries of a rig file or a problem's file.
+///
+/// ```
+/// use stretch_data::{Remarks, RigFile};
+/// let rig = RigFile::parse("rig.toml", "[muscle]\ntau_m = { value = 0.03 }")?;
+/// let mut remarks = Remarks::default();
+/// remarks.head.push("Found on Monday.".into());
+/// remarks.parameters.insert(("muscle".into(), "tau_m".into()), "lag, s".into());
+/// let text = rig.to_toml_with(&remarks);
+/// assert_eq!(text, "# Found on Monday.\n\n[muscle]\ntau_m = { value = 0.03 } # lag, s\n");
+/// assert_eq!(RigFile::parse("copy", &text)?, rig);
+/// # Ok::<(), stretch_data::DataError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Remarks {
+    /// Lines at the top of the file.
+    pub head: Vec<String>,
+    /// Behind a parameter: by stage and name in a rig file, by `parameter` and name in a problem's file. Behind a parameter of an effect: by
+    /// the name of the effect and its own.
+    pub parameters: BTreeMap<(String, String), String>,
+    /// Lines above an effect: by its name.
+    pub effects: BTreeMap<String, Vec<String>>,
+}
+
+impl Remarks {
+    /// A value as TOML with these comments: tables of the top have a header of their own, tables inside stand in one line. Numbers read back
+    /// to the same bits.
+    ///
+    /// # Panics
+    /// Never for structs and maps of numbers, texts and lists.
+    pub fn write(&self, value: &impl Serialize) -> String {
+        let mut document = toml_edit::ser::to_document(value).expect("a table");
+        for (key, item) in document.iter_mut() {
+            if !item.is_array() {
+                *item = mem::take(item).into_table().map_or_else(|value| value, Item::Table);
+            }
+            with_header(item, &mut |table| self.comment(table, &key));
+        }
+        let head: String = self.head.iter().map(|line| comment(line)).collect();
+        let gap = if head.is_empty() || document.iter().any(|(_, item)| item.is_value()) {
+            ""
+        } else {
+            "\n"
+        };
+        format!("{head}{gap}{document}")
+    }
+
+    /// Adds the comments of a table; `owner` is its key, or the effect that it is an argument of.
+    fn comment(&self, table: &mut Table, owner: &str) {
+        let name = table.get("name").and_then(Item::as_str).map(str::to_owned);
+        if let Some((mut key, lines)) =
+            name.as_ref().and_then(|name| table.key_mut("name").zip(self.effects.get(name)))
+        {
+            key.leaf_decor_mut()
+                .set_prefix(lines.iter().map(|line| comment(line)).collect::<String>());
+        }
+        let own = name.as_deref().unwrap_or(owner);
+        for (key, item) in table.iter_mut() {
+            with_header(item, &mut |inner| self.comment(inner, own));
+            let owners = [(own, key.get()), (owner, own), (own, own)];
+            let places = if key == "value" { &owners[..] } else { &owners[..1] };
+            let find = |(owner, name): &(&str, &str)| {
+                self.parameters.get(&((*owner).into(), (*name).into()))
+            };
+            if let (Some(remark), Some(value)) = (places.iter().find_map(find), item.as_value_mut())
+            {
+                value.decor_mut().set_suffix(format!(" {}", comment(remark).trim_end()));
+            }
+        }
     }
 }
 
-/// A number as TOML spells it, with the fewest digits that read back to the same bits.
-pub(crate) fn number_text(value: f64) -> String {
-    Value::Float(value).to_string()
+/// Gives lists of tables a header each, and does something to these and to a table.
+fn with_header(item: &mut Item, each: &mut dyn FnMut(&mut Table)) {
+    *item = mem::take(item).into_array_of_tables().map_or_else(|item| item, Item::ArrayOfTables);
+    match item {
+        Item::Table(table) => each(table),
+        Item::ArrayOfTables(tables) => tables.iter_mut().for_each(each),
+        _ => {}
+    }
 }
 
-/// A text as TOML spells it.
-pub(crate) fn string_text(text: &str) -> String {
-    Value::String(text.to_owned()).to_string()
+/// A comment ends with its line, and holds no control character.
+fn comment(text: &str) -> String {
+    let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    format!("# {text}\n")
 }

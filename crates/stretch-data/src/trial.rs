@@ -2,9 +2,7 @@
 
 use std::iter;
 
-use stretch_files::Checksum;
-
-use crate::{DataError, Place};
+use crate::{DataError, Place, digest::CRC};
 
 /// A recording: time stamps and, beside them, named channels of the same length.
 ///
@@ -81,19 +79,14 @@ impl Trial {
     /// assert_eq!(trial.checksum(&["length_mm"]), copy.checksum(&["length_mm"]));
     /// ```
     pub fn checksum(&self, columns: &[&str]) -> Option<u32> {
-        let mut checksum = Checksum::default();
-        (self.add_to(&mut checksum, columns) && !self.is_empty()).then(|| checksum.value())
-    }
-
-    /// Adds the rows of a part of a trial to its [checksum](Trial::checksum); false where a column is missing.
-    pub fn add_to(&self, checksum: &mut Checksum, columns: &[&str]) -> bool {
-        let own: Option<Vec<&[f64]>> = columns.iter().map(|name| self.channel(name)).collect();
-        let Some(own) = own else { return false };
+        let own: Vec<&[f64]> =
+            columns.iter().map(|name| self.channel(name)).collect::<Option<_>>()?;
+        let mut checksum = CRC.digest();
         for row in 0..self.len() {
             let values = own.iter().filter_map(|column| column.get(row));
-            values.for_each(|value| checksum.take(&value.to_bits().to_le_bytes()));
+            values.for_each(|value| checksum.update(&value.to_bits().to_le_bytes()));
         }
-        true
+        (!self.is_empty()).then(|| checksum.finalize())
     }
 
     /// Seconds from the first sample to the last; 0 for fewer than two.

@@ -5,9 +5,7 @@ use std::{
     path::Path,
 };
 
-use stretch_files::write_whole;
-
-use crate::{Channel, DataError, Trial};
+use crate::{Channel, DataError, Trial, files::write_whole};
 
 impl Trial {
     /// Writes the trial to a file, whole or not at all: `time_s`, then the channels.

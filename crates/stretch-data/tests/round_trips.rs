@@ -3,7 +3,11 @@
 use proptest::prelude::*;
 use stretch_data::{DataSet, RigFile, strategies};
 
+use crate::cases;
+
 proptest! {
+    #![proptest_config(cases(256))]
+
     #[test]
     fn rigs(rig in strategies::rig_file()) {
         prop_assert_eq!(RigFile::parse("rig.toml", &rig.to_toml())?, rig);

@@ -3,13 +3,11 @@
 use alloc::{boxed::Box, vec};
 
 use crate::{
-    effect::{Acts, Effect, each},
+    effect::{Acts, Effect, Live, each},
     kind::{Beside, Kind, Side},
-    live::Live,
     operator::{Operator, Span},
     parameter::{EffectParameter, Form},
-    place::Place,
-    rig_stage::RigStage,
+    place::{Place, RigStage},
     sketch::Sketch,
 };
 

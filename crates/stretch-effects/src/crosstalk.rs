@@ -3,9 +3,8 @@
 use alloc::{boxed::Box, vec};
 
 use crate::{
-    effect::{Acts, Effect, Need},
+    effect::{Acts, Effect, Live, Need},
     kind::{Beside, Kind, Side},
-    live::Live,
     operator::{Operator, Span},
     parameter::{EffectParameter, Form},
     place::Action,

@@ -2,7 +2,7 @@
 
 use alloc::{boxed::Box, format, vec, vec::Vec};
 
-use stretch_core::play;
+use stretch_core::arithmetic::play;
 
 use crate::{
     extent::Extent,

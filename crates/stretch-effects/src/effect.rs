@@ -1,15 +1,14 @@
-//! An effect of the rig, or of any stretch sensor: a kind at a place.
+//! An effect of the rig or of any stretch sensor: a kind at a place, where it is searched, and how it is inverted live.
 
 use alloc::{vec, vec::Vec};
+
+use stretch_core::DiagnosedMap;
 
 use crate::{
     extent::Extent,
     kind::{Find, Kind, Line, Starts},
-    live::Live,
     parameter::EffectParameter,
-    place::{Action, Place, Surroundings},
-    rig_stage::RigStage,
-    search::{Alone, Search},
+    place::{Action, Place, RigStage, Surroundings},
     sketch::Sketch,
 };
 
@@ -258,4 +257,99 @@ impl Search {
             starts: starts.into_iter().map(|s| EffectParameter::complete(&fitted, s)).collect(),
         }
     }
+}
+
+/// What the search needs to know of the measurement of a gauge alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alone {
+    /// From the first to the last sample, s.
+    pub session_s: f64,
+    /// Time by which the signal seems to trail the reference, s.
+    pub lag_s: f64,
+}
+
+/// Ranges and starting points of the search for an effect, one number each of its [fitted](crate::Effect::fitted) parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Search {
+    /// Least and greatest value of each parameter.
+    pub ranges: Vec<[f64; 2]>,
+    /// Points at which it is screened.
+    pub starts: Vec<Vec<f64>>,
+}
+
+impl Search {
+    /// The same in other units, one factor a parameter.
+    pub fn times(mut self, units: &[f64]) -> Self {
+        for (range, unit) in self.ranges.iter_mut().zip(units) {
+            *range = range.map(|x| x * unit);
+        }
+        for start in &mut self.starts {
+            start.iter_mut().zip(units).for_each(|(x, unit)| *x *= unit);
+        }
+        self
+    }
+
+    /// Lets the first strength go as far as `most`, either way.
+    pub fn reach(&mut self, most: f64) {
+        self.ranges[0] = [-most, most];
+    }
+
+    /// Lets the first strength go as far as `most`, either way, and begins at a fifth of it.
+    pub fn reach_from(&mut self, most: f64) {
+        self.reach(most);
+        self.starts.iter_mut().for_each(|start| start[0] = 0.2 * most);
+    }
+
+    /// Leaves out the points at which an effect does not show at a sample rate, Hz; says which rate would do where none is left.
+    /// `least` tells the rate that it needs with some values.
+    pub fn at_rate(&mut self, least: impl Fn(&[f64]) -> f64, rate_hz: f64) -> Option<f64> {
+        let needed = self.starts.iter().map(|s| least(s)).fold(f64::INFINITY, f64::min);
+        // A rate told by rounded stamps may miss its own value by a little.
+        self.starts.retain(|start| least(start) <= rate_hz * (1.0 + 1e-6));
+        self.starts.is_empty().then_some(needed)
+    }
+}
+
+/// What the live map of an effect depends on beside its numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    /// Whether the target falls while the strain rises, as a contraction does.
+    pub falls: bool,
+    /// Greatest pressure of the trials, in its own unit.
+    pub pressure: f64,
+}
+
+impl Target {
+    /// The target at a strain, both in shares of their range.
+    pub fn at(&self, strain: f64) -> f64 {
+        if self.falls { 1.0 - strain } else { strain }
+    }
+}
+
+/// How a diagnosed calibration carries an effect of a gauge or of its reference: the numbers that it fits, and what they are in the map
+/// that is inverted live.
+///
+/// ```
+/// use stretch_effects::{GAUGE, Target, gauge_effect};
+/// let skew = gauge_effect("channel_skew").unwrap().live.unwrap();
+/// assert_eq!(skew.parameters[0].min, -1.0); // s: two recorders may be started by two hands
+/// // A mains hum takes no part in the map, and a curved scale is in its curve: they have no numbers.
+/// let bent = gauge_effect("pot_nonlinearity").unwrap().live.unwrap();
+/// assert!(bent.parameters.is_empty());
+/// assert!(GAUGE.iter().all(|effect| effect.live.is_some()));
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Live {
+    /// Its numbers in shares of the range of target and signal, with ranges; `typical` is where a fit begins when nothing was found. Empty
+    /// where the curve of the map carries the effect.
+    pub parameters: &'static [EffectParameter],
+    /// Writes the effect with these numbers into a map.
+    pub set: fn(&[f64], &Target, &mut DiagnosedMap),
+    /// Whether it lets the resting signal drift, so that the baseline has to be followed.
+    pub drifts: bool,
+}
+
+impl Live {
+    /// An effect that the curve of the map carries.
+    pub const BY_CURVE: Self = Self { parameters: &[], set: |_, _, _| (), drifts: false };
 }

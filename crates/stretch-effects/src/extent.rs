@@ -18,7 +18,7 @@ pub struct Extent {
     pub trial_s: f64,
     /// From the first to the last sample of the session, s.
     pub session_s: f64,
-    /// Step of the lattice that the values stand on best.
+    /// Step of which the values are most nearly multiples.
     pub lattice: f64,
     /// Least and greatest value of what the effect looks at beside the channel.
     pub beside: [f64; 2],
@@ -84,33 +84,49 @@ impl Extent {
 /// Steps that a span may have on a lattice, and values that are looked at.
 const STEPS: [f64; 2] = [10.0, 400.0];
 const LOOKED: usize = 2000;
+/// Distance from zero, in spans, from which on the lattice is searched from the least value. The phase at zero takes steps of 1/d that become
+/// finer with that distance.
+const FAR: f64 = 20.0;
 
-/// The step d for which the values stand most nearly on multiples of it: the greatest |mean of exp(2 pi i x/d)| (Rayleigh's test), over
-/// 1/d in steps that leave no phase of the span further apart than a quarter turn.
+/// The step d for which the values are most nearly multiples of it: the greatest |mean of exp(2 pi i x/d)| (Rayleigh's test), over
+/// 1/d in steps of a tenth of a turn at the value that is farthest from the origin.
 fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64; 2]) -> f64 {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
         return 0.0;
     }
     let every = values.clone().count().div_ceil(LOOKED).max(1);
-    let some: Vec<f64> = values.step_by(every).copied().collect();
-    let reach = span.max(low.abs()).max(high.abs());
-    let (mut best, mut most) = (span / STEPS[1], 0.0);
-    let mut per_unit = STEPS[0] / span;
+    let distance = low.abs().max(high.abs());
+    let is_far = distance > FAR * span;
+    let (origin, reach) = if is_far { (low, span) } else { (0.0, span.max(distance)) };
+    let (mut per_unit, by) = (STEPS[0] / span, 0.1 / reach);
+    let wave = |x: &f64| {
+        let x = x - origin;
+        (unit_phasor(x * per_unit), unit_phasor(x * by))
+    };
+    let mut waves: Vec<([f64; 2], [f64; 2])> = values.step_by(every).map(wave).collect();
+    let (mut best, mut most) = (STEPS[1] / span, 0.0);
     while per_unit <= STEPS[1] / span {
         let (mut cos, mut sin) = (0.0, 0.0);
-        for x in &some {
-            let angle = TAU * (x * per_unit);
-            cos += libm::cos(angle);
-            sin += libm::sin(angle);
+        for ([re, im], [turn_re, turn_im]) in &mut waves {
+            cos += *re;
+            sin += *im;
+            (*re, *im) = (*re * *turn_re - *im * *turn_im, *re * *turn_im + *im * *turn_re);
         }
-        // Multiples stand at phase 0.
+        // Multiples have phase 0.
         if cos > most && cos > sin.abs() {
-            (best, most) = (1.0 / per_unit, cos);
+            (best, most) = (per_unit, cos);
         }
-        per_unit += 0.1 / reach;
+        per_unit += by;
     }
-    best
+    // The least value is on the lattice, which turns 1/d by less than a step of the search.
+    if is_far { low / libm::round(low * best) } else { 1.0 / best }
+}
+
+/// The point of the unit circle at a number of turns, as [cos, sin].
+fn unit_phasor(turns: f64) -> [f64; 2] {
+    let (sin, cos) = libm::sincos(TAU * turns);
+    [cos, sin]
 }
 
 /// Least and greatest.

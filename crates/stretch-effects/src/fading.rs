@@ -5,12 +5,11 @@ use alloc::{boxed::Box, format, vec, vec::Vec};
 use stretch_core::Fading;
 
 use crate::{
-    effect::{Acts, Effect, pairs},
+    effect::{Acts, Effect, Live, pairs},
     extent::Extent,
     grid::Grid,
     kind::{Kind, Side, Signals},
-    live::Live,
-    mean_reversion::MeanReversion,
+    lowpass::MeanReversion,
     operator::{Operator, Span, Start},
     parameter::{EffectParameter, Form},
     place::Place,

@@ -69,7 +69,7 @@ pub struct Measured<'a> {
 /// Finds what a record alone can tell, and acts with it: values, the record, the simulated samples.
 pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
 
-/// A line in the record whose phase nothing foretells: what is known of a found effect where nothing may be fitted.
+/// A line in the record whose phase cannot be predicted: what is known of a found effect where nothing may be fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Frequency, Hz.

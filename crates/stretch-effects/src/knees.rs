@@ -5,10 +5,9 @@ use alloc::{boxed::Box, vec};
 use stretch_core::Knee;
 
 use crate::{
-    effect::{Acts, Effect, Need},
+    effect::{Acts, Effect, Live, Need},
     extent::Extent,
     kind::{Kind, Side},
-    live::Live,
     operator::{Operator, Span},
     parameter::{EffectParameter, Form},
     place::Place,

@@ -1,16 +1,60 @@
-//! Where an effect acts in a rig, and what it may need to know of what is around it.
+//! Where an effect acts in a rig, and what it may need to know of its surroundings.
 
 use alloc::boxed::Box;
+use core::fmt;
 
 use crate::{
     extent::Extent,
     grid::Grid,
     kind::{Kind, Signals},
-    law::{Droop, Law},
     operator::Operator,
     sketch::Quantity,
-    skew_spec::SkewSpec,
+    skew::SkewSpec,
 };
+
+/// A stage of the rig: what is simulated alone on a measured input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum RigStage {
+    /// Openings to pressure.
+    Pneumatics,
+    /// Pressure to length.
+    Muscle,
+    /// Openings to length, both of the above as one.
+    Actuation,
+    /// Length (and pressure, for cross-talk) to bridge voltage.
+    Sensing,
+    /// True length to measured length.
+    Reference,
+}
+
+impl RigStage {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Pneumatics, Self::Muscle, Self::Actuation, Self::Sensing, Self::Reference];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pneumatics => "pneumatics",
+            Self::Muscle => "muscle",
+            Self::Actuation => "actuation",
+            Self::Sensing => "sensing",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Whether an effect or a parameter of the stage `other` acts in it: `actuation` holds `pneumatics` and `muscle`.
+    pub fn holds(self, other: Self) -> bool {
+        self == other
+            || (self == Self::Actuation && matches!(other, Self::Pneumatics | Self::Muscle))
+    }
+}
+
+impl fmt::Display for RigStage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
 
 /// Where in a rig a kind stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,4 +268,18 @@ pub enum Action {
     Record(Box<dyn Operator>),
     /// Length as the reference sees it, mm.
     Length(Box<dyn Operator>),
+}
+
+/// A memoryless law y = f(x).
+pub trait Law: fmt::Debug + Send + Sync {
+    /// Its value at `x`.
+    fn at(&self, x: f64) -> f64;
+}
+
+/// A pressure that the supply loses to the flow drawn from it: y' = rate(y, flow).
+pub trait Droop: fmt::Debug + Send + Sync {
+    /// Rate of the droop, Pa/s, at the droop y (Pa) and the flow through the inlet (kg/s).
+    fn rate(&self, droop_pa: f64, flow_kg_s: f64) -> f64;
+    /// What is left of it after `rest_s` seconds without flow.
+    fn relaxed(&self, droop_pa: f64, rest_s: f64) -> f64;
 }

@@ -2,16 +2,14 @@
 
 use alloc::{boxed::Box, vec};
 
-use stretch_core::{Plays, play};
+use stretch_core::{Plays, arithmetic::play};
 
 use crate::{
-    effect::{Acts, Effect, pairs},
+    effect::{Acts, Effect, Live, pairs},
     kind::{Family, Kind, Side},
-    live::Live,
     operator::{Operator, Span, Start},
     parameter::{EffectParameter, Form},
     place::Place,
-    play_start::play_start,
     sketch::Sketch,
 };
 
@@ -65,7 +63,7 @@ impl Operator for PrandtlIshlinskii {
 
     fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
         for (z, r) in cells.iter_mut().zip(self.radii) {
-            *z = play_start(start, *z, first, r);
+            *z = start.of_play(*z, first, r);
         }
     }
 

@@ -5,10 +5,9 @@ use alloc::{boxed::Box, format, vec};
 use stretch_core::Worn;
 
 use crate::{
-    effect::{Acts, Effect, pairs},
+    effect::{Acts, Effect, Live, pairs},
     extent::Extent,
     kind::{Beside, Kind, Side, Signals},
-    live::Live,
     operator::{Operator, Span, Start},
     parameter::{EffectParameter, Form},
     place::Place,

@@ -3,11 +3,10 @@
 use alloc::{boxed::Box, vec, vec::Vec};
 
 use crate::{
-    effect::{Acts, Effect, pairs},
+    effect::{Acts, Effect, Live, pairs},
     fading::Times,
     grid::Grid,
     kind::Kind,
-    live::Live,
     operator::{Operator, Span, Start},
     parameter::{EffectParameter, Form},
     place::Place,

@@ -1,7 +1,7 @@
 //! The self-test of several gauges: their samples, every kind of loss, and the computer's answers.
 
-use stretch_core::{ArrayCalibration, Design, Stage};
-use stretch_receptor::{ArrayReceptor, ArrayWithheld};
+use stretch_core::{Design, Stage};
+use stretch_sleeve::{ArrayCalibration, ArrayReceptor, ArrayWithheld};
 
 use crate::{
     part::kept,
@@ -16,7 +16,7 @@ fn samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32;
     if n == 24 || (30..35).contains(&n) {
         return out;
     }
-    for (k, (place, channel)) in out.iter_mut().zip(&calibration.channels).enumerate() {
+    for (k, (place, channel)) in out.iter_mut().zip(&calibration.spec().channels).enumerate() {
         let ends = channel.state_min.iter().zip(channel.state_max.iter()).next();
         let (min, max) = ends.map_or((0.0, 1.0), |(&min, &max)| (min, max));
         let possible = channel.possible;
@@ -49,7 +49,7 @@ pub(crate) fn array<const N: usize>(calibration: &ArrayCalibration<N>) -> String
         let (estimate, sd, lost, clamped) =
             answer.map_or((0.0, 0.0, 0, false), |r| (r.estimate, r.sd, r.lost, r.clamped));
         let flags = status | u8::from(clamped) << 2;
-        let volts = volts[..calibration.channels.len()].iter().map(|x| format!("{x:?}f"));
+        let volts = volts[..calibration.spec().channels.len()].iter().map(|x| format!("{x:?}f"));
         let volts = volts.collect::<Vec<_>>().join(", ");
         rows.push(&format!("{{{{{volts}}}, {estimate:?}f, {sd:?}f, {lost}u, {flags}}}"));
     }

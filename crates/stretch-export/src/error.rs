@@ -1,7 +1,7 @@
 //! Why there is no C.
 
 use stretch_calibrate::CalibrateError;
-use stretch_filter::FilterError;
+use stretch_receptor::ReceptorError;
 
 use crate::Form;
 
@@ -33,7 +33,7 @@ pub enum ExportError {
     },
     /// A calibration that gives no receptor.
     #[error("the calibration gives no receptor: {0}")]
-    Receptor(#[from] FilterError),
+    Receptor(#[from] ReceptorError),
     /// A calibration that is no record.
     #[error(transparent)]
     NoRecord(CalibrateError),

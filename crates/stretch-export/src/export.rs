@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{
-    CalibrateError, RecordNumbers, array_seal, calibration_seal, fixed_record,
-};
-use stretch_core::{ArrayCalibration, Calibration, Label, Model, Provenance, SampleRate};
+use stretch_calibrate::{CalibrateError, RecordNumbers, calibration_seal, fixed_record};
+use stretch_core::{Calibration, Label, Model, Provenance, SampleRate};
+use stretch_sleeve::{ArrayCalibration, GaugeCalibration, Turns, array_seal};
 
 use crate::{
     ExportError, Form, Options, array_test,
@@ -55,8 +54,25 @@ pub struct Header {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
+    one(calibration, None, options)
+}
+
+/// A calibration as [`header`] makes it; in `float` with the watch of the gauge's zero, where the record holds where
+/// movements turn.
+///
+/// # Errors
+/// As [`header`].
+pub fn gauge_header(gauge: &GaugeCalibration, options: &Options) -> Result<Header, ExportError> {
+    one(gauge.calibration(), gauge.turns(), options)
+}
+
+fn one(
+    calibration: &Calibration,
+    turns: Option<&Turns>,
+    options: &Options,
+) -> Result<Header, ExportError> {
     if options.form == Some(Form::Float) {
-        return float(calibration, options);
+        return float(calibration, turns, options);
     }
     match fixed(calibration, options) {
         // what is missing in integers may be there in floats; a converter that does not fit is another matter
@@ -65,7 +81,7 @@ pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, Ex
                 CalibrateError::NoFixedForm { .. } | CalibrateError::FixedRate { .. },
             ),
         ) => {
-            let float = float(calibration, options)?;
+            let float = float(calibration, turns, options)?;
             if options.form.is_none() { Ok(float) } else { Err(none) }
         }
         other => other,
@@ -84,21 +100,26 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
     Ok(assembled(&Source::of(calibration, seal), options, Form::Fixed, part, &test))
 }
 
-fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
-    let part = match &calibration.model {
+fn float(
+    calibration: &Calibration,
+    turns: Option<&Turns>,
+    options: &Options,
+) -> Result<Header, ExportError> {
+    let mut part = match &calibration.spec().model {
         Model::Linear(_) | Model::Surfaces { .. } => surfaces_float(calibration)?,
         Model::Observer(_) => observer_float(calibration)?,
         Model::Diagnosed(_) => diagnosed_float(calibration)?,
         other => {
             let model = match other {
-                Model::Blended { .. } => "a blended model",
                 Model::History(_) => "a model that remembers, other than the observer,",
                 _ => "this model",
             };
             return Err(ExportError::NoForm { model: model.into() });
         }
     };
-    let part = with_zero(part, calibration);
+    if let Some(turns) = turns {
+        part = with_zero(part, calibration.spec().polarity, turns);
+    }
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
     Ok(assembled(&Source::of(calibration, seal), options, Form::Float, part, &test))
@@ -113,7 +134,7 @@ fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
 /// use stretch_calibrate::parse_adc;
 /// use stretch_export::{Options, array_header};
 /// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
-/// let header = array_header(&stretch_receptor::example_array(), &options)?;
+/// let header = array_header(&stretch_sleeve::example_array(), &options)?;
 /// assert_eq!((header.array, header.model.as_str()), (Some(2), "2 gauges"));
 /// assert!(header.text.contains("stretch_step(stretch_state *s, const float *volts)"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -125,12 +146,12 @@ pub fn array_header<const N: usize>(
     if options.form == Some(Form::Fixed) {
         return Err(ExportError::FixedArray);
     }
-    let names: Vec<&str> = calibration.channels.iter().map(|c| c.signal.as_str()).collect();
+    let names: Vec<&str> = calibration.spec().channels.iter().map(|c| c.signal.as_str()).collect();
     let source = Source {
         signal: names.join(", "),
-        reference: &calibration.reference,
-        sample_rate: calibration.sample_rate_hz,
-        provenance: &calibration.provenance,
+        reference: &calibration.spec().reference,
+        sample_rate: calibration.spec().sample_rate_hz,
+        provenance: &calibration.spec().provenance,
         seal: array_seal(calibration).map_err(ExportError::NoRecord)?,
     };
     let made = assembled(
@@ -155,10 +176,10 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     fn of(calibration: &'a Calibration, seal: u32) -> Self {
         Self {
-            signal: calibration.signal.as_str().to_owned(),
-            reference: &calibration.reference,
-            sample_rate: calibration.sample_rate_hz,
-            provenance: &calibration.provenance,
+            signal: calibration.spec().signal.as_str().to_owned(),
+            reference: &calibration.spec().reference,
+            sample_rate: calibration.spec().sample_rate_hz,
+            provenance: &calibration.spec().provenance,
             seal,
         }
     }
@@ -244,7 +265,7 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
         .word(
             "SEAL",
             format!("0x{:08x}u", source.seal),
-            "of the record, as stretch record check says it",
+            "of the record, as stretch export --calibration says it",
         )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .word("PERIOD_US", format!("{period_us}L"), "from a sample to the next")

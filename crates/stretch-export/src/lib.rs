@@ -12,5 +12,5 @@ mod self_test;
 
 pub use arduino::{File, arduino_library};
 pub use error::ExportError;
-pub use export::{HEADER, Header, SELF_TEST_SAMPLES, array_header, header};
+pub use export::{HEADER, Header, SELF_TEST_SAMPLES, array_header, gauge_header, header};
 pub use options::{Form, Options};

@@ -23,7 +23,7 @@ const PERIOD: usize = 70;
 /// Signals that go up and down, a tenth beyond both ends of the calibrated range, with one, three and
 /// five samples lost: all that a step can meet.
 fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
-    let (min, max) = (calibration.signal_range.min(), calibration.signal_range.max());
+    let (min, max) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
     (0..SAMPLES).map(move |n| {
         let lost = n == 48 || (90..93).contains(&n) || (121..126).contains(&n);
         (!lost).then_some(min + share(n) * (max - min))
@@ -75,7 +75,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     let receptor = Receptor::<f32>::new(calibration)?;
     let mut memory = receptor.memory();
     let (mut rows, mut branch) = (Rows::default(), Branch::Inflation);
-    let map = match &calibration.model {
+    let map = match &calibration.spec().model {
         Model::Diagnosed(map) => Some(map),
         _ => None,
     };

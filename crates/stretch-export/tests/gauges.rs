@@ -12,11 +12,13 @@ use proptest::{
 };
 use stretch_calibrate::parse_adc;
 use stretch_core::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, Design, HistoryShape,
-    Interval, Label, Provenance, SampleRate, Schema, Stage, Values,
+    Design, HistoryShape, Interval, Label, Provenance, SampleRate, Schema, Stage, Values,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, array_header};
-use stretch_receptor::{ArrayReceptor, ArrayWithheld, Loss, ShiftWatch, Shifts, example_array};
+use stretch_sleeve::{
+    ArrayCalibration, ArrayChannel, ArrayGains, ArrayLoss, ArrayReceptor, ArrayShifts, ArraySpec,
+    ArrayWithheld, ShiftWatch, Shifts, example_array,
+};
 
 const ROOM: usize = 16;
 
@@ -159,7 +161,9 @@ fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (Str
             }
         };
         let mut volts = [f32::NAN; N];
-        for ((place, share), channel) in volts.iter_mut().zip(shares).zip(&calibration.channels) {
+        for ((place, share), channel) in
+            volts.iter_mut().zip(shares).zip(&calibration.spec().channels)
+        {
             let (min, max) = (channel.state_min[0], channel.state_max[0]);
             *place = (min + share * (max - min)) as f32;
             write!(input, "{:x} ", place.to_bits()).unwrap();
@@ -182,12 +186,12 @@ fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (Str
             sd.to_bits()
         )
         .unwrap();
-        for k in 0..calibration.channels.len() {
+        for k in 0..calibration.spec().channels.len() {
             let loss = match memory.loss(k) {
                 None => 0,
-                Some(Loss::Missing) => 1,
-                Some(Loss::Outside) => 2,
-                Some(Loss::Still) => 3,
+                Some(ArrayLoss::Missing) => 1,
+                Some(ArrayLoss::Outside) => 2,
+                Some(ArrayLoss::Still) => 3,
                 Some(_) => 4,
             };
             write!(expected, " {loss}").unwrap();
@@ -196,7 +200,7 @@ fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (Str
         if let Some(Shifts { off, shifted, most }) = shifts {
             let most = most.map_or(-1, |most| most as i32);
             write!(expected, " shifts {shifted} {most}").unwrap();
-            for off in &off[..calibration.channels.len()] {
+            for off in &off[..calibration.spec().channels.len()] {
                 write!(expected, " {:08x}", off.to_bits()).unwrap();
             }
         }

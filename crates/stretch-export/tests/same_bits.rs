@@ -9,13 +9,13 @@ use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Design, DiagnosedMap, Interval, Knee, Model,
-    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Turns, Values, Volts, Worn,
+    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Values, Volts, Worn,
 };
-use stretch_export::{Form, HEADER, Options, arduino_library, header};
+use stretch_export::{Form, HEADER, Options, arduino_library, gauge_header, header};
 use stretch_receptor::{
-    Receptor, Withheld, Zero, ZeroWatch, code::Adc, code::AdcCode, example_diagnosed,
-    example_observer,
+    Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
 };
+use stretch_sleeve::{GaugeCalibration, Turns, Zero, ZeroWatch};
 
 fn adc() -> Adc {
     parse_adc("12,0,3.3").unwrap()
@@ -79,11 +79,11 @@ fn pressure(n: usize) -> f32 {
 }
 
 fn takes_pressure(calibration: &Calibration) -> bool {
-    matches!(&calibration.model, Model::Diagnosed(map) if map.crosstalk.is_some())
+    matches!(&calibration.spec().model, Model::Diagnosed(map) if map.crosstalk.is_some())
 }
 
 /// What the harness should print.
-fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
+fn expected(calibration: &Calibration, turns: Option<&Turns>, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
     match form {
         Form::Fixed => {
@@ -99,8 +99,11 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
         Form::Float => {
             let receptor = Receptor::<f32>::new(calibration).unwrap();
             let mut memory = receptor.memory();
-            let watch = ZeroWatch::<f32>::new(calibration);
-            let mut zero = watch.map(|w| (w.following(calibration), w.memory()));
+            let mut zero = turns.map(|turns| {
+                let watch =
+                    ZeroWatch::<f32>::new(calibration.spec().polarity, turns).following(turns);
+                (watch, watch.memory())
+            });
             for (n, &code) in codes.iter().enumerate() {
                 let mut sample = volts(code);
                 if let Some((watch, own)) = &mut zero {
@@ -156,9 +159,20 @@ fn input(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
 }
 
 fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compiler]) {
+    holds_with(name, calibration, None, form, compilers);
+}
+
+fn holds_with(
+    name: &str,
+    calibration: &Calibration,
+    turns: Option<Turns>,
+    form: Form,
+    compilers: &[Compiler],
+) {
     let folder = tempfile::tempdir().unwrap();
     let options = Options { form: Some(form), adc: adc() };
-    let made = header(calibration, &options).unwrap();
+    let gauge = GaugeCalibration::new(calibration.clone(), turns).unwrap();
+    let made = gauge_header(&gauge, &options).unwrap();
     fs::write(folder.path().join(HEADER), made.text).unwrap();
     for compiler in compilers {
         let defined: &[&str] = if form == Form::Float { &["-DFLOAT"] } else { &[] };
@@ -166,9 +180,9 @@ fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compile
         for codes in [trial(), erratic()] {
             let (found, expected) = (
                 run(&program, &input(calibration, form, &codes)),
-                expected(calibration, form, &codes),
+                expected(calibration, gauge.turns(), form, &codes),
             );
-            if calibration.turns.is_some() && form == Form::Float {
+            if turns.is_some() && form == Form::Float {
                 assert!(expected.contains("zero "), "{name}");
             }
             let what = || format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
@@ -298,20 +312,18 @@ fn zeros(compilers: &[Compiler]) {
     let wide = Turns { limit: 0.5, mean_limit: 0.2, scatter: 0.3, ..turns };
     let poly13 = stretch_receptor::example_calibration();
     let linear = read_calibration(&firmware("linear.postcard")).unwrap();
-    let falling = |spec: &mut CalibrationSpec| {
-        (spec.polarity, spec.turns) = (Polarity::Falling, Some(wide));
-    };
-    for (name, calibration) in [
-        ("a narrow limit", changed(&poly13, |spec| spec.turns = Some(turns))),
-        ("a wide one", changed(&poly13, |spec| spec.turns = Some(wide))),
-        ("of a falling signal", changed(&linear, falling)),
-        ("of named defects", changed(&example_diagnosed(), |spec| spec.turns = Some(wide))),
-        ("of an observer", changed(&example_observer(), |spec| spec.turns = Some(turns))),
+    let falling = changed(&linear, |spec| spec.polarity = Polarity::Falling);
+    for (name, calibration, turns) in [
+        ("a narrow limit", &poly13, turns),
+        ("a wide one", &poly13, wide),
+        ("of a falling signal", &falling, wide),
+        ("of named defects", &example_diagnosed(), wide),
+        ("of an observer", &example_observer(), turns),
     ] {
-        holds(name, &calibration, Form::Float, compilers);
+        holds_with(name, calibration, Some(turns), Form::Float, compilers);
     }
     // integers have no watch
-    holds("integers", &changed(&poly13, |spec| spec.turns = Some(turns)), Form::Fixed, compilers);
+    holds_with("integers", &poly13, Some(turns), Form::Fixed, compilers);
 }
 
 fn diagnosed_with(change: impl FnOnce(&mut DiagnosedMap)) -> Calibration {

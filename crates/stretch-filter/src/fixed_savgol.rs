@@ -106,8 +106,8 @@ pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY:
     PhantomData<S>,
 );
 
-/// What a [`FixedSgRate`] computes with, its shape forgotten: for whoever writes the step in
-/// another language. The letters are those of [`FixedSgRate`].
+/// The integers that a [`FixedSgRate`] computes with, without its const parameters. Use them to
+/// write the step in another language. The letters are those of [`FixedSgRate`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FixedSgIntegers {
     /// Samples in the window.
@@ -120,9 +120,10 @@ pub struct FixedSgIntegers {
     pub choose: [i32; MOMENTS],
     /// SHIFT.
     pub shift: u32,
-    /// The factor f and the shift s of [`FixedSgRate::change`]:
-    /// `(((output f) >> (s - 9)) samples + 256) >> 9`.
-    pub change: (i64, u32),
+    /// The factor f of [`FixedSgRate::change`]: `(((output f) >> (s - 9)) samples + 256) >> 9`.
+    pub change_factor: i64,
+    /// Its shift s.
+    pub change_shift: u32,
 }
 
 /// What a [`FixedSgRate`] remembers: the window and its moments.
@@ -200,7 +201,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         memory
     }
 
-    /// The output for the window as it stands.
+    /// The output for the current window.
     #[inline(always)]
     fn output(memory: &FixedSgMemory<S, WINDOW>) -> i32 {
         let half = if Self::SHIFT == 0 { 0 } else { 1 << (Self::SHIFT.max(1) - 1) };
@@ -241,7 +242,8 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         weights: Self::TAPS.weights,
         choose: binomials(WINDOW),
         shift: Self::SHIFT,
-        change: Self::CHANGE,
+        change_factor: Self::CHANGE.0,
+        change_shift: Self::CHANGE.1,
     };
 
     /// The change of the signal over `samples` samples that an output means, rounded.

@@ -103,9 +103,14 @@ impl<T: Real> Tracker<T> {
         self.spec
     }
 
-    /// The gains (alpha, beta) as they run, that is, rounded to `T`.
-    pub fn gains(&self) -> (T, T) {
-        (self.alpha, self.beta)
+    /// The gain of the value as it runs, that is, rounded to `T`.
+    pub fn alpha(&self) -> T {
+        self.alpha
+    }
+
+    /// The gain of the change a sample, likewise.
+    pub fn beta(&self) -> T {
+        self.beta
     }
 
     /// How many samples give `None` at the start.

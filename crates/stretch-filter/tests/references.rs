@@ -165,7 +165,7 @@ fn tracker_gains_solve_the_riccati_equation() {
     for (i, &tracking_index) in table["tracking_index"].iter().enumerate() {
         let tracker =
             Tracker::<f64>::new(TrackerSpec { tracking_index, sample_rate: one }).unwrap();
-        let (alpha, beta) = tracker.gains();
+        let (alpha, beta) = (tracker.alpha(), tracker.beta());
         let ours = [alpha, beta, tracker.value_noise_gain(), tracker.noise_gain()];
         let names = ["alpha", "beta", "value_noise_gain", "rate_noise_gain"];
         for (ours, name) in ours.iter().zip(names) {

@@ -1,9 +1,9 @@
 //! Takes samples one by one and keeps only their triangular factor.
 
-use stretch_core::{Degree, Real};
+use stretch_core::{Degree, MAX_TERMS, Real};
 
 use crate::{
-    Factor, Fit, FitError,
+    Factor, Fit, FitError, Sample,
     basis::{Basis, entry_exponent, power_of_two},
 };
 
@@ -13,7 +13,8 @@ use crate::{
 /// triangular [`Factor`] by Householder reflections. Memory is
 /// `TERMS^2 + (TERMS + 4) ROWS` numbers whatever the length of the log.
 ///
-/// - `TERMS`: room for terms, 7 for poly13, 21 for any degree.
+/// - `TERMS`: room for terms, enough for any degree unless memory is scarce:
+///   `{ Degree::POLY13.terms() }` then.
 /// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a
 ///   board. It changes speed and memory, and results only by rounding, which
 ///   grows with the number of blocks: below 8 rows, logs of more than 1e5
@@ -25,12 +26,12 @@ use crate::{
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::SurfaceAccumulator;
+/// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
-/// let mut log: SurfaceAccumulator<f64, 7, 64> = SurfaceAccumulator::new(Degree::POLY13)?;
+/// let mut log = SurfaceAccumulator::<f64>::new(Degree::POLY13)?;
 /// for k in 0..200 {
 ///     let (rate, volts) = (f64::from(k % 7) - 3.0, f64::from(k % 31) / 30.0);
-///     log.push(rate, volts, 0.25 + 0.5 * volts - 0.125 * rate * volts)?;
+///     log.push(Sample { rate, volts, value: 0.25 + 0.5 * volts - 0.125 * rate * volts })?;
 /// }
 /// let surface = log.fit()?.surface();
 /// approx::assert_abs_diff_eq!(surface.coefficient(0, 1), 0.5, epsilon = 1e-12);
@@ -38,7 +39,7 @@ use crate::{
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct SurfaceAccumulator<T, const TERMS: usize, const ROWS: usize> {
+pub struct SurfaceAccumulator<T, const TERMS: usize = MAX_TERMS, const ROWS: usize = 128> {
     factor: Factor<T, TERMS>,
     filled: usize,
     root_weights: [T; ROWS],
@@ -58,12 +59,9 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// # Errors
     /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms.
     pub fn new(degree: Degree) -> Result<Self, FitError> {
-        Ok(Self::of_basis(Basis::new(degree)?))
-    }
-
-    pub(crate) fn of_basis(basis: Basis<TERMS>) -> Self {
         let () = Self::SHAPE;
-        Self {
+        let basis = Basis::new(degree)?;
+        Ok(Self {
             factor: Factor::empty(basis),
             filled: 0,
             root_weights: [T::zero(); ROWS],
@@ -73,21 +71,21 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             block: [[T::zero(); ROWS]; TERMS],
             most_input: basis.most(),
             most_value: power_of_two(entry_exponent::<T>()),
-        }
+        })
     }
 
-    /// Adds a sample: at this rate and voltage the surface should be `value`.
+    /// Adds a sample.
     ///
     /// # Errors
     /// [`FitError::OutOfRange`] for a number that is not finite or whose powers
     /// would overflow; the sample is then not added.
     #[inline]
-    pub fn push(&mut self, rate: T, volts: T, value: T) -> Result<(), FitError> {
-        if self.takes(rate, volts, value) {
-            self.place(rate, volts, value, T::one());
+    pub fn push(&mut self, sample: Sample<T>) -> Result<(), FitError> {
+        if self.takes(sample) {
+            self.place(sample, T::one());
             Ok(())
         } else {
-            Err(self.refusal(rate, volts, value))
+            Err(self.refusal(sample))
         }
     }
 
@@ -98,16 +96,11 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// # Errors
     /// As for [`push`](Self::push); also for a weight below zero, or so large
     /// that weight times a squared power overflows.
-    pub fn push_weighted(
-        &mut self,
-        rate: T,
-        volts: T,
-        value: T,
-        weight: T,
-    ) -> Result<(), FitError> {
-        if !self.takes(rate, volts, value) {
-            return Err(self.refusal(rate, volts, value));
+    pub fn push_weighted(&mut self, sample: Sample<T>, weight: T) -> Result<(), FitError> {
+        if !self.takes(sample) {
+            return Err(self.refusal(sample));
         }
+        let Sample { rate, volts, value } = sample;
         let largest = rate.abs().max(volts.abs()).max(T::one());
         let power = (0..self.factor.degree().total()).fold(T::one(), |power, _| power * largest);
         let most = self.most_value / power.max(value.abs());
@@ -118,20 +111,20 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             return Err(FitError::OutOfRange { field: "weight", value: weight.as_f64(), most });
         }
         if weight > T::zero() {
-            self.place(rate, volts, value, root_weight);
+            self.place(sample, root_weight);
         }
         Ok(())
     }
 
     #[inline(always)]
-    fn takes(&self, rate: T, volts: T, value: T) -> bool {
+    fn takes(&self, Sample { rate, volts, value }: Sample<T>) -> bool {
         within(rate, self.most_input)
             && within(volts, self.most_input)
             && within(value, self.most_value)
     }
 
     #[inline(always)]
-    fn place(&mut self, rate: T, volts: T, value: T, root_weight: T) {
+    fn place(&mut self, Sample { rate, volts, value }: Sample<T>, root_weight: T) {
         let row = self.filled;
         self.root_weights[row] = root_weight;
         self.rates[row] = rate;
@@ -144,7 +137,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     }
 
     #[cold]
-    fn refusal(&self, rate: T, volts: T, value: T) -> FitError {
+    fn refusal(&self, Sample { rate, volts, value }: Sample<T>) -> FitError {
         let most = self.most_input.as_f64();
         if !within(rate, self.most_input) {
             return FitError::OutOfRange { field: "rate", value: rate.as_f64(), most };
@@ -156,12 +149,12 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         FitError::OutOfRange { field: "value", value: value.as_f64(), most }
     }
 
-    /// Adds many samples, `(rate, volts, value)`, up to the first refused one.
+    /// Adds many samples, up to the first refused one.
     ///
     /// # Errors
     /// As for [`push`](Self::push).
-    pub fn extend(&mut self, samples: impl IntoIterator<Item = (T, T, T)>) -> Result<(), FitError> {
-        samples.into_iter().try_for_each(|(rate, volts, value)| self.push(rate, volts, value))
+    pub fn extend(&mut self, samples: impl IntoIterator<Item = Sample<T>>) -> Result<(), FitError> {
+        samples.into_iter().try_for_each(|sample| self.push(sample))
     }
 
     /// Adds many samples that stand in columns, as many as the shortest has: all of them, or none. The same as pushing each, bit
@@ -174,7 +167,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// use stretch_core::Degree;
     /// use stretch_fit::{FitError, SurfaceAccumulator};
     ///
-    /// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
     /// line.push_columns(&[0.0; 3], &[0.0, 1.0, 2.0], &[1.0, 3.0, 5.0])?;
     /// approx::assert_abs_diff_eq!(line.fit()?.coefficients()[1], 2.0, epsilon = 1e-12);
     /// assert!(line.push_columns(&[0.0; 2], &[0.0; 2], &[1.0, f64::NAN]).is_err());
@@ -182,11 +175,13 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// # Ok::<(), FitError>(())
     /// ```
     pub fn push_columns(&mut self, rates: &[T], volts: &[T], values: &[T]) -> Result<(), FitError> {
-        let samples = || rates.iter().zip(volts).zip(values).map(|((&r, &v), &x)| (r, v, x));
+        let rows = rates.iter().zip(volts).zip(values);
+        let samples =
+            || rows.clone().map(|((&rate, &volts), &value)| Sample { rate, volts, value });
         // without a way out of the loop it is done side by side
-        if !samples().fold(true, |sound, (r, v, x)| sound & self.takes(r, v, x)) {
-            let refused = samples().find(|&(r, v, x)| !self.takes(r, v, x));
-            return refused.map_or(Ok(()), |(r, v, x)| Err(self.refusal(r, v, x)));
+        if !samples().fold(true, |sound, sample| sound & self.takes(sample)) {
+            let refused = samples().find(|&sample| !self.takes(sample));
+            return refused.map_or(Ok(()), |sample| Err(self.refusal(sample)));
         }
         let mut done = 0;
         let count = samples().len();
@@ -250,11 +245,12 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     ///
     /// ```
     /// use stretch_core::Degree;
-    /// use stretch_fit::SurfaceAccumulator;
+    /// use stretch_fit::{Sample, SurfaceAccumulator};
     ///
-    /// let mut block: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+    /// let mut block = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
     /// let empty = block.factor();
-    /// block.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0)])?;
+    /// let samples = [(0.0, 1.0), (1.0, 3.0)];
+    /// block.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;
     /// let first = block.exchange(empty)?;
     /// assert_eq!((first.samples(), block.samples()), (2, 0));
     /// # Ok::<(), stretch_fit::FitError>(())

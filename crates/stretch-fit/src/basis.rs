@@ -26,17 +26,6 @@ pub(crate) struct Basis<const TERMS: usize> {
     steps: [(u8, bool); TERMS],
 }
 
-impl Basis<2> {
-    /// The constant and the voltage.
-    pub(crate) const LINE: Self = Self {
-        degree: match Degree::new(0, 1) {
-            Ok(degree) => degree,
-            Err(_) => panic!("a line is a degree"),
-        },
-        steps: [(0, false), (0, true)],
-    };
-}
-
 impl<const TERMS: usize> Basis<TERMS> {
     pub(crate) fn new(degree: Degree) -> Result<Self, FitError> {
         let terms = degree.terms();
@@ -56,7 +45,7 @@ impl<const TERMS: usize> Basis<TERMS> {
         Ok(Self { degree, steps })
     }
 
-    pub(crate) const fn degree(&self) -> Degree {
+    pub(crate) fn degree(&self) -> Degree {
         self.degree
     }
 

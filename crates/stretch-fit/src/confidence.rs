@@ -1,11 +1,9 @@
 //! Bounds at a confidence level.
 
-use stretch_core::Real;
+use stretch_core::{MAX_TERMS, Real};
+use stretch_metrics::student_t::critical;
 
-use crate::{
-    Fit, FitError,
-    quantile::{fisher, student_two_sided},
-};
+use crate::{Fit, FitError, quantile::fisher};
 
 /// A value and the bounds around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,10 +37,11 @@ pub struct Bounds<T> {
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::SurfaceAccumulator;
+/// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
-/// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
-/// line.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0), (0.0, 2.0, 4.0)])?;
+/// let samples = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)];
+/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+/// line.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;
 /// let fit = line.fit()?;
 /// let bounds = fit.confidence(0.95)?;
 /// let slope = bounds.coefficient(1).unwrap();
@@ -53,7 +52,7 @@ pub struct Bounds<T> {
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Confidence<'a, T, const TERMS: usize> {
+pub struct Confidence<'a, T, const TERMS: usize = MAX_TERMS> {
     fit: &'a Fit<T, TERMS>,
     level: f64,
     t: T,
@@ -80,7 +79,7 @@ impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
         let too_few =
             FitError::TooFewSamples { needed: fit.terms() as u64 + 1, got: fit.samples() };
         let sigma = fit.sigma().ok_or(too_few)?;
-        let t = T::from_f64(student_two_sided(level, fit.dof()));
+        let t = T::from_f64(critical(1.0 - level, fit.dof() as f64));
         if !t.is_finite() {
             return Err(FitError::NotFinite);
         }

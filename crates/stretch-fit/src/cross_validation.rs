@@ -85,19 +85,18 @@ pub struct CrossValidation<T> {
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::{SurfaceAccumulator, cross_validate};
+/// use stretch_fit::{Sample, SurfaceAccumulator, cross_validate};
 ///
 /// // Three trials; the last sensor reading is 0.1 too high throughout.
 /// let trials = [0.0, 0.0, 0.1].map(|offset| {
-///     let mut trial: SurfaceAccumulator<f64, 2, 16> =
-///         SurfaceAccumulator::new(Degree::new(0, 1).unwrap()).unwrap();
+///     let mut trial = SurfaceAccumulator::<f64>::new(Degree::LINE).unwrap();
 ///     for k in 0..50 {
 ///         let volts = f64::from(k) / 50.0;
-///         trial.push(0.0, volts, 2.0 * volts + offset).unwrap();
+///         trial.push(Sample { rate: 0.0, volts, value: 2.0 * volts + offset }).unwrap();
 ///     }
 ///     trial.factor()
 /// });
-/// let judged = cross_validate(&trials, Degree::new(0, 1).unwrap())?;
+/// let judged = cross_validate(&trials, Degree::LINE)?;
 /// assert_eq!(judged.worst.trial, 2);
 /// approx::assert_abs_diff_eq!(judged.worst.rmse(), 0.1, epsilon = 1e-12);
 /// # Ok::<(), stretch_fit::FitError>(())

@@ -24,7 +24,8 @@ pub enum FitError {
         got: u64,
     },
     /// The data cannot tell this term from those before it in the order of
-    /// `Degree::exponents` (a rate that never changes cannot determine p10).
+    /// `Degree::exponents` (a rate that never changes cannot determine p10),
+    /// or only if the voltage is counted from within the samples.
     RankDeficient {
         /// Power of the rate in the term.
         rate_power: u8,
@@ -93,7 +94,10 @@ impl fmt::Display for FitError {
             Self::RankDeficient { rate_power, volts_power } => {
                 f.write_str("the data cannot determine the term ")?;
                 write_term(f, rate_power, volts_power)?;
-                f.write_str(": over these samples it is a combination of the terms before it")
+                f.write_str(
+                    ": over these samples it is a combination of the terms before it, or nearly so; count volts \
+                     that vary little from their middle",
+                )
             }
             Self::TooManyTerms { terms, room } => {
                 write!(f, "the degree has {terms} terms, but there is room for {room}")

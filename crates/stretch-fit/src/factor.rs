@@ -3,7 +3,7 @@
 // Triangles are walked by index, as in the textbooks.
 #![allow(clippy::needless_range_loop)]
 
-use stretch_core::{Degree, Real, Surface};
+use stretch_core::{Degree, MAX_TERMS, Real, Surface};
 
 use crate::{
     Fit, FitError,
@@ -20,7 +20,7 @@ use crate::{
 /// degree within it ([`fit_degree`](Self::fit_degree)), so a log is read once.
 /// Get one from [`SurfaceAccumulator::factor`](crate::SurfaceAccumulator::factor).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factor<T, const TERMS: usize> {
+pub struct Factor<T, const TERMS: usize = MAX_TERMS> {
     basis: Basis<TERMS>,
     /// Terms are powers of `volts - centre`; the first sample's voltage.
     centre: T,
@@ -35,7 +35,7 @@ pub struct Factor<T, const TERMS: usize> {
 
 /// The numbers of a [`Factor`], to be stored or sent; [`Factor::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FactorSpec<T, const TERMS: usize> {
+pub struct FactorSpec<T, const TERMS: usize = MAX_TERMS> {
     /// The degree that the samples were accumulated for.
     pub degree: Degree,
     /// The voltage that powers are taken about.
@@ -44,8 +44,10 @@ pub struct FactorSpec<T, const TERMS: usize> {
     pub r: [[T; TERMS]; TERMS],
     /// `Q^T z`, a number a term.
     pub q: [T; TERMS],
-    /// Residual sum of squares, and what its last addition rounded off.
-    pub residual: (T, T),
+    /// Residual sum of squares.
+    pub residual: T,
+    /// What the last addition to the residual rounded off.
+    pub residual_rounding: T,
     /// Samples of a weight above zero.
     pub samples: u64,
     /// Blocks and triangles folded in.
@@ -61,10 +63,11 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     ///
     /// ```
     /// use stretch_core::Degree;
-    /// use stretch_fit::{Factor, FitError, SurfaceAccumulator};
+    /// use stretch_fit::{Factor, FitError, Sample, SurfaceAccumulator};
     ///
-    /// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
-    /// line.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0), (0.0, 2.0, 4.0)])?;
+    /// let samples = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)];
+    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+    /// line.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;
     /// let spec = line.factor().spec();
     /// assert_eq!(Factor::new(spec)?, line.factor());
     /// let damaged = stretch_fit::FactorSpec { centre: f64::NAN, ..spec };
@@ -72,7 +75,8 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// # Ok::<(), FitError>(())
     /// ```
     pub fn new(spec: FactorSpec<T, TERMS>) -> Result<Self, FitError> {
-        let FactorSpec { degree, centre, r, q, residual, samples, folds } = spec;
+        let FactorSpec { degree, centre, r, q, residual, residual_rounding, samples, folds } = spec;
+        let residual = (residual, residual_rounding);
         let mut factor = Self::empty(Basis::new(degree)?);
         let terms = factor.basis.terms();
         let mut sound = centre.is_finite() && residual.0.is_finite() && residual.1.is_finite();
@@ -95,7 +99,8 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
             centre: self.centre,
             r: self.r,
             q: self.q,
-            residual: self.residual,
+            residual: self.residual.0,
+            residual_rounding: self.residual.1,
             samples: self.samples,
             folds: self.folds,
         }
@@ -309,8 +314,10 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// # Errors
     /// [`FitError::TooFewSamples`] unless there is a sample a term,
     /// [`FitError::RankDeficient`] with the first term (in the order of
-    /// `Degree::exponents`) that depends on those before it,
-    /// [`FitError::NotFinite`].
+    /// `Degree::exponents`) that depends on those before it, or with the
+    /// highest power of the voltage where the surface can be fitted but not
+    /// evaluated ([`counted_from`](Self::counted_from) an origin within the
+    /// samples it can), [`FitError::NotFinite`].
     pub fn fit(&self) -> Result<Fit<T, TERMS>, FitError> {
         let terms = self.basis.terms();
         if self.samples < terms as u64 {
@@ -341,6 +348,14 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         let inverse = product(terms, &to_raw, &inverse);
         let surface =
             Surface::new(self.degree(), &coefficients[..terms]).map_err(|_| FitError::NotFinite)?;
+        let rounding = self.rounding_of(&coefficients);
+        let (residual, total) = (self.residual_sum(), self.total_sum());
+        let values = total + self.q[0] * self.q[0];
+        // half of the values' digits are lost, and what is left of the fit is rounding
+        if rounding > residual && rounding > T::epsilon() * values {
+            let (rate_power, volts_power) = (0, self.degree().volts());
+            return Err(FitError::RankDeficient { rate_power, volts_power });
+        }
         let fit = Fit {
             basis: self.basis,
             coefficients,
@@ -348,12 +363,26 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
             centre: self.centre,
             r: self.r,
             inverse,
-            sse: self.residual_sum(),
-            sst: self.total_sum(),
+            sse: residual + rounding,
+            sst: total,
             samples: self.samples,
             sigma_squared: None,
         };
         if fit.is_finite() { Ok(fit) } else { Err(FitError::NotFinite) }
+    }
+
+    /// What rounding adds to the residual sum of squares where the surface of
+    /// these coefficients is evaluated: each product of a coefficient and its
+    /// term has an error of about its last digit, and terms of raw volts that
+    /// vary little are large and cancel.
+    fn rounding_of(&self, coefficients: &[T; TERMS]) -> T {
+        let terms = self.basis.terms();
+        let raw = product(terms, &self.r, &shift(self.degree(), self.centre));
+        let squares = (0..terms).fold(T::zero(), |sum, k| {
+            let term = coefficients[k] * column_norm(&raw, k);
+            sum + term * term
+        });
+        T::epsilon() * T::epsilon() * squares
     }
 
     /// [`fit`](Self::fit) for a degree within the accumulated one.
@@ -373,29 +402,29 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     fn check_rank(&self) -> Result<(), FitError> {
         let walked = libm::sqrt(self.folds as f64) + self.basis.terms() as f64;
         let rounding = T::epsilon() * T::from_f64(8.0 * walked);
-        let volts = position(self.degree(), (0, 1)).map_or(T::zero(), |k| self.column_norm(k));
+        let volts = position(self.degree(), (0, 1)).map_or(T::zero(), |k| column_norm(&self.r, k));
         let magnified = self.centre.abs() * self.r[0][0].abs() / volts;
         for (k, (rate_power, volts_power)) in self.degree().exponents().enumerate() {
             let factor = if volts_power > 0 { T::one() + magnified } else { T::one() };
-            let above = self.r[k][k].abs() > rounding * factor * self.column_norm(k);
+            let above = self.r[k][k].abs() > rounding * factor * column_norm(&self.r, k);
             if !above {
                 return Err(FitError::RankDeficient { rate_power, volts_power });
             }
         }
         Ok(())
     }
+}
 
-    /// The length of a column of the design matrix, kept by the reflections.
-    fn column_norm(&self, k: usize) -> T {
-        let largest = (0..=k).fold(T::zero(), |most, m| most.max(self.r[m][k].abs()));
-        if largest == T::zero() {
-            return largest;
-        }
-        // Divided by the largest first, so that no square can underflow.
-        let square = (0..=k).fold(T::zero(), |sum, m| {
-            let part = self.r[m][k] / largest;
-            sum + part * part
-        });
-        largest * square.sqrt()
+/// The length of a column of the design matrix, kept by the reflections: that of its column in the triangle.
+fn column_norm<T: Real, const TERMS: usize>(triangle: &[[T; TERMS]; TERMS], k: usize) -> T {
+    let largest = (0..=k).fold(T::zero(), |most, m| most.max(triangle[m][k].abs()));
+    if largest == T::zero() {
+        return largest;
     }
+    // Divided by the largest first, so that no square can underflow.
+    let square = (0..=k).fold(T::zero(), |sum, m| {
+        let part = triangle[m][k] / largest;
+        sum + part * part
+    });
+    largest * square.sqrt()
 }

@@ -3,7 +3,7 @@
 // Triangles are walked by index, as in the textbooks.
 #![allow(clippy::needless_range_loop)]
 
-use stretch_core::{Degree, Real, Surface};
+use stretch_core::{Degree, MAX_TERMS, Real, Surface};
 
 use crate::{
     basis::Basis,
@@ -19,11 +19,11 @@ use crate::{
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::SurfaceAccumulator;
+/// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
-/// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
 /// for (volts, value) in [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)] {
-///     line.push(0.0, volts, value)?;
+///     line.push(Sample { rate: 0.0, volts, value })?;
 /// }
 /// let fit = line.fit()?;
 /// approx::assert_abs_diff_eq!(fit.coefficients()[1], 1.5, epsilon = 1e-14);
@@ -32,7 +32,7 @@ use crate::{
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fit<T, const TERMS: usize> {
+pub struct Fit<T, const TERMS: usize = MAX_TERMS> {
     pub(crate) basis: Basis<TERMS>,
     pub(crate) coefficients: [T; TERMS],
     pub(crate) surface: Surface<T>,
@@ -86,7 +86,8 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         self.samples.saturating_sub(self.terms() as u64)
     }
 
-    /// The sum of squared residuals, in squared units of the value.
+    /// The sum of squared residuals, in squared units of the value, of the
+    /// surface as it is evaluated: rounding counts where terms cancel.
     pub fn sse(&self) -> T {
         self.sse
     }

@@ -23,9 +23,17 @@ pub struct OrderRow<T> {
     /// some trial is needed to determine a term.
     pub cross_validation: Result<CrossValidation<T>, FitError>,
     /// How much larger the cross-validated mean squared error is than that of
-    /// the best order: mean over trials, and the standard error of that mean.
-    /// `None` without cross-validation.
-    pub excess: Option<(T, T)>,
+    /// the best order; `None` without cross-validation.
+    pub excess: Option<Excess<T>>,
+}
+
+/// A difference of two orders' cross-validated mean squared errors, over trials.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excess<T> {
+    /// Mean over trials.
+    pub mean: T,
+    /// Standard error of that mean.
+    pub standard_error: T,
 }
 
 /// An order with its row, or with the reason why it cannot be fitted.
@@ -43,16 +51,17 @@ pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::{OrderTable, SurfaceAccumulator};
+/// use stretch_fit::{OrderTable, Sample, SurfaceAccumulator};
 ///
 /// // The truth is quadratic in the voltage; the error differs from trial to trial.
 /// let trials = [1, 2, 3, 4].map(|trial| {
-///     let mut sums: SurfaceAccumulator<f64, 21, 16> =
-///         SurfaceAccumulator::new(OrderTable::<f64>::covering(Degree::POLY13)).unwrap();
+///     let covering = OrderTable::<f64>::covering(Degree::POLY13);
+///     let mut sums = SurfaceAccumulator::<f64>::new(covering).unwrap();
 ///     for k in 0..300 {
 ///         let (rate, volts) = (f64::from(k % 17) / 8.0 - 1.0, f64::from(k % 41) / 20.0 - 1.0);
 ///         let noise = 0.05 * f64::from(k * k * trial % 23 - 11) / 11.0;
-///         sums.push(rate, volts, rate + volts + rate * volts + volts * volts + noise).unwrap();
+///         let value = rate + volts + rate * volts + volts * volts + noise;
+///         sums.push(Sample { rate, volts, value }).unwrap();
 ///     }
 ///     sums.factor()
 /// });
@@ -100,13 +109,47 @@ impl<T: Real> OrderTable<T> {
         trials: &[Factor<T, TERMS>],
         chosen: Degree,
     ) -> Result<Self, FitError> {
+        Self::comparing(trials, chosen, Self::neighbours(chosen))
+    }
+
+    /// Compares the curves of the signal alone, of the first degree to the fifth, as far as the factors, one a trial,
+    /// were accumulated for them.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    ///
+    /// ```
+    /// use stretch_core::Degree;
+    /// use stretch_fit::{OrderTable, Sample, SurfaceAccumulator};
+    ///
+    /// // a weight and a reading a trial; the sensor is quadratic
+    /// let trial = |k: u32| {
+    ///     let mut sums = SurfaceAccumulator::<f64>::new(Degree::new(0, 5).unwrap()).unwrap();
+    ///     let (volts, noise) = (f64::from(k), 0.1 * (f64::from(7 * k * k % 11) - 5.0));
+    ///     sums.push(Sample { rate: 0.0, volts, value: volts + 0.3 * volts * volts + noise }).unwrap();
+    ///     sums.factor()
+    /// };
+    /// let trials: Vec<_> = (0..20).map(trial).collect();
+    /// assert_eq!(OrderTable::curves(&trials)?.recommended(), Some(Degree::new(0, 2).unwrap()));
+    /// # Ok::<(), stretch_fit::FitError>(())
+    /// ```
+    pub fn curves<const TERMS: usize>(trials: &[Factor<T, TERMS>]) -> Result<Self, FitError> {
+        let degrees = (1..=MAX_DEGREE as u8).filter_map(|volts| Degree::new(0, volts).ok());
+        Self::comparing(trials, Degree::LINE, degrees)
+    }
+
+    fn comparing<const TERMS: usize>(
+        trials: &[Factor<T, TERMS>],
+        chosen: Degree,
+        degrees: impl Iterator<Item = Degree>,
+    ) -> Result<Self, FitError> {
         let needed = chosen.terms() as u64;
         let (first, rest) =
             trials.split_first().ok_or(FitError::TooFewSamples { needed, got: 0 })?;
         let mut all = *first;
         rest.iter().try_for_each(|trial| all.merge(trial))?;
         let mut rows = [None; MOST];
-        for (place, degree) in rows.iter_mut().zip(Self::neighbours(chosen)) {
+        for (place, degree) in rows.iter_mut().zip(degrees) {
             *place = Some((degree, row(&all, trials, degree)));
         }
         let mut table = Self { chosen, rows };
@@ -154,7 +197,7 @@ impl<T: Real> OrderTable<T> {
     /// say how the surface does on the next.
     pub fn recommended(&self) -> Option<Degree> {
         self.fitted()
-            .find(|row| row.excess.is_some_and(|(mean, error)| mean <= error))
+            .find(|row| row.excess.is_some_and(|excess| excess.mean <= excess.standard_error))
             .map(|row| row.degree)
     }
 }
@@ -181,13 +224,12 @@ fn row<T: Real, const TERMS: usize>(
     })
 }
 
-/// Mean over trials of the difference in held-out mean squared error, and the
-/// standard error of that mean.
+/// The difference in held-out mean squared error, over trials.
 fn excess<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     degree: Degree,
     best: Degree,
-) -> Option<(T, T)> {
+) -> Option<Excess<T>> {
     let differences = || {
         held_out(trials, degree)
             .zip(held_out(trials, best))
@@ -200,5 +242,5 @@ fn excess<T: Real, const TERMS: usize>(
     let n = T::from_f64(count as f64);
     let mean = differences().fold(T::zero(), |sum, d| sum + d) / n;
     let squares = differences().fold(T::zero(), |sum, d| sum + (d - mean) * (d - mean));
-    Some((mean, (squares / (n * (n - T::one()))).sqrt()))
+    Some(Excess { mean, standard_error: (squares / (n * (n - T::one()))).sqrt() })
 }

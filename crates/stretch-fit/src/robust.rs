@@ -1,8 +1,8 @@
 //! Fits that outliers cannot pull.
 
-use stretch_core::{Degree, Real};
+use stretch_core::{Degree, MAX_TERMS, Real};
 
-use crate::{Fit, FitError, SurfaceAccumulator};
+use crate::{Fit, FitError, Sample, SurfaceAccumulator};
 
 /// What a residual costs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,7 +38,7 @@ impl Loss {
 
 /// A robust surface, its scale and how the iteration went.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RobustFit<T, const TERMS: usize> {
+pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
     /// The surface. SSE, R^2 and RMSE count every sample alike, outliers
     /// included; `sigma`, standard errors and bounds use the robust scale.
     pub fit: Fit<T, TERMS>,
@@ -53,7 +53,7 @@ pub struct RobustFit<T, const TERMS: usize> {
 /// Fits a surface by iteratively re-weighted least squares.
 ///
 /// `samples` is called once a pass and must give the same
-/// `(rate, volts, value)` each time; `memory` is lent, one number a sample,
+/// samples each time; `memory` is lent, one number a sample,
 /// for the median of the residuals. Nothing else grows with the log.
 ///
 /// **Bisquare**, as MATLAB's `fit(..., 'Robust', 'Bisquare')` documents it:
@@ -74,18 +74,18 @@ pub struct RobustFit<T, const TERMS: usize> {
 ///
 /// ```
 /// use stretch_core::Degree;
-/// use stretch_fit::{Loss, robust_fit};
+/// use stretch_fit::{Loss, Sample, robust_fit};
 ///
 /// // A line, a wobble, and one gross error in ten samples.
 /// let samples = || (0..100).map(|k| {
 ///     let volts = f64::from(k) / 100.0;
 ///     let wobble = 0.01 * f64::from(k * k % 7 - 3);
-///     (0.0, volts, 3.0 * volts + wobble + if k % 10 == 9 { 50.0 * volts } else { 0.0 })
+///     let gross = if k % 10 == 9 { 50.0 * volts } else { 0.0 };
+///     Sample { rate: 0.0, volts, value: 3.0 * volts + wobble + gross }
 /// });
 /// let mut memory = [0.0; 100];
-/// let line = Degree::new(0, 1).unwrap();
 /// for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
-///     let robust = robust_fit::<f64, 2, _>(line, loss, samples, &mut memory)?;
+///     let robust = robust_fit::<f64, 2, _>(Degree::LINE, loss, samples, &mut memory)?;
 ///     assert!(robust.converged);
 ///     approx::assert_abs_diff_eq!(robust.fit.coefficients()[1], 3.0, epsilon = 0.02);
 /// }
@@ -105,7 +105,7 @@ pub fn robust_fit<T: Real, const TERMS: usize, I>(
     memory: &mut [T],
 ) -> Result<RobustFit<T, TERMS>, FitError>
 where
-    I: IntoIterator<Item = (T, T, T)>,
+    I: IntoIterator<Item = Sample<T>>,
 {
     let mut plain = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
     plain.extend(samples())?;
@@ -130,7 +130,7 @@ where
     let spread = (ols.sst / T::from_f64((n - 1) as f64)).sqrt();
     let tiny = T::from_f64(1e-6) * if spread > T::zero() { spread } else { T::one() };
     let scale_of = |fit: &Fit<T, TERMS>, residuals: &mut [T]| {
-        for ((rate, volts, value), place) in samples().into_iter().zip(&mut *residuals) {
+        for (Sample { rate, volts, value }, place) in samples().into_iter().zip(&mut *residuals) {
             let e = value - fit.surface.eval(rate, volts);
             *place = (e * studentising(rate, volts)).abs();
         }
@@ -138,7 +138,8 @@ where
     };
 
     // Absolute residuals below this are rounding of the values.
-    let largest = samples().into_iter().fold(T::zero(), |most, (_, _, z)| most.max(z.abs()));
+    let largest =
+        samples().into_iter().fold(T::zero(), |most, sample| most.max(sample.value.abs()));
     let rounding = T::from_f64(8.0) * T::epsilon() * largest.max(T::min_positive_value());
     let rest = T::epsilon().sqrt();
     let mut found = ols;
@@ -150,13 +151,14 @@ where
             Loss::LeastAbsolute => (T::from_f64(1e-6) * scale_of(&found, residuals)).max(rounding),
         };
         let mut sums = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
-        for (rate, volts, value) in samples() {
+        for sample in samples() {
+            let Sample { rate, volts, value } = sample;
             let e = (value - found.surface.eval(rate, volts)) * studentising(rate, volts);
             let weight = match loss {
                 Loss::Bisquare => bisquare_weight(e / reach),
                 Loss::LeastAbsolute => reach / e.abs().max(reach),
             };
-            sums.push_weighted(rate, volts, value, weight)?;
+            sums.push_weighted(sample, weight)?;
         }
         let next = sums.fit()?;
         converged = next
@@ -172,7 +174,7 @@ where
     let sigma = match loss {
         Loss::Bisquare => {
             let reach = T::from_f64(TUNING) * scale_of(&found, residuals).max(tiny);
-            let studentised = samples().into_iter().map(|(rate, volts, value)| {
+            let studentised = samples().into_iter().map(|Sample { rate, volts, value }| {
                 let e = (value - found.surface.eval(rate, volts)) * studentising(rate, volts);
                 let h = ols.leverage(rate, volts).min(T::from_f64(MOST_LEVERAGE));
                 if e.abs() >= reach {
@@ -183,7 +185,8 @@ where
             bisquare_sigma(studentised, reach, &ols)
         }
         Loss::LeastAbsolute => {
-            for ((rate, volts, value), place) in samples().into_iter().zip(&mut *residuals) {
+            for (Sample { rate, volts, value }, place) in samples().into_iter().zip(&mut *residuals)
+            {
                 *place = value - found.surface.eval(rate, volts);
             }
             median_spread(residuals, ols.terms())

@@ -23,12 +23,13 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     ///
     /// ```
     /// use stretch_core::Degree;
-    /// use stretch_fit::SurfaceAccumulator;
-    /// let line = Degree::new(0, 1).unwrap();
-    /// let mut parts = [SurfaceAccumulator::<f64, 2, 8>::new(line)?, SurfaceAccumulator::new(line)?];
+    /// use stretch_fit::{Sample, SurfaceAccumulator};
+    /// let line = SurfaceAccumulator::<f64, { Degree::LINE.terms() }>::new(Degree::LINE)?;
+    /// let mut parts = [line.clone(), line];
     /// for k in 0..40_u32 {
     ///     let volts = 1.0 + f64::from(k % 20) / 20.0;
-    ///     parts[(k / 20) as usize].push(0.0, volts, 2.0 * volts + 0.1 * f64::from(k % 3))?;
+    ///     let value = 2.0 * volts + 0.1 * f64::from(k % 3);
+    ///     parts[(k / 20) as usize].push(Sample { rate: 0.0, volts, value })?;
     /// }
     /// let mut all = parts[0].factor();
     /// all.merge(&parts[1].factor())?;

@@ -7,7 +7,7 @@
 //!
 //! let config = ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() };
 //! proptest!(config, |(log in observations(Degree::POLY13, 0.0, 50..200))| {
-//!     let mut sums = SurfaceAccumulator::<f64, 7, 16>::new(log.surface.degree())?;
+//!     let mut sums = SurfaceAccumulator::<f64>::new(log.surface.degree())?;
 //!     sums.extend(log.samples.iter().copied())?;
 //!     let fit = sums.fit()?;
 //!     prop_assert!(fit.rmse().unwrap() < 1e-10);
@@ -21,13 +21,15 @@ use std::{ops::Range, vec::Vec};
 use proptest::{collection::vec, prelude::*};
 use stretch_core::{Degree, MAX_DEGREE, Surface};
 
+use crate::Sample;
+
 /// Samples of a known surface.
 #[derive(Debug, Clone)]
 pub struct Observations {
     /// The truth.
     pub surface: Surface<f64>,
-    /// `(rate, volts, value)`; rate in -1 to 1, volts in 0 to 1.
-    pub samples: Vec<(f64, f64, f64)>,
+    /// Rate in -1 to 1, volts in 0 to 1.
+    pub samples: Vec<Sample<f64>>,
 }
 
 /// Any degree up to 5 in each variable.
@@ -57,7 +59,7 @@ pub fn observations(
             // Cell k along the voltage; the golden ratio spreads the rates.
             let volts = (k as f64 + along) / cells;
             let rate = 2.0 * (k as f64 * 0.618_033_988_749_894_9 + 0.3 * across).fract() - 1.0;
-            (rate, volts, surface.eval(rate, volts) + noise * error)
+            Sample { rate, volts, value: surface.eval(rate, volts) + noise * error }
         });
         Observations { surface, samples: samples.collect() }
     })

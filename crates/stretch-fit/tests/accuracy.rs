@@ -1,7 +1,7 @@
 //! Accuracy where it is hard: narrow raw volts, `f32`, long logs, outliers.
 
 use stretch_core::{Degree, Real};
-use stretch_fit::{Loss, SurfaceAccumulator, robust_fit};
+use stretch_fit::{FitError, Loss, Sample, SurfaceAccumulator, robust_fit};
 use testkit::tolerance as tol;
 
 const TRUTH: [f64; 7] = [0.058, 0.001, 0.774, -0.121, 2.30, 0.094, -2.26];
@@ -26,7 +26,7 @@ fn error<T: Real, const ROWS: usize>(samples: u32, centre: f64, width: f64) -> (
         let (rate, volts) = (T::from_f64(rate), T::from_f64(volts));
         // The value belongs to the voltage as this type holds it.
         let value = T::from_f64(surface(rate.as_f64(), volts.as_f64()));
-        sums.push(rate, volts, value).unwrap();
+        sums.push(Sample { rate, volts, value }).unwrap();
     }
     let fit = sums.fit().unwrap();
     let off: f64 =
@@ -77,10 +77,10 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
     const RUNS: usize = 200;
     let mut held = [[0; 7]; 3];
     for _ in 0..RUNS {
-        let samples: Vec<(f64, f64, f64)> = points(150, 0.35, 1.0)
+        let samples: Vec<Sample<f64>> = points(150, 0.35, 1.0)
             .map(|(rate, volts)| {
                 let normal = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-                (rate, volts, surface(rate, volts) + 0.1 * normal)
+                Sample { rate, volts, value: surface(rate, volts) + 0.1 * normal }
             })
             .collect();
         let mut sums = SurfaceAccumulator::<f64, 7, 32>::new(Degree::POLY13).unwrap();
@@ -105,4 +105,50 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
         let share = held.iter().sum::<usize>() as f64 / (7 * RUNS) as f64;
         assert!((0.95 - 0.046..=0.95 + 0.046).contains(&share), "{fit}: {share}");
     }
+}
+
+/// Raw counts about an offset: the root mean square error of a fit, if there is one, beside that of its surface.
+fn stated_and_found(offset: f64, half: f64, cubic: Degree) -> Option<(f64, f64)> {
+    let sample = |k: u32| {
+        let x = f64::from(k % 201) / 100.0 - 1.0;
+        Sample {
+            rate: 0.0,
+            volts: offset + half * x,
+            value: 50.0 + 40.0 * x + 9.0 * x * x - 11.0 * x * x * x,
+        }
+    };
+    let mut sums = SurfaceAccumulator::<f64>::new(cubic).unwrap();
+    sums.extend((0..2010).map(sample)).unwrap();
+    let fit = match sums.fit() {
+        Ok(fit) => fit,
+        Err(FitError::RankDeficient { .. }) => return None,
+        Err(other) => panic!("{other}"),
+    };
+    let squares =
+        (0..2010).map(sample).map(|s| (fit.surface().eval(0.0, s.volts) - s.value).powi(2));
+    Some((fit.rmse().unwrap(), (squares.sum::<f64>() / 2010.0).sqrt()))
+}
+
+#[test]
+fn the_error_that_a_fit_states_is_that_of_its_surface() {
+    let cubic = Degree::new(0, 3).unwrap();
+    // 24-bit counts of a load cell: the terms of raw counts cancel 13 digits
+    assert_eq!(stated_and_found(8.3e6, 100.0, cubic), None);
+    for (offset, half) in
+        [(0.0, 1.0), (3.0, 1.0), (30.0, 1.0), (100.0, 1.0), (2.5, 0.004), (1000.0, 1.0)]
+    {
+        let Some((stated, found)) = stated_and_found(offset, half, cubic) else { continue };
+        assert!(
+            found <= 3.0 * stated + 1e-13,
+            "{offset}, {half}: stated {stated:e}, found {found:e}"
+        );
+    }
+    assert!(stated_and_found(100.0, 1.0, cubic).is_some());
+    // about the middle nothing is lost
+    let line = |k: u32| Sample { rate: 0.0, volts: 8.3e6 + f64::from(k), value: f64::from(k * k) };
+    let mut sums = SurfaceAccumulator::<f64>::new(cubic).unwrap();
+    sums.extend((0..200).map(line)).unwrap();
+    assert!(sums.fit().is_err());
+    let about = sums.factor().counted_from(8.3e6 + 100.0).fit().unwrap();
+    assert!(about.rmse().unwrap() < 1e-8, "{:?}", about.rmse());
 }

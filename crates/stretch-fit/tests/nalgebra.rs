@@ -9,7 +9,7 @@ use stretch_fit::{
 };
 use testkit::tolerance as tol;
 
-type Sample = (f64, f64, f64);
+type Sample = stretch_fit::Sample<f64>;
 
 fn folded<const ROWS: usize>(degree: Degree, samples: &[Sample]) -> Factor<f64, 21> {
     let mut sums = SurfaceAccumulator::<f64, 21, ROWS>::new(degree).unwrap();
@@ -21,10 +21,10 @@ fn folded<const ROWS: usize>(degree: Degree, samples: &[Sample]) -> Factor<f64, 
 fn problem(degree: Degree, samples: &[Sample], weights: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let exponents: Vec<_> = degree.exponents().collect();
     let design = DMatrix::from_fn(samples.len(), exponents.len(), |row, term| {
-        let ((rate, volts, _), (i, j)) = (samples[row], exponents[term]);
+        let (Sample { rate, volts, .. }, (i, j)) = (samples[row], exponents[term]);
         weights[row].sqrt() * rate.powi(i.into()) * volts.powi(j.into())
     });
-    let values = samples.iter().zip(weights).map(|(sample, weight)| weight.sqrt() * sample.2);
+    let values = samples.iter().zip(weights).map(|(sample, weight)| weight.sqrt() * sample.value);
     (design, DVector::from_iterator(samples.len(), values))
 }
 
@@ -59,7 +59,7 @@ fn agrees(
 }
 
 fn narrowed(samples: &[Sample], centre: f64, width: f64) -> Vec<Sample> {
-    samples.iter().map(|&(rate, volts, value)| (rate, centre + width * volts, value)).collect()
+    samples.iter().map(|s| Sample { volts: centre + width * s.volts, ..*s }).collect()
 }
 
 proptest! {
@@ -118,8 +118,8 @@ proptest! {
         weights in prop::collection::vec(1e-3..1e3f64, 150),
     ) {
         let mut sums = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
-        for (&(rate, volts, value), &weight) in log.samples.iter().zip(&weights) {
-            sums.push_weighted(rate, volts, value, weight).unwrap();
+        for (&sample, &weight) in log.samples.iter().zip(&weights) {
+            sums.push_weighted(sample, weight).unwrap();
         }
         agrees(&sums.fit().unwrap(), problem(Degree::POLY13, &log.samples, &weights))?;
     }

@@ -4,13 +4,12 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use proptest::prelude::*;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
-    Factor, FitError, LineAccumulator, Loss, OrderTable, SurfaceAccumulator, cross_validate,
-    held_out, robust_fit,
+    Factor, FitError, Loss, OrderTable, SurfaceAccumulator, cross_validate, held_out, robust_fit,
     strategies::{degrees, observations, surfaces},
 };
 use testkit::tolerance as tol;
 
-type Sample = (f64, f64, f64);
+type Sample = stretch_fit::Sample<f64>;
 
 fn accumulate<const ROWS: usize>(
     degree: Degree,
@@ -58,7 +57,7 @@ proptest! {
         let (before, after) = log.samples.split_at((cut * log.samples.len() as f64) as usize);
         for part in [before, after] {
             let column = |of: fn(&Sample) -> f64| part.iter().map(of).collect::<Vec<f64>>();
-            columns.push_columns(&column(|s| s.0), &column(|s| s.1), &column(|s| s.2)).unwrap();
+            columns.push_columns(&column(|s| s.rate), &column(|s| s.volts), &column(|s| s.value)).unwrap();
         }
         let one_by_one = accumulate::<16>(Degree::POLY13, &log.samples);
         prop_assert_eq!(columns.factor(), one_by_one.factor());
@@ -125,7 +124,7 @@ proptest! {
         let [r, v, z] = [r, v, z].map(|n| 2.0_f64.powi(n));
         let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
         let other: Vec<Sample> =
-            log.samples.iter().map(|s| (s.0 * r, s.1 * v, s.2 * z)).collect();
+            log.samples.iter().map(|s| Sample { rate: s.rate * r, volts: s.volts * v, value: s.value * z }).collect();
         let other = accumulate::<16>(Degree::POLY13, &other).fit().unwrap();
         for (k, (i, j)) in Degree::POLY13.exponents().enumerate() {
             let back = other.coefficients()[k] * r.powi(i.into()) * v.powi(j.into()) / z;
@@ -141,9 +140,9 @@ proptest! {
     ) {
         let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
         let moved: Vec<Sample> =
-            log.samples.iter().map(|s| (s.0, s.1 + by_volts, s.2 + by_value)).collect();
+            log.samples.iter().map(|s| Sample { volts: s.volts + by_volts, value: s.value + by_value, ..*s }).collect();
         let moved = accumulate::<16>(Degree::POLY13, &moved).fit().unwrap();
-        for &(rate, volts, _) in &log.samples {
+        for &Sample { rate, volts, .. } in &log.samples {
             let (a, b) = (fit.surface(), moved.surface());
             let (a, b) = (a.eval(rate, volts) + by_value, b.eval(rate, volts + by_volts));
             // Horner in raw volts adds terms up to 10 * 6^3 that cancel.
@@ -166,9 +165,9 @@ proptest! {
     ) {
         let mut weighted = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
         let mut repeated = weighted.clone();
-        for (&(rate, volts, value), &weight) in log.samples.iter().zip(&weights) {
-            weighted.push_weighted(rate, volts, value, weight.into()).unwrap();
-            (0..weight).for_each(|_| repeated.push(rate, volts, value).unwrap());
+        for (&sample, &weight) in log.samples.iter().zip(&weights) {
+            weighted.push_weighted(sample, weight.into()).unwrap();
+            (0..weight).for_each(|_| repeated.push(sample).unwrap());
         }
         prop_assume!(weighted.samples() > 20);
         let (weighted, repeated) = (weighted.factor(), repeated.factor());
@@ -218,7 +217,7 @@ proptest! {
         let sum: f64 = log
             .samples
             .iter()
-            .map(|&(rate, volts, value)| (value - other.eval(rate, volts)).powi(2))
+            .map(|&Sample { rate, volts, value }| (value - other.eval(rate, volts)).powi(2))
             .sum();
         let found = factor.residual_of(&other.coefficients()[..7]);
         assert_relative_eq!(found, sum, epsilon = 0.0, max_relative = tol::FIT_STATISTICS);
@@ -227,7 +226,7 @@ proptest! {
     #[test]
     fn leverages_sum_to_the_number_of_terms(log in observations(Degree::POLY13, 0.5, 30..100)) {
         let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
-        let sum: f64 = log.samples.iter().map(|s| fit.leverage(s.0, s.1)).sum();
+        let sum: f64 = log.samples.iter().map(|s| fit.leverage(s.rate, s.volts)).sum();
         assert_abs_diff_eq!(sum, 7.0, epsilon = tol::FIT_STATISTICS);
     }
 
@@ -250,7 +249,7 @@ proptest! {
             let surface = accumulate::<16>(Degree::POLY13, &others).fit().unwrap().surface();
             let sse: f64 = parts[held_out.trial]
                 .iter()
-                .map(|&(rate, volts, value)| (value - surface.eval(rate, volts)).powi(2))
+                .map(|&Sample { rate, volts, value }| (value - surface.eval(rate, volts)).powi(2))
                 .sum();
             assert_relative_eq!(
                 held_out.sse,
@@ -291,15 +290,15 @@ proptest! {
         apart in 5..9_usize,
     ) {
         let n = log.samples.len();
-        let spoilt = || log.samples.iter().enumerate().map(|(k, &(rate, volts, value))| {
+        let spoilt = || log.samples.iter().enumerate().map(|(k, sample)| {
             let error = if k % apart == 0 { gross[(k / apart) % 16] } else { 0.0 };
-            (rate, volts, value + error)
+            Sample { value: sample.value + error, ..*sample }
         });
         let mut memory = vec![0.0; n];
         let absolute =
             robust_fit::<f64, 7, _>(Degree::POLY13, Loss::LeastAbsolute, spoilt, &mut memory);
         let surface = absolute.unwrap().fit.surface();
-        for &(rate, volts, _) in &log.samples {
+        for &Sample { rate, volts, .. } in &log.samples {
             let (found, truth) = (surface.eval(rate, volts), log.surface.eval(rate, volts));
             assert_abs_diff_eq!(found, truth, epsilon = tol::FIT_GROSS_ERRORS * 0.01);
         }
@@ -317,22 +316,6 @@ proptest! {
             prop_assert!(off < tol::FIT_WELL * 10.0, "off by {off:e}");
         }
     }
-
-    #[test]
-    fn a_line_is_the_degree_of_a_line(log in observations(Degree::POLY13, 0.5, 10..50)) {
-        let mut line = LineAccumulator::new();
-        let mut other = LineAccumulator::new();
-        let mut surface =
-            SurfaceAccumulator::<f64, 2, 16>::new(LineAccumulator::<f64>::DEGREE).unwrap();
-        for (k, &(_, volts, value)) in log.samples.iter().enumerate() {
-            if k % 2 == 0 { &mut line } else { &mut other }.push(volts, value).unwrap();
-            surface.push(0.0, volts, value).unwrap();
-        }
-        line.merge(&other);
-        let (line, surface) = (line.fit().unwrap(), surface.fit().unwrap());
-        let both = [line.intercept(), line.slope()];
-        prop_assert!(distance(&both, surface.coefficients()) < tol::FIT_WELL);
-    }
 }
 
 /// Any bits whatever, and samples all of one scale: an `Err` or finite numbers.
@@ -345,12 +328,13 @@ fn finite_or_refused<T: Real>(
     let mut tame = gross.clone();
     for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
         let [r, v, z, w] = [rate, volts, value, weight.abs()].map(T::from_f64);
-        let _ = gross.push(r, v, z);
-        let _ = gross.push_weighted(r, v, z, w);
+        let sample = stretch_fit::Sample { rate: r, volts: v, value: z };
+        let _ = gross.push(sample);
+        let _ = gross.push_weighted(sample, w);
         let unit = |x: f64| if x.is_finite() && x != 0.0 { x.abs().log2() % 1.0 } else { 0.5 };
-        let sample = [unit(rate) * scale, k as f64 * scale, unit(value) / scale];
-        let [r, v, z] = sample.map(T::from_f64);
-        let _ = tame.push(r, v, z);
+        let [rate, volts, value] =
+            [unit(rate) * scale, k as f64 * scale, unit(value) / scale].map(T::from_f64);
+        let _ = tame.push(stretch_fit::Sample { rate, volts, value });
     }
     for sums in [gross, tame] {
         let fit = match sums.fit() {
@@ -384,7 +368,7 @@ fn trial(k: u32, degree: Degree, truth: impl Fn(f64, f64) -> f64) -> Factor<f64,
     for _ in 0..250 {
         let (rate, volts) = (2.0 * uniform() - 1.0, uniform());
         let noise = 0.02 * (uniform() + uniform() + uniform() - 1.5);
-        sums.push(rate, volts, truth(rate, volts) + noise).unwrap();
+        sums.push(Sample { rate, volts, value: truth(rate, volts) + noise }).unwrap();
     }
     sums.factor()
 }

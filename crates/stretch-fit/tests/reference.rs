@@ -4,7 +4,7 @@ use approx::{assert_relative_eq, relative_eq};
 use std::collections::HashMap;
 
 use stretch_core::Degree;
-use stretch_fit::{Factor, Loss, SurfaceAccumulator, robust_fit};
+use stretch_fit::{Factor, Loss, Sample, SurfaceAccumulator, robust_fit};
 use testkit::{tolerance as tol, vectors::columns};
 
 type Columns = HashMap<String, Vec<f64>>;
@@ -16,7 +16,7 @@ fn accumulate(samples: &Columns, degree: Degree, weighted: bool) -> Factor<f64, 
     for (k, &rate) in samples["rate"].iter().enumerate() {
         let [volts, value, weight] = ["volts", "value", "weight"].map(|name| samples[name][k]);
         let weight = if weighted { weight } else { 1.0 };
-        sums.push_weighted(rate, volts, value, weight).unwrap();
+        sums.push_weighted(Sample { rate, volts, value }, weight).unwrap();
     }
     sums.factor()
 }
@@ -140,7 +140,7 @@ fn robust_fits() {
     let points = || {
         let (rate, volts) = (samples["rate"].iter(), samples["volts"].iter());
         let xy = rate.zip(volts).zip(&samples["with_outliers"]);
-        xy.map(|((&rate, &volts), &value)| (rate, volts, value))
+        xy.map(|((&rate, &volts), &value)| Sample { rate, volts, value })
     };
     let mut memory = vec![0.0; samples["rate"].len()];
     let mut fitted =
@@ -163,7 +163,9 @@ fn robust_fits() {
     let cost = |c: &[f64]| -> f64 {
         let c: &[f64; 7] = c.try_into().unwrap();
         let surface = stretch_core::Surface::new(Degree::POLY13, c).unwrap();
-        points().map(|(rate, volts, value)| (value - surface.eval(rate, volts)).abs()).sum()
+        points()
+            .map(|Sample { rate, volts, value }| (value - surface.eval(rate, volts)).abs())
+            .sum()
     };
     let (found, best) = (cost(absolute.fit.coefficients()), cost(&expected["least_absolute"]));
     assert!(found >= best * (1.0 - tol::PRINTED), "{found} beats the optimum {best}");

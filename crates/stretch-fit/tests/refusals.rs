@@ -3,10 +3,17 @@
 use approx::assert_abs_diff_eq;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
-    Factor, FactorSpec, FitError, LineAccumulator, Loss, SurfaceAccumulator, cross_validate,
-    robust_fit,
+    Factor, FactorSpec, FitError, Loss, Sample, SurfaceAccumulator, cross_validate, robust_fit,
 };
 use testkit::tolerance::F64_ROUNDING;
+
+/// A line through values over the volts 0, 1, 2 ...
+fn line(values: impl IntoIterator<Item = f64>) -> SurfaceAccumulator<f64, 2> {
+    let mut sums = SurfaceAccumulator::new(Degree::LINE).unwrap();
+    let sample = |(k, value): (u32, f64)| Sample { rate: 0.0, volts: f64::from(k), value };
+    sums.extend((0..).zip(values).map(sample)).unwrap();
+    sums
+}
 
 fn poly13() -> SurfaceAccumulator<f64, 7, 16> {
     SurfaceAccumulator::new(Degree::POLY13).unwrap()
@@ -15,8 +22,8 @@ fn poly13() -> SurfaceAccumulator<f64, 7, 16> {
 #[test]
 fn the_term_that_the_data_cannot_determine_is_named() {
     // (rate and volts of sample k) and the first term that depends on those before.
-    type Sample = fn(u32) -> (f64, f64);
-    let cases: [(Sample, (u8, u8), &str); 6] = [
+    type Point = fn(u32) -> (f64, f64);
+    let cases: [(Point, (u8, u8), &str); 6] = [
         (|k| (0.7, f64::from(k) / 50.0), (1, 0), "p10 (rate)"),
         (|k| (f64::from(k % 7), 1.24), (0, 1), "p01 (volts)"),
         (|k| (f64::from(k), 0.3 * f64::from(k) - 2.0), (0, 1), "p01 (volts)"),
@@ -28,11 +35,11 @@ fn the_term_that_the_data_cannot_determine_is_named() {
             "p12 (rate * volts^2)",
         ),
     ];
-    for (sample, (rate_power, volts_power), name) in cases {
+    for (point, (rate_power, volts_power), name) in cases {
         let mut sums = poly13();
         for k in 0..100 {
-            let (rate, volts) = sample(k);
-            sums.push(rate, volts, f64::from(k * k % 17)).unwrap();
+            let (rate, volts) = point(k);
+            sums.push(Sample { rate, volts, value: f64::from(k * k % 17) }).unwrap();
         }
         let error = sums.fit().unwrap_err();
         assert_eq!(error, FitError::RankDeficient { rate_power, volts_power }, "{name}");
@@ -46,7 +53,7 @@ fn dependent<T: Real, const ROWS: usize>(samples: u32, offset: f64) -> FitError 
     for k in 0..samples {
         let rate = (f64::from(k) * 0.618_033_988_749).fract();
         let (rate, volts) = (T::from_f64(rate), T::from_f64(offset + 3.0 * rate));
-        sums.push(rate, volts, T::from_f64(0.5)).unwrap();
+        sums.push(Sample { rate, volts, value: T::from_f64(0.5) }).unwrap();
     }
     sums.fit().unwrap_err()
 }
@@ -67,7 +74,7 @@ fn dependence_is_seen_through_the_rounding_of_a_long_log() {
 fn too_few_samples() {
     let mut sums = poly13();
     for k in 0..6 {
-        sums.push(f64::from(k % 2), f64::from(k), 1.0).unwrap();
+        sums.push(Sample { rate: f64::from(k % 2), volts: f64::from(k), value: 1.0 }).unwrap();
     }
     let error = sums.fit().unwrap_err();
     assert_eq!(error, FitError::TooFewSamples { needed: 7, got: 6 });
@@ -77,13 +84,10 @@ fn too_few_samples() {
 
 #[test]
 fn as_many_samples_as_terms_leave_no_degree_of_freedom() {
-    let mut line = LineAccumulator::new();
-    line.push(0.0, 1.0_f64).unwrap();
-    line.push(1.0, 3.0).unwrap();
-    let fit = line.fit().unwrap();
-    assert_abs_diff_eq!(fit.slope(), 2.0, epsilon = F64_ROUNDING);
-    assert_eq!((fit.fit().dof(), fit.fit().rmse()), (0, None));
-    assert!(fit.fit().standard_errors().is_none() && fit.fit().adjusted_r_squared().is_none());
+    let fit = line([1.0, 3.0]).fit().unwrap();
+    assert_abs_diff_eq!(fit.coefficients()[1], 2.0, epsilon = F64_ROUNDING);
+    assert_eq!((fit.dof(), fit.rmse()), (0, None));
+    assert!(fit.standard_errors().is_none() && fit.adjusted_r_squared().is_none());
     let error = fit.confidence(0.95).unwrap_err();
     assert_eq!(error, FitError::TooFewSamples { needed: 3, got: 2 });
 }
@@ -96,18 +100,19 @@ fn numbers_that_are_not_finite_or_overflow_are_not_added() {
             [("rate", [bad, 0.0, 0.0]), ("volts", [0.0, bad, 0.0]), ("value", [0.0, 0.0, bad])]
         {
             let [rate, volts, value] = sample;
-            for error in [
-                sums.push(rate, volts, value).unwrap_err(),
-                sums.push_weighted(rate, volts, value, 1.0).unwrap_err(),
-            ] {
+            let sample = Sample { rate, volts, value };
+            for error in
+                [sums.push(sample).unwrap_err(), sums.push_weighted(sample, 1.0).unwrap_err()]
+            {
                 let named = matches!(error, FitError::OutOfRange { field: f, .. } if f == field);
                 assert!(named, "{error:?} should name {field}");
                 assert!(error.to_string().starts_with(field), "{error}");
             }
         }
     }
+    let zero = Sample { rate: 0.0, volts: 0.0, value: 0.0 };
     for bad in [f64::NAN, f64::INFINITY, -1.0, f64::MAX] {
-        let error = sums.push_weighted(0.0, 0.0, 0.0, bad).unwrap_err();
+        let error = sums.push_weighted(zero, bad).unwrap_err();
         assert!(matches!(error, FitError::OutOfRange { field: "weight", .. }), "{error:?}");
     }
     assert_eq!(sums, poly13());
@@ -116,7 +121,7 @@ fn numbers_that_are_not_finite_or_overflow_are_not_added() {
 #[test]
 fn a_sample_without_weight_is_not_counted() {
     let mut sums = poly13();
-    sums.push_weighted(1.0, 1.0, 1.0, 0.0).unwrap();
+    sums.push_weighted(Sample { rate: 1.0, volts: 1.0, value: 1.0 }, 0.0).unwrap();
     assert_eq!(sums, poly13());
 }
 
@@ -133,9 +138,7 @@ fn degrees_must_have_room_and_agree() {
 
 #[test]
 fn levels_lie_between_0_and_1() {
-    let mut line = LineAccumulator::new();
-    (0..9).for_each(|k| line.push(f64::from(k), f64::from(k * k)).unwrap());
-    let fit = line.fit().unwrap();
+    let fit = line((0..9).map(|k| f64::from(k * k))).fit().unwrap();
     for level in [0.0, 1.0, -0.5, 95.0, f64::NAN] {
         assert!(matches!(fit.confidence(level), Err(FitError::Level { .. })), "{level}");
     }
@@ -144,18 +147,17 @@ fn levels_lie_between_0_and_1() {
 
 #[test]
 fn equal_values_have_no_r_squared() {
-    let mut line = LineAccumulator::new();
-    (0..9).for_each(|k| line.push(f64::from(k), 0.0).unwrap());
-    let fit = line.fit().unwrap();
-    assert_eq!(fit.fit().r_squared(), None);
-    assert_eq!(fit.fit().adjusted_r_squared(), None);
-    assert_eq!(fit.fit().rmse(), Some(0.0));
+    let fit = line([0.0; 9]).fit().unwrap();
+    assert_eq!(fit.r_squared(), None);
+    assert_eq!(fit.adjusted_r_squared(), None);
+    assert_eq!(fit.rmse(), Some(0.0));
 }
 
 #[test]
 fn robust_fits_need_memory_and_a_degree_of_freedom() {
-    let samples = |n: u32| move || (0..n).map(|k| (0.0, f64::from(k), f64::from(k % 3)));
-    let line = LineAccumulator::<f64>::DEGREE;
+    let sample = |k| Sample { rate: 0.0, volts: f64::from(k), value: f64::from(k % 3) };
+    let samples = |n: u32| move || (0..n).map(sample);
+    let line = Degree::LINE;
     let mut memory = [0.0; 9];
     let short = robust_fit::<f64, 2, _>(line, Loss::Bisquare, samples(10), &mut memory);
     assert_eq!(short.unwrap_err(), FitError::ShortMemory { needed: 10, got: 9 });
@@ -170,7 +172,8 @@ fn cross_validation_needs_two_trials() {
     assert_eq!(cross_validate(&none, Degree::POLY13).unwrap_err(), needed);
     let mut sums = poly13();
     for k in 0..50 {
-        sums.push(f64::from(k % 5), f64::from(k % 7), f64::from(k % 11)).unwrap();
+        let [rate, volts, value] = [k % 5, k % 7, k % 11].map(f64::from);
+        sums.push(Sample { rate, volts, value }).unwrap();
     }
     assert_eq!(cross_validate(&[sums.factor()], Degree::POLY13).unwrap_err(), needed);
     assert!(cross_validate(&[sums.factor(), sums.factor()], Degree::POLY13).is_ok());
@@ -180,7 +183,8 @@ fn cross_validation_needs_two_trials() {
 fn counts_that_were_damaged_where_they_were_stored_never_panic() {
     let mut sums = poly13();
     for k in 0..50 {
-        sums.push(f64::from(k % 5), f64::from(k % 7), f64::from(k % 11)).unwrap();
+        let [rate, volts, value] = [k % 5, k % 7, k % 11].map(f64::from);
+        sums.push(Sample { rate, volts, value }).unwrap();
     }
     let sound = sums.factor();
     for (samples, folds) in [(u64::MAX, u64::MAX), (50, u64::MAX), (u64::MAX, 0), (1, 0)] {
@@ -189,7 +193,7 @@ fn counts_that_were_damaged_where_they_were_stored_never_panic() {
         both.merge(&damaged).unwrap();
         both.merge(&sound).unwrap();
         assert_eq!(both.samples(), samples.saturating_mul(2).saturating_add(50));
-        for degree in [Degree::POLY13, Degree::new(1, 2).unwrap(), Degree::new(0, 1).unwrap()] {
+        for degree in [Degree::POLY13, Degree::new(1, 2).unwrap(), Degree::LINE] {
             let lower = both.restrict(degree).unwrap();
             assert_eq!(lower.samples(), both.samples());
             // so many roundings may hide every term, which is said

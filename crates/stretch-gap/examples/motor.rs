@@ -1,4 +1,5 @@
-//! A simulator of another kind, a motor with a gear, beside a bench that has friction and backlash in forms of its own.
+//! Another kind of simulator, a motor with a gear, and a bench that has friction and backlash in
+//! other forms.
 use stretch_gap::*;
 const SAMPLES: usize = 3000; // of each of two trials; the second is tested on
 

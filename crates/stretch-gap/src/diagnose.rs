@@ -5,8 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use crate::{
     evidence::{
         candidates::{Candidate, beside_unknown, candidates, posterior, shifts, stage_gaps},
-        detection_limit::{Asked, DetectionLimit, detection_limits},
-        function::function,
+        detection_limit::{DetectionLimit, LimitInputs, detection_limits},
         gathered::Evidence,
         localise::{self, causes::with_causes, location::Where},
         null_band::null_band,
@@ -15,9 +14,10 @@ use crate::{
         sanity::Sanity,
         shares::{EffectShare, eliminated, shares},
         stability::{EffectStability, stabilities},
+        term_sum::weigh_term_sum,
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    missing::{Proposed, propose},
+    missing::{Proposed, propose, propose_for},
     numerics::stopwatch::Stopwatch,
     options::Options,
     problem::{
@@ -26,8 +26,10 @@ use crate::{
         simulator::Simulator,
     },
     record::{
-        columns_alone::columns_alone, examine::Doubts, gross::Gross, suspect::Suspect,
-        weigh::weighed,
+        columns_alone::columns_alone,
+        examine::Doubts,
+        gross::{Gross, weigh_errors},
+        suspect::Suspect,
     },
     search::{
         baselines::baselines,
@@ -36,15 +38,11 @@ use crate::{
         selection::{Found, Looked, Search},
     },
     verdict::{
-        coverage::{is_short, too_little},
+        coverage::{TooLittle, is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
-        extrapolated::extrapolated,
         judge::{Case, Judged, judge},
-        nothing_above::nothing_above,
-        proposal::lacking,
+        notes::{detection_limit_note, extrapolation_notes, swing_notes},
         sentence::{Answer, cut_short, tell},
-        swinging::swinging,
-        too_little::TooLittle,
     },
 };
 
@@ -146,7 +144,7 @@ fn prepare<'a>(
 ) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
     let Task { simulator, options, depth, progress, stop } = task;
     let at_rows = PreparedProblem::prepare(simulator, stop, options.seed, progress)?;
-    let at_rows = at_rows.begun_anew(options.thresholds.least_gap, options.seed)?;
+    let at_rows = at_rows.retuned_from_starts(options.thresholds.least_gap, options.seed)?;
     let limits = (&options.thresholds, depth);
     command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
 }
@@ -197,7 +195,7 @@ fn search<'a>(
     let mut search = Search::new(&problem, &options.thresholds, depth).quick();
     let best = search.best(from, progress)?;
     let least_gap = options.thresholds.least_gap;
-    if let Some(other) = problem.begun_from(&best, least_gap, options.seed)? {
+    if let Some(other) = problem.retuned_from(&best, least_gap, options.seed)? {
         let from = other.nominal.clone();
         return self::search(task, other, &from);
     }
@@ -240,7 +238,7 @@ fn doubt(
     let doubts = Doubts::of(doubted, suspect, thresholds)
         .and_then(|doubts| doubts.closer_if(doubted, suspect, found, thresholds));
     let Some(doubts) = unless_spent(doubts)? else { return Ok(None) };
-    Ok(weighed(doubted, suspect, doubts.errors, found, thresholds))
+    Ok(weigh_errors(doubted, suspect, doubts.errors, found, thresholds))
 }
 
 /// How strong each effect would have to be to be named; none where the record carries no name at all, or no more runs may be made.
@@ -255,8 +253,8 @@ fn limits(
     }
     (task.progress)("detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
-    let asked = Asked { problem, best, thresholds, null_band, seed: task.options.seed };
-    Ok(unless_spent(detection_limits(asked, searched.looked.as_deref()))?.unwrap_or_default())
+    let inputs = LimitInputs { problem, best, thresholds, null_band, seed: task.options.seed };
+    Ok(unless_spent(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
 /// What the gap is put down to: the best set of effects, or an error.
@@ -298,7 +296,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
         (task.progress)("what the catalogue lacks");
         proposal = unless_spent(propose(problem, &problem.nominal))?.flatten();
         let Some(proposal) = &proposal else { return Ok(None) };
-        Ok(unless_spent(function(problem, evidence, (proposal, best), thresholds))?.flatten())
+        Ok(unless_spent(weigh_term_sum(problem, evidence, (proposal, best), thresholds))?.flatten())
     };
     let (posterior, held) =
         posterior(problem, thresholds, (&mut evidence, null_band), (all, held), lacks)?;
@@ -345,7 +343,7 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
     let best = &cause.found.best;
     let lacking = |names| {
         let found =
-            lacking(cause.problem, best, (names, gathered.proposed.as_ref()), task.progress);
+            propose_for(cause.problem, best, (names, gathered.proposed.as_ref()), task.progress);
         Ok(unless_spent(found)?.flatten())
     };
     judge(&case, &task.options.thresholds, lacking)
@@ -391,17 +389,17 @@ fn report(
     let naming = judged.naming();
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(searched.problem.starts.note());
-    text.notes.extend(extrapolated(simulator, &evidence.roles, &naming.named));
+    text.notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // What another form of an effect leaves may look like a swing.
     if is_quiet || evidence.gap.left <= thresholds.unknown_excess {
-        text.notes.extend(swinging(cause.problem, &evidence));
+        text.notes.extend(swing_notes(cause.problem, &evidence));
     }
     let model_runs = runs.counted();
     if let Some(note) = model_runs.and_then(|runs| runs.note()) {
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
         text.notes.push(note);
     }
-    let no_name = is_quiet.then(|| nothing_above(&detection_limits, simulator.effects()));
+    let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
     text.notes.extend(no_name.flatten());
     let location = Where {
         stages: with_causes(location.stages, &shares, &naming.named, simulator),

@@ -22,15 +22,15 @@ pub use diagnose::diagnose;
 pub use evidence::{
     candidates::{Candidate, EffectValue, ParameterShift},
     detection_limit::DetectionLimit,
-    excess::Excess,
-    gathered::{Evidence, StageEvidence},
+    gathered::{Evidence, Excess, StageEvidence},
     localise::location::{SliceGap, StageGap, StageShare, Where},
-    response::{Answered, Response, Responses},
+    responses::{Answered, Response, Responses},
     shares::EffectShare,
     stability::EffectStability,
 };
 pub use fit::{
     identifiability::{Identified, Knowledge},
+    sample_fit::{SampleFit, SampleValue, fit_samples},
     starts::Starts,
 };
 pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
@@ -42,8 +42,7 @@ pub use problem::{
     description::{Description, DescriptionSpec},
     error::GapError,
     noise::{Noise, WINDOW, noise_variance},
-    record_facts::{Motion, MotionSpec, RecordFacts, Recorded},
-    rows_used::RowsUsed,
+    record_facts::{Motion, MotionSpec, RecordFacts, Recorded, RowsUsed},
     sample_roles::{BLOCK_S, Role, SampleRoles, Segment},
     simulator::{Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines},
     spec::{EffectSpec, ParameterSpec, SlowDrift, StageSpec, TrialSpec},

@@ -1,21 +1,23 @@
-//! How to diagnose.
+//! Options of a diagnosis.
 
 use crate::problem::thresholds::Thresholds;
 
-/// How to diagnose.
+/// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Most effects named at once.
+    /// Largest number of effects named at once.
     pub depth: usize,
-    /// Threads; 0 takes all. The result is the same.
+    /// Number of threads; 0 uses all. The result does not depend on it.
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// Whether simpler methods are run beside.
+    /// Whether simpler methods are also run, for comparison.
     pub baselines: bool,
-    /// Whether [answers](crate::Responses) to the numbers of the best set are gathered, for a page where they can be turned.
+    /// Whether [responses](crate::Responses) to the parameters of the best set are gathered, for a
+    /// page where they can be varied.
     pub responses: bool,
-    /// Whether [detection limits](crate::DetectionLimit) are found whatever the verdict is; where nothing is named they are found anyway.
+    /// Whether [detection limits](crate::DetectionLimit) are computed whatever the verdict is. If
+    /// nothing is named they are always computed.
     pub detection_limits: bool,
     /// Calibrated numbers.
     pub thresholds: Thresholds,

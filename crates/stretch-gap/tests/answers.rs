@@ -1,4 +1,5 @@
-//! What a report and a page are given beside the verdict: answers to each number, what the gap costs a calibration, and JSON.
+//! Further outputs for a report and a page: responses to each parameter, what the gap costs a
+//! calibration, and JSON.
 
 use crate::{
     consistent::evidenced,

@@ -35,7 +35,7 @@ fn assert_probabilities(told: &Diagnosis) {
     for pair in of_effects.windows(2) {
         assert!(pair[0].probability >= pair[1].probability, "{pair:?}");
     }
-    // What a calibration of thresholds computes from the answer is what stands in it.
+    // A calibration of thresholds recomputes exactly the numbers of the answer.
     let again = told.probabilities(&stretch_gap::Thresholds::frozen());
     for (candidate, p) in told.candidates.iter().zip(again) {
         assert!((candidate.probability - p).abs() < 1e-9, "{p}: {candidate:?}");
@@ -126,7 +126,7 @@ fn holds_null(value: &serde_json::Value) -> bool {
     }
 }
 
-/// The sentence speaks of the names that stand in the lists, and every share in it is one.
+/// The sentence uses only the names in the lists, and every share in it is listed.
 fn assert_sentence(told: &Diagnosis, measured: &Measured) {
     let sentence = &told.sentence;
     let says = |name: &str| {

@@ -59,8 +59,8 @@ fn the_limit_scales_with_the_noise() {
     assert!((loud / quiet / 4.0 - 1.0).abs() < 0.02, "{quiet} {loud}");
 }
 
-/// Two names for one law: whichever is there, a coin decides, and neither is ever named nine times in ten. A lag beside a delay is told
-/// apart, by more than it takes to see one alone.
+/// Two names for one law: whichever is present, a coin decides, and neither is ever named nine
+/// times in ten. To distinguish a lag from a delay takes more than to detect one alone.
 #[test]
 fn twins_have_larger_limits_than_one_alone() {
     let frozen = Thresholds::frozen();

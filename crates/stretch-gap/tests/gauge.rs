@@ -24,7 +24,7 @@ pub(crate) enum Lack {
     Warming,
     /// Two levels between which it switches on its own.
     Telegraph,
-    /// A step at a time of its own in each trial.
+    /// A step at a different time in each trial.
     Jumps,
     /// 0.04 V x (1 - x): the effect that the simulator knows.
     Curve,

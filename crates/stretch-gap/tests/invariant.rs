@@ -124,8 +124,8 @@ fn with_another_test(seed: u64) -> (Measured, Measured) {
     (plain, other)
 }
 
-/// Nothing is fitted, chosen or screened on test trials: with others in their place every fit is the same to the bit, and only what is told of the
-/// test trials is not.
+/// Nothing is fitted, chosen or screened on test trials: with other test trials every fit is the
+/// same to the bit, and only the results on test trials change.
 #[test]
 fn test_trials_are_never_fitted() {
     let (plain, other) = with_another_test(7);
@@ -149,7 +149,8 @@ fn test_trials_are_never_fitted() {
     }
 }
 
-/// What is worse on the test trials than nothing closes no share of them, and is not told as if it did.
+/// A proposal that is worse on the test trials than none closes no share of them, and is not
+/// reported as if it did.
 #[test]
 fn a_proposal_that_fails_on_the_test_trials_is_not_told() {
     told(&with_another_test(7).1);
@@ -172,7 +173,7 @@ fn borrowed_test_samples_are_never_fitted() {
     assert!(two.gap.left > one.gap.left);
 }
 
-/// A session with a test trial in its middle: what is tested on is not asked, wherever it stands.
+/// A session with a test trial in its middle: test samples are not used, wherever they are.
 #[test]
 fn a_test_trial_in_the_middle_is_not_fitted() {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Play, Effect::Quadratic]);

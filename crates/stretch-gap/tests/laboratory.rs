@@ -44,7 +44,8 @@ fn what_was_measured_cannot_tell_and_the_next_experiment_can() {
     );
 }
 
-/// Evidence a minute is what counts: the same motion behind ten minutes of preparation is worth less, and stands behind.
+/// Evidence per minute counts: the same motion after ten minutes of preparation is worth less, and
+/// ranks lower.
 #[test]
 fn preparation_counts_into_the_minutes() {
     let (measured, told, evidence) = tied();
@@ -72,7 +73,8 @@ fn a_single_name_needs_no_experiment() {
     assert_eq!(next_experiment(&quiet, &told, &evidence).expect("simulated"), None);
 }
 
-/// Nobody knows which rival is true: both are tried, and it does not matter which is told first. A model does not differ from itself.
+/// It is unknown which hypothesis is true: both are assumed, and their order does not matter. A
+/// model does not differ from itself.
 #[test]
 fn differences_have_no_order() {
     let (measured, _, _) = tied();

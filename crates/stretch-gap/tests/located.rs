@@ -1,4 +1,4 @@
-//! Where a gap sits: a gap that was put in one place stands out there, and not elsewhere.
+//! Location of a gap: a gap that was added in one place is reported there, and not elsewhere.
 
 use crate::{
     consistent::{evidenced, told},
@@ -6,7 +6,8 @@ use crate::{
 };
 use stretch_gap::{Diagnosis, Options, RandomGenerator};
 
-/// A line beside a bench whose offset jumps by noise wherever `is_there` says so of sample, motion and rate. No parameter can follow that.
+/// A line and a bench whose offset jumps by noise wherever `is_there` says so of sample, motion and
+/// rate. No parameter can follow that.
 fn disturbed(seed: u64, sd: f64, is_there: impl Fn(usize, f64, f64) -> bool) -> Measured {
     let toy =
         Toy { trials: vec![(1500, false), (1500, false), (1500, true)], ..Toy::of(&[Law::Line]) };
@@ -27,7 +28,7 @@ fn standing_out<'a>(told: &'a Diagnosis, by: &str) -> Vec<&'a str> {
     slices.map(|s| s.slice.as_str()).collect()
 }
 
-/// Axes that stand out and say something else than `allowed`.
+/// Axes with significant slices other than `allowed`.
 fn elsewhere<'a>(told: &'a Diagnosis, allowed: &[&str]) -> Vec<(&'a str, &'a str)> {
     let slices = told.location.slices.iter().filter(|s| s.stands_out);
     let all = slices.map(|s| (s.by.as_str(), s.slice.as_str()));
@@ -90,8 +91,8 @@ fn a_gap_of_one_octave_stands_out_there() {
     assert_eq!(elsewhere(&told, &["frequency"]), []);
 }
 
-/// Where nothing is wrong something stands out in 5 of 100 records at most (dependent slices make it fewer): over 60 no more than a binomial count
-/// exceeds once in a thousand.
+/// If nothing is wrong a slice is significant in at most 5 of 100 records (dependent slices make it
+/// fewer): over 60 no more than a binomial count exceeds once in a thousand.
 #[test]
 fn nothing_stands_out_of_noise() {
     let alarms = (0..60)
@@ -119,9 +120,10 @@ fn shares_of_slices_sum_to_the_gap() {
     }
 }
 
-/// A lag drives a line: what was measured of the lag, its noise included, is what the line gets. From end to end nobody measures the lag: its noise,
-/// one variance, is missing beside its gap, and passes a line of gain 1 as it is. With gaps e of the two, in variances of the noise, the
-/// share of the lag is (1 + e_0)/(1 + e_0 + e_1).
+/// A lag drives a line. The line is driven by the measured output of the lag, including its noise.
+/// In the chain the output of the lag is not measured: its noise, one variance, is missing in
+/// addition to its gap, and passes a line of gain 1 unchanged. With gaps e of the two, in variances
+/// of the noise, the share of the lag is (1 + e_0)/(1 + e_0 + e_1).
 fn end_to_end(wrong: usize, size: f64) -> ([f64; 2], [f64; 2]) {
     let mut toy = Toy::of(&[Law::Lag, Law::Line]);
     toy.hidden = vec![(wrong, Effect::Cubic, vec![size])];
@@ -148,7 +150,8 @@ fn a_gap_has_the_stage_that_makes_it() {
 fn noise_that_drives_a_stage_is_that_of_the_stage_before() {
     let (gaps, ends) = end_to_end(0, 0.0);
     assert!(gaps.iter().all(|e| *e < 0.2), "{gaps:?}");
-    // The product of two noises over 1000 samples is 2/sqrt(1000) = 0.06 of a variance, beside that of a mean square, 0.045: three of these.
+    // The product of two noises over 1000 samples is 2/sqrt(1000) = 0.06 of a variance, plus that
+    // of a mean square, 0.045: three of these.
     assert!(ends[0] > 0.8, "{ends:?}");
 }
 

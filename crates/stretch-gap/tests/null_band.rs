@@ -1,4 +1,5 @@
-//! Records in which nothing is missing stay within the band of noise, and what is above it but carries no name is told so.
+//! Records in which nothing is missing stay within the band of noise, and a gap above it without a
+//! name is reported as such.
 
 use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};

@@ -13,7 +13,8 @@ fn exact() -> Toy {
     toy
 }
 
-/// The same law under two names: each is as probable, each may stand for the other, and the sentence says so.
+/// The same law under two names: both are equally probable, each is an alternative to the other,
+/// and the sentence says so.
 #[test]
 fn exact_twins_are_a_tie() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Square, Effect::Drift]);
@@ -47,7 +48,8 @@ fn what_is_told_apart_is_no_tie() {
     assert!(told.candidates[0].probability > 0.9, "{}", told.candidates[0].probability);
 }
 
-/// A known cause c x^2 beside noise of a known size e in the offset that nothing closes: 1 - e^2/(e^2 + mean of (c x^2)^2).
+/// A known cause c x^2 plus noise of a known size e in the offset that nothing closes: 1 - e^2/(e^2 +
+/// mean of (c x^2)^2).
 fn half_closed(seed: u64) -> (Diagnosis, f64) {
     let (c, e) = (0.1, 0.012);
     let toy = exact().may_lack(&[Effect::Quadratic]).hiding(&[(Effect::Quadratic, &[c])]);
@@ -129,7 +131,7 @@ fn shares_of_effects_sum_to_what_the_set_closes() {
     }
 }
 
-/// What is certain and closes next to nothing is not named beside what closes all.
+/// A certain effect that closes almost nothing is not named with one that closes all.
 #[test]
 fn what_closes_nothing_stands_below() {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -143,8 +145,9 @@ fn what_closes_nothing_stands_below() {
     }
 }
 
-/// A size is told with an interval that holds it: over 40 records no fewer than a binomial count of 0.05 misses once in a thousand. (A block of
-/// fifty samples counts as one observation, though here all are: intervals are wide, and none may be missed by much.)
+/// A size is reported with an interval that holds it: over 40 records at least as often as a
+/// binomial count of 0.05 misses allows once in a thousand. (A block of fifty samples counts as one
+/// observation, although here all are: intervals are wide, and none may be missed by much.)
 #[test]
 fn intervals_of_a_size_hold_it_over_seeds() {
     let missed = (0..40)

@@ -1,4 +1,4 @@
-//! What no catalogue holds, on a line whose offset follows a law of its own: the law is proposed, noise is not.
+//! A line whose offset follows a law outside every catalogue: the law is proposed, noise is not.
 
 use crate::{
     consistent::told,
@@ -9,8 +9,8 @@ use stretch_gap::{Factor, Passage, Proposed, RandomGenerator, RateForm, VerdictK
 /// Samples of a trial: 29 s.
 const SAMPLES: usize = 2900;
 
-/// A line that knows no effect, beside a bench whose offset is a function of the motion, trial by trial, on the scale that terms have:
-/// 0 to 1 over what is fitted.
+/// A line without effects, and a bench whose offset is a function of the motion, trial by trial, on
+/// the scale of terms: 0 to 1 over the fitted part.
 fn with_offset(seed: u64, law: impl Fn(&[f64]) -> Vec<f64>) -> (Option<Proposed>, VerdictKind) {
     let toy = short_trials();
     let x = toy.measured(seed).x;
@@ -133,7 +133,8 @@ fn a_product_with_the_rate_is_proposed() {
     assert!(is_near(term.coefficient, expected), "{expected}: {}", proposed.equation);
 }
 
-/// White or slow noise of its own, a few times that of the record: a function of nothing. Of 12 records none gets a term.
+/// Additional white or slow noise, a few times that of the record: a function of nothing. None of
+/// 12 records gets a term.
 #[test]
 fn nothing_is_proposed_for_noise() {
     for seed in 0..12 {
@@ -171,7 +172,7 @@ fn a_function_of_many_terms_is_not_called_random() {
     });
     assert_eq!(verdict, VerdictKind::Unknown);
     let proposed = proposed.expect("an unknown gap is asked what it may be");
-    assert!(!proposed.random || proposed.foretold < 0.3, "{proposed:?}");
+    assert!(!proposed.random || proposed.predicted < 0.3, "{proposed:?}");
     assert!(proposed.terms.is_empty() || proposed.closes_held > 0.1, "{proposed:?}");
 }
 
@@ -191,7 +192,7 @@ fn what_the_test_trial_alone_has_is_not_proposed() {
     assert!(told.proposed.is_none_or(|p| p.terms.is_empty()));
 }
 
-/// An effect of the catalogue that is there needs no proposal beside it, and takes the place of one.
+/// If an effect of the catalogue is present no term is proposed in addition to it or instead of it.
 #[test]
 fn a_name_needs_no_proposal() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]);

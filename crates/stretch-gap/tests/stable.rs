@@ -1,4 +1,4 @@
-//! How firmly names stand when the record is resampled.
+//! Stability of names when the record is resampled.
 
 use crate::{
     consistent::told,
@@ -32,7 +32,8 @@ fn each_of_two_twins_has_a_half() {
     }
 }
 
-/// A quadratic and a cubic beside each other: the strong one is in every set, one that chance could have brought is in fewer.
+/// A quadratic and a cubic together: the strong one is in every set, one that chance could have
+/// caused is in fewer.
 #[test]
 fn of_two_causes_the_stronger_is_the_firmer() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic, Effect::Drift]);

@@ -97,7 +97,7 @@ fn units_change_nothing_that_has_none() {
     }
 }
 
-/// Samples that were not measured count for nothing, whatever stands in their place.
+/// Samples that were not measured do not count, whatever their value.
 #[test]
 fn what_was_not_measured_changes_nothing() {
     for mut toy in toys() {
@@ -111,7 +111,7 @@ fn what_was_not_measured_changes_nothing() {
     }
 }
 
-/// Baselines and responses are told beside the answer, and change nothing of it.
+/// Baselines and responses are additional outputs, and do not change the answer.
 #[test]
 fn what_is_asked_for_beside_changes_no_answer() {
     for toy in toys() {

@@ -1,13 +1,14 @@
-//! The noise of a channel from its record: what it is told to be, and what passes for it.
+//! The noise of a channel, estimated from its record, and signals that pass for noise.
 
 use stretch_gap::{Noise, RandomGenerator, VerdictKind, WINDOW, noise_variance};
 
 use crate::toys::{Effect, Law, Toy, slow};
 
 const SAMPLES: usize = 20_000;
-/// Standard errors of a deviation told by the median of n squared second differences: the median of a squared normal variable is known
-/// to 0.5/(0.4711 sqrt n) of 0.4549, and neighbours that share samples make a third of them independent (1/(1 + 2 (4/6)^2 + 2 (1/6)^2)):
-/// 1.6/sqrt n of the deviation; five of them.
+/// Standard errors of a deviation estimated by the median of n squared second differences: the
+/// median of a squared normal variable is known to 0.5/(0.4711 sqrt n) of 0.4549, and neighbours
+/// that share samples make a third of them independent (1/(1 + 2 (4/6)^2 + 2 (1/6)^2)): 1.6/sqrt n
+/// of the deviation; five of them.
 const TOLD: f64 = 5.0 * 1.6 / 141.0;
 
 fn white(sd: f64, seed: u64) -> Vec<f64> {
@@ -73,9 +74,10 @@ fn a_hum_of_the_mains_is_left_out() {
     }
 }
 
-/// A resonance that rings all the time passes for noise, for nothing in the record says that it is none: of A sin(2 pi f t) second differences
-/// have the mean square A^2 (2 - 2 cos(2 pi f dt))^2/2, told as if a sixth were variance, and up to 1/0.4549 of that where the median of a
-/// sine's square, which is its mean, is taken for a normal variable's.
+/// A resonance that rings all the time passes for noise, because nothing in the record shows that
+/// it is none. Second differences of A sin(2 pi f t) have the mean square A^2 (2 - 2 cos(2 pi f
+/// dt))^2/2. A sixth of it is reported as variance, and up to 1/0.4549 times that, because the
+/// median of a sine's square, which is its mean, is taken for a normal variable's.
 #[test]
 fn a_resonance_passes_for_noise_as_far_as_its_bends_do() {
     for (hertz, amplitude) in [(5.0, 1.0), (12.0, 0.3), (20.0, 1.0)] {
@@ -96,8 +98,8 @@ fn a_resonance_passes_for_noise_as_far_as_its_bends_do() {
     }
 }
 
-/// Noise that is remembered shows little of itself from sample to sample: of a correlation rho^k second differences hold
-/// 6 - 8 rho + 2 rho^2 of the variance, a sixth of which is told.
+/// Correlated noise is only partly visible from sample to sample: with a correlation rho^k second
+/// differences hold 6 - 8 rho + 2 rho^2 of the variance, a sixth of which is reported.
 #[test]
 fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
     for memory in [2.0_f64, 10.0, 50.0] {
@@ -121,7 +123,7 @@ fn windows_tell_slow_noise_that_differences_miss() {
     approx::assert_relative_eq!(found.sd(), 0.1, max_relative = 0.25);
     let (share, memory) = found.slow();
     assert!(share > 0.85 && (10.0..40.0).contains(&memory), "{share} {memory}");
-    // Of what is not still, no slow part is told: only what is quick.
+    // For moving signals only the quick part is reported, not the slow one.
     let quick = Noise::of_windows(&windows, Some(0.02), false, 0.01).expect("enough windows");
     assert!(quick.sd() < 0.05 && quick.slow().0 == 0.0, "{quick:?}");
     let samples = found.samples(50_000, &mut random);
@@ -130,7 +132,8 @@ fn windows_tell_slow_noise_that_differences_miss() {
     approx::assert_relative_eq!(power.sqrt(), found.sd(), max_relative = 0.08);
 }
 
-/// A diagnosis that takes its noise from the record says the same of what is missing as one that was told it.
+/// A diagnosis that estimates its noise from the record finds the same missing effects as one with
+/// stated noise.
 #[test]
 fn noise_from_the_record_names_what_stated_noise_names() {
     for law in [Law::Line, Law::Lag, Law::Oscillator] {

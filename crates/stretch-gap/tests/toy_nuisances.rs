@@ -1,4 +1,5 @@
-//! Slow drift and offsets that a simulator describes are no effects, and effects beside them are still found.
+//! Slow drift and offsets that a simulator describes are no effects, and other effects are still
+//! found.
 
 use stretch_gap::{Options, SlowDrift, VerdictKind};
 
@@ -31,7 +32,7 @@ fn swings(notes: &[String]) -> Vec<&str> {
     notes.iter().map(String::as_str).filter(|note| note.contains("swings")).collect()
 }
 
-/// What a drift could have done is no gap, but a swing of one frequency is told with its frequency and size.
+/// A swing that a drift could explain is no gap, but it is reported with its frequency and size.
 #[test]
 fn a_drift_that_swings_is_told() {
     for seed in 0..5 {
@@ -53,8 +54,9 @@ fn a_drift_that_swings_is_told() {
     }
 }
 
-/// An effect whose changes, 0.06, are twelve times the drift's: no size of the drift that is tried, 2.5 times what is described at most, does as
-/// much. (Beside a drift of half its size the same effect is left unnamed, for so much the drift may have done.)
+/// An effect whose changes, 0.06, are twelve times the drift's: no tried size of the drift, at most
+/// 2.5 times the described one, does as much. (With a drift of half its size the same effect is
+/// left unnamed, because the drift may explain so much.)
 #[test]
 fn an_effect_beside_a_smaller_drift_is_found() {
     let described = SlowDrift { sd: 0.005, correlation_s: 3.0 };
@@ -68,7 +70,8 @@ fn an_effect_beside_a_smaller_drift_is_found() {
     }
 }
 
-/// What nobody described is a gap, and no effect of the catalogue is to blame: the same drift is in no way an effect's.
+/// An undescribed drift is a gap, and no effect of the catalogue is to blame, because the same
+/// drift is in no way an effect's.
 #[test]
 fn a_drift_that_nobody_described_is_a_gap() {
     for seed in 0..5 {
@@ -98,7 +101,7 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
     }
 }
 
-/// Simpler methods name what is hidden where it stands alone, and nothing in noise.
+/// Simpler methods name a single hidden effect, and nothing in noise.
 #[test]
 fn simpler_methods_name_a_strong_effect_and_no_noise() {
     let options = Options { baselines: true, ..Options::default() };
@@ -122,7 +125,8 @@ fn simpler_methods_name_a_strong_effect_and_no_noise() {
     assert_eq!(plain.baselines, None);
 }
 
-/// A drift beside which the test trial lies later than all that was fitted goes on by its law alone, and a note says from where to where.
+/// A drift that is extrapolated to a test trial later than all fitted ones follows only its law,
+/// and a note gives the range.
 #[test]
 fn a_drift_is_told_as_extrapolated() {
     let notes = |effect: Effect, size: f64| {

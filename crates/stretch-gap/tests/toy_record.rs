@@ -1,4 +1,4 @@
-//! Errors of the record, each told as what it is, and none where there is none.
+//! Errors of the record, each reported as what it is, and none if there is none.
 
 use stretch_gap::{Diagnosis, Distortion, Gross, GrossKind, RandomGenerator, VerdictKind};
 
@@ -33,7 +33,8 @@ fn distorted(record: Measured, column: &str, error: Distortion) -> Measured {
     })
 }
 
-/// The one error of a kind in a column that is told; a scale of one column is that of its neighbour as well, and is told beside it.
+/// The only reported error of a kind in a column. A scale of one column is equivalent to that of
+/// its neighbour, which is reported as well.
 fn found<'a>(told: &'a Diagnosis, what: GrossKind, column: &str) -> &'a Gross {
     assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
     let is_it = |g: &&Gross| g.what == what && g.column.as_deref() == Some(column);
@@ -74,7 +75,8 @@ fn scale_offset_sign_and_delay_of_an_output_are_told() {
         let size = found(&offset, GrossKind::Offset, "y1").offset.expect("an offset");
         // The line's own zero, within 0.05, takes part of it.
         approx::assert_abs_diff_eq!(size, 1.5, epsilon = 0.1);
-        // Late by the clock of its own recorder: no column is held at its ends as a shifted copy would be.
+        // Late by the clock of its recorder: no column is held at its ends as a shifted copy would
+        // be.
         let late =
             told(&Toy { hidden: vec![(1, Effect::Late, vec![0.3])], ..chain() }.measured(seed));
         let delay = found(&late, GrossKind::Delay, "y1").delay_s.expect("a delay");
@@ -94,7 +96,8 @@ fn errors_of_the_driving_column_are_told() {
             told(&distorted(toy.measured(seed), "x", error))
         };
         let toy = Toy::of(&[Law::Oscillator]).may_lack(&[Effect::Play, Effect::Quadratic]);
-        // What comes 0.4 s late is as good as an input that was recorded 0.4 s early: both are told.
+        // An output that is 0.4 s late is equivalent to an input that was recorded 0.4 s early:
+        // both are reported.
         let late = told(&toy.hiding(&[(Effect::Late, &[0.4])]).measured(seed));
         assert_eq!(late.verdict, VerdictKind::Record, "{}", late.sentence);
         for gross in late.gross.iter().filter(|g| g.what == GrossKind::Delay) {
@@ -172,7 +175,7 @@ fn swapped_columns_are_given_no_effect() {
     }
 }
 
-/// A number of the rig file far beyond its tolerance is told as that.
+/// A number of the rig file far beyond its tolerance is reported as such.
 #[test]
 fn a_wrong_number_of_the_rig_file_is_told() {
     for seed in 0..3 {

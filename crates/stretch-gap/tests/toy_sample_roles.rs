@@ -1,4 +1,4 @@
-//! How a session is cut: every sample in one role, by rules that can be told beforehand.
+//! Division of a session: every sample has one role, by rules that are known beforehand.
 
 use proptest::{prelude::*, test_runner::RngSeed};
 use stretch_gap::{BLOCK_S, GapError, Role, SampleRoles};
@@ -52,7 +52,7 @@ proptest! {
             let of = |role| -> usize {
                 own.iter().filter(|s| s.role == role).map(|s| s.to - s.from).sum()
             };
-            // What may be looked at stands first, and no more than that is fitted or held out.
+            // Samples that may be used come first, and no more than these are fitted or held out.
             prop_assert_eq!(of(Role::Fit) + of(Role::Held), not_tested[trial]);
             let order = |role: Role| match role { Role::Fit => 0, Role::Held => 1, Role::Test => 2 };
             prop_assert!(own.is_sorted_by_key(|s| order(s.role)));

@@ -10,7 +10,7 @@ fn line() -> Toy {
     Toy::of(&[Law::Line]).may_lack(&Effect::ALL)
 }
 
-/// The offset of the bench moves by noise of its own: something that no catalogue holds.
+/// The offset of the bench moves by independent noise, which is outside every catalogue.
 fn restless(toy: Toy, sd: f64, seed: u64) -> Toy {
     let mut random = RandomGenerator::new(seed, 40);
     let zero = toy.parameter("line.zero");
@@ -49,7 +49,7 @@ fn a_missing_effect_is_named_with_its_size() {
     assert!(size.interval[0] <= 0.2 && 0.2 <= size.interval[1], "{size:?}");
 }
 
-/// A play of which the catalogue knows nothing, beside a drift that it knows and that closes less.
+/// A play outside the catalogue, plus a drift in the catalogue that closes less.
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Drift]).hiding(&[(Effect::Play, &[0.2])]);
@@ -59,7 +59,8 @@ fn what_the_catalogue_lacks_is_unknown() {
     assert!(unknown.probability > 0.5, "{unknown:?}");
 }
 
-/// Half a cause that is known, half of one that is not: mostly the first, the rest told with its share.
+/// Half of the gap is a known cause, half an unknown one: mostly the first is named, the rest is
+/// reported with its share.
 #[test]
 fn a_cause_beside_something_else_is_told_in_part() {
     let toy = restless(line().hiding(&[(Effect::Quadratic, &[0.2])]), 0.02, 5);
@@ -98,8 +99,8 @@ fn another_rigs_record_is_the_wrong_one() {
     assert!(told.named.is_empty());
 }
 
-/// Parameters of another rig altogether, eight tolerances off: they stand at their ends, more than noise is left, and no effect of the catalogue
-/// is blamed for it.
+/// Parameters of a different rig, eight tolerances off: they are at their bounds, more than noise
+/// is left, and no effect of the catalogue is blamed.
 #[test]
 fn parameters_at_their_ends_are_told() {
     let toy = Toy::of(&[Law::Oscillator]).off_by(&[0.0, 8.0, 8.0]);
@@ -109,7 +110,8 @@ fn parameters_at_their_ends_are_told() {
     assert!(ends >= 1, "{:?}", told.parameters);
 }
 
-/// Four times the greatest size that the catalogue allows: what stands at the end of its range stands in for something else.
+/// Four times the largest size that the catalogue allows: an effect at the end of its range
+/// compensates for something else.
 #[test]
 fn an_effect_at_the_end_of_its_range_is_not_named() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]);
@@ -143,12 +145,12 @@ fn causes_of_two_stages_are_named_where_they_act() {
     let mut named = told.named.clone();
     named.sort();
     assert_eq!(named, ["play", "quadratic_1"], "{}", told.sentence);
-    // Every stage has a gap of its own, and keeps its share whatever the other's noise.
+    // Every stage has a separate gap, and keeps its share whatever the other's noise.
     assert!(told.location.stages.iter().all(|s| s.share > 0.05), "{:?}", told.location.stages);
 }
 
-/// Whatever is struck from the catalogue is not given another's name in the place of its own, unless the other closes what it closes: the ones
-/// that are no kin to each other.
+/// An effect that is removed from the catalogue does not get another name, unless the other effect
+/// closes as much: this is about effects that are no kin to each other.
 #[test]
 fn strangers_get_no_name() {
     let cases: [(Effect, &[f64], &[Effect]); 3] = [
@@ -220,7 +222,7 @@ fn a_record_that_is_too_short_carries_no_name() {
     assert!(told.sentence.contains("Record at least"), "{}", told.sentence);
 }
 
-/// What wanders slowly on its own is no effect, whichever its time.
+/// An independent slow drift is no effect, whatever its correlation time.
 #[test]
 fn a_slow_course_of_its_own_is_no_effect() {
     for (seed, correlation_s) in [(1, 0.3), (2, 3.0)] {

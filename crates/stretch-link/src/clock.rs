@@ -4,11 +4,13 @@ use crate::{Event, Frame};
 
 /// The time line of frames: seconds since the first frame, always rising.
 ///
-/// A frame's time is that of the frame before it plus the step of the board's clock, which wraps at 2^32 ms. A board that started again counts anew:
-/// then the time that passed at the receiver, and at least one sample period, stands in for the step. Times are rounded to 1 us.
+/// A frame's time is the time of the previous frame plus the step of the board's clock, which wraps
+/// at 2^32 ms. A board that restarts begins its clock at zero; the step is then the time that
+/// passed at the receiver, and at least one sample period. Times are rounded to 1 us.
 ///
-/// A frame with the millisecond of the frame before it has no time of its own where samples are two milliseconds apart or more: the board's
-/// clock stands, and none is invented. Faster samples share a millisecond; 1 us apart, their times say their order.
+/// If samples are two or more milliseconds apart, a frame with the same millisecond as the previous
+/// frame has no time, because the board's clock has stopped and no time is invented. Faster samples
+/// share a millisecond; their times are 1 us apart, which keeps their order.
 ///
 /// ```
 /// use stretch_link::{Answer, Event, Frame, TimeLine};
@@ -39,13 +41,15 @@ struct Last {
 const APART_S: f64 = 2e-3;
 
 impl TimeLine {
-    /// A time line of samples that are `period_s` apart, s; where the board starts again, at least that far.
+    /// A time line of samples that are `period_s` apart, s; the same distance is the minimum when
+    /// the board restarts.
     pub fn new(period_s: f64) -> Self {
         Self { period_s, last: None }
     }
 
-    /// Seconds from the first frame to that of `event`, which was heard at `now_s` of the receiver's clock, s; none for an event without a
-    /// frame, and for a frame at which the board's clock stands.
+    /// Seconds from the first frame to that of `event`, which was received at `now_s` of the
+    /// receiver's clock, s. `None` for an event without a frame, and for a frame at which the
+    /// board's clock has stopped.
     pub fn time_s(&mut self, event: &Event, now_s: f64) -> Option<f64> {
         let Frame { time_ms: board_ms, .. } = event.frame()?;
         let time_s = match self.last {

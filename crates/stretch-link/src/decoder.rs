@@ -55,11 +55,11 @@ pub struct Counts {
 
 /// A streaming decoder.
 ///
-/// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a
-/// new one. A counter that steps ahead gives the number of lost frames. A frame that is
-/// one of the last [`REPLAYED`](Self::REPLAYED), to the last field, is a repetition, alone or
-/// in a block that came twice; any other step back of the counter or of the board's clock is
-/// a board that started again, and so is any step back to the counter 0.
+/// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a new one. A counter
+/// that steps ahead gives the number of lost frames. A frame that equals one of the last
+/// [`REPLAYED`](Self::REPLAYED), to the last field, is a repetition, alone or in a block that came
+/// twice. Any other step back of the counter or of the board's clock means that the board
+/// restarted, and so does any step back to the counter 0.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     line: [u8; Frame::LONGEST],
@@ -90,7 +90,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// How many frames are remembered: a block of so many that comes once more is skipped.
+    /// Number of stored frames: a block of so many that arrives again is skipped.
     pub const REPLAYED: usize = Recent::MOST;
 
     /// A decoder that has seen nothing.
@@ -140,9 +140,9 @@ impl Decoder {
         }
     }
 
-    /// The stream ended or broke off (a cable was pulled): no byte follows what was begun.
+    /// The stream ended or broke off (a cable was pulled), so no byte completes the current frame.
     ///
-    /// A frame that lacks nothing but its newline is one: the checksum is its last field.
+    /// A frame that lacks only its newline is complete, because the checksum is its last field.
     pub fn disconnected(&mut self) -> Option<Event> {
         if self.state == State::Frame
             && matches!(
@@ -179,7 +179,7 @@ impl Decoder {
         }
     }
 
-    /// Where a sound frame stands in the sequence.
+    /// The position of a sound frame in the sequence.
     fn place(&mut self, frame: Frame) -> Event {
         let event = match self.last {
             None => Event::Frame(frame),

@@ -1,5 +1,7 @@
 //! One frame: what the board says about one sample.
 
+use core::fmt;
+
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use stretch_core::Branch;
 use stretch_receptor::{Domain, Withheld, code::CodeReading};
@@ -38,6 +40,33 @@ pub enum Answer {
     Warming,
     /// The sample did not come.
     Missing,
+}
+
+impl fmt::Display for Answer {
+    /// The last cells of a row of a recording: estimate in the reference's unit, branch and domain; or two empty cells and why
+    /// there is no estimate.
+    ///
+    /// ```
+    /// use stretch_link::Answer;
+    /// use stretch_core::Branch;
+    /// use stretch_receptor::Domain;
+    ///
+    /// let (branch, domain) = (Branch::Inflation, Domain::Inside);
+    /// let reading = Answer::Reading { thousandths: -512, branch, domain };
+    /// assert_eq!(reading.to_string(), "-0.512,inflation,inside");
+    /// assert_eq!(Answer::Warming.to_string(), ",,warming");
+    /// ```
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Reading { thousandths, branch, domain } => {
+                let (sign, size) =
+                    (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
+                write!(f, "{sign}{}.{:03},{branch},{domain}", size / 1000, size % 1000)
+            }
+            Self::Warming => f.write_str(",,warming"),
+            Self::Missing => f.write_str(",,missing"),
+        }
+    }
 }
 
 impl From<Result<CodeReading<i32>, Withheld>> for Answer {

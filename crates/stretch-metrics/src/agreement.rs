@@ -1,6 +1,6 @@
 //! How well an estimate follows the truth, in the units of both and in percent.
 
-use stretch_core::Real;
+use stretch_core::{Interval, Real};
 
 use crate::{
     ErrorStats,
@@ -34,7 +34,7 @@ pub enum Delta {
 /// for (truth, estimate) in [(150.0, 152.0), (160.0, 160.0), (170.0, 172.0), (180.0, 176.0)] {
 ///     agreement.push(truth, estimate);
 /// }
-/// assert_eq!(agreement.truth_range(), Some((150.0, 180.0)));
+/// assert_eq!(agreement.truth_range().unwrap().max, 180.0);
 /// assert_eq!(agreement.average_error_percent(Delta::Estimate), Some(100.0 * 2.0 / 24.0));
 /// assert_eq!(agreement.average_error_percent(Delta::Truth), Some(100.0 * 2.0 / 30.0));
 /// assert_eq!(agreement.r_squared(), Some(1.0 - 24.0 / 500.0));
@@ -100,6 +100,10 @@ impl<T: Real> Spread<T> {
 
     fn range(&self) -> Option<(T, T)> {
         (self.moments.count() > 0).then_some((self.min, self.max))
+    }
+
+    fn interval(&self) -> Option<Interval> {
+        self.range().map(|(min, max)| Interval { min: min.as_f64(), max: max.as_f64() })
     }
 }
 
@@ -200,13 +204,13 @@ impl<T: Real> Agreement<T> {
     }
 
     /// Least and greatest value of the truth. `None` when empty.
-    pub fn truth_range(&self) -> Option<(T, T)> {
-        self.truth.range()
+    pub fn truth_range(&self) -> Option<Interval> {
+        self.truth.interval()
     }
 
     /// Least and greatest value of the estimate. `None` when empty.
-    pub fn estimate_range(&self) -> Option<(T, T)> {
-        self.estimate.range()
+    pub fn estimate_range(&self) -> Option<Interval> {
+        self.estimate.interval()
     }
 
     /// The paper's average error: 100 mean(|d_p - d_s|) / delta. `None` when empty or when
@@ -228,9 +232,9 @@ impl<T: Real> Agreement<T> {
         self.percent(self.errors.rmse()?, delta)
     }
 
-    /// R^2 = 1 - SSE / SST of the estimate as it stands, without refitting: 1 is perfect, 0 as
-    /// good as the mean of the truth, below 0 worse. `None` when empty or the truth is
-    /// constant (or so nearly that R^2 is beyond every number).
+    /// R^2 = 1 - SSE / SST of the estimate without refitting: 1 is perfect, 0 is as good as the
+    /// mean of the truth, below 0 is worse. `None` if there are no samples or the truth is constant
+    /// (or so nearly constant that R^2 overflows).
     pub fn r_squared(&self) -> Option<T> {
         let total = self.truth.moments.squares();
         if total <= T::zero() {

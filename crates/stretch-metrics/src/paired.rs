@@ -1,6 +1,6 @@
 //! The paired t test, streaming.
 
-use stretch_core::Real;
+use stretch_core::{Interval, Real};
 
 use crate::{
     MetricsError,
@@ -52,14 +52,14 @@ pub struct TTest {
     /// Natural logarithm of the two-tailed P, finite however small P is.
     pub ln_p: f64,
     /// Ends of the 95 % interval of the mean difference.
-    pub interval_95: (f64, f64),
+    pub interval_95: Interval,
 }
 
 impl TTest {
     /// The two-sided confidence interval of the mean difference at `level`, such as 0.99.
-    pub fn interval(&self, level: f64) -> (f64, f64) {
+    pub fn interval(&self, level: f64) -> Interval {
         let half = critical(1.0 - level, self.dof as f64) * self.standard_error;
-        (self.mean_difference - half, self.mean_difference + half)
+        Interval { min: self.mean_difference - half, max: self.mean_difference + half }
     }
 }
 
@@ -130,7 +130,7 @@ impl<T: Real> PairedT<T> {
             dof,
             p: two_tailed(t, dof as f64),
             ln_p: ln_two_tailed(t, dof as f64),
-            interval_95: (0.0, 0.0),
+            interval_95: Interval { min: 0.0, max: 0.0 },
         };
         test.interval_95 = test.interval(0.95);
         Ok(test)

@@ -2,7 +2,8 @@
 
 use stretch_core::Real;
 
-/// A sum with what rounding lost beside it (Neumaier, doi:10.1002/zamm.19740540106).
+/// A compensated sum: the sum and its accumulated rounding error (Neumaier,
+/// doi:10.1002/zamm.19740540106).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Sum<T> {
     high: T,

@@ -2,6 +2,7 @@
 
 use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
+use stretch_core::Interval;
 use stretch_metrics::{
     Agreement, Delta, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,
 };
@@ -133,9 +134,10 @@ proptest! {
         }
         let (one, other) = (one.test()?, other.test()?);
         prop_assert_eq!((one.t, one.p, one.dof), (-other.t, other.p, other.dof));
-        prop_assert_eq!(one.interval_95, (-other.interval_95.1, -other.interval_95.0));
+        let turned = Interval { min: -other.interval_95.max, max: -other.interval_95.min };
+        prop_assert_eq!(one.interval_95, turned);
         // The 95 % interval leaves 0 out exactly where P is below 0.05.
-        let outside = one.interval_95.0 > 0.0 || one.interval_95.1 < 0.0;
+        let outside = one.interval_95.min > 0.0 || one.interval_95.max < 0.0;
         prop_assert_eq!(outside, one.p < 0.05);
     }
 

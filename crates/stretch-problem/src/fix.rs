@@ -10,7 +10,7 @@ use stretch_gap::{
 };
 use stretch_sim::{Effect, SimError, Tolerance};
 
-use crate::file::ProblemFile;
+use crate::black_box::ProblemSpec;
 
 /// A rig file or a problem's file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
 /// parameter and form. Comments beside the entries say where each entry comes from.
@@ -33,7 +33,7 @@ pub enum Fixed {
     /// The built-in rig, or a gauge alone.
     Rig(RigFile),
     /// The problem's file of a user's own simulator: parameters re-tuned, effects around the simulator under `[[wrapped]]`.
-    Problem(Box<ProblemFile>),
+    Problem(Box<ProblemSpec>),
 }
 
 impl Fix {
@@ -193,7 +193,7 @@ impl<'a> Chosen<'a> {
         remarks.effects.insert(name.into(), self.lines(effect));
         for p in self.numbers(name) {
             let key = (name.to_owned(), p.name.clone());
-            remarks.effect_parameters.insert(key, effect_remark(&p));
+            remarks.parameters.insert(key, effect_remark(&p));
         }
     }
 

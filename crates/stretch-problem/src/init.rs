@@ -38,10 +38,10 @@ const LISTED: usize = 40;
 ///     std::fs::write(folder.join(name), format!("time_s,command_V,angle_deg\n{rows}"))?;
 /// }
 /// let text = stretch_problem::first_problem(&folder)?;
-/// let file = stretch_problem::ProblemFile::parse("problem.toml", &text)?;
-/// assert_eq!(file.spec.stages[0].inputs, ["command_V"]);
-/// assert_eq!(file.spec.stages[0].output, "angle_deg");
-/// assert_eq!(file.trials[1].split, stretch_data::Split::Test);
+/// let file = stretch_problem::ProblemSpec::parse("problem.toml", &text)?;
+/// assert_eq!(file.stages[0].inputs, ["command_V"]);
+/// assert_eq!(file.stages[0].output, "angle_deg");
+/// assert_eq!(file.files[1].split, stretch_data::Split::Test);
 /// # std::fs::remove_dir_all(&folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -2,18 +2,20 @@
 
 use std::{
     fmt::Debug,
+    num::NonZeroUsize,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use stretch_data::DataSet;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
+use stretch_recording::ReadOptions;
 use stretch_sim::Catalogue;
 
 use crate::{
-    black_box::{Agreed, BlackBox},
+    black_box::{Agreed, BlackBox, ProblemSpec},
     error::ProblemError,
-    file::{IN_FOLDER, ProblemFile, SimulatorEntry},
+    file::IN_FOLDER,
     fix::{Fix, NoFix},
     gauge::GaugeSimulator,
     implement::Implementation,
@@ -92,35 +94,29 @@ pub struct Reading<'a> {
     pub columns: Option<(&'a str, &'a str)>,
     /// A column by which runs are told apart ([`Problem::by_column`]), which is read beside those of the problem.
     pub by: Option<&'a str>,
+    /// How recordings are read, in place of what the data say.
+    pub recorded: Option<&'a ReadOptions>,
     /// Effects that are not looked for.
     pub without: &'a [String],
-    /// Number of workers at once, where the problem's file gives none.
-    pub jobs: usize,
-    /// Greatest number of runs of a simulator that is not built in.
-    pub budget: Option<usize>,
-    /// Whether the program that the `problem.toml` of a folder names may run. A problem's file that is given by its own name
-    /// needs no such permission.
-    pub allow_commands: bool,
     /// Hears in one line which program is going to run, before it runs.
     pub announce: Option<fn(&str)>,
 }
 
 impl Problem {
     /// Reads a problem from a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
-    /// workers of a simulator that is not built in are started, where the path names the problem's file or [`Reading::allow_commands`] stands.
+    /// workers of a simulator that is not built in are started if the path names the problem's file, and not if it names its folder.
     ///
     /// # Errors
     /// Files that cannot be read, names that stand for nothing, options that mean nothing to the simulator, and a folder whose `problem.toml`
     /// would run a program.
     pub fn read(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
-        let Some(file) = ProblemFile::at(path)? else { return Self::built_in(path, reading) };
-        let (data_set, rig, columns) = match &file.simulator {
-            SimulatorEntry::Rig { data_set, rig } => (data_set, rig, &None),
-            SimulatorEntry::Gauge { data_set, rig, columns } => (data_set, rig, columns),
-            _ => return Self::of_file(path, file, reading),
+        let Some(file) = ProblemSpec::at(path)? else { return Self::built_in(path, reading) };
+        let Some(own) = file.simulator.as_ref().filter(|own| own.builtin.is_some()) else {
+            return Self::of_file(path, file, reading);
         };
-        let rig = rig.as_ref().map(|rig| file.folder.join(rig));
-        let own = columns.as_ref().map(|(reference, signal)| (reference.as_str(), signal.as_str()));
+        let rig = own.rig.as_ref().map(|rig| file.folder.join(rig));
+        let data_set = own.data_set.as_deref().unwrap_or(".");
+        let own = own.reference.as_deref().zip(own.signal.as_deref());
         let reading = Reading {
             rig: reading.rig.or(rig.as_deref()),
             columns: reading.columns.or(own),
@@ -133,25 +129,22 @@ impl Problem {
 
     /// Reads a built-in simulator's problem from a data set's folder, or from a trial.
     fn built_in(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
-        if reading.budget.is_some() {
-            let hint = "the built-in ones need none";
-            return Err(no_option("--budget", "it counts runs of a simulator of your own", hint));
-        }
         let Reading { rig, columns, .. } = *reading;
+        let recorded = reading.recorded.cloned().unwrap_or_default();
         if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
             if rig.is_some() {
                 let hint = "diagnose one signal at a time beside it";
                 return Err(no_option("--rig", "it is of one signal", hint));
             }
-            let source = Box::new(read_sensors(path, several, reading.without)?);
+            let source = Box::new(read_sensors(path, several, reading.without, recorded)?);
             return Ok(Self { name: name_of(path), source, read: vec![path.to_owned()] });
         }
         let catalogue = Catalogue::default().without(reading.without)?;
         let source: Box<dyn Diagnosable> = match GaugeSimulator::read(
-            path, columns, rig, &catalogue,
+            path, columns, rig, &catalogue, &recorded,
         )? {
             Some(gauge) => Box::new(gauge),
-            None if path.is_dir() => Box::new(RigSimulator::read(path, rig, &catalogue)?),
+            None if path.is_dir() => Box::new(RigSimulator::read(path, rig, &catalogue, recorded)?),
             None => {
                 let hint = "say which columns with --reference and --signal, or give the folder of a data set";
                 return Err(ProblemError::too_little(
@@ -168,35 +161,37 @@ impl Problem {
     /// Starts the workers of a simulator that is not built in, and binds them to the problem of a file.
     fn of_file(
         path: &Path,
-        mut file: ProblemFile,
+        mut file: ProblemSpec,
         reading: &Reading<'_>,
     ) -> Result<Self, ProblemError> {
         if reading.rig.is_some() {
             let hint = "its parameters stand in the problem's file";
             return Err(no_option("--rig", "it is for the built-in simulators", hint));
         }
-        file.spec.set_sensor(reading.columns);
-        file.spec.by = reading.by.map(str::to_owned);
-        file.spec.without.extend(reading.without.iter().cloned());
-        file.budget = reading.budget.or(file.budget);
-        let workers = file.workers(reading.jobs)?;
+        if let Some((reference, signal)) = reading.columns {
+            (file.reference, file.signal) = (Some(reference.into()), Some(signal.into()));
+        }
+        file.by = reading.by.map(str::to_owned);
+        file.without.extend(reading.without.iter().cloned());
+        let own = file.reading();
+        let recorded = reading.recorded.unwrap_or(&own);
+        let workers = file.workers(1)?;
         let workers = workers.ok_or_else(|| ProblemError::Simulator("it is built in".into()))?;
         let program = workers.shown();
-        let inside = path.join(IN_FOLDER);
-        if path.is_dir() && !reading.allow_commands {
+        if path.is_dir() {
+            let inside = path.join(IN_FOLDER);
             let inside = inside.display();
             return Err(ProblemError::Simulator(format!(
-                "{inside}: it names a program to run ({program}), and a folder runs none; where you trust it, give the file itself, {inside}, or --allow-commands"
+                "{inside}: it names a program to run ({program}), and a folder runs none; where you trust it, give the file itself, {inside}"
             )));
         }
         if let Some(announce) = reading.announce {
-            let file = if path.is_dir() { &inside } else { path };
             let folder = workers.folder.display();
-            announce(&format!("{} runs, in the folder {folder}: {program}", file.display()));
+            announce(&format!("{} runs, in the folder {folder}: {program}", path.display()));
         }
-        let (checked, source) = Workers::bound(file.load()?, workers)?;
-        let name = file.name.clone();
-        let own = BlackBox::within(checked, Arc::new(source), file.budget).from_file(file);
+        let (checked, source) = Workers::bound(file.load_as(recorded)?, workers)?;
+        let name = file.shown_name().to_owned();
+        let own = BlackBox::within(checked, Arc::new(source), file.budget.map(NonZeroUsize::get));
         Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })
     }
 

@@ -112,6 +112,7 @@ pub(crate) fn read_sensors(
     path: &Path,
     (reference, signals): (&str, &str),
     without: &[String],
+    recorded: ReadOptions,
 ) -> Result<BlackBox, ProblemError> {
     let signals: Vec<&str> = signals.split(',').map(str::trim).collect();
     let twice = signals.iter().enumerate().find(|(i, name)| signals[..*i].contains(name));
@@ -119,7 +120,7 @@ pub(crate) fn read_sensors(
         let hint = "name each signal once";
         return Err(ProblemError::value("--signal", format!("{name} is named twice"), hint));
     }
-    let options = signals.iter().fold(ReadOptions::new().require(reference), |o, s| o.require(*s));
+    let options = signals.iter().fold(recorded.require(reference), |o, s| o.require(*s));
     let trials = match path.is_dir() {
         true => Recording::session(&DataSet::read(path)?, path, &options)?,
         false => vec![SessionTrial::from(Recording::read(path, &options)?)],

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Options, RandomGenerator, Simulator};
+use stretch_gap::{Knowledge, Options, RandomGenerator, SampleValue, Simulator};
 use stretch_problem::{
     Argument, Ask, BlackBox, ByTrial, Checked, Examined, OwnEffect, Parameter, Problem,
-    ProblemSpec, StageEntry, Standing, Tolerance, closure,
+    ProblemSpec, StageEntry, Tolerance, closure,
 };
 
 const DT_S: f64 = 0.02;
@@ -76,8 +76,7 @@ fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examine
             name: "play".into(),
             arguments: vec![Argument {
                 unit: "deg".into(),
-                min: 0.0,
-                max: 10.0,
+                range: [0.0, 10.0],
                 off: Some(0.0),
                 ..Argument::default()
             }],
@@ -116,13 +115,14 @@ fn runs_of_one_servo_agree_and_their_values_are_told() {
     assert_eq!(named, ["play"]);
     assert!(found.values.iter().all(|v| !v.differs), "{:?}", found.sentences());
     assert!(found.apart.is_empty(), "{:?}", found.sentences());
-    let names: Vec<&str> = found.all.values.iter().map(|v| v.name.as_str()).collect();
+    let names: Vec<&str> = found.all.values.iter().map(|v| v.identified.name.as_str()).collect();
     assert_eq!(names, ["gain", "tau", "play.play"]);
     for (value, truth) in found.all.values.iter().zip([10.4, 0.11, 0.5]) {
-        assert_eq!(value.standing, Standing::Identified, "{value:?}");
+        let sd = value.identified.sd;
+        assert_eq!(value.identified.knowledge, Knowledge::Determined, "{value:?}");
         // Within four of its standard deviations, which are small.
-        assert!((value.value - truth).abs() < 4.0 * value.sd, "{value:?}");
-        assert!(value.sd < 0.01 * truth, "{value:?}");
+        assert!((value.value - truth).abs() < 4.0 * sd, "{value:?}");
+        assert!(sd < 0.01 * truth, "{value:?}");
     }
     assert!(found.runs.iter().all(|run| (0.9..1.1).contains(&run.times_noise)));
 }
@@ -150,8 +150,8 @@ fn runs_of_one_load_are_fitted_together_and_a_value_that_goes_with_it_is_told() 
     let runs: Vec<&str> = found.runs.iter().map(|run| run.run.as_str()).collect();
     assert!(runs[0].starts_with("load_kg 9.5") && runs[1].starts_with("load_kg 10.3"), "{runs:?}");
     for (run, gain) in found.runs.iter().zip([10.4, 9.6]) {
-        let told = &run.values[0];
-        assert!((told.value - gain).abs() < 4.0 * told.sd && told.sd < 0.1, "{told:?}");
+        let (value, sd) = (run.values[0].value, run.values[0].identified.sd);
+        assert!((value - gain).abs() < 4.0 * sd && sd < 0.1, "{value} {sd}");
     }
     let differ: Vec<&str> =
         found.values.iter().filter(|v| v.differs).map(|v| v.name.as_str()).collect();
@@ -165,18 +165,22 @@ fn runs_of_one_load_are_fitted_together_and_a_value_that_goes_with_it_is_told() 
 #[test]
 fn what_another_absorbs_and_what_is_free_is_said() {
     let (found, _) = by_trial(&[[10.4, 0.11, 0.5]; 3], 5, true);
-    let of = |name: &str| found.all.values.iter().find(|v| v.name == name).expect("a value");
-    assert_eq!(of("gain").standing, Standing::Absorbed);
+    let of = |name: &str| {
+        let is_it = |v: &&SampleValue| v.identified.name == name;
+        &found.all.values.iter().find(is_it).expect("a value").identified
+    };
     assert_eq!(
-        (of("gain").absorbed_by[0].as_str(), of("gear").absorbed_by[0].as_str()),
-        ("gear", "gain")
+        (of("gain").like.as_slice(), of("gear").like.as_slice()),
+        (&["gear".to_owned()][..], &["gain".to_owned()][..])
     );
-    assert_eq!(of("inertia").standing, Standing::Free);
-    assert_eq!(of("tau").standing, Standing::Identified);
-    let said = found.sentences().join("; ");
+    assert_ne!(of("gain").knowledge, Knowledge::Determined);
+    assert_eq!(of("inertia").knowledge, Knowledge::Dead);
+    assert_eq!(of("tau").knowledge, Knowledge::Determined);
+    let sentences = found.sentences().join("; ");
     assert!(
-        said.contains("gain is absorbed by gear") && said.contains("inertia is free"),
-        "{said}"
+        sentences.contains("gain is not told apart from gear")
+            && sentences.contains("inertia does nothing"),
+        "{sentences}"
     );
 }
 
@@ -198,7 +202,7 @@ fn intervals_hold_the_truth_in_nineteen_of_twenty_servos() {
         for run in found.runs.iter().chain([&found.all]) {
             let names = ["gain", "tau", "play.play"];
             let own = run.values.iter();
-            let own = own.map(|v| (v, names.iter().position(|name| *name == v.name)));
+            let own = own.map(|v| (v, names.iter().position(|name| *name == v.identified.name)));
             for (value, at) in own {
                 let truth = truth[at.expect("a name that is known")];
                 let [low, high] = value.interval;

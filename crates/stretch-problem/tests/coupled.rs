@@ -5,8 +5,8 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Laboratory, Model, Options, RandomGenerator, Simulator, diagnose};
 use stretch_problem::{
-    Ask, BlackBox, Checked, Diagnosable, Parameter, ProblemSpec, Source, SourceError, StageEntry,
-    Tolerance, Wrapped,
+    Ask, BlackBox, Checked, Diagnosable, EffectEntry, Parameter, ProblemSpec, Source, SourceError,
+    StageEntry, Tolerance,
 };
 
 const DT_S: f64 = 0.02;
@@ -193,7 +193,7 @@ fn altered_inputs_of_both_joints_are_run_at_once() {
 #[test]
 fn a_wrapper_that_acts_in_every_run_acts_on_both_joints() {
     let values = [("w".to_owned(), DEAD.hip)].into();
-    let wrapped = vec![Wrapped { name: "hip.input.dead_zone".into(), values }];
+    let wrapped = vec![EffectEntry { name: "hip.input.dead_zone".into(), parameters: values }];
     let problem = ProblemSpec { wrapped, ..problem(CARRIED, DEAD, &NAMES) };
     let (found, _) = diagnosed(problem, CARRIED, true);
     assert!(found.named.is_empty(), "{}", found.sentence);

@@ -62,8 +62,8 @@ fn every_experiment_is_replayed_from_its_columns() {
         let mut session = stretch_sim::Session::new(&Default::default(), &quiet).unwrap();
         let (_, trial) = session.run(&replay).unwrap();
         // Length and voltage in noises; there is no pressure here.
-        let foretold = rig.predict(&nominal, &setting).unwrap();
-        for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&foretold) {
+        let predicted = rig.predict(&nominal, &setting).unwrap();
+        for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&predicted) {
             // A vented muscle shows the voltage of its own pressure where the candidate lets the pressure follow a course of its own.
             let noise = if column == "length_mm" { 0.05 } else { 0.002 };
             let shown = trial.channel(column).unwrap();

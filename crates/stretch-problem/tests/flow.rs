@@ -6,8 +6,8 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Options, RandomGenerator, VerdictKind};
 use stretch_problem::{
-    Argument, Ask, BlackBox, Checked, Examined, Fixed, NoFix, OwnEffect, Parameter, Problem,
-    ProblemFile, ProblemSpec, RecordedSession, Sensor, StageEntry, Tolerance, Wrapped, closure,
+    Argument, Ask, BlackBox, Checked, EffectEntry, Examined, Fixed, NoFix, OwnEffect, Parameter,
+    Problem, ProblemSpec, RecordedSession, StageEntry, Tolerance, closure,
 };
 
 const DT_S: f64 = 0.01;
@@ -100,8 +100,7 @@ fn described(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
             name: "bend".into(),
             arguments: vec![Argument {
                 unit: "1/deg".into(),
-                min: -0.1,
-                max: 0.1,
+                range: [-0.1, 0.1],
                 off: Some(0.0),
                 ..Argument::default()
             }],
@@ -133,7 +132,7 @@ fn examined(spec: ProblemSpec, toy: Toy) -> Examined {
 fn fixed(examined: &Examined, trials: Vec<SessionTrial>) -> (ProblemSpec, String) {
     let fix = examined.fix.as_ref().expect("a fix");
     let Fixed::Problem(file) = &fix.file else { panic!("{:?}", fix.file) };
-    (ProblemSpec { trials, ..file.spec.clone() }, fix.text("fixed.toml".as_ref()))
+    (ProblemSpec { trials, ..(**file).clone() }, fix.text("fixed.toml".as_ref()))
 }
 
 fn agrees(examined: &Examined) -> bool {
@@ -155,7 +154,7 @@ fn hidden_play_is_named_written_into_the_problem_and_agrees_then() {
     );
     let (spec, text) = fixed(&found, trials);
     assert_eq!(spec.wrapped.len(), 1);
-    assert!((spec.wrapped[0].values["w"] - 0.4).abs() < 0.03, "{:?}", spec.wrapped);
+    assert!((spec.wrapped[0].parameters["w"] - 0.4).abs() < 0.03, "{:?}", spec.wrapped);
     assert!((spec.parameters[0].value - 3.05).abs() < 0.01);
     assert!(text.contains("[[wrapped]]") && text.contains("was 3; 95 %:"), "{text}");
     let again = examined(spec, line);
@@ -189,7 +188,7 @@ fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
     let found = examined(described(trials.clone(), &wrap), lagging);
     assert_eq!(found.diagnosis.named, ["input.delay"], "{}", found.diagnosis.sentence);
     let (spec, _) = fixed(&found, trials);
-    let values = &spec.wrapped[0].values;
+    let values = &spec.wrapped[0].parameters;
     assert!((values["delay_s"] - 0.06).abs() < 1e-3, "{values:?}");
     assert!((values["empty"] - 1.0).abs() < 0.05, "{values:?}");
     let again = examined(spec, lagging);
@@ -263,10 +262,10 @@ fn effects_are_left_out_by_name_by_kind_and_by_place() {
 fn a_stage_that_is_a_sensor_tells_what_a_calibration_loses() {
     let trials = recorded(|x| play(4.0, &line(3.0, 0.0, x)));
     let mut spec = described(trials, &["output.backlash"]);
-    spec.sensor = Some(Sensor { reference: "shaft_deg".into(), signal: "gear_deg".into() });
+    (spec.reference, spec.signal) = (Some("shaft_deg".into()), Some("gear_deg".into()));
     let found = examined(spec.clone(), line);
     assert!(found.diagnosis.transfer.is_some(), "{}", found.diagnosis.sentence);
-    spec.sensor = Some(Sensor { reference: "shaft_deg".into(), signal: "gera_deg".into() });
+    spec.signal = Some("gera_deg".into());
     let refused = Checked::new(spec).unwrap_err().to_string();
     assert!(refused.contains("did you mean gear_deg?"), "{refused}");
 }
@@ -335,16 +334,16 @@ file = "tuesday.csv"
 start_s = 100
 split = "test"
 "#;
-    let file = ProblemFile::parse("p.toml", text).expect("a problem");
-    assert_eq!(file.spec.wrapped[0].values["w"], 0.4);
-    let again = ProblemFile::parse("p.toml", &file.to_toml()).expect("the same");
+    let file = ProblemSpec::parse("p.toml", text).expect("a problem");
+    assert_eq!(file.wrapped[0].parameters["w"], 0.4);
+    let again = ProblemSpec::parse("p.toml", &file.to_toml()).expect("the same");
     assert_eq!(again, file, "{}", file.to_toml());
     // Wrappers with values that are not theirs are refused.
     let trials = recorded(|x| line(3.0, 0.0, x));
     let with = |values: &[(&str, f64)]| {
         let mut spec = described(trials.clone(), &[]);
         let values = values.iter().map(|(name, x)| ((*name).to_owned(), *x)).collect();
-        spec.wrapped = vec![Wrapped { name: "output.backlash".into(), values }];
+        spec.wrapped = vec![EffectEntry { name: "output.backlash".into(), parameters: values }];
         Checked::new(spec).map(drop).map_err(|e| e.to_string())
     };
     with(&[("w", 0.4)]).expect("the form is usual where it is left out");

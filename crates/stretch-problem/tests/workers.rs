@@ -55,7 +55,7 @@ fn problem() -> Checked {
         tolerance: Tolerance::Relative(0.1),
         ..Parameter::default()
     };
-    let argument = Argument { min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
+    let argument = Argument { range: [0.0, 20.0], off: Some(0.0), ..Argument::default() };
     Checked::new(ProblemSpec {
         stages: vec![StageEntry {
             name: "servo".into(),

@@ -1,6 +1,6 @@
 //! The forward model of a gauge's named defects, sample by sample.
 
-use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights};
+use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, arithmetic::lag_weights};
 
 use crate::fold::held;
 
@@ -16,7 +16,7 @@ const LN_2: f64 = core::f64::consts::LN_2;
 /// use stretch_receptor::{Defects, example_diagnosed};
 /// use stretch_core::Model;
 /// let calibration = example_diagnosed();
-/// let Model::Diagnosed(map) = &calibration.model else { unreachable!() };
+/// let Model::Diagnosed(map) = &calibration.spec().model else { unreachable!() };
 /// let defects = Defects::<f64>::new(map, 0.01);
 /// let mut memory = defects.begin(0.5, 0.0);
 /// let settled = defects.advance(&mut memory, 0.5, 0.0);

@@ -1,12 +1,12 @@
 //! The live form of a gauge with named defects: a Kalman filter that estimates the motion behind the signal.
 
 use stretch_core::{
-    Baseline, Branch, Calibration, Design, DesignError, DiagnosedMap, Model, Real, RestLevel, lag,
-    lag_share,
+    Baseline, Branch, Calibration, Design, DesignError, DiagnosedMap, Model, Real, RestLevel,
+    arithmetic::{lag, lag_share},
 };
 
 use crate::{
-    Domain, Front, Reading, ReceptorMemory,
+    Domain, Front, Reading, ReceptorError, ReceptorMemory,
     curve::Curve,
     defects::{Defects, DefectsMemory},
     fold::{greater, held, output, reference_dead_band},
@@ -51,7 +51,7 @@ const BEYOND: f64 = 0.003;
 /// let readings = (0..200).map(|n| receptor.step(&mut memory, Volts(1.3 + 0.004 * n as f32)).unwrap());
 /// let last = readings.last().unwrap();
 /// assert!(last.length().0 < 165.0 && last.sd.unwrap() < 2.0);
-/// # Ok::<(), stretch_core::DesignError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
 
@@ -130,13 +130,13 @@ impl<T: Real> DiagnosedReceptor<T> {
     /// A receptor for `calibration`.
     ///
     /// # Errors
-    /// [`DesignError`] when the calibration is of another model.
-    pub fn new(calibration: &Calibration) -> Result<Self, DesignError> {
-        let Model::Diagnosed(map) = &calibration.model else {
-            return Err(calibration.model.instead_of("diagnosed"));
+    /// [`ReceptorError`] when the calibration is of another model.
+    pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        let Model::Diagnosed(map) = &calibration.spec().model else {
+            return Err(calibration.spec().model.instead_of("diagnosed").into());
         };
         map.validate()?;
-        Diagnosed::new(map, calibration).map(|model| Self { model })
+        Ok(Self { model: Diagnosed::new(map, calibration)? })
     }
 }
 
@@ -157,7 +157,8 @@ impl<T: Real> DiagnosedMemory<T> {
 
 impl<T: Real> Diagnosed<T> {
     fn new(map: &DiagnosedMap, calibration: &Calibration) -> Result<Self, DesignError> {
-        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
+        let (polarity, sample_rate) =
+            (calibration.spec().polarity, calibration.spec().sample_rate_hz);
         let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
         let knots = map.curve.len();
@@ -177,7 +178,7 @@ impl<T: Real> Diagnosed<T> {
         let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
             sign: T::from_f64(sign),
-            rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),
+            rest: RestLevel::new(map.rest, polarity, calibration.spec().signal_range, sample_rate),
             defects,
             curve: Curve::new(values, map.drive_domain),
             period_s: T::from_f64(period_s),

@@ -1,10 +1,9 @@
 //! The calibration that the documentation's examples run with.
 
 use stretch_core::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, BranchSurface, Calibration,
-    CalibrationSpec, DesignError, DiagnosedMap, Fading, FitSummary, Interval, Label, Model,
-    Normalisation, ObserverMap, Plays, Polarity, Poly13, Provenance, Range, RangeSpec,
-    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
+    BranchSurface, Calibration, CalibrationSpec, DesignError, DiagnosedMap, Fading, FitSummary,
+    Interval, Label, Model, Normalisation, ObserverMap, Plays, Polarity, Poly13, Provenance, Range,
+    RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
 };
 
 /// The paper's published surfaces (section 3.2) as a calibration record, for an
@@ -16,7 +15,7 @@ use stretch_core::{
 /// ```
 /// use stretch_core::Model;
 /// let calibration = stretch_receptor::example_calibration();
-/// assert!(matches!(calibration.model, Model::Surfaces { .. }));
+/// assert!(matches!(calibration.spec().model, Model::Surfaces { .. }));
 /// ```
 pub fn example_calibration() -> Calibration {
     build().expect("the parts are constants and in range")
@@ -29,7 +28,7 @@ pub fn example_calibration() -> Calibration {
 /// ```
 /// use stretch_core::Model;
 /// let calibration = stretch_receptor::example_observer();
-/// assert!(matches!(calibration.model, Model::Observer(_)));
+/// assert!(matches!(calibration.spec().model, Model::Observer(_)));
 /// ```
 pub fn example_observer() -> Calibration {
     observer().expect("the parts are constants and in range")
@@ -41,66 +40,16 @@ pub fn example_observer() -> Calibration {
 /// ```
 /// use stretch_core::Model;
 /// let calibration = stretch_receptor::example_diagnosed();
-/// assert!(matches!(calibration.model, Model::Diagnosed(_)));
+/// assert!(matches!(calibration.spec().model, Model::Diagnosed(_)));
 /// ```
 pub fn example_diagnosed() -> Calibration {
     diagnosed().expect("the parts are constants and in range")
 }
 
-/// Two gauges in volts on a knee, each of which may be lost: 1 to 2 V over 0 to 90 degrees, with a memory of 0.3 s.
-///
-/// ```
-/// assert_eq!(stretch_receptor::example_array().channels.len(), 2);
-/// ```
-pub fn example_array() -> ArrayCalibration<2> {
-    array().expect("the parts are constants and in range")
-}
-
-fn array() -> Result<ArrayCalibration<2>, DesignError> {
-    let channel = |name: &str, follows: [f64; 2]| {
-        Ok::<_, DesignError>(ArrayChannel {
-            signal: Label::new(name)?,
-            state_min: Values::new("state_min", &[1.0, -0.5])?,
-            state_max: Values::new("state_max", &[2.0, 0.5])?,
-            possible: Interval { min: 0.5, max: 2.5 },
-            still_samples: 0,
-            follows: Values::new("follows", &follows)?,
-            largest_jump: 0.1,
-        })
-    };
-    let gains = |of: [&[f64]; 2]| {
-        let terms = of.iter().map(|own| Values::new("terms", own)).collect::<Result<_, _>>()?;
-        Ok::<_, DesignError>(ArrayGains { constant: 45.0, terms, sd: 2.0 })
-    };
-    let [half, whole]: [&[f64]; 2] = [&[22.5, 1.0], &[45.0, 2.0]];
-    ArrayCalibration::new(ArraySpec {
-        schema: Schema::CURRENT,
-        reference: Label::new("angle_deg")?,
-        sample_rate_hz: SampleRate::new(100.0)?,
-        relaxations_s: Values::new("relaxations_s", &[0.3])?,
-        degree: 1,
-        memory_degree: 1,
-        estimate_domain: Interval { min: 0.0, max: 90.0 },
-        channels: [channel("front_v", [0.0, 1.0])?, channel("back_v", [1.0, 0.0])?]
-            .into_iter()
-            .collect(),
-        all: gains([half, half])?,
-        without: [gains([&[], whole])?, gains([whole, &[]])?].into_iter().collect(),
-        alone: [gains([whole, &[]])?, gains([&[], whole])?].into_iter().collect(),
-        shifts: Some(ArrayShifts {
-            block_s: 5.0,
-            false_alarms_an_hour: 0.25,
-            usual: Values::new("usual", &[0.0, 0.0])?,
-            limits: Values::new("limits", &[6.0, 6.0])?,
-        }),
-        provenance: Provenance::new("", ["example"]),
-    })
-}
-
 fn diagnosed() -> Result<Calibration, DesignError> {
     let observer = observer()?;
-    let Model::Observer(map) = observer.model else {
-        return Err(observer.model.instead_of("observer"));
+    let Model::Observer(map) = observer.spec().model else {
+        return Err(observer.spec().model.instead_of("observer"));
     };
     let map = DiagnosedMap {
         rest: None,
@@ -208,7 +157,6 @@ fn build() -> Result<Calibration, DesignError> {
                 0.01821,
             ),
         },
-        turns: None,
         provenance: Provenance::new("", ["published coefficients"]),
     })
 }

@@ -186,12 +186,6 @@ impl<T: Real> Direction<T> {
         Self { rising, dead_band: T::from_f64(dead_band) }
     }
 
-    /// The rate with the sign of the target's rate.
-    #[inline(always)]
-    pub(crate) fn signed(&self, rate: T) -> T {
-        if self.rising == Branch::Inflation { rate } else { -rate }
-    }
-
     #[inline(always)]
     pub(crate) fn next(&self, before: Branch, rate: T) -> Branch {
         if rate > self.dead_band {

@@ -1,6 +1,6 @@
 //! The stationary gains of a Kalman filter, slope by slope.
 
-use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, lag_share};
+use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, arithmetic::lag_share};
 
 /// Number of states: the target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;

@@ -1,13 +1,14 @@
 //! The live form of a polynomial of the signal's history.
 
 use stretch_core::{
-    Baseline, Branch, Calibration, Design, DesignError, HistoryMap, MAX_HISTORY_TERMS, MAX_PLAYS,
-    MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage, lag, lag_share, play,
+    Baseline, Branch, Calibration, Design, HistoryMap, MAX_HISTORY_TERMS, MAX_PLAYS,
+    MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage,
+    arithmetic::{lag, lag_share, play},
 };
-use stretch_filter::{FilterError, RateFilter};
+use stretch_filter::RateFilter;
 
 use crate::{
-    Domain, Front, Reading,
+    Domain, Front, Reading, ReceptorError,
     fold::{estimator, output, reference_dead_band, rounded},
     front::{Direction, Live, over_volts},
 };
@@ -68,10 +69,10 @@ impl<T: Real> HistoryReceptor<T> {
     /// A receptor for `calibration`, with the rate estimator that it names.
     ///
     /// # Errors
-    /// [`FilterError`] when the estimator cannot run live, or the calibration
+    /// [`ReceptorError`] when the estimator cannot run live, or the calibration
     /// is of another model.
-    pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        Ok(Self::with_rate(calibration, estimator(calibration)?)?)
+    pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        Self::with_rate(calibration, estimator(calibration)?)
     }
 }
 
@@ -79,14 +80,15 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator for the estimate.
     ///
     /// # Errors
-    /// [`DesignError`] when the calibration is of another model.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, DesignError> {
-        let Model::History(map) = &calibration.model else {
-            return Err(calibration.model.instead_of("history"));
+    /// [`ReceptorError`] when the calibration is of another model.
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+        let Model::History(map) = &calibration.spec().model else {
+            return Err(calibration.spec().model.instead_of("history").into());
         };
         map.validate()?;
-        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
-        let range = calibration.signal_range;
+        let (polarity, sample_rate) =
+            (calibration.spec().polarity, calibration.spec().sample_rate_hz);
+        let range = calibration.spec().signal_range;
         let shape = map.shape();
         let (gain, zero) = output(calibration);
         let mut products = [(0, 0); MAX_HISTORY_TERMS];

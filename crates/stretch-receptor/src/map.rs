@@ -5,15 +5,15 @@
 //! polynomial itself.
 
 use stretch_core::{
-    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Poly13, Real, Surface,
-    power,
+    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13, Real,
+    Surface, arithmetic::power,
 };
 
 use crate::{Domain, fold::output};
 
 /// Value and local slope of a calibration at one input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point<T> {
+pub(crate) struct Point<T> {
     pub estimate: T,
     /// Change of the estimate per change of the signal.
     pub slope: T,
@@ -22,14 +22,14 @@ pub struct Point<T> {
 
 /// The ends of an input's domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds<T> {
+pub struct DomainEnds<T> {
     /// The lower end.
     pub min: T,
     /// The upper end.
     pub max: T,
 }
 
-impl<T: Real> Bounds<T> {
+impl<T: Real> DomainEnds<T> {
     fn round(interval: Interval) -> Self {
         Self { min: T::from_f64(interval.min), max: T::from_f64(interval.max) }
     }
@@ -47,7 +47,7 @@ impl<T: Real> Bounds<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line<T> {
     /// Range to which the signal is clamped.
-    pub signal: Bounds<T>,
+    pub signal: DomainEnds<T>,
     /// Offset that is subtracted from the signal.
     pub offset: T,
     /// Reference units per signal unit.
@@ -60,9 +60,9 @@ pub struct Line<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangedSurface<T, S> {
     /// Range to which the signal is clamped.
-    pub signal: Bounds<T>,
+    pub signal: DomainEnds<T>,
     /// Range to which the rate is clamped.
-    pub rate: Bounds<T>,
+    pub rate: DomainEnds<T>,
     /// Offset that is subtracted from the signal.
     pub offset: T,
     /// Offset that is subtracted from the rate.
@@ -84,17 +84,13 @@ pub enum Map<T> {
 }
 
 impl<T: Real> Map<T> {
-    /// One line for both branches.
-    pub(crate) fn line(calibration: &Calibration, line: &LinearMap) -> Self {
-        Self::Line(fold_line(calibration, line))
-    }
-
-    /// One surface with ranges for each branch.
-    pub(crate) fn surfaces(
-        calibration: &Calibration,
-        inflation: &BranchSurface,
-        deflation: &BranchSurface,
-    ) -> Result<Self, DesignError> {
+    /// The line or the surfaces of a calibration.
+    pub(crate) fn of(calibration: &Calibration) -> Result<Self, DesignError> {
+        let (inflation, deflation) = match &calibration.spec().model {
+            Model::Linear(line) => return Ok(Self::Line(fold_line(calibration, line))),
+            Model::Surfaces { inflation, deflation } => (inflation, deflation),
+            other => return Err(other.instead_of("linear or surfaces")),
+        };
         let up = fold_surface(calibration, inflation)?;
         let down = fold_surface(calibration, deflation)?;
         let surfaces = [round_surface(&up.surface)?, round_surface(&down.surface)?];
@@ -138,7 +134,7 @@ impl<T: Real, S> RangedSurface<T, S> {
 
 impl<S> RangedSurface<f64, S> {
     fn with<T: Real, U>(self, surface: U) -> RangedSurface<T, U> {
-        let bounds = |b: Bounds<f64>| Bounds::round(Interval { min: b.min, max: b.max });
+        let bounds = |b: DomainEnds<f64>| DomainEnds::round(Interval { min: b.min, max: b.max });
         RangedSurface {
             signal: bounds(self.signal),
             rate: bounds(self.rate),
@@ -158,9 +154,9 @@ fn round_surface<T: Real>(surface: &Surface) -> Result<Surface<T>, DesignError> 
 fn fold_line<T: Real>(calibration: &Calibration, line: &LinearMap) -> Line<T> {
     let (gain, zero) = output(calibration);
     Line {
-        signal: Bounds::round(line.signal_domain),
-        offset: T::from_f64(calibration.signal_range.offset()),
-        slope: T::from_f64(line.slope * gain / calibration.signal_range.span()),
+        signal: DomainEnds::round(line.signal_domain),
+        offset: T::from_f64(calibration.spec().signal_range.offset()),
+        slope: T::from_f64(line.slope * gain / calibration.spec().signal_range.span()),
         intercept: T::from_f64(zero + gain * line.intercept),
     }
 }
@@ -170,9 +166,9 @@ fn fold_surface(
     branch: &BranchSurface,
 ) -> Result<RangedSurface<f64, Surface>, DesignError> {
     let (gain, zero) = output(calibration);
-    let sign = calibration.polarity.sign();
+    let sign = calibration.spec().polarity.sign();
     let rate_scale = sign / branch.rate_range.span();
-    let signal_scale = calibration.signal_range.span().recip();
+    let signal_scale = calibration.spec().signal_range.span().recip();
     let degree = branch.surface.degree();
     let mut folded = [0.0; stretch_core::MAX_TERMS];
     for (place, (i, j)) in folded.iter_mut().zip(degree.exponents()) {
@@ -181,11 +177,11 @@ fn fold_surface(
     }
     folded[0] += zero;
     let [min, max] = [branch.rate_domain.min, branch.rate_domain.max].map(|rate| sign * rate);
-    let rate = if sign > 0.0 { Bounds { min, max } } else { Bounds { min: max, max: min } };
+    let rate = if sign > 0.0 { DomainEnds { min, max } } else { DomainEnds { min: max, max: min } };
     Ok(RangedSurface {
-        signal: Bounds::round(branch.signal_domain),
+        signal: DomainEnds::round(branch.signal_domain),
         rate,
-        offset: calibration.signal_range.offset(),
+        offset: calibration.spec().signal_range.offset(),
         rate_offset: sign * branch.rate_range.offset(),
         surface: Surface::new(degree, &folded[..degree.terms()])?,
     })

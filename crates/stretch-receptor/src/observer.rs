@@ -2,11 +2,12 @@
 
 use stretch_core::{
     Baseline, Branch, Calibration, Design, DesignError, MAX_KNOTS, MAX_OBSERVER_PLAYS,
-    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel, lag, lag_share, play,
+    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel,
+    arithmetic::{lag, lag_share, play},
 };
 
 use crate::{
-    Domain, Front, Reading,
+    Domain, Front, Reading, ReceptorError,
     fold::{output, reference_dead_band, rounded},
     front::{Live, over_volts},
     gains::{Gains, SLOPES, STATES},
@@ -96,13 +97,14 @@ impl<T: Real> ObserverReceptor<T> {
     /// A receptor for `calibration`.
     ///
     /// # Errors
-    /// [`DesignError`] when the calibration is of another model.
-    pub fn new(calibration: &Calibration) -> Result<Self, DesignError> {
-        let Model::Observer(map) = &calibration.model else {
-            return Err(calibration.model.instead_of("observer"));
+    /// [`ReceptorError`] when the calibration is of another model.
+    pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        let Model::Observer(map) = &calibration.spec().model else {
+            return Err(calibration.spec().model.instead_of("observer").into());
         };
         map.validate()?;
-        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
+        let (polarity, sample_rate) =
+            (calibration.spec().polarity, calibration.spec().sample_rate_hz);
         let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
         let knots = map.curve.len();
@@ -117,7 +119,7 @@ impl<T: Real> ObserverReceptor<T> {
         let gains = Gains::new(map, period_s, flattest, steepest)?;
         let model = Observer {
             sign: T::from_f64(sign),
-            rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),
+            rest: RestLevel::new(map.rest, polarity, calibration.spec().signal_range, sample_rate),
             knots,
             curve: rounded(map.curve.iter().map(|v| sign * v)),
             drive_low: T::from_f64(drive.min),

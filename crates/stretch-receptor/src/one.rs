@@ -1,12 +1,11 @@
 //! A receptor for any model that a calibration can hold.
 
 use stretch_core::{Branch, Calibration, Design, Model, Real, Stage};
-use stretch_filter::{FilterError, RateFilter};
+use stretch_filter::RateFilter;
 
 use crate::{
-    BlendedReceptor, DiagnosedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading,
+    DiagnosedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading, ReceptorError,
     ReceptorMemory, StretchReceptor,
-    across::{Jump, Mixed},
     diagnosed::{Diagnosed, DiagnosedMemory},
     fold::estimator,
     front::{Live, over_volts},
@@ -34,9 +33,7 @@ pub type Receptor<T, R = RateFilter<T>> = Front<AnyModel<T, R>>;
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum AnyModel<T, R> {
     /// The model of a [`StretchReceptor`].
-    Surfaces(Surfaces<T, R, Jump>),
-    /// The model of a [`BlendedReceptor`].
-    Blended(Surfaces<T, R, Mixed<T>>),
+    Surfaces(Surfaces<T, R>),
     /// Of a [`HistoryReceptor`].
     History(History<T, R>),
     /// Of an [`ObserverReceptor`].
@@ -49,7 +46,7 @@ pub enum AnyModel<T, R> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum AnyMemory<T, M> {
-    /// The memory of a [`StretchReceptor`] or a [`BlendedReceptor`].
+    /// The memory of a [`StretchReceptor`].
     Surfaces(SurfacesMemory<T, M>),
     /// Of a [`HistoryReceptor`].
     History(HistoryMemory<T, M>),
@@ -63,10 +60,10 @@ impl<T: Real> Receptor<T> {
     /// A receptor for `calibration`, with the rate estimator that it names.
     ///
     /// # Errors
-    /// [`FilterError`] when the estimator cannot run live or cannot be designed,
+    /// [`ReceptorError`] when the estimator cannot run live or cannot be designed,
     /// or a coefficient leaves the range of `T`.
-    pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        match &calibration.model {
+    pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        match &calibration.spec().model {
             // the rate of these models is a state, so that no estimator is needed
             Model::Observer(_) | Model::Diagnosed(_) => Self::observer(calibration),
             _ => Self::with_rate(calibration, estimator(calibration)?),
@@ -78,12 +75,9 @@ impl<T: Real, R> Receptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// # Errors
-    /// [`FilterError`] when a coefficient leaves the range of `T`.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, FilterError> {
-        let model = match &calibration.model {
-            Model::Blended { .. } => {
-                AnyModel::Blended(BlendedReceptor::with_rate(calibration, rate)?.model)
-            }
+    /// [`ReceptorError`] when a coefficient leaves the range of `T`.
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+        let model = match &calibration.spec().model {
             Model::History(_) => {
                 AnyModel::History(HistoryReceptor::with_rate(calibration, rate)?.model)
             }
@@ -93,8 +87,8 @@ impl<T: Real, R> Receptor<T, R> {
         Ok(Self { model })
     }
 
-    fn observer(calibration: &Calibration) -> Result<Self, FilterError> {
-        let model = match &calibration.model {
+    fn observer(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        let model = match &calibration.spec().model {
             Model::Diagnosed(_) => AnyModel::Diagnosed(DiagnosedReceptor::new(calibration)?.model),
             _ => AnyModel::Observer(ObserverReceptor::new(calibration)?.model),
         };
@@ -117,7 +111,6 @@ macro_rules! with_its_own {
     ($model:expr, $memory:expr, |$own:ident, $its:ident| $answer:expr, $else:expr) => {
         match ($model, $memory) {
             (AnyModel::Surfaces($own), AnyMemory::Surfaces($its)) => $answer,
-            (AnyModel::Blended($own), AnyMemory::Surfaces($its)) => $answer,
             (AnyModel::History($own), AnyMemory::History($its)) => $answer,
             (AnyModel::Observer($own), AnyMemory::Observer($its)) => $answer,
             (AnyModel::Diagnosed($own), AnyMemory::Diagnosed($its)) => $answer,
@@ -133,7 +126,6 @@ impl<T: Real, R: Design> Design for AnyModel<T, R> {
     fn memory(&self) -> Self::Memory {
         match self {
             Self::Surfaces(model) => AnyMemory::Surfaces(model.memory()),
-            Self::Blended(model) => AnyMemory::Surfaces(model.memory()),
             Self::History(model) => AnyMemory::History(model.memory()),
             Self::Observer(model) => AnyMemory::Observer(model.memory()),
             Self::Diagnosed(model) => AnyMemory::Diagnosed(model.memory()),

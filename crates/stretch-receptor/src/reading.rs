@@ -58,11 +58,6 @@ impl Domain {
             (true, true) => Self::BothClamped,
         }
     }
-
-    #[inline]
-    pub(crate) fn signal_outside(self) -> bool {
-        matches!(self, Self::SignalClamped | Self::BothClamped)
-    }
 }
 
 impl fmt::Display for Domain {

@@ -1,11 +1,10 @@
 //! The live form of lines and surfaces: a signal in, a reading out, one sample at a time.
 
-use stretch_core::{Branch, Calibration, Design, DesignError, Real, Stage};
-use stretch_filter::{FilterError, RateFilter};
+use stretch_core::{Branch, Calibration, Design, Real, Stage};
+use stretch_filter::RateFilter;
 
 use crate::{
-    Front, Reading,
-    across::{Across, Jump, Mixed},
+    Front, Reading, ReceptorError,
     fold::estimator,
     front::{Direction, Live, over_volts},
     map::{Map, Point},
@@ -21,8 +20,6 @@ use crate::{
 /// 4. the branch's surface gives the estimate in the reference's unit, and the slope of the surface times the rate of
 ///    the signal gives the estimate's rate (the derivative leaves out the surface's dependence on the rate, which would
 ///    need the second derivative of a noisy signal).
-///
-/// [`BlendedReceptor`] is the same without the jump at a reversal.
 ///
 /// **Missing samples, warm-up, branch**: see [`Front`]. A short gap is bridged by
 /// the last sample moved on by the last rate, so that one lost sample costs one
@@ -46,31 +43,22 @@ use crate::{
 ///     }
 /// }
 /// assert!(length_mm > 158.0 && length_mm < 161.0);
-/// # Ok::<(), stretch_filter::FilterError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 ///
 /// Source: paper sections 2.5 and 3.4. Cost: see the crate's front page.
-pub type StretchReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Jump>>;
+pub type StretchReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R>>;
 
-/// A [`StretchReceptor`] for [`Model::Blended`](stretch_core::Model::Blended): inside
-/// the dead band the estimate is a mean of both surfaces, weighted by the rate, so that there is no jump at a
-/// reversal. With `r` the signed rate and `d` the dead band, the weight of the inflation surface is `(1 + r/d)/2`,
-/// held to 0..1.
-///
-/// Cost: one surface outside the dead band, two inside.
-pub type BlendedReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Mixed<T>>>;
-
-/// The model of a [`StretchReceptor`]; `A` says what happens across the dead band.
+/// The model of a [`StretchReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surfaces<T, R, A> {
+pub struct Surfaces<T, R> {
     rate: R,
     map: Map<T>,
     direction: Direction<T>,
-    across: A,
     period_s: T,
 }
 
-impl<T: Real, R, A> Surfaces<T, R, A> {
+impl<T: Real, R> Surfaces<T, R> {
     /// The folded line or surfaces.
     pub fn map(&self) -> &Map<T> {
         &self.map
@@ -95,7 +83,7 @@ pub struct SurfacesMemory<T, M> {
     last_rate: T,
 }
 
-impl<T: Real, A: Across<T>> Front<Surfaces<T, RateFilter<T>, A>> {
+impl<T: Real> StretchReceptor<T> {
     /// A receptor for `calibration`, with the rate estimator that it names.
     ///
     /// The estimator's shape is a run-time value here; where it is known to the
@@ -103,14 +91,14 @@ impl<T: Real, A: Across<T>> Front<Surfaces<T, RateFilter<T>, A>> {
     /// [`SgRate`](stretch_filter::SgRate) and is smaller and faster.
     ///
     /// # Errors
-    /// [`FilterError`] when the estimator cannot run live or cannot be designed,
+    /// [`ReceptorError`] when the estimator cannot run live or cannot be designed,
     /// the calibration is of another model, or a coefficient leaves the range of `T`.
-    pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        Ok(Self::with_rate(calibration, estimator(calibration)?)?)
+    pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
+        Self::with_rate(calibration, estimator(calibration)?)
     }
 }
 
-impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
+impl<T: Real, R> StretchReceptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// `rate` must be the estimator that [`CalibrationSpec::rate_estimator`]
@@ -119,16 +107,16 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
     /// [`CalibrationSpec::rate_estimator`]: stretch_core::CalibrationSpec::rate_estimator
     ///
     /// # Errors
-    /// [`DesignError`] when the calibration is of another model or a coefficient
+    /// [`ReceptorError`] when the calibration is of another model or a coefficient
     /// leaves the range of `T`.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, DesignError> {
-        let direction = Direction::of_signal(calibration.polarity, calibration.dead_band);
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+        let direction =
+            Direction::of_signal(calibration.spec().polarity, calibration.spec().dead_band);
         let model = Surfaces {
             rate,
-            map: A::map(calibration)?,
+            map: Map::of(calibration)?,
             direction,
-            across: A::new(direction),
-            period_s: T::from_f64(calibration.sample_rate_hz.period_s()),
+            period_s: T::from_f64(calibration.spec().sample_rate_hz.period_s()),
         };
         Ok(Self { model })
     }
@@ -142,7 +130,7 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
     /// let receptor = StretchReceptor::<f64, ()>::with_rate(&example_calibration(), ())?;
     /// let reading = receptor.at(Branch::Inflation, 0.4, 1.5);
     /// assert!(reading.estimate > 150.0 && reading.estimate < 180.0);
-    /// # Ok::<(), stretch_core::DesignError>(())
+    /// # Ok::<(), stretch_receptor::ReceptorError>(())
     /// ```
     pub fn at(&self, branch: Branch, rate: T, signal: T) -> Reading<T> {
         self.model.reading(branch, rate, signal)
@@ -154,16 +142,15 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
     }
 }
 
-impl<T: Real, R, A: Across<T>> Surfaces<T, R, A> {
+impl<T: Real, R> Surfaces<T, R> {
     #[inline(always)]
     fn reading(&self, branch: Branch, rate: T, signal: T) -> Reading<T> {
-        let point = self.across.point(&self.map, self.direction, branch, rate, signal);
-        let Point { estimate, slope, domain } = point;
+        let Point { estimate, slope, domain } = self.map.at(branch, rate, signal);
         Reading { estimate, rate: slope * rate, branch, domain, sd: None }
     }
 }
 
-impl<T: Real, R: Design, A> Design for Surfaces<T, R, A> {
+impl<T: Real, R: Design> Design for Surfaces<T, R> {
     type Memory = SurfacesMemory<T, R::Memory>;
 
     fn memory(&self) -> Self::Memory {
@@ -171,7 +158,7 @@ impl<T: Real, R: Design, A> Design for Surfaces<T, R, A> {
     }
 }
 
-impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R, A> {
+impl<T: Real, R: Stage<T, Out = Option<T>>> Live for Surfaces<T, R> {
     over_volts!(T);
 
     #[inline(always)]

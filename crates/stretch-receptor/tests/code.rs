@@ -21,13 +21,16 @@ fn due() -> Adc {
 
 /// Full scale of the calibration's target, in thousandths of the reference's unit.
 fn full_scale(calibration: &Calibration) -> f64 {
-    1000.0 * (calibration.target.reference_per_target() * calibration.target_range.span()).abs()
+    1000.0
+        * (calibration.spec().target.reference_per_target()
+            * calibration.spec().target_range.span())
+        .abs()
 }
 
 type Exact = StretchReceptor<f64, SgRate<f64, 11, 2>>;
 
 fn exact(calibration: &Calibration) -> Exact {
-    let rate = SgRate::new(calibration.sample_rate_hz).unwrap();
+    let rate = SgRate::new(calibration.spec().sample_rate_hz).unwrap();
     StretchReceptor::with_rate(calibration, rate).unwrap()
 }
 
@@ -50,7 +53,8 @@ fn compare<A: CodeArithmetic>(
 ) -> Result<Compared, String> {
     let mut found = Compared::default();
     let (mut fixed, mut float) = (Runner::new(*fixed), Runner::new(exact(calibration)));
-    let mut rate = Runner::new(SgRate::<f64, 11, 2>::new(calibration.sample_rate_hz).unwrap());
+    let mut rate =
+        Runner::new(SgRate::<f64, 11, 2>::new(calibration.spec().sample_rate_hz).unwrap());
     for (n, &code) in codes.iter().enumerate() {
         let volts = adc.volts(AdcCode(code));
         let rate = volts.and_then(|volts| rate.step(volts));
@@ -63,7 +67,7 @@ fn compare<A: CodeArithmetic>(
         };
         if ours.branch != theirs.branch {
             // on the very edge of the dead band the float one rounds to either side
-            let tie = rate.is_some_and(|r| (r.abs() - calibration.dead_band).abs() < 1e-9);
+            let tie = rate.is_some_and(|r| (r.abs() - calibration.spec().dead_band).abs() < 1e-9);
             return if tie { Ok(found) } else { Err(format!("sample {n}: branch")) };
         }
         if ours.domain != theirs.domain && !at_an_end(calibration, ours.branch, rate, volts) {
@@ -86,8 +90,8 @@ fn at_an_end(
     volts: Option<f64>,
 ) -> bool {
     let near = |x: Option<f64>, end: f64| x.is_some_and(|x| (x - end).abs() < 1e-9);
-    let sign = calibration.polarity.sign();
-    match &calibration.model {
+    let sign = calibration.spec().polarity.sign();
+    match &calibration.spec().model {
         Model::Surfaces { inflation, deflation } => {
             let surface = if branch == Branch::Inflation { inflation } else { deflation };
             let (signal, ends) = (surface.signal_domain, surface.rate_domain);

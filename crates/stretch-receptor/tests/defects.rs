@@ -2,14 +2,14 @@
 
 use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
-use stretch_core::{DiagnosedMap, Fading, Model, lag_weights};
+use stretch_core::{DiagnosedMap, Fading, Model, arithmetic::lag_weights};
 use stretch_receptor::{Defects, example_diagnosed};
 use testkit::tolerance::RECURSIVE_OUTPUT;
 
 const PERIOD_S: f64 = 0.01;
 
 fn map() -> DiagnosedMap {
-    let Model::Diagnosed(map) = example_diagnosed().model else { unreachable!() };
+    let Model::Diagnosed(map) = example_diagnosed().spec().model else { unreachable!() };
     DiagnosedMap { slip: None, relaxation: None, ..map }
 }
 

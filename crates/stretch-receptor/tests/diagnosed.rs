@@ -20,7 +20,7 @@ const LOOPS: Plays = Plays { share: 0.2, radii: [0.05, 0.1, 0.2] };
 const OVERSHOOT: Fading = Fading { share: 0.3, taus_s: [0.2, 0.4, 0.8] };
 
 fn plain() -> DiagnosedMap {
-    let Model::Diagnosed(map) = example_diagnosed().model else { unreachable!() };
+    let Model::Diagnosed(map) = example_diagnosed().spec().model else { unreachable!() };
     DiagnosedMap {
         slip: None,
         relaxation: None,
@@ -235,9 +235,9 @@ proptest! {
         stream in stretch_receptor::strategies::faulty_stream(150),
         pressure in proptest::num::f64::ANY,
     ) {
-        let Model::Diagnosed(map) = &calibration.model else { unreachable!() };
+        let Model::Diagnosed(map) = &calibration.spec().model else { unreachable!() };
         let receptor = DiagnosedReceptor::<f64>::new(&calibration).unwrap();
-        let (range, target) = (calibration.target_range, calibration.target);
+        let (range, target) = (calibration.spec().target_range, calibration.spec().target);
         let mut memory = receptor.memory();
         memory.set_pressure(pressure);
         for volts in stream {

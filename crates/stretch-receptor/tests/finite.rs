@@ -83,7 +83,7 @@ fn stays_finite<T: Real>(
 ) -> Result<bool, TestCaseError> {
     let Ok(receptor) = Receptor::<T>::new(calibration) else { return Ok(false) };
     let mut receptor = Runner::new(receptor);
-    let range = calibration.signal_range;
+    let range = calibration.spec().signal_range;
     for (nth, &(is_share, x)) in stream.iter().enumerate() {
         let volts = if is_share { range.min() + x * range.span() } else { x };
         if let Ok(reading) = receptor.step(Volts(T::from_f64(volts))) {

@@ -41,8 +41,8 @@ fn integers_answer_as_floats_do() {
     for case in 0..256 {
         let (calibration, stream) = any.new_tree(&mut runner).expect("a calibration").current();
         let codes: Vec<AdcCode> = stream.iter().map(|&v| adc().code(v)).collect();
-        let span =
-            calibration.target_range.span() * calibration.target.reference_per_target().abs();
+        let span = calibration.spec().target_range.span()
+            * calibration.spec().target.reference_per_target().abs();
         let most = testkit::tolerance::FIXED_OBSERVER * span + 1e-3;
         let is_apart = |(a, b): &(Result<f64, Withheld>, Result<f64, Withheld>)| match (a, b) {
             (Ok(a), Ok(b)) => (a - b).abs() > most,
@@ -69,8 +69,8 @@ proptest! {
         ], 300),
     ) {
         let mut receptor = Runner::new(FixedObserver::new(&calibration, &adc()).unwrap());
-        let range = calibration.target_range;
-        let ends = [0.0, 1.0].map(|t| calibration.target.to_reference(range.denormalise(t)));
+        let range = calibration.spec().target_range;
+        let ends = [0.0, 1.0].map(|t| calibration.spec().target.to_reference(range.denormalise(t)));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         for code in codes {
             match receptor.step(AdcCode(code)) {

@@ -11,8 +11,8 @@ use proptest::{collection::vec, prelude::*};
 use stretch_core::{Calibration, Runner, strategies};
 use stretch_receptor::{
     code::{
-        Adc, AdcCode, AdcSpec, FixedCalibration, FixedNumbers, FixedObserver, FixedReceptor,
-        IntegerObserver, RangedSurface, RangedSurfaces, Span,
+        Adc, AdcCode, AdcSpec, CodeMap, CodeSurface, FixedCalibration, FixedNumbers, FixedObserver,
+        FixedReceptor, IntegerObserver, Span,
     },
     example_calibration, example_observer,
 };
@@ -152,14 +152,14 @@ fn prove_surfaces(numbers: &FixedNumbers) -> Proof {
     // the largest that a 16-bit sample can be away from a centre, moved up
     (both(u16::MAX) * just(1 << 15)).fits(32, "signal from the centre")?;
     match numbers.surfaces {
-        RangedSurfaces::Line(RangedSurface { signal, rate, surface: line, .. }) => {
+        CodeMap::Line(CodeSurface { signal, rate, surface: line, .. }) => {
             let (intercept, slope) = <(i32, i32)>::from(line.of);
             let eval = |_: Between, v: Between| Sum::new(intercept.into()).plus(slope, v)?.value();
             surface(eval, line.thousandths, (signal, rate))
         }
-        RangedSurfaces::Poly13(surfaces) => {
+        CodeMap::Poly13(surfaces) => {
             let mut all: Option<Between> = None;
-            for RangedSurface { signal, rate, surface: poly, .. } in surfaces {
+            for CodeSurface { signal, rate, surface: poly, .. } in surfaces {
                 let [p00, p10, p01, p11, p02, p12, p03] = <[i32; 7]>::from(poly.of);
                 let eval = |r: Between, v: Between| {
                     let by_rate = Sum::new(p11.into()).plus(p12, v)?.times(v, p10)?;
@@ -325,7 +325,7 @@ fn prove_observer(o: &IntegerObserver) -> Proof {
 }
 
 fn adc(bits: u8, calibration: &Calibration) -> Adc {
-    let range = calibration.signal_range;
+    let range = calibration.spec().signal_range;
     let (zero_v, full_scale_v) =
         (range.min() - 0.1 * range.span(), range.max() + 0.2 * range.span());
     Adc::new(AdcSpec { bits, zero_v, full_scale_v }).unwrap()
@@ -423,11 +423,9 @@ fn every_code_at_a_grid_of_rates_is_within_its_rounding() {
     let calibration = example_calibration();
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
     let fixed = FixedCalibration::<11, 2>::new(&calibration, &adc).unwrap();
-    let RangedSurfaces::Poly13(surfaces) = fixed.numbers().surfaces else {
-        panic!("it has surfaces")
-    };
+    let CodeMap::Poly13(surfaces) = fixed.numbers().surfaces else { panic!("it has surfaces") };
     let (mut worst, mut seen) = (0.0f64, 0u32);
-    for RangedSurface { centre, signal, rate, surface } in surfaces {
+    for CodeSurface { centre, signal, rate, surface } in surfaces {
         let (p, unit) = (surface.of.coefficients(), (1u64 << 32) as f64);
         for code in 0..4096i32 {
             let volts = ((code << 4) - i32::from(centre)) << 15;

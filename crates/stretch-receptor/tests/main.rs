@@ -1,6 +1,5 @@
 //! The tests of stretch-receptor from outside, one program: linking takes longer than most of them.
 
-mod array;
 mod code;
 mod defects;
 mod diagnosed;

@@ -5,10 +5,10 @@ use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
 use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, HistoryMap, HistoryShape, Interval,
-    Model, ObserverMap, RateEstimator, RestTracker, Runner, Values, Volts, play,
+    Model, ObserverMap, RateEstimator, RestTracker, Runner, Values, Volts, arithmetic::play,
 };
 use stretch_receptor::{
-    BlendedReceptor, HistoryReceptor, ObserverReceptor, Receptor, StretchReceptor, Withheld,
+    HistoryReceptor, ObserverReceptor, Receptor, ReceptorError, StretchReceptor, Withheld,
     code::{Adc, AdcSpec, FixedCalibration, FixedObserver},
     example_calibration, strategies,
 };
@@ -63,13 +63,6 @@ fn shape_of_the_terms() {
     assert_eq!(shape.terms(), TERMS);
 }
 
-/// A model's blended twin.
-fn blended() -> Calibration {
-    let spec = example_calibration().into_spec();
-    let Model::Surfaces { inflation, deflation } = spec.model else { unreachable!() };
-    with(Model::Blended { inflation, deflation })
-}
-
 fn rest() -> impl Strategy<Value = Option<RestTracker>> {
     prop_oneof![Just(None), Just(Some(REST))]
 }
@@ -79,7 +72,6 @@ fn remembering() -> impl Strategy<Value = Calibration> {
         (rest(), -0.3..0.6f64).prop_map(|(rest, amplitude)| observer(rest, amplitude)),
         (rest(), proptest::collection::vec(-2.0..2.0f64, TERMS))
             .prop_map(|(rest, coefficients)| history(rest, &coefficients)),
-        Just(blended()),
     ]
 }
 
@@ -94,7 +86,7 @@ proptest! {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
         // a length of the normalised targets 0..1, and what rounding may add
-        let inside = |x: f64| !matches!(calibration.model, Model::History(_) | Model::Observer(_))
+        let inside = |x: f64| !matches!(calibration.spec().model, Model::History(_) | Model::Observer(_))
             || (150.0..180.1).contains(&x);
         for &volts in &stream {
             if let Ok(reading) = wide.step(Volts(volts)) {
@@ -165,7 +157,7 @@ proptest! {
     #[test]
     fn an_observer_inverts_its_gauge(amplitude in -0.3..0.6f64, turns in 0.1..0.6f64) {
         let calibration = observer(None, amplitude);
-        let Model::Observer(map) = &calibration.model else { unreachable!() };
+        let Model::Observer(map) = &calibration.spec().model else { unreachable!() };
         let mut receptor = Runner::new(ObserverReceptor::<f64>::new(&calibration).unwrap());
         let share = -(-0.01f64 / 0.25).exp_m1();
         let omega = core::f64::consts::TAU * turns;
@@ -210,21 +202,21 @@ fn one_lost_sample_costs_one_reading_and_a_long_gap_a_warm_up() {
 
 #[test]
 fn a_model_needs_its_own_receptor_and_hears_so() {
-    let mismatch = |expected, found| DesignError::Mismatch { field: "model", expected, found };
+    let mismatch = |expected, found| {
+        ReceptorError::Calibration(DesignError::Mismatch { field: "model", expected, found })
+    };
     let (remembers, surfaces) = (observer(None, 0.3), example_calibration());
     let refused = StretchReceptor::<f64>::new(&remembers).unwrap_err();
-    assert_eq!(refused, mismatch("linear or surfaces", "observer").into());
-    let refused = BlendedReceptor::<f64>::new(&surfaces).unwrap_err();
-    assert_eq!(refused, mismatch("blended", "surfaces").into());
+    assert_eq!(refused, mismatch("linear or surfaces", "observer"));
     let refused = HistoryReceptor::<f64>::new(&remembers).unwrap_err();
-    assert_eq!(refused, mismatch("history", "observer").into());
+    assert_eq!(refused, mismatch("history", "observer"));
     let refused = ObserverReceptor::<f64>::new(&surfaces).unwrap_err();
     assert_eq!(refused, mismatch("observer", "surfaces"));
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
     let refused = FixedObserver::new(&surfaces, &adc).unwrap_err();
     assert_eq!(refused, mismatch("observer", "surfaces"));
-    let refused = FixedCalibration::<11, 2>::new(&blended(), &adc).unwrap_err();
-    assert_eq!(refused, mismatch("linear or surfaces", "blended"));
+    let refused = FixedCalibration::<11, 2>::new(&remembers, &adc).unwrap_err();
+    assert_eq!(refused, mismatch("linear or surfaces", "observer"));
     let tracked = RateEstimator::Tracker { tracking_index: 0.1 };
     let spec = CalibrationSpec { rate_estimator: tracked, ..surfaces.into_spec() };
     let refused = FixedCalibration::<11, 2>::new(&Calibration::new(spec).unwrap(), &adc);
@@ -232,25 +224,6 @@ fn a_model_needs_its_own_receptor_and_hears_so() {
         refused.unwrap_err().to_string(),
         "the calibration's rate estimator is a tracker, but this takes Savitzky-Golay"
     );
-}
-
-#[test]
-fn blending_has_no_jump() {
-    let spec = CalibrationSpec { dead_band: 0.5, ..blended().into_spec() };
-    let mut receptor =
-        Runner::new(BlendedReceptor::<f64>::new(&Calibration::new(spec).unwrap()).unwrap());
-    let mut before: Option<f64> = None;
-    for n in 0..600 {
-        let volts = 1.6 + 0.05 * (0.02 * f64::from(n)).sin();
-        if let Ok(reading) = receptor.step(Volts(volts)) {
-            if let Some(before) = before {
-                let step = (reading.estimate - before).abs();
-                assert!(step < 0.2, "{step} mm in a sample");
-            }
-            before = Some(reading.estimate);
-        }
-    }
-    assert!(before.is_some());
 }
 
 #[test]

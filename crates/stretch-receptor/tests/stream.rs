@@ -18,15 +18,15 @@ fn receptor() -> Runner<StretchReceptor<f64>> {
 
 /// The pipeline written out as the paper has it: nothing folded.
 fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> (f64, bool) {
-    let signal = calibration.signal_range;
-    let (normalised, inside) = match &calibration.model {
+    let signal = calibration.spec().signal_range;
+    let (normalised, inside) = match &calibration.spec().model {
         Model::Linear(line) => {
             let v = volts.clamp(line.signal_domain.min, line.signal_domain.max);
             (line.intercept + line.slope * signal.normalise(v), v == volts)
         }
         Model::Surfaces { inflation, deflation } => {
             let s = if branch == Branch::Inflation { inflation } else { deflation };
-            let signed = calibration.polarity.sign() * rate;
+            let signed = calibration.spec().polarity.sign() * rate;
             let v = volts.clamp(s.signal_domain.min, s.signal_domain.max);
             let r = signed.clamp(s.rate_domain.min, s.rate_domain.max);
             let inside = v == volts && r == signed;
@@ -34,7 +34,13 @@ fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> 
         }
         _ => unreachable!("the strategies make no other model"),
     };
-    (calibration.target.to_reference(calibration.target_range.denormalise(normalised)), inside)
+    (
+        calibration
+            .spec()
+            .target
+            .to_reference(calibration.spec().target_range.denormalise(normalised)),
+        inside,
+    )
 }
 
 proptest! {
@@ -43,7 +49,7 @@ proptest! {
         calibration in paper_calibration(), stream in strategies::clean_stream(80),
     ) {
         let receptor = StretchReceptor::<f64>::new(&calibration).unwrap();
-        let rates = RateFilter::<f64>::new(calibration.rate_estimator, calibration.sample_rate_hz).unwrap();
+        let rates = RateFilter::<f64>::new(calibration.spec().rate_estimator, calibration.spec().sample_rate_hz).unwrap();
         let (mut memory, mut rate_memory) = (receptor.memory(), rates.memory());
         let mut branch = Branch::Inflation;
         for &volts in &stream {
@@ -53,11 +59,11 @@ proptest! {
                 continue;
             };
             let reading = reading.unwrap();
-            branch = branch.next(calibration.polarity.sign() * rate, calibration.dead_band);
+            branch = branch.next(calibration.spec().polarity.sign() * rate, calibration.spec().dead_band);
             prop_assert_eq!(reading.branch, branch);
             let (estimate, inside) = by_hand(&calibration, branch, rate, volts);
             prop_assert_eq!(reading.domain == Domain::Inside, inside);
-            let scale = calibration.target.reference_per_target().abs().max(1.0);
+            let scale = calibration.spec().target.reference_per_target().abs().max(1.0);
             let difference = (reading.estimate - estimate).abs();
             prop_assert!(difference <= tolerance::FOLDED * scale, "{} {}", reading.estimate, estimate);
         }

@@ -1,9 +1,11 @@
 //! What can be wrong with a recording, with the evidence.
 
-use std::{fmt, io};
+use std::{fmt, io, path::Path};
 
+use stretch_data::files::FileError;
 use stretch_data::{DataError, Place};
-use stretch_files::FileError;
+
+use crate::read::STDIN;
 
 /// Why a recording could not be read.
 ///
@@ -31,18 +33,46 @@ pub enum RecordingError {
         /// The file.
         file: String,
     },
-    /// The first line holds numbers where names should stand.
+    /// Lines of text without a row of numbers.
     #[error(
-        "{file}: the first line (\"{first}\") holds numbers and no names; put a header line above it, such as time_s,length_mm,bridge_v, or name the columns with --columns"
+        "{file}: none of its first {lines} lines is a row of numbers (the first is \"{first}\"); write a line a sample, with a separator between its numbers"
+    )]
+    NoNumbers {
+        /// The file.
+        file: String,
+        /// Lines that were searched.
+        lines: usize,
+        /// The first line, shortened.
+        first: String,
+    },
+    /// Rows of numbers without names above them.
+    #[error(
+        "{file}: {rows} rows of {numbers} numbers from line {row} on, and {above}; name the columns with --columns, or put a header line above them, such as time_s,length_mm,bridge_v"
     )]
     NoHeader {
         /// The file.
         file: String,
-        /// The first line, shortened.
-        first: String,
+        /// How many rows.
+        rows: String,
+        /// Numbers of a row.
+        numbers: usize,
+        /// The first row.
+        row: u64,
+        /// What is above them.
+        above: String,
     },
-    /// Two columns of one name.
-    #[error("{file}: the header names column {column} twice; rename or remove one of them")]
+    /// A row that cannot be read, in a recording from which it may not be left out.
+    #[error("{first} ({reason})")]
+    Refused {
+        /// What is wrong with the row.
+        first: Box<Self>,
+        /// Why it is not left out.
+        reason: String,
+    },
+    /// Two columns of one name that is asked for.
+    #[error(
+        "{file}: the header names column {column} twice; ask for {column}.0 or {column}.1, the first and the second of them"
+    )]
     DuplicateColumn {
         /// The file.
         file: String,
@@ -81,13 +111,11 @@ pub enum RecordingError {
         /// The field.
         value: String,
     },
-    /// Bytes that are no UTF-8 text.
-    #[error("{at}: \"{value}\" is not UTF-8 text; save the file with the encoding UTF-8")]
-    NotUtf8 {
-        /// Where.
-        at: Place,
-        /// The bytes, the foreign ones escaped.
-        value: String,
+    /// Text in another encoding than UTF-8 that is not guessed.
+    #[error("{file}: the text is UTF-16; save the file with the encoding UTF-8")]
+    Utf16 {
+        /// The file.
+        file: String,
     },
     /// A row with more or fewer fields than the header.
     #[error(
@@ -120,8 +148,20 @@ pub enum RecordingError {
         value: String,
     },
     /// A date or a time of day that is none.
-    #[error("{at}: \"{value}\" is not a time stamp that is understood{}", if cfg!(feature = "iso-time") { "; write it as 2024-05-01T12:00:00.250Z, or as seconds" } else { ": this program was built without the feature iso-time; write the time as seconds" })]
+    #[error(
+        "{at}: \"{value}\" is not a time stamp that is understood; write it as 2024-05-01T12:00:00.250Z, or as seconds"
+    )]
     TimeStamp {
+        /// Where.
+        at: Place,
+        /// The field.
+        value: String,
+    },
+    /// A date of which the day and the month may be exchanged.
+    #[error(
+        "{at}: which number of \"{value}\" is the day is open; say it with --time {}:dmy or {}:mdy", .at.column, .at.column
+    )]
+    DayOrMonth {
         /// Where.
         at: Place,
         /// The field.
@@ -143,7 +183,7 @@ pub enum RecordingError {
     },
     /// A rate at which nobody records.
     #[error(
-        "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between 1e-3 and 1e7; say what its numbers count with --time-unit s, ms, us or ns"
+        "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between {least_hz:e} and {most_hz:e}; say what its numbers count with --time {column}:s, :ms, :us, :ns, :min, :h or :d, or the rate with --sample-rate HZ"
     )]
     Rate {
         /// The file.
@@ -152,6 +192,18 @@ pub enum RecordingError {
         column: String,
         /// The rate as it was read.
         rate_hz: f64,
+        /// The least rate that is read.
+        least_hz: f64,
+        /// The greatest rate that is read.
+        most_hz: f64,
+    },
+    /// A column of time that cannot be one.
+    #[error("{at}: {problem}; the rate with --sample-rate HZ replaces a column of time")]
+    Stamps {
+        /// Where.
+        at: Place,
+        /// What is wrong with its stamps.
+        problem: String,
     },
     /// A grid that has many more instants than were recorded.
     #[error(
@@ -165,9 +217,9 @@ pub enum RecordingError {
         /// How long the recording lasts.
         span_s: f64,
     },
-    /// Whole numbers in a column of seconds that count something shorter.
-    #[error("{file}, column {column}: its times are whole numbers, {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time-unit s or ms, or rename it {column_ms}", 1e3 * .rate_hz)]
-    WholeSeconds {
+    /// A column of seconds that may count something shorter.
+    #[error("{file}, column {column}: its times go up by {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time {column}:s or {column}:ms, or rename it {column_ms}", 1e3 * .rate_hz)]
+    SlowSeconds {
         /// The file.
         file: String,
         /// The time.
@@ -178,6 +230,22 @@ pub enum RecordingError {
         rate_hz: f64,
         /// What the column should be called if they are milliseconds.
         column_ms: String,
+    },
+    /// No column that is the time.
+    #[error(
+        "{missing}; say which column is the time with --time COLUMN, or --time 100hz if there is none"
+    )]
+    MissingTime {
+        /// The column, and those that are there.
+        missing: DataError,
+    },
+    /// Nothing but a time.
+    #[error("{file}: no channel of numbers has a clock{}", if notes.is_empty() { String::new() } else { format!(" ({notes})") })]
+    NoChannels {
+        /// The file.
+        file: String,
+        /// What was left out.
+        notes: String,
     },
     /// A recording without any time.
     #[error("{file}: there is no time; {}", .hint)]
@@ -203,17 +271,19 @@ pub enum RecordingError {
         /// Its span.
         second_s: String,
     },
-    /// A format that this program was built without.
+    /// A format that is read in Python.
     #[error(
-        "{file}: this is {format}, which this program was built without; build it with --features {feature}, or export the recording as CSV"
+        "{file}: this is {format}, which is not read here; convert it with `python -m stretch_gap convert {command}` (pip install \"stretch-gap[{extra}]\")"
     )]
-    Feature {
+    Convert {
         /// The file.
         file: String,
         /// What it is.
         format: &'static str,
-        /// The feature that reads it.
-        feature: &'static str,
+        /// What the command converts, and into what.
+        command: String,
+        /// The extra of the Python package that has the library.
+        extra: &'static str,
     },
     /// Something in a file that is no text, where a reader could not go on.
     #[error("{file}: this {format} file cannot be read: {problem}")]
@@ -252,6 +322,52 @@ impl RecordingError {
         DataError::missing_column(file, column, present).into()
     }
 
+    /// No column that is the time among names.
+    pub(crate) fn missing_time(file: &str, column: &str, names: &[String]) -> Self {
+        let present = names.iter().map(String::as_str);
+        Self::MissingTime { missing: DataError::missing_column(file, column, present) }
+    }
+
+    /// The same error of a recording from which the row may not be left out.
+    pub(crate) fn refused(self, reason: String) -> Self {
+        Self::Refused { first: Box::new(self), reason }
+    }
+
+    /// Whether it is open which numbers are meant, in this row and in others.
+    pub(crate) fn is_about_notation(&self) -> bool {
+        matches!(self, Self::DecimalComma { .. } | Self::DecimalPoint { .. })
+    }
+
+    /// Whether a field is blank, or a number that is not finite.
+    pub(crate) fn is_blank(&self) -> bool {
+        matches!(self, Self::EmptyField { .. } | Self::Data(DataError::NotFinite { .. }))
+    }
+
+    /// The row that is wrong, if it is one.
+    pub(crate) fn row(&self) -> Option<u64> {
+        match self {
+            Self::NotANumber { at, .. }
+            | Self::EmptyField { at }
+            | Self::TimeStamp { at, .. }
+            | Self::Quote { at }
+            | Self::Data(DataError::NotFinite { at, .. }) => Some(at.row),
+            Self::Ragged { row, .. } => Some(*row),
+            _ => None,
+        }
+    }
+
+    /// A file that the Python package converts, with the command that does it.
+    pub(crate) fn convert(file: &str, format: &'static str, extra: &'static str) -> Self {
+        let quoted = |path: &str| {
+            let is_plain = path.chars().all(|c| c.is_alphanumeric() || "._-/+:\\".contains(c));
+            if is_plain { path.to_owned() } else { format!("\"{path}\"") }
+        };
+        let path = if file == STDIN { "FILE" } else { file };
+        let out = Path::new(path).with_extension("npz");
+        let command = format!("{} {}", quoted(path), quoted(&out.to_string_lossy()));
+        Self::Convert { file: file.to_owned(), format, command, extra }
+    }
+
     /// Whether time stood still or went back.
     pub fn is_time(&self) -> bool {
         matches!(self, Self::Data(DataError::TimeNotRising { .. }))
@@ -266,7 +382,6 @@ impl RecordingError {
                 | Self::DecimalComma { .. }
                 | Self::DecimalPoint { .. }
                 | Self::TimeStamp { .. }
-                | Self::NotUtf8 { .. }
                 | Self::Ragged { .. }
                 | Self::Quote { .. }
                 | Self::LineTooLong { .. }

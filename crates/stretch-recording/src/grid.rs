@@ -3,31 +3,54 @@
 use stretch_data::{Channel, DataError, Place, Trial, can_name, rate_of, tidy_time};
 
 use crate::{
-    ReadOptions, Recording, RecordingError,
-    clock::{EPOCH_S, told_epoch},
+    ReadOptions, Recording, RecordingError, TimeUnit,
+    clock::{
+        self, BRIDGED, EPOCH_S, Stamps, note_on_epoch,
+        unit::{RATES_HZ, check_range},
+    },
     names::tidy,
     room::Room,
-    text::columns::KNOWN,
+    text::{bad_rows::BadRows, columns::KNOWN},
 };
 
 /// Channels that a device holds from one sample to the next.
 const HELD: [&str; 2] = ["inlet", "outlet"];
-/// Periods of a channel's own clock over which a straight line is drawn: as many lost samples as a live receptor bridges, and one.
-const BRIDGED: f64 = 4.5;
 /// Names that a sentence holds; more are counted.
 const TOLD: usize = 4;
 
 /// Channels that were recorded at the same instants.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Track {
-    /// What the clock is called: a topic, the array of the stamps.
-    pub(crate) clock: String,
-    /// Stamps as they were recorded.
-    pub(crate) counts: Vec<f64>,
-    /// Counts in a second.
-    pub(crate) per_second: f64,
+    /// What the clock is called.
+    pub(crate) label: String,
+    pub(crate) stamps: Stamps,
     /// NaN where a sample has no value.
     pub(crate) channels: Vec<Channel>,
+}
+
+impl Track {
+    /// Channels on the clock of a column.
+    pub(crate) fn new(stamps: Stamps, channels: Vec<Channel>) -> Self {
+        Self { label: stamps.name.clone(), stamps, channels }
+    }
+
+    /// Takes samples out, which are given in order.
+    pub(crate) fn remove(&mut self, samples: &[usize]) {
+        if samples.is_empty() {
+            return;
+        }
+        let is_kept = |i: &usize| samples.binary_search(i).is_err();
+        let kept = (0..self.stamps.counts.len()).filter(is_kept);
+        self.stamps.rows = self.stamps.rows.of(kept);
+        let columns = self.channels.iter_mut().map(|channel| &mut channel.values);
+        for values in columns.chain([&mut self.stamps.counts]) {
+            let (mut gone, mut at) = (samples.iter().peekable(), 0);
+            values.retain(|_| {
+                at += 1;
+                gone.next_if(|i| **i == at - 1).is_none()
+            });
+        }
+    }
 }
 
 /// A track whose clock counts seconds from the recording's beginning.
@@ -38,13 +61,13 @@ struct Timed {
     channels: Vec<Channel>,
 }
 
-/// One recording of tracks, and the clock's name.
+/// One recording of tracks whose channels are called as their file calls them.
 pub(crate) fn merged(
     file: &str,
     mut tracks: Vec<Track>,
     mut notes: Vec<String>,
     options: &ReadOptions,
-) -> Result<(Recording, String), RecordingError> {
+) -> Result<Recording, RecordingError> {
     tidy_names(&mut tracks, &mut notes, options);
     for wanted in options.required() {
         find(file, &mut tracks, wanted)?;
@@ -53,54 +76,125 @@ pub(crate) fn merged(
         // Whether or not it is there.
         let _ = find(file, &mut tracks, known);
     }
-    let is_needed =
-        |c: &Channel| options.required().contains(&c.name) || KNOWN.contains(&c.name.as_str());
+    let tracks = tracks.into_iter().flat_map(|track| sparse(track, options, &mut notes));
+    let tracks = tracks.collect();
+    let recording = joined(file, tracks, notes, options)?;
+    match recording.trial.channels.is_empty() {
+        true => Err(no_channels(file, &recording.notes)),
+        false => Ok(recording),
+    }
+}
+
+fn no_channels(file: &str, notes: &[String]) -> RecordingError {
+    RecordingError::NoChannels { file: file.to_owned(), notes: notes.join("; ") }
+}
+
+/// One recording of tracks: on the clock that there is, on the fastest of several, or on an even grid.
+pub(crate) fn joined(
+    file: &str,
+    mut tracks: Vec<Track>,
+    mut notes: Vec<String>,
+    options: &ReadOptions,
+) -> Result<Recording, RecordingError> {
     // Every clock that is taken shortens what all of them cover: those that nobody asks for are not.
     if tracks.len() > 1 && !options.required().is_empty() {
         let is_asked = |c: &Channel| options.required().contains(&c.name);
         let (needed, other): (Vec<_>, Vec<_>) =
             tracks.into_iter().partition(|t| t.channels.iter().any(is_asked));
         tracks = needed;
-        let clocks: Vec<_> = other.into_iter().map(|t| t.clock).collect();
+        let clocks: Vec<_> = other.into_iter().map(|t| t.label).collect();
         note(&mut notes, "left out, nothing asked for is on these clocks", &clocks);
     }
     let mut left_out = Vec::new();
     for track in &mut tracks {
-        whole_channels(file, track, is_needed, &mut left_out)?;
+        whole_channels(file, track, options, &mut left_out, &mut notes)?;
     }
     note(&mut notes, "left out, not all of their values are finite numbers", &left_out);
-    tracks.retain(|t| !t.channels.is_empty());
     if tracks.len() > 1 {
-        tracks.retain(|t| t.counts.len() > 1);
+        tracks.retain(|t| !t.channels.is_empty() && t.stamps.counts.len() > 1);
+    }
+    for track in &mut tracks {
+        clock::read(file, track, options, &mut notes)?;
     }
     let mut timed = timed(file, tracks, &mut notes)?;
     if timed.is_empty() {
-        let hint = format!("no channel of numbers has a clock ({})", notes.join("; "));
-        return Err(RecordingError::NoTime { file: file.to_owned(), hint });
+        return Err(no_channels(file, &notes));
     }
     if timed.len() == 1
         && options.grid_hz.is_none()
-        && let Some(Timed { clock, time_s, channels, .. }) = timed.pop()
+        && let Some(Timed { time_s, channels, .. }) = timed.pop()
     {
-        let trial = Trial { name: file.to_owned(), time_s, channels };
-        return Ok((Recording { trial, notes }, clock));
+        return Ok(Recording { trial: Trial { name: file.to_owned(), time_s, channels }, notes });
     }
-    let recording = on_one_grid(file, &timed, options.grid_hz, notes)?;
-    let clock = timed[fastest(&timed)].clock.clone();
-    Ok((recording, clock))
+    on_one_grid(file, &timed, options.grid_hz, notes)
 }
 
-/// A recording on an even grid of another rate.
-pub(crate) fn resampled(recording: Recording, rate_hz: f64) -> Result<Recording, RecordingError> {
-    let Recording { trial, notes } = recording;
-    let Some(own_hz) = trial.rate_hz() else { return Ok(Recording { trial, notes }) };
-    let timed = Timed {
-        clock: "the recording".to_owned(),
-        time_s: trial.time_s,
-        rate_hz: own_hz,
-        channels: trial.channels,
+/// Whether a column is asked for or, if none is, known by its name.
+pub(crate) fn is_needed(name: &str, options: &ReadOptions) -> bool {
+    let asked = options.required();
+    asked.iter().any(|asked| asked == name) || (asked.is_empty() && KNOWN.contains(&name))
+}
+
+/// Gives columns of a sparse table, in which each row has the values of one clock and blanks for the others, clocks of their own rows.
+///
+/// Such a column has many blanks between its first and its last value, and nearly all of its blank rows have a value in another column.
+/// One that is not asked for is taken only if no column is whole.
+pub(crate) fn sparse(
+    mut track: Track,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Vec<Track> {
+    let samples = track.stamps.counts.len();
+    if track.channels.iter().all(|c| c.values.iter().all(|x| x.is_finite())) {
+        return vec![track];
+    }
+    let filled: Vec<usize> = (0..samples)
+        .map(|i| track.channels.iter().filter(|c| c.values[i].is_finite()).count())
+        .collect();
+    let blank = |c: &Channel| c.values.iter().filter(|x| !x.is_finite()).count();
+    let is_whole = |c: &Channel| BadRows::are_few(blank(c), samples);
+    let any_whole = track.channels.iter().any(is_whole);
+    let is_sparse = |c: &Channel| {
+        let lone = c.values.iter().zip(&filled).filter(|(x, n)| !x.is_finite() && **n == 0).count();
+        let is_taken = !any_whole || is_needed(&c.name, options);
+        is_taken && has_blanks_between(&c.values) && BadRows::are_few(lone, blank(c))
     };
-    on_one_grid(&trial.name, &[timed], Some(rate_hz), notes)
+    let (own, others): (Vec<_>, Vec<_>) = track.channels.into_iter().partition(is_sparse);
+    let mut tracks: Vec<(Vec<usize>, Track)> = Vec::new();
+    let mut names = Vec::new();
+    for channel in own {
+        names.push(format!("{} ({} of {samples})", channel.name, samples - blank(&channel)));
+        let is_filled = |i: &usize| channel.values[*i].is_finite();
+        let rows: Vec<usize> = (0..samples).filter(is_filled).collect();
+        let values = rows.iter().map(|i| channel.values[*i]).collect();
+        let channel = Channel { values, name: channel.name };
+        if let Some((_, same)) = tracks.iter_mut().find(|(other, _)| *other == rows) {
+            same.channels.push(channel);
+            continue;
+        }
+        let stamps = Stamps {
+            counts: rows.iter().map(|i| track.stamps.counts[*i]).collect(),
+            rows: track.stamps.rows.of(rows.iter().copied()),
+            name: track.stamps.name.clone(),
+            ..track.stamps
+        };
+        let label = format!("{} of {}", stamps.name, channel.name);
+        tracks.push((rows, Track { label, stamps, channels: vec![channel] }));
+    }
+    note(notes, "columns with blanks have the clock of their own rows", &names);
+    track.channels = others;
+    let own = tracks.into_iter().map(|(_, track)| track);
+    std::iter::once(track).filter(|t| !t.channels.is_empty()).chain(own).collect()
+}
+
+/// Whether more than a few blanks are between the first and the last value: at the ends a sensor is lost.
+fn has_blanks_between(values: &[f64]) -> bool {
+    let is_value = |x: &f64| x.is_finite();
+    let ends = values.iter().position(is_value).zip(values.iter().rposition(is_value));
+    let Some((first, last)) = ends.filter(|(first, last)| first < last) else { return false };
+    let between = &values[first..=last];
+    let blank = between.iter().filter(|x| !x.is_finite()).count();
+    !BadRows::are_few(blank, between.len())
 }
 
 /// Names with units in this project's way.
@@ -136,63 +230,87 @@ fn find(file: &str, tracks: &mut [Track], wanted: &str) -> Result<(), RecordingE
     Ok(())
 }
 
-/// Leaves out channels with holes and those of a name that was there before; refuses a hole in a channel that is needed.
+/// Leaves out channels with holes and those of a name that was there before; of channels that are needed, the few rows with holes.
 fn whole_channels(
     file: &str,
     track: &mut Track,
-    is_needed: impl Fn(&Channel) -> bool,
+    options: &ReadOptions,
     left_out: &mut Vec<String>,
+    notes: &mut Vec<String>,
 ) -> Result<(), RecordingError> {
     let mut kept: Vec<Channel> = Vec::new();
+    let mut holes: Vec<usize> = Vec::new();
     for channel in std::mem::take(&mut track.channels) {
-        let hole = channel.values.iter().position(|x| !x.is_finite());
-        if let Some(hole) = hole.filter(|_| is_needed(&channel)) {
+        let of_it = || (0..channel.values.len()).filter(|i| !channel.values[*i].is_finite());
+        let is_needed = is_needed(&channel.name, options);
+        if let Some(hole) = of_it().next().filter(|_| is_needed) {
             let value = channel.values[hole].to_string();
-            let at = Place { file: file.to_owned(), row: hole as u64 + 1, column: channel.name };
-            return Err(DataError::NotFinite { at, value }.into());
+            let row = track.stamps.rows.row(hole);
+            holes.extend(of_it());
+            holes.sort_unstable();
+            holes.dedup();
+            let at = Place { file: file.to_owned(), row, column: channel.name.clone() };
+            if options.strict || !BadRows::are_few(holes.len(), channel.values.len()) {
+                return Err(DataError::NotFinite { at, value }.into());
+            }
+            let (count, name) = (of_it().count(), &channel.name);
+            notes.push(format!(
+                "{count} rows without a number in {name} are left out, the first of them row {row}"
+            ));
         }
+        let has_holes = !is_needed && of_it().next().is_some();
         let is_twice = kept.iter().any(|other| other.name == channel.name);
-        if hole.is_some() || is_twice || !can_name(&channel.name) {
+        if has_holes || is_twice || !can_name(&channel.name) {
             left_out.push(channel.name.escape_debug().to_string());
         } else {
             kept.push(channel);
         }
     }
     track.channels = kept;
+    track.remove(&holes);
     Ok(())
 }
 
-/// Clocks in seconds, from the recording's beginning where they count from 1970.
+/// Clocks in seconds, from the recording's beginning where they count from long ago or from an origin of their own.
 fn timed(
     file: &str,
     tracks: Vec<Track>,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Timed>, RecordingError> {
-    let begins = tracks.iter().filter_map(|t| Some((*t.counts.first()? / t.per_second, t)));
+    let per_second = |stamps: &Stamps| stamps.per_second.unwrap_or(1.0);
+    let begins = tracks.iter().filter_map(|t| {
+        let first = t.stamps.counts.first()?;
+        Some(((t.stamps.origin + first) / per_second(&t.stamps), *first, &t.stamps))
+    });
     let first = begins.min_by(|a, b| a.0.total_cmp(&b.0));
-    let epoch = first.filter(|(first_s, _)| first_s.abs() >= EPOCH_S);
-    if let Some((first_s, _)) = epoch {
-        notes.push(told_epoch(first_s));
-    }
-    let origin = epoch.map_or((0.0, 1.0), |(_, t)| (t.counts[0], t.per_second));
-    let mut timed = Vec::new();
-    for Track { clock, counts, per_second, channels } in tracks {
-        let from = origin.0 * (per_second / origin.1);
-        let mut time_s = counts;
+    let epoch = first.filter(|(first_s, _, s)| first_s.abs() >= EPOCH_S || s.origin != 0.0);
+    let base = epoch.map(|(first_s, first, stamps)| {
+        let are_days = per_second(stamps) == TimeUnit::Days.per_second();
+        notes.push(note_on_epoch(if are_days { 0.0 } else { first_s }));
+        (first, stamps.origin, per_second(stamps))
+    });
+    let timed = tracks.into_iter().map(|Track { label, stamps, channels }| {
+        let per_second = per_second(&stamps);
+        let from = base.map_or(0.0, |(first, origin, own)| {
+            let scale = per_second / own;
+            first * scale + (origin * scale - stamps.origin)
+        });
+        let (mut time_s, rows, column) = (stamps.counts, stamps.rows, stamps.name);
         time_s.iter_mut().for_each(|t| *t = (*t - from) / per_second);
         let place =
-            |i: usize| Place { file: file.to_owned(), row: i as u64 + 1, column: clock.clone() };
+            |i: usize| Place { file: file.to_owned(), row: rows.row(i), column: column.clone() };
         if let Some(i) = time_s.iter().position(|t| !t.is_finite()) {
             return Err(DataError::NotFinite { at: place(i), value: time_s[i].to_string() }.into());
         }
+        // Stamps that differ by less than what numbers of their size resolve are one.
         if let Some(i) = time_s.windows(2).position(|t| t[1] <= t[0]) {
             let (previous_s, time_s) = (time_s[i], time_s[i + 1]);
             return Err(DataError::TimeNotRising { at: place(i + 1), time_s, previous_s }.into());
         }
         let rate_hz = rate_of(&time_s).unwrap_or(0.0);
-        timed.push(Timed { clock, time_s, rate_hz, channels });
-    }
-    Ok(timed)
+        Ok(Timed { clock: label, time_s, rate_hz, channels })
+    });
+    timed.collect()
 }
 
 fn fastest(timed: &[Timed]) -> usize {
@@ -267,10 +385,7 @@ fn on_one_grid(
 
 fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, RecordingError> {
     let count = ((to_s - from_s) * rate_hz + 1e-6).floor();
-    if !(1e-3..=1e7).contains(&rate_hz) {
-        let (file, column) = (file.to_owned(), "grid".to_owned());
-        return Err(RecordingError::Rate { file, column, rate_hz });
-    }
+    check_range(file, "grid", rate_hz, RATES_HZ)?;
     let largest_s = from_s.abs().max(to_s.abs());
     let at = |i: u64| tidy_time(from_s + i as f64 / rate_hz, largest_s);
     // Rounding must not push the last instant beyond the last sample.

@@ -1,5 +1,7 @@
 //! Names of columns as people write them: units in brackets or in a row of their own, and what may be the time.
 
+use crate::TimeUnit;
+
 /// Names that a time column has elsewhere, the likeliest first.
 const TIMES: [&str; 35] = [
     "time_s",
@@ -39,6 +41,24 @@ const TIMES: [&str; 35] = [
     "us",
 ];
 
+/// Words of which one in a name makes it a time if no other name has one; in German at the end of a word, too.
+const TIME_WORDS: [&str; 12] = [
+    "time",
+    "timestamp",
+    "timestamps",
+    "elapsed",
+    "zeit",
+    "tiempo",
+    "temps",
+    "tempo",
+    "tijd",
+    "tid",
+    "czas",
+    "uptime",
+];
+/// The time of a table that LabVIEW writes.
+const LABVIEW_TIME: &str = "x_value";
+
 /// The unit in this project's spelling: `mm`, `n`, `m_per_s2`, `percent`; empty for a pure number, none where it is no unit.
 pub(crate) fn unit(text: &str) -> Option<String> {
     let text = text.trim();
@@ -46,10 +66,11 @@ pub(crate) fn unit(text: &str) -> Option<String> {
         return Some(String::new());
     }
     let mut parts = text.split('/');
-    let mut spelt = factor(parts.next()?)?.to_owned();
+    let spell = |part: &str| factor(part).or_else(|| word(&part.trim().to_lowercase()));
+    let mut spelt = spell(parts.next()?)?.to_owned();
     for part in parts {
         spelt.push_str("_per_");
-        spelt.push_str(factor(part)?);
+        spelt.push_str(spell(part)?);
     }
     Some(spelt)
 }
@@ -57,24 +78,24 @@ pub(crate) fn unit(text: &str) -> Option<String> {
 /// Units without a stroke. Letters keep their meaning by the whole word: mPa is not among them, MPa is.
 fn factor(text: &str) -> Option<&'static str> {
     Some(match text.trim() {
-        "s" | "sec" | "secs" | "seconds" | "S" => "s",
-        "ms" | "msec" => "ms",
-        "us" | "µs" | "μs" | "usec" => "us",
+        "s" | "S" => "s",
+        "ms" => "ms",
+        "us" | "µs" | "μs" => "us",
         "ns" => "ns",
         "min" => "min",
         "s^2" | "s²" | "s2" | "s**2" => "s2",
         "m" | "M" => "m",
         "cm" => "cm",
-        "mm" | "MM" => "mm",
+        "mm" => "mm",
         "um" | "µm" | "μm" => "um",
         "nm" => "nanom",
-        "in" | "inch" => "in",
+        "in" => "in",
         "m^2" | "m²" => "m2",
         "N" => "n",
         "kN" => "kn",
         "mN" => "mn",
         "Nm" | "N·m" | "N m" | "N*m" | "N.m" => "nm",
-        "V" | "volt" | "volts" => "v",
+        "V" => "v",
         "mV" => "mv",
         "uV" | "µV" | "μV" => "uv",
         "A" => "a",
@@ -82,14 +103,9 @@ fn factor(text: &str) -> Option<&'static str> {
         "W" => "w",
         "Pa" => "pa",
         "hPa" => "hpa",
-        "kPa" | "kpa" => "kpa",
+        "kPa" => "kpa",
         "MPa" => "mpa",
-        "bar" => "bar",
-        "mbar" => "mbar",
-        "psi" => "psi",
-        "rad" => "rad",
-        "deg" | "°" | "degree" | "degrees" => "deg",
-        "rpm" | "RPM" => "rpm",
+        "°" => "deg",
         "Hz" => "hz",
         "kHz" => "khz",
         "K" => "k",
@@ -97,18 +113,47 @@ fn factor(text: &str) -> Option<&'static str> {
         "kg" => "kg",
         "g" => "g",
         "%" => "percent",
-        "Ohm" | "ohm" | "Ω" => "ohm",
+        "Ω" => "ohm",
         "kOhm" | "kΩ" => "kohm",
         "T" => "t",
         "mT" => "mt",
-        "LSB" | "lsb" | "counts" | "count" => "counts",
-        "ticks" => "ticks",
+        _ => return None,
+    })
+}
+
+/// Units written as words, in small letters; a scope calls numbers of samples a sequence.
+fn word(text: &str) -> Option<&'static str> {
+    Some(match text {
+        "sec" | "secs" | "second" | "seconds" | "sekunden" | "segundos" | "secondes" => "s",
+        "msec" | "millis" | "millisecond" | "milliseconds" | "millisekunden" => "ms",
+        "usec" | "micros" | "microsecond" | "microseconds" => "us",
+        "nsec" | "nanos" | "nanosecond" | "nanoseconds" => "ns",
+        "mins" | "minute" | "minutes" | "minuten" => "min",
+        "hr" | "hrs" | "hour" | "hours" | "stunden" => "h",
+        "day" | "days" | "tage" | "datenum" => "d",
+        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm",
+        "inch" | "inches" => "in",
+        "newton" | "newtons" => "n",
+        "volt" | "volts" => "v",
+        "millivolt" | "millivolts" => "mv",
+        "kpa" => "kpa",
+        "bar" => "bar",
+        "mbar" => "mbar",
+        "psi" => "psi",
+        "rad" | "radian" | "radians" => "rad",
+        "deg" | "degree" | "degrees" => "deg",
+        "rpm" => "rpm",
+        "hz" | "hertz" => "hz",
+        "ohm" | "ohms" => "ohm",
+        "lsb" | "count" | "counts" => "counts",
+        "tick" | "ticks" => "ticks",
+        "sequence" => "",
         _ => return None,
     })
 }
 
 /// Small letters, digits and underscores.
-fn plain(text: &str) -> String {
+pub(crate) fn plain(text: &str) -> String {
     let mut name = String::new();
     for c in text.trim().chars() {
         if c.is_alphanumeric() {
@@ -118,6 +163,18 @@ fn plain(text: &str) -> String {
         }
     }
     name.trim_end_matches('_').to_owned()
+}
+
+/// A name in small letters with an underscore between its words: `time_us` for `TimeUS`, `t_ms` for `t (ms)`.
+pub(crate) fn words(name: &str) -> String {
+    let mut parted = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && parted.ends_with(char::is_lowercase) {
+            parted.push('_');
+        }
+        parted.push(c);
+    }
+    plain(&parted)
 }
 
 /// A column's name in this project's way: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`; any other as it is.
@@ -152,7 +209,9 @@ fn bracketed(name: &str) -> Option<(&str, String)> {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']'), ('{', '}')] {
         if let Some((base, rest)) = name.strip_suffix(close).and_then(|n| n.rsplit_once(open)) {
-            return Some((base, unit(rest)?));
+            // `q[1]` is one of several.
+            let is_index = rest.bytes().all(|byte| byte.is_ascii_digit());
+            return Some((base, unit(rest).filter(|_| !is_index || rest.is_empty())?));
         }
     }
     let (base, rest) = name.rsplit_once(", ").or_else(|| name.rsplit_once(" / "))?;
@@ -177,12 +236,23 @@ pub(crate) fn are_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
 
 /// How likely a name is that of the time, 0 first; none where it is not.
 pub(crate) fn time_rank(name: &str) -> Option<usize> {
-    let name = plain(name);
-    TIMES.iter().position(|time| *time == name)
+    let name = words(name);
+    let known = |name: &str| TIMES.iter().position(|time| *time == name);
+    let is_unit = |word: &str| TimeUnit::of(word).is_some();
+    let of_unit = || name.rsplit_once('_').filter(|(_, last)| is_unit(last)).map(|(base, _)| base);
+    // `milliseconds` is a time, `ms` and `d` alone may be anything.
+    let is_word = || name.len() > 3 && !name.contains('_') && is_unit(&name);
+    known(&name)
+        .or_else(|| known(of_unit()?).map(|rank| TIMES.len() + rank))
+        .or_else(|| (name == LABVIEW_TIME || is_word()).then_some(2 * TIMES.len()))
+}
+
+/// Whether a name has a word for the time in it.
+pub(crate) fn may_be_time(name: &str) -> bool {
+    words(name).split('_').any(|word| TIME_WORDS.contains(&word) || word.ends_with("zeit"))
 }
 
 /// What a clock called `name` is the clock of: `imu` for `imu_t`, `t_imu`, `imu/time_s`; empty for a clock that says nothing.
-#[cfg(any(test, feature = "npz", feature = "mat", feature = "hdf5"))]
 pub(crate) fn clock_of(name: &str) -> Option<String> {
     let (group, last) = name.rsplit_once(['/', '.']).unwrap_or(("", name));
     let within = |tag: &str| match (group, tag) {
@@ -209,7 +279,7 @@ pub(crate) fn clock_of(name: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{are_units, clock_of, tidy, time_rank};
+    use super::{are_units, clock_of, may_be_time, tidy, time_rank};
 
     #[test]
     fn units_come_out_of_brackets_and_rows() {
@@ -222,6 +292,16 @@ mod tests {
             ("Pos", Some("mm"), Some("pos_mm")),
             ("pos_mm", Some("[mm]"), Some("pos_mm")),
             ("ratio (-)", None, Some("ratio")),
+            ("Time (Seconds)", None, Some("time_s")),
+            ("Tiempo (segundos)", None, Some("tiempo_s")),
+            ("clock [Millis]", None, Some("clock_ms")),
+            ("t (S)", None, Some("t_s")),
+            ("Stress (MPa)", None, Some("stress_mpa")),
+            ("Pressure (mPa)", None, None),
+            ("q[1]", None, None),
+            ("Trial (2)", None, None),
+            ("CH1", Some("Volt"), Some("ch1_v")),
+            ("X", Some("Sequence"), Some("x")),
             ("pos (raw)", None, None),
             ("pos_mm", None, None),
             ("s2", Some(""), None),
@@ -252,5 +332,16 @@ mod tests {
             assert_eq!(clock_of(name).as_deref(), of, "{name}");
         }
         assert!(time_rank("Time") < time_rank("Timestamp"));
+        for name in ["TimeUS", "elapsedTime", "timestampMs", "time_h", "Days", "t_min"] {
+            assert!(time_rank(name).is_some(), "{name}");
+        }
+        assert!(time_rank("d").is_none() && time_rank("current_ms").is_none());
+        for name in ["time_seconds", "elapsed_ms", "Timestamp (us)", "X_Value", "zeit_sec"] {
+            assert!(time_rank(name).is_some(), "{name}");
+        }
+        for name in ["rel_time", "Prüfzeit (s)", "Time since start (s)", "Unit_A_Timestamp_CAL"] {
+            assert!(may_be_time(name), "{name}");
+        }
+        assert!(!may_be_time("timer_count") && !may_be_time("length_mm"));
     }
 }

@@ -1,16 +1,34 @@
 //! What a reader asks of a recording.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, de::value::StrDeserializer};
+
+use crate::names::{unit, words};
+
 /// What the numbers of a time column count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TimeUnit {
     /// Seconds.
+    #[serde(rename = "s")]
     Seconds,
     /// Thousandths of a second.
+    #[serde(rename = "ms")]
     Milliseconds,
     /// Millionths of a second.
+    #[serde(rename = "us")]
     Microseconds,
     /// Billionths of a second.
+    #[serde(rename = "ns")]
     Nanoseconds,
+    /// Minutes.
+    #[serde(rename = "min")]
+    Minutes,
+    /// Hours.
+    #[serde(rename = "h")]
+    Hours,
+    /// Days, as spreadsheets and MATLAB count them.
+    #[serde(rename = "d")]
+    Days,
 }
 
 impl TimeUnit {
@@ -21,24 +39,59 @@ impl TimeUnit {
             Self::Milliseconds => 1e3,
             Self::Microseconds => 1e6,
             Self::Nanoseconds => 1e9,
+            Self::Minutes => 1.0 / 60.0,
+            Self::Hours => 1.0 / 3600.0,
+            Self::Days => 1.0 / 86_400.0,
         }
     }
 
-    /// The unit that the last part of a column's name says; seconds where it says none.
+    /// What is counted, in a sentence.
+    pub(crate) fn plural(self) -> &'static str {
+        match self {
+            Self::Seconds => "seconds",
+            Self::Milliseconds => "milliseconds",
+            Self::Microseconds => "microseconds",
+            Self::Nanoseconds => "nanoseconds",
+            Self::Minutes => "minutes",
+            Self::Hours => "hours",
+            Self::Days => "days",
+        }
+    }
+
+    /// The unit of this abbreviation: s, ms, us, ns, min, h or d.
     ///
     /// ```
     /// use stretch_recording::TimeUnit;
-    /// assert_eq!(TimeUnit::of("t_ms"), TimeUnit::Milliseconds);
-    /// assert_eq!(TimeUnit::of("clock"), TimeUnit::Seconds);
+    /// assert_eq!(TimeUnit::abbreviated("us"), Some(TimeUnit::Microseconds));
+    /// assert_eq!(TimeUnit::abbreviated("mm"), None);
     /// ```
-    pub fn of(column: &str) -> Self {
-        match column.rsplit(['_', '.', '/']).next() {
-            Some("ms" | "millis") => Self::Milliseconds,
-            Some("us" | "micros") => Self::Microseconds,
-            Some("ns" | "nanos") => Self::Nanoseconds,
-            _ => Self::Seconds,
-        }
+    pub fn abbreviated(text: &str) -> Option<Self> {
+        Self::deserialize(StrDeserializer::<serde::de::value::Error>::new(text)).ok()
     }
+
+    /// The unit that the last word of a column's name says, in whatever case.
+    ///
+    /// ```
+    /// use stretch_recording::TimeUnit;
+    /// assert_eq!(TimeUnit::of("t_ms"), Some(TimeUnit::Milliseconds));
+    /// assert_eq!(TimeUnit::of("TimeUS"), Some(TimeUnit::Microseconds));
+    /// assert_eq!(TimeUnit::of("Time (Seconds)"), Some(TimeUnit::Seconds));
+    /// assert_eq!(TimeUnit::of("clock"), None);
+    /// ```
+    pub fn of(column: &str) -> Option<Self> {
+        let words = words(column);
+        let last = words.rsplit('_').next()?;
+        Self::abbreviated(last).or_else(|| Self::abbreviated(&unit(last)?))
+    }
+}
+
+/// Which number of a date such as 05/01/2024 is the day.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DateOrder {
+    /// 5 January.
+    DayFirst,
+    /// May 1.
+    MonthFirst,
 }
 
 /// What a reader asks of a file.
@@ -60,9 +113,12 @@ pub struct ReadOptions {
     required: Vec<String>,
     pub(crate) columns: Option<Vec<String>>,
     pub(crate) sample_rate_hz: Option<f64>,
+    pub(crate) untimed_hz: Option<f64>,
     pub(crate) grid_hz: Option<f64>,
     pub(crate) episode: Option<u32>,
     pub(crate) max_line_bytes: usize,
+    pub(crate) strict: bool,
+    pub(crate) date_order: Option<DateOrder>,
 }
 
 /// What the time is called unless somebody says otherwise.
@@ -76,9 +132,12 @@ impl Default for ReadOptions {
             required: Vec::new(),
             columns: None,
             sample_rate_hz: None,
+            untimed_hz: None,
             grid_hz: None,
             episode: None,
             max_line_bytes: 64 * 1024,
+            strict: false,
+            date_order: None,
         }
     }
 }
@@ -94,8 +153,7 @@ impl ReadOptions {
         Self::default()
     }
 
-    /// Takes the time from another column. Its name's last part is the unit: `_ms`, `_us`,
-    /// and `_ns` are divided down to seconds, anything else is seconds.
+    /// Takes the time from another column. Its unit is the last word of its name, or what its numbers show; otherwise it is seconds.
     pub fn time(mut self, column: impl Into<String>) -> Self {
         self.time = column.into();
         self
@@ -119,10 +177,29 @@ impl ReadOptions {
         self
     }
 
-    /// Says how many samples a second a recording without any time has; the time then counts from 0.
+    /// Says how many samples a second a recording has, whatever a column of time says; the time then counts from 0.
     pub fn sample_rate_hz(mut self, rate_hz: f64) -> Self {
         self.sample_rate_hz = Some(rate_hz);
         self
+    }
+
+    /// Samples a second of a recording without any time where nothing else states them; 1 makes the time the number of the row.
+    pub fn untimed_hz(mut self, rate_hz: f64) -> Self {
+        self.untimed_hz = Some(rate_hz);
+        self
+    }
+
+    /// Samples a second where they are counted, and who says so: by the options whether there is a time or not, else by what is
+    /// stated above a table without one.
+    pub(crate) fn counted(
+        &self,
+        has_time: bool,
+        stated: Option<(f64, String)>,
+    ) -> Option<(f64, String)> {
+        let given = self.sample_rate_hz.map(|rate_hz| (rate_hz, "was said".to_owned()));
+        let stated = || stated.map(|(rate_hz, by)| (rate_hz, format!("{by} above it says")));
+        let usual = || Some((self.untimed_hz?, "is usual; --time RATEhz sets another".to_owned()));
+        given.or_else(|| stated().or_else(usual).filter(|_| !has_time))
     }
 
     /// Brings a [`Recording`](crate::Recording) onto an even grid of so many samples a second.
@@ -137,18 +214,31 @@ impl ReadOptions {
         self
     }
 
+    /// Refuses a recording with a row that cannot be read, which is otherwise left out with a note.
+    pub fn strict(mut self, is_strict: bool) -> Self {
+        self.strict = is_strict;
+        self
+    }
+
+    /// Says which number of a date is the day, where no date of the first rows shows it.
+    pub fn date_order(mut self, order: DateOrder) -> Self {
+        self.date_order = Some(order);
+        self
+    }
+
+    /// The names that are asked for: of the time and of the columns.
+    pub(crate) fn asked(&self) -> Vec<&String> {
+        self.required.iter().chain([&self.time]).collect()
+    }
+
     /// The columns asked for by [`require`](Self::require), in order.
     pub fn required(&self) -> &[String] {
         &self.required
     }
 
-    /// What the numbers of a time column of this name are divided by.
+    /// Counts in a second of a time column of this name.
     pub(crate) fn divisor(&self, column: &str) -> f64 {
-        self.time_unit.unwrap_or_else(|| TimeUnit::of(column)).per_second()
-    }
-
-    /// What the time column's numbers are divided by.
-    pub(crate) fn time_divisor(&self) -> f64 {
-        self.divisor(&self.time)
+        let unit = self.time_unit.or_else(|| TimeUnit::of(column));
+        unit.unwrap_or(TimeUnit::Seconds).per_second()
     }
 }

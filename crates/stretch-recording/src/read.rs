@@ -1,4 +1,4 @@
-//! Reads a recording in whatever format it was made: text in any dialect, arrays, messages.
+//! Reads a recording: text in any dialect, arrays, Parquet.
 
 use std::{
     fs::File,
@@ -7,26 +7,30 @@ use std::{
 };
 
 use crate::{
-    ReadOptions, Recording, RecordingError, clock, grid, room::Packed, sniff, sniff::Format, text,
+    ReadOptions, Recording, RecordingError, grid,
+    room::{Packed, Unpacked},
+    sniff,
+    sniff::Format,
+    text,
 };
 
-#[cfg(feature = "gzip")]
-use crate::room::Unpacked;
+/// What standard input is called in messages.
+pub(crate) const STDIN: &str = "standard input";
 
 impl Recording {
     /// Reads a recording from a file, `-` being standard input.
     ///
-    /// The format is told by the file's first bytes, never by its name:
+    /// The format is recognised by the file's first bytes, never by its name:
     ///
     /// - A table of text: separated by commas, semicolons, tabs or runs of blanks; decimal points or, where no comma
     ///   separates, decimal commas; comment lines (`#`, `%`, `//`), lines above the header, a row of units, units in
-    ///   brackets (`Pos (mm)` becomes `pos_mm`), time in seconds, `ms`, `us`, `ns`, since 1970, or (feature `iso-time`)
-    ///   as ISO 8601; without a header line with [`ReadOptions::columns`].
-    /// - Any of these in gzip (feature `gzip`).
-    /// - NumPy's NPY and NPZ (`npz`), MATLAB's MAT of version 5 (`mat`), HDF5 and with it MAT 7.3 (`hdf5`), MCAP with
-    ///   messages in JSON, ROS 2's CDR, or protobuf (`mcap`), Parquet (`parquet`), ROS 2 bags in
-    ///   SQLite (`rosbag`). Of LeRobot's Parquet files with several
-    ///   episodes, `FILE#3` is episode 3.
+    ///   brackets (`Pos (mm)` becomes `pos_mm`), time in seconds, `ms`, `us`, `ns`, since 1970, or as ISO 8601; without
+    ///   a header line with [`ReadOptions::columns`].
+    /// - NumPy's NPY and NPZ.
+    /// - Any of these in gzip.
+    /// - Parquet (feature `parquet`). Of LeRobot's files with several episodes, `FILE#3` is episode 3.
+    ///
+    /// MCAP, ROS bags, MAT and HDF5 are refused with the command of the Python package that converts them.
     ///
     /// Channels on several clocks are brought to that of the fastest, or to [`ReadOptions::grid_hz`], within the time
     /// that all of them cover: by straight lines, the commands `inlet` and `outlet` held.
@@ -34,11 +38,11 @@ impl Recording {
     /// # Errors
     /// A file that cannot be opened or read, what its format refuses, with row and column where there are any; a column that
     /// [`ReadOptions::require`] asks for and the file lacks; a rate outside 1e-3 .. 1e7 Hz; seconds that must be milliseconds; a format
-    /// whose feature is off.
+    /// that is not read.
     pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         if path.as_os_str() == "-" {
-            return Self::from_reader(io::stdin().lock(), "standard input", options);
+            return Self::from_reader(io::stdin().lock(), STDIN, options);
         }
         if let (false, Some((path, episode))) = (path.exists(), episode(path)) {
             return Self::read(path, &options.of_episode(episode));
@@ -84,21 +88,13 @@ impl Recording {
             let problem = "it holds no episodes; leave the # and what follows out".to_owned();
             return Err(RecordingError::Format { file: name.to_owned(), format: "file", problem });
         }
-        let (mut recording, time) = match format {
-            Format::Text => text::read(reader, name, options, packed)?,
-            other => {
-                let (tracks, notes) = other.tracks(reader, name, options, packed)?;
-                grid::merged(name, tracks, notes, options)?
-            }
-        };
-        clock::check(&recording.trial, &time, options)?;
-        if let (Some(rate_hz), Format::Text) = (options.grid_hz, format) {
-            recording = grid::resampled(recording, rate_hz)?;
+        if format == Format::Text {
+            return text::read(reader, name, options, packed);
         }
-        Ok(recording)
+        let (tracks, notes) = format.tracks(reader, name, options, packed)?;
+        grid::merged(name, tracks, notes, options)
     }
 
-    #[cfg(feature = "gzip")]
     fn unpacked(
         reader: &mut dyn Read,
         name: &str,
@@ -112,12 +108,6 @@ impl Recording {
         }
         let all = &mut Cursor::new(head).chain(reader);
         Self::read_format(format, all, name, options, Some(&packed))
-    }
-
-    #[cfg(not(feature = "gzip"))]
-    fn unpacked(_: &mut dyn Read, name: &str, _: &ReadOptions) -> Result<Self, RecordingError> {
-        let file = name.to_owned();
-        Err(RecordingError::Feature { file, format: "a gzip file", feature: "gzip" })
     }
 }
 

@@ -1,23 +1,20 @@
 //! How much memory a file may take once it is read: a small file that unpacks to gigabytes is refused before they are taken.
 
-#[cfg(feature = "gzip")]
-use std::rc::Rc;
 use std::{
     cell::Cell,
     io::{self, Read},
+    rc::Rc,
 };
 
 /// Memory that any file may take, bytes.
 const ANY: u64 = 192 << 20;
 /// What a file may take beyond that, in multiples of its own size: with its bytes themselves there are four.
 const TIMES: u64 = 3;
-/// The largest file of arrays or messages, which are read whole, bytes.
+/// The largest file of arrays, which are read whole, and the most numbers of a table of text, bytes.
 const LARGEST: u64 = 4 << 30;
 /// What a packed file may always unpack to, bytes.
-#[cfg(feature = "gzip")]
 const UNPACKED: u64 = 64 << 20;
 /// Greatest length of what is unpacked in lengths of what was packed. Recordings reach 20; a kilobyte of blanks in each byte is an attack.
-#[cfg(feature = "gzip")]
 const RATIO: u64 = 100;
 /// Bytes that are read at once.
 const PIECE: u64 = 1 << 20;
@@ -36,6 +33,11 @@ impl Room {
     /// The room of a file of so many bytes.
     pub(crate) fn beside(file_bytes: u64) -> Self {
         Self { most: ANY.saturating_add(TIMES.saturating_mul(file_bytes)), taken: 0 }
+    }
+
+    /// The room of a table of text that is not packed.
+    pub(crate) fn of_text() -> Self {
+        Self { most: LARGEST, taken: 0 }
     }
 
     /// Takes room before memory is taken.
@@ -59,13 +61,11 @@ impl Room {
     }
 
     /// Takes room for what every recording has beside its channels: its time, and for its rate the steps of that.
-    #[cfg(any(feature = "npz", feature = "mat", feature = "hdf5", feature = "parquet"))]
     pub(crate) fn take_time(&mut self, rows: usize) -> Result<(), String> {
         self.take_numbers(rows.saturating_mul(2))
     }
 
     /// Unpacks a stream into memory.
-    #[cfg(any(feature = "npz", feature = "mat"))]
     pub(crate) fn unpack(&mut self, reader: impl Read) -> io::Result<Result<Vec<u8>, String>> {
         let (mut bytes, left) = (Vec::new(), self.most.saturating_sub(self.taken));
         reader.take(left + 1).read_to_end(&mut bytes)?;
@@ -75,19 +75,12 @@ impl Room {
     }
 
     /// Gives room back that is used no more.
-    #[cfg(any(
-        feature = "npz",
-        feature = "mat",
-        feature = "hdf5",
-        feature = "mcap",
-        feature = "parquet"
-    ))]
     pub(crate) fn give_back(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_sub(bytes as u64);
     }
 }
 
-/// A file of arrays or messages as a whole, and the room beside it.
+/// A file of arrays as a whole, and the memory that it may take.
 pub(crate) fn whole(
     reader: &mut dyn Read,
     packed: Option<&Packed>,
@@ -114,20 +107,17 @@ pub(crate) fn whole(
 }
 
 /// What a stream of gzip unpacks to, refused where it grows beyond any recording.
-#[cfg(feature = "gzip")]
 pub(crate) struct Unpacked<R> {
     decoder: flate2::read::MultiGzDecoder<Counted<R>>,
     given: u64,
 }
 
 /// A stream whose bytes are counted.
-#[cfg(feature = "gzip")]
 struct Counted<R> {
     reader: R,
     count: Rc<Packed>,
 }
 
-#[cfg(feature = "gzip")]
 impl<R: Read> Unpacked<R> {
     /// Unpacks a stream; the count of its packed bytes comes with it.
     pub(crate) fn new(reader: R) -> (Self, Rc<Packed>) {
@@ -137,7 +127,6 @@ impl<R: Read> Unpacked<R> {
     }
 }
 
-#[cfg(feature = "gzip")]
 impl<R: Read> Read for Counted<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let read = self.reader.read(out)?;
@@ -146,7 +135,6 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-#[cfg(feature = "gzip")]
 impl<R: Read> Read for Unpacked<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let read = self.decoder.read(out)?;

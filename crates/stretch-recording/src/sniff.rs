@@ -4,6 +4,7 @@ use std::io::Read;
 
 use crate::{
     ReadOptions, RecordingError,
+    arrays::npy,
     grid::Track,
     room::{self, Packed},
 };
@@ -18,53 +19,64 @@ pub(crate) enum Format {
     Gzip,
     Npy,
     Npz,
-    Mat,
-    Hdf5,
-    Mcap,
     Parquet,
-    Rosbag,
+    /// Read in Python, where the owners of the format keep a library: what it is, and the extra of the package.
+    Python(&'static str, &'static str),
     /// Known and not read: what it is, and what to do.
     Foreign(&'static str, &'static str),
 }
 
+/// Formats that the Python package converts.
+const PYTHON: [(&[u8], &str, &str); 5] = [
+    (b"\x89MCAP0\r\n", "an MCAP file", "ros"),
+    (b"SQLite format 3\0", "a ROS 2 bag in SQLite", "ros"),
+    (b"#ROSBAG", "a ROS 1 bag", "ros"),
+    (b"MATLAB 7.3 MAT-file", "a MAT file of version 7.3", "matlab"),
+    (HDF5, "an HDF5 file", "matlab"),
+];
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+
 /// Formats that are known to be none of those that are read.
-const FOREIGN: [(&[u8], &str, &str); 6] = [
-    (b"#ROSBAG", "ROS 1 bag", "convert it with `mcap convert in.bag out.mcap`"),
+const FOREIGN: [(&[u8], &str, &str); 5] = [
     (b"ARROW1", "Arrow", "write it as Parquet"),
     (b"\x28\xb5\x2f\xfd", "zstd", "unpack it with unzstd, or pack it with gzip"),
     (b"BZh", "bzip2", "unpack it with bunzip2, or pack it with gzip"),
     (b"\xfd7zXZ\0", "xz", "unpack it with unxz, or pack it with gzip"),
-    (b"\xd0\xcf\x11\xe0", "Excel", "save the sheet as CSV"),
+    (b"\xd0\xcf\x11\xe0", "Excel", EXCEL),
 ];
+/// What to do with a workbook of either kind.
+pub(crate) const EXCEL: &str = "save the sheet as CSV";
 
 impl Format {
     /// The format of a file that begins so.
     pub(crate) fn of(head: &[u8]) -> Self {
-        let is_hdf5 =
-            |at: usize| head.get(at..).is_some_and(|h| h.starts_with(b"\x89HDF\r\n\x1a\n"));
-        let foreign = FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic));
+        let find = |known: &[(&[u8], &'static str, &'static str)]| {
+            let found = known.iter().find(|(magic, ..)| head.starts_with(magic));
+            found.map(|(_, what, more)| (*what, *more))
+        };
         match head {
             [0x1f, 0x8b, ..] => Self::Gzip,
             _ if head.starts_with(b"\x93NUMPY") => Self::Npy,
             _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => Self::Npz,
-            _ if is_hdf5(0) || is_hdf5(512) => Self::Hdf5,
-            _ if head.starts_with(b"\x89MCAP0\r\n") => Self::Mcap,
             _ if head.starts_with(b"PAR1") => Self::Parquet,
-            _ if head.starts_with(b"SQLite format 3\0") => Self::Rosbag,
-            _ if is_mat(head) => Self::Mat,
+            // behind a header of 512 bytes that may say anything
+            _ if head.get(512..).is_some_and(|h| h.starts_with(HDF5)) => {
+                Self::Python("a MAT file of version 7.3", "matlab")
+            }
+            _ if is_mat(head) => Self::Python("a MAT file of version 5", "matlab"),
             _ if is_page(head) => {
                 Self::Foreign("HTML", "a server answered in place of the file; download it again")
             }
-            _ if is_json(head) => {
-                Self::Foreign("JSON", "write a row a sample as CSV, or messages as MCAP")
-            }
-            _ => foreign.map_or(Self::Text, |(_, what, todo)| Self::Foreign(what, todo)),
+            _ if is_json(head) => Self::Foreign("JSON", "write a row a sample as CSV"),
+            _ => match (find(&PYTHON), find(&FOREIGN)) {
+                (Some((what, extra)), _) => Self::Python(what, extra),
+                (None, Some((what, todo))) => Self::Foreign(what, todo),
+                (None, None) => Self::Text,
+            },
         }
     }
 
     /// Reads a recording that is no table of text: what is on each clock, and notes.
-    // Without a feature its format needs none of the arguments.
-    #[allow(unused_mut, unused_variables)]
     pub(crate) fn tracks(
         self,
         reader: &mut dyn Read,
@@ -72,55 +84,25 @@ impl Format {
         options: &ReadOptions,
         packed: Option<&Packed>,
     ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-        let off = |format, feature| -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-            Err(RecordingError::Feature { file: file.to_owned(), format, feature })
-        };
+        let refused =
+            |format, problem| RecordingError::Format { file: file.to_owned(), format, problem };
         let mut whole = || {
             let read = room::whole(reader, packed);
             let read = read.map_err(|e| RecordingError::io(file, "read it", e))?;
-            read.map_err(|problem| RecordingError::Format {
-                file: file.to_owned(),
-                format: "file",
-                problem,
-            })
+            read.map_err(|problem| refused("file", problem))
         };
         match self {
-            #[cfg(feature = "npz")]
-            Self::Npy => crate::arrays::npy::read(whole()?, file, options),
-            #[cfg(feature = "npz")]
-            Self::Npz => crate::arrays::npy::read_archive(whole()?, file, options),
-            #[cfg(feature = "mat")]
-            Self::Mat => crate::arrays::mat::read(whole()?, file, options),
-            #[cfg(feature = "hdf5")]
-            Self::Hdf5 => crate::arrays::hdf5::read(whole()?, file, options),
-            #[cfg(feature = "mcap")]
-            Self::Mcap => crate::mcap::read(whole()?, file),
+            Self::Npy => npy::read(whole()?, file, options),
+            Self::Npz => npy::read_archive(whole()?, file, options),
             #[cfg(feature = "parquet")]
             Self::Parquet => crate::parquet::read(whole()?, file, options),
-            #[cfg(feature = "rosbag")]
-            Self::Rosbag => crate::rosbag::read(whole()?, file),
-            #[cfg(not(feature = "npz"))]
-            Self::Npy | Self::Npz => off("a NumPy file", "npz"),
-            #[cfg(not(feature = "mat"))]
-            Self::Mat => off("a MAT file", "mat"),
-            #[cfg(not(feature = "hdf5"))]
-            Self::Hdf5 => {
-                off("an HDF5 file (a MAT file of version 7.3 is one; save it with -v7)", "hdf5")
-            }
-            #[cfg(not(feature = "mcap"))]
-            Self::Mcap => off("an MCAP file", "mcap"),
             #[cfg(not(feature = "parquet"))]
-            Self::Parquet => off("a Parquet file", "parquet"),
-            #[cfg(not(feature = "rosbag"))]
-            Self::Rosbag => off("a ROS 2 bag in SQLite", "rosbag"),
+            Self::Parquet => Err(RecordingError::convert(file, "a Parquet file", "parquet")),
+            Self::Python(format, extra) => Err(RecordingError::convert(file, format, extra)),
             Self::Foreign(format, todo) => {
-                let problem = format!("recordings of this kind are not read; {todo}");
-                Err(RecordingError::Format { file: file.to_owned(), format, problem })
+                Err(refused(format, format!("recordings of this kind are not read; {todo}")))
             }
-            Self::Text | Self::Gzip => {
-                let problem = "it is none of arrays or messages".to_owned();
-                Err(RecordingError::Format { file: file.to_owned(), format: "text", problem })
-            }
+            Self::Text | Self::Gzip => Err(refused("text", "it holds no arrays".to_owned())),
         }
     }
 }

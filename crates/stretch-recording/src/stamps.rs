@@ -1,31 +1,97 @@
 //! Time stamps written as dates: ISO 8601, and a time of day alone.
 
-/// Nanoseconds that a stamp stands for: since 1970 for a date, since midnight for a time of day; none where it is no stamp.
-/// A date without a zone counts as UTC.
-#[cfg(feature = "iso-time")]
-pub(crate) fn nanoseconds(text: &str) -> Option<i128> {
-    use jiff::{Timestamp, civil::DateTime, civil::Time, tz::TimeZone};
-    if let Ok(stamp) = text.parse::<Timestamp>() {
-        return Some(stamp.as_nanosecond());
-    }
-    // A date alone is no sample's time, and the parser would take it for midnight.
-    if text.contains(':') {
-        if let Ok(civil) = text.parse::<DateTime>() {
-            return civil.to_zoned(TimeZone::UTC).ok().map(|z| z.timestamp().as_nanosecond());
-        }
-        let time = text.parse::<Time>().ok()?;
-        let seconds = i128::from(time.hour()) * 3600
-            + i128::from(time.minute()) * 60
-            + i128::from(time.second());
-        return Some(seconds * 1_000_000_000 + i128::from(time.subsec_nanosecond()));
-    }
-    None
+use std::borrow::Cow;
+
+use crate::DateOrder;
+
+/// Why a text is no time stamp.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StampFault {
+    Unknown,
+    /// Which number is the day and which the month is open.
+    DayOrMonth,
 }
 
-/// No stamp is understood: the feature `iso-time` is off.
-#[cfg(not(feature = "iso-time"))]
-pub(crate) fn nanoseconds(_text: &str) -> Option<i128> {
-    None
+/// Nanoseconds that a stamp stands for: since 1970 for a date, since midnight for a time of day.
+/// A date without a zone counts as UTC. Where a point stands between the numbers of a date, the day comes first.
+pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, StampFault> {
+    use jiff::{Timestamp, civil::DateTime, civil::Time, tz::TimeZone};
+    if let Ok(stamp) = text.parse::<Timestamp>() {
+        return Ok(stamp.as_nanosecond());
+    }
+    // A date alone is no sample's time, and the parser would take it for midnight.
+    if !text.contains(':') {
+        return Err(StampFault::Unknown);
+    }
+    let (date, time) = match text.split_once([' ', 'T']) {
+        Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
+        _ => (None, text),
+    };
+    let time = of_day(time);
+    let unknown = |_| StampFault::Unknown;
+    let Some(date) = date else {
+        let time = time.parse::<Time>().map_err(unknown)?;
+        return Ok(time.duration_since(Time::midnight()).as_nanos());
+    };
+    let (year, month, day) = numbered(date, order)?;
+    let civil = format!("{year:04}-{month:02}-{day:02}T{time}").parse::<DateTime>();
+    let zoned = civil.and_then(|civil| civil.to_zoned(TimeZone::UTC)).map_err(unknown)?;
+    Ok(zoned.timestamp().as_nanosecond())
+}
+
+/// A time of day with two digits for its hour, of 24, and a point.
+fn of_day(time: &str) -> Cow<'_, str> {
+    let half = |end: &str| {
+        let at = time.len().checked_sub(end.len())?;
+        let (head, tail) = time.split_at_checked(at)?;
+        tail.eq_ignore_ascii_case(end).then(|| head.trim_end())
+    };
+    let (time, afternoon) = match (half("am"), half("pm")) {
+        (Some(time), _) => (time, Some(0)),
+        (_, Some(time)) => (time, Some(12)),
+        _ => (time, None),
+    };
+    let Some((hour, rest)) = time.split_once(':') else { return Cow::Borrowed(time) };
+    match (hour.parse::<u32>(), afternoon) {
+        (Ok(hour @ 1..=12), Some(later)) => {
+            Cow::Owned(format!("{:02}:{}", hour % 12 + later, rest.replace(',', ".")))
+        }
+        (Ok(hour), None) => Cow::Owned(format!("{hour:02}:{}", rest.replace(',', "."))),
+        _ => Cow::Borrowed(time),
+    }
+}
+
+/// Year, month and day of a date in numbers.
+fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), StampFault> {
+    let parts: Option<Vec<u32>> = date.split(['.', '/', '-']).map(|p| p.parse().ok()).collect();
+    let Some([first, second, last]) = parts.as_deref() else { return Err(StampFault::Unknown) };
+    if *first > 31 {
+        return Ok((*first, *second, *last));
+    }
+    let year = if *last < 100 { 2000 + last } else { *last };
+    let shown = match (first, second) {
+        _ if date.contains('.') => Some(DateOrder::DayFirst),
+        (13.., _) => Some(DateOrder::DayFirst),
+        (_, 13..) => Some(DateOrder::MonthFirst),
+        (first, second) if first == second => Some(DateOrder::DayFirst),
+        _ => None,
+    };
+    match order.or(shown) {
+        Some(DateOrder::DayFirst) => Ok((year, *second, *first)),
+        Some(DateOrder::MonthFirst) => Ok((year, *first, *second)),
+        None => Err(StampFault::DayOrMonth),
+    }
+}
+
+/// The order of a date that has only one.
+pub(crate) fn order_of(text: &str) -> Option<DateOrder> {
+    let day_first = nanoseconds(text, Some(DateOrder::DayFirst));
+    let month_first = nanoseconds(text, Some(DateOrder::MonthFirst));
+    match (day_first, month_first) {
+        (Ok(_), Err(_)) => Some(DateOrder::DayFirst),
+        (Err(_), Ok(_)) => Some(DateOrder::MonthFirst),
+        _ => None,
+    }
 }
 
 /// Whether a text has the look of a date or a time of day, understood or not.
@@ -44,11 +110,10 @@ pub(crate) fn looks_like_stamp(text: &str) -> bool {
     }
 }
 
-/// A stamp in words, for a note: seconds since 1970 as a date where dates are understood.
+/// Seconds since 1970 as a date, for a note.
 pub(crate) fn date(epoch_s: f64) -> String {
-    #[cfg(feature = "iso-time")]
-    if let Ok(stamp) = jiff::Timestamp::from_millisecond((epoch_s * 1e3).round() as i64) {
-        return stamp.to_string();
+    match jiff::Timestamp::from_millisecond((epoch_s * 1e3).round() as i64) {
+        Ok(stamp) => stamp.to_string(),
+        Err(_) => format!("{epoch_s} s after the beginning of 1970"),
     }
-    format!("{epoch_s} s after the beginning of 1970")
 }

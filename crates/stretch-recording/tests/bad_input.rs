@@ -10,6 +10,14 @@ fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
     Recording::from_reader(text.as_ref(), "t.csv", &options).map(|recording| recording.trial)
 }
 
+/// Of a file in which so many of all rows are bad.
+#[track_caller]
+fn refuses(text: impl AsRef<[u8]>, message: &str, bad: usize, all: usize) {
+    let share =
+        format!("{bad} of {all} rows cannot be read, and no more than one in 5 is left out");
+    says(text, &format!("{message} ({share})"));
+}
+
 #[track_caller]
 fn says(text: impl AsRef<[u8]>, message: &str) {
     let error = read(text).expect_err("it is wrong");
@@ -32,8 +40,13 @@ fn files_that_are_not_there_or_hold_nothing() {
     );
     says(
         "0,1.5\n0.1,1.6\n",
-        "t.csv: the first line (\"0,1.5\") holds numbers and no names; put a header line above \
-         it, such as time_s,length_mm,bridge_v, or name the columns with --columns",
+        "t.csv: 2 rows of 2 numbers from line 1 on, and no names above them; name the columns with \
+         --columns, or put a header line above them, such as time_s,length_mm,bridge_v",
+    );
+    says(
+        "(1.0) can0 123#2710\n(1.1) can0 123#2711\n",
+        "t.csv: none of its first 2 lines is a row of numbers (the first is \"(1.0) can0 123#2710\"); \
+         write a line a sample, with a separator between its numbers",
     );
 }
 
@@ -44,10 +57,15 @@ fn columns() {
         "t.csv: there is no column bridge_v (did you mean brdige_v?); the columns are time_s, \
          brdige_v, s1",
     );
-    says("x,bridge_v\n0,1\n", "t.csv: there is no column time_s; the columns are x, bridge_v");
+    says(
+        "x,bridge_v\n0,1\n",
+        "t.csv: there is no column time_s; the columns are x, bridge_v; say which column is the time \
+         with --time COLUMN, or --time 100hz if there is none",
+    );
     says(
         "time_s,bridge_v,bridge_v\n0,1,1\n",
-        "t.csv: the header names column bridge_v twice; rename or remove one of them",
+        "t.csv: the header names column bridge_v twice; ask for bridge_v.0 or bridge_v.1, the first \
+         and the second of them",
     );
 }
 
@@ -62,63 +80,68 @@ fn line_ends_of_another_age() {
 
 #[test]
 fn fields() {
-    says(
-        "time_s,bridge_v\n0,1\n0.1,oops\n",
-        "t.csv, row 3, column bridge_v: \"oops\" is not a number; correct it or remove that row",
-    );
-    // A column that the format knows is held to it even where nobody requires it.
-    says(
-        "time_s,bridge_v,length_mm\n0,1,180mm\n",
-        "t.csv, row 2, column length_mm: \"180mm\" is not a number; correct it or remove that row",
+    let not_a_number =
+        "t.csv, row 3, column bridge_v: \"oops\" is not a number; correct it or remove that row";
+    refuses("time_s,bridge_v\n0,1\n0.1,oops\n", not_a_number, 1, 2);
+    // A column that the format knows is held to it where nothing is asked for.
+    let known = "time_s,bridge_v,length_mm\n0,1,180mm\n";
+    assert_eq!(read(known).expect("bridge_v").channels.len(), 1);
+    let error = Recording::from_reader(known.as_bytes(), "t.csv", &ReadOptions::new());
+    let error = error.expect_err("no length").to_string();
+    assert!(
+        error.starts_with("t.csv, row 2, column length_mm: \"180mm\" is not a number"),
+        "{error}"
     );
     for value in ["NaN", "-inf", "1e999", "\"Infinity\""] {
         let shown = value.trim_matches('"');
-        says(
+        refuses(
             format!("bridge_v,time_s\n1,0\n{value},1\n"),
             &format!(
                 "t.csv, row 3, column bridge_v: \"{shown}\" is not a finite number; correct it \
                  or remove that row"
             ),
+            1,
+            2,
         );
     }
-    says(
+    refuses(
         "time_s,bridge_v\n0,\n",
         "t.csv, row 2, column bridge_v: the field is empty; fill it in or remove that row",
+        1,
+        1,
     );
+    // Nothing says which notation is meant, however few the rows are.
     says(
         "time_s,bridge_v\n0,\"1,5\"\n",
         "t.csv, row 2, column bridge_v: \"1,5\" has a decimal comma; export the file again with \
          decimal points",
     );
-    says(
+    refuses(
         "time_s,bridge_v\n0,\"1\n",
         "t.csv, row 2, column bridge_v: the quotation marks do not pair up within the line; \
          remove or double them",
+        1,
+        1,
     );
-    says(
+    refuses(
         format!("time_s,bridge_v\n0,{}\n", "x".repeat(5000)),
         &format!(
             "t.csv, row 2, column bridge_v: \"{}...\" is not a number; correct it or remove that row",
             "x".repeat(40)
         ),
+        1,
+        1,
     );
 }
 
 #[test]
 fn bytes_that_are_no_text() {
-    says(
-        b"time_s,bridge_v\n0,1\xb0\n",
-        "t.csv, row 2, column bridge_v: \"1\\xb0\" is not UTF-8 text; save the file with the \
-         encoding UTF-8",
-    );
-    says(
-        b"time_s,bridge_v,T_\xb0C\n0,1,2\n",
-        "t.csv, row 1, column 3: \"T_\\xb0C\" is not UTF-8 text; save the file with the \
-         encoding UTF-8",
-    );
+    let degrees =
+        "t.csv, row 2, column bridge_v: \"1°\" is not a number; correct it or remove that row";
+    refuses(b"time_s,bridge_v\n0,1\xb0\n", degrees, 1, 1);
     let utf16: Vec<u8> =
         "\u{feff}time_s,bridge_v\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-    assert!(matches!(read(utf16), Err(RecordingError::NotUtf8 { .. })));
+    assert!(matches!(read(utf16), Err(RecordingError::Utf16 { .. })));
     // A control character never reaches the terminal.
     let error = read("time_s,bridge_v\n0,\u{1b}[2J\n").expect_err("no number").to_string();
     assert!(!error.contains('\u{1b}'), "{error:?}");
@@ -126,23 +149,27 @@ fn bytes_that_are_no_text() {
 
 #[test]
 fn rows_and_time() {
-    says(
-        "time_s,bridge_v\n\n0,1\n0.1\n",
-        "t.csv, row 4: there are 1 fields where the header has 2; complete or remove that row",
+    refuses(
+        "time_s,bridge_v\n0,1\n0.1\n0.2,1\n",
+        "t.csv, row 3: there are 1 fields where the header has 2; complete or remove that row",
+        1,
+        3,
     );
     says(
         "time_s,bridge_v\n0,1,7,8\n",
-        "t.csv, row 2: there are 4 fields where the header has 2; complete or remove that row",
+        "t.csv: 1 rows of 4 numbers from line 2 on, and no names for them in the line above \
+         (\"time_s,bridge_v\"), unless they have decimal commas; name the columns with --columns, or put a header line above them, such \
+         as time_s,length_mm,bridge_v",
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.25,1\n",
-        "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; time must rise from row \
-         to row: sort the rows or split the recordings",
+        "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; the rate with \
+         --sample-rate HZ replaces a column of time",
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.5,1\n",
-        "t.csv, row 3, column time_s: time stands still from 0.5 to 0.5; time must rise from row \
-         to row: sort the rows or split the recordings",
+        "t.csv, row 3, column time_s: time stands still at 0.5; the rate with --sample-rate HZ \
+         replaces a column of time",
     );
 }
 
@@ -229,7 +256,7 @@ fn a_stream_survives_its_rows() {
             "row: live, row 4: ther",
             "5 3 4",
             "row: live, row 6: the ",
-            "time: live, row 8, col",
+            "8 3.6 5",
             "time: live, row 9, col",
             "10 2 7",
         ]

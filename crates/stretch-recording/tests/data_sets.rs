@@ -2,8 +2,8 @@
 
 use std::{fs, path::Path};
 
+use stretch_data::files::write_folder;
 use stretch_data::{Channel, DataError, DataSet, Split, Trial, TrialEntry, TrialKind};
-use stretch_files::write_folder;
 use stretch_recording::{ReadOptions, Recording, RecordingError};
 
 fn names(folder: &Path) -> Vec<String> {

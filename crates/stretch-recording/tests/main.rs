@@ -1,11 +1,14 @@
 //! The tests of stretch-recording from outside, one program: linking takes longer than most of them.
 
 mod bad_input;
-mod bags;
+mod bad_rows;
+mod bare;
+mod clocks;
 mod corpus;
 mod data_sets;
 mod dialects;
 mod found;
+mod headers;
 mod memory;
 mod recordings;
 mod round_trips;

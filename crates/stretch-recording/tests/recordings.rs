@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use stretch_data::Trial;
-use stretch_recording::{ReadOptions, Recording};
+use stretch_recording::{Array, Clock, ReadOptions, Recording};
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../reference/recordings").join(name)
@@ -23,14 +23,6 @@ fn asked() -> ReadOptions {
 }
 
 /// Largest distance to the table's channel.
-#[cfg(any(
-    feature = "gzip",
-    feature = "npz",
-    feature = "mat",
-    feature = "hdf5",
-    feature = "mcap",
-    feature = "parquet"
-))]
 #[track_caller]
 fn off(trial: &Trial, channel: &str) -> f64 {
     let (own, table) = (trial.require(channel).expect("there"), plain());
@@ -39,14 +31,6 @@ fn off(trial: &Trial, channel: &str) -> f64 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-#[cfg(any(
-    feature = "gzip",
-    feature = "npz",
-    feature = "mat",
-    feature = "hdf5",
-    feature = "mcap",
-    feature = "parquet"
-))]
 #[track_caller]
 fn is_the_table(trial: &Trial) {
     let late = trial.time_s.iter().zip(plain().time_s).map(|(a, b)| (a - b).abs());
@@ -64,13 +48,11 @@ fn the_own_form_is_read_to_the_bit_and_nothing_is_said() {
 }
 
 #[test]
-#[cfg(feature = "gzip")]
 fn gzip() {
     is_the_table(&read("packed.csv.gz", &asked()).trial);
 }
 
 #[test]
-#[cfg(feature = "npz")]
 fn numpy() {
     let named = asked().columns(["time_s", "length_mm", "bridge_v"]);
     is_the_table(&read("matrix.npy", &named).trial);
@@ -84,23 +66,6 @@ fn numpy() {
     assert!(stamps.trial.time_s.iter().zip(plain().time_s).all(|(a, b)| (a - b).abs() < 5e-7));
     let error = Recording::read(path("matrix.npy"), &ReadOptions::new()).expect_err("no names");
     assert!(error.to_string().contains("--columns"), "{error}");
-}
-
-#[test]
-#[cfg(feature = "mat")]
-fn matlab() {
-    is_the_table(&read("plain.mat", &asked()).trial);
-    let Recording { trial, .. } = read("structure.mat", &ReadOptions::new().require("bridge_v"));
-    assert_eq!(off(&trial, "bridge_v"), 0.0);
-    // Written in single precision.
-    assert!(off(&trial, "length_mm") < 1e-5);
-}
-
-#[test]
-#[cfg(feature = "hdf5")]
-fn hdf5_and_matlab_7_3() {
-    is_the_table(&read("groups.h5", &asked()).trial);
-    is_the_table(&read("seven_three.mat", &asked()).trial);
 }
 
 #[test]
@@ -124,66 +89,13 @@ fn parquet() {
 }
 
 #[test]
-#[cfg(feature = "mcap")]
-fn messages_in_json() {
-    is_the_table(&read("json.mcap", &asked()).trial);
-    let Recording { trial, notes } = read("json.mcap", &asked().require("pressure_kpa"));
-    // The slower topic begins later and ends earlier: nothing is made up beyond it.
-    assert_eq!((trial.time_s[0], trial.len()), (0.05, 45));
-    for (t, p) in trial.time_s.iter().zip(trial.require("pressure_kpa").expect("asked for")) {
-        // A straight line rounded to hundredths lies between two such.
-        assert!((p - (200.0 + 100.0 * t)).abs() < 0.0051, "{p} at {t}");
-    }
-    assert!(
-        notes.contains(
-            &"brought to the clock of /gauge (100.00 Hz) by straight lines: /pressure (25.00 Hz)"
-                .into()
-        ),
-        "{notes:?}"
-    );
-    assert!(
-        notes.contains(
-            &"0.050 s at the beginning and 0.100 s at the end are left out: not every clock runs there".into()
-        ),
-        "{notes:?}"
-    );
-}
-
-#[test]
-#[cfg(feature = "mcap")]
-fn messages_of_ros() {
-    let options = ReadOptions::new().require("elbow").require("gauge.code");
-    let Recording { trial, notes } = read("ros2.mcap", &options);
-    // Both have stamps of their own, half a period apart; the recorder's were late and uneven.
-    assert!(
-        notes[0].starts_with("time is what the messages' own stamps say: /gauge, /joint_states"),
-        "{notes:?}"
-    );
-    assert_eq!(trial.len(), 59);
-    let table = plain();
-    let length = table.require("length_mm").expect("there");
-    let (elbow, code) = (
-        trial.require("elbow").expect("asked for"),
-        trial.require("gauge.code").expect("asked for"),
-    );
-    for i in 0..59 {
-        assert_eq!(code[i], -(i as f64));
-        // In the middle between two positions, by a straight line; stamps are whole nanoseconds.
-        assert!((elbow[i] - 0.5 * (length[i] + length[i + 1])).abs() < 1e-6, "{i}");
-    }
-    assert_eq!(trial.channel("gauge.axes.2").map(|v| v[7]), Some(7.0));
-    assert_eq!(trial.channel("gauge.ok").map(|v| v[0]), Some(1.0));
-    assert!(trial.channels.iter().all(|c| !c.name.contains("image")));
-}
-
-#[test]
 fn a_grid_is_chosen_and_nothing_lies_beyond_the_samples() {
     let Recording { trial, notes } = read("plain.csv", &asked().grid_hz(40.0));
     assert_eq!((trial.len(), trial.time_s[23]), (24, 0.575));
     assert_eq!(
         notes,
         [
-            "brought to a grid of 40 Hz by straight lines: the recording (100.00 Hz); nothing is filtered, so that what is faster folds down"
+            "brought to a grid of 40 Hz by straight lines: time_s (100.00 Hz); nothing is filtered, so that what is faster folds down"
         ]
     );
     let table = plain();
@@ -230,20 +142,94 @@ fn a_table_has_no_episodes() {
     assert!(refused.unwrap_err().to_string().contains("it holds no episodes"));
 }
 
+/// Numbers as the array of a name.
+fn array(name: &str, values: impl IntoIterator<Item = f64>) -> Array {
+    let values: Vec<f64> = values.into_iter().collect();
+    Array { name: name.to_owned(), shape: vec![values.len()], values }
+}
+
+fn taken(arrays: Vec<Array>) -> (Recording, Vec<Clock>) {
+    Recording::from_arrays("a", arrays, Vec::new(), &ReadOptions::new()).expect("arrays")
+}
+
 #[test]
-#[cfg(feature = "mcap")]
-fn protobuf_in_mcap() {
-    let Recording { trial, notes } = read("protobuf.mcap", &ReadOptions::new());
-    let (table, samples) = (plain(), 60);
-    let late = trial.time_s.iter().zip(&table.time_s).map(|(a, b)| (a - b).abs());
-    assert!(late.fold(0.0, f64::max) < 1e-9, "own stamps, not when it was logged");
-    assert_eq!(trial.channel("length_mm"), Some(table.require("length_mm").expect("there")));
-    let bridge_v = trial.require("bridge_v").expect("a message within");
-    let wanted = table.require("bridge_v").expect("there");
-    assert!(bridge_v.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 2e-7), "single precision");
-    assert_eq!(trial.require("rig.gauge.count").expect("zigzag")[samples - 1], -59.0);
-    assert_eq!(trial.require("rig.position.wrist").expect("by its name")[samples - 1], -59.0);
-    // what protobuf leaves out is 0
-    assert_eq!(trial.require("rig.is_moving").expect("true and false")[..2], [0.0, 1.0]);
-    assert!(notes.iter().any(|note| note.contains("own stamps")), "{notes:?}");
+fn slower_channels_are_brought_to_the_fastest_clock_and_not_beyond_their_own() {
+    let fast = || (0..60).map(|k| 0.01 * f64::from(k));
+    let slow = || (0..12).map(|k| 0.05 + 0.04 * f64::from(k));
+    let (Recording { trial, notes }, clocks) = taken(vec![
+        array("gauge.time_s", fast()),
+        array("gauge.bridge_v", fast()),
+        array("pressure.time_s", slow()),
+        array("pressure.pressure_kpa", slow().map(|t| 200.0 + 100.0 * t)),
+    ]);
+    let lengths: Vec<_> = clocks.iter().map(|clock| clock.time_s.len()).collect();
+    assert_eq!(lengths, [60, 12]);
+    assert_eq!((trial.time_s[0], trial.len()), (0.05, 45));
+    for (t, p) in trial.time_s.iter().zip(trial.require("pressure_kpa").expect("there")) {
+        assert!((p - (200.0 + 100.0 * t)).abs() < 1e-9, "{p} at {t}");
+    }
+    assert!(
+        notes.contains(
+            &"brought to the clock of gauge.time_s (100.00 Hz) by straight lines: pressure.time_s (25.00 Hz)".into()
+        ),
+        "{notes:?}"
+    );
+    assert!(
+        notes.contains(
+            &"0.050 s at the beginning and 0.100 s at the end are left out: not every clock runs there".into()
+        ),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn a_date_and_times_beside_the_time_are_no_clocks() {
+    let times = || (0..40).map(|k| 0.1 * f64::from(k));
+    let (Recording { trial, notes }, _) = taken(vec![
+        array("data.time", times()),
+        array("data.length_mm", times().map(|t| 180.0 - t)),
+        array("data.information.date", [2024.0, 2.0, 17.0]),
+        array("data.information.timestamp", [15.0, 30.0, 59.0]),
+    ]);
+    assert_eq!((trial.len(), trial.channels.len()), (40, 1));
+    assert!(notes[0].contains("data.information.date, data.information.timestamp"), "{notes:?}");
+
+    let (Recording { trial, .. }, clocks) = taken(vec![
+        array("imu.time_s", times()),
+        array("imu.timestamp", times().map(|t| 7.0 + t)),
+        array("imu.motor_t", times().map(|t| 20.0 + t)),
+        array("time", times()),
+        array("stamp", times().map(|t| 3.0 + t)),
+    ]);
+    let names: Vec<_> = trial.channels.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!((clocks.len(), names), (2, vec!["imu.timestamp", "imu.motor_t", "stamp"]));
+}
+
+#[test]
+fn what_is_read_in_python_is_refused_with_the_command() {
+    let refused = |head: &[u8], file: &str| {
+        let read = Recording::from_reader(head, file, &ReadOptions::new());
+        read.expect_err("not read").to_string()
+    };
+    assert_eq!(
+        refused(b"\x89MCAP0\r\n", "logs/run 1.mcap"),
+        "logs/run 1.mcap: this is an MCAP file, which is not read here; convert it with `python -m stretch_gap convert \
+         \"logs/run 1.mcap\" \"logs/run 1.npz\"` (pip install \"stretch-gap[ros]\")"
+    );
+    let behind_a_header = [&[b' '; 512][..], b"\x89HDF\r\n\x1a\n"].concat();
+    let told = refused(&behind_a_header, "standard input");
+    assert!(
+        told.contains("MAT file of version 7.3") && told.contains("convert FILE FILE.npz"),
+        "{told}"
+    );
+}
+
+#[test]
+#[cfg(not(feature = "parquet"))]
+fn parquet_without_its_feature_is_refused_with_the_command() {
+    let error = Recording::read(path("zstd.parquet"), &ReadOptions::new()).expect_err("not read");
+    assert!(
+        error.to_string().contains("zstd.npz` (pip install \"stretch-gap[parquet]\")"),
+        "{error}"
+    );
 }

@@ -34,20 +34,22 @@ impl<'a> BranchView<'a> {
     }
 
     fn new(calibration: &'a Calibration, fit: &'a FitReport) -> Option<Self> {
-        let Model::Surfaces { inflation, deflation } = &calibration.model else { return None };
+        let Model::Surfaces { inflation, deflation } = &calibration.spec().model else {
+            return None;
+        };
         let surface = match fit.branch? {
             Branch::Inflation => inflation,
             Branch::Deflation => deflation,
         };
         // for a fit on the rate of the reference, the common axis is the normalised rate
         let rate_scale =
-            (calibration.rate_source == RateSource::Voltage).then_some(surface.rate_range);
-        let (signal, reference) = (&calibration.signal, &calibration.reference);
+            (calibration.spec().rate_source == RateSource::Voltage).then_some(surface.rate_range);
+        let (signal, reference) = (&calibration.spec().signal, &calibration.spec().reference);
         let rate_label = match rate_scale {
             Some(_) => format!("rate of {signal}, per s"),
             None => "rate, normalised".to_owned(),
         };
-        let target_label = match calibration.target {
+        let target_label = match calibration.spec().target {
             Target::Contraction { .. } => "contraction, %".to_owned(),
             Target::Direct => reference.to_string(),
         };
@@ -58,7 +60,7 @@ impl<'a> BranchView<'a> {
             signal: 0.0..1.0,
             target: 0.0..1.0,
             labels: [rate_label, signal.to_string(), target_label],
-            falling: calibration.polarity == Polarity::Falling,
+            falling: calibration.spec().polarity == Polarity::Falling,
             calibration,
             rate_scale,
         };
@@ -69,7 +71,7 @@ impl<'a> BranchView<'a> {
             .map(|&[rate, signal, target]| {
                 [
                     view.rate_of(rate),
-                    calibration.signal_range.denormalise(signal),
+                    calibration.spec().signal_range.denormalise(signal),
                     view.shown(target),
                 ]
             })
@@ -86,13 +88,13 @@ impl<'a> BranchView<'a> {
     /// The surface at a rate and a signal in the units of the data.
     pub(crate) fn surface(&self, rate: f64, signal: f64) -> f64 {
         let rate = self.rate_scale.map_or(rate, |scale| scale.normalise(rate));
-        let signal = self.calibration.signal_range.normalise(signal);
+        let signal = self.calibration.spec().signal_range.normalise(signal);
         self.shown(self.fit.surface.eval(rate, signal))
     }
 
     /// Name of the branch.
     pub(crate) fn name(&self) -> &'static str {
-        let contraction = matches!(self.calibration.target, Target::Contraction { .. });
+        let contraction = matches!(self.calibration.spec().target, Target::Contraction { .. });
         match (self.fit.branch, contraction) {
             (Some(Branch::Deflation), true) => "Deflation",
             (Some(Branch::Deflation), false) => "Falling (deflation)",
@@ -106,8 +108,8 @@ impl<'a> BranchView<'a> {
     }
 
     fn shown(&self, normalised: f64) -> f64 {
-        let target = self.calibration.target_range.denormalise(normalised);
-        match self.calibration.target {
+        let target = self.calibration.spec().target_range.denormalise(normalised);
+        match self.calibration.spec().target {
             Target::Contraction { .. } => 100.0 * target,
             Target::Direct => target,
         }

@@ -1,21 +1,22 @@
 //! Tables of runs that were fitted one by one.
 
-use stretch_problem::{ByTrial, FittedValue, RunFit, Standing};
+use stretch_gap::{Identified, Knowledge};
+use stretch_problem::{ByTrial, RunFit};
 
 use super::{
     markup::{number, percent},
     page::Table,
 };
 
-/// Every value of every run with its 95 % interval, and whether the run tells it.
+/// Every value of every run with its 95 % interval, and whether the run determines it.
 pub fn run_table(by_trial: &ByTrial) -> Table {
-    let head = ["value", "run", "fitted", "from", "to", "unit", "told"];
+    let head = ["value", "run", "fitted", "from", "to", "unit", "determined"];
     let all: Vec<&RunFit> = std::iter::once(&by_trial.all).chain(&by_trial.runs).collect();
     let row = |fit: &RunFit, i: usize| {
         let v = &fit.values[i];
         let numbers = [v.value, v.interval[0], v.interval[1]].map(|x| number(x, 4));
-        let texts = [v.name.clone(), fit.run.clone()];
-        let behind = [v.unit.clone(), standing(v)];
+        let texts = [v.identified.name.clone(), fit.run.clone()];
+        let behind = [v.identified.unit.clone(), knowledge(&v.identified)];
         texts.into_iter().chain(numbers).chain(behind).collect::<Vec<String>>()
     };
     let values = 0..by_trial.all.values.len();
@@ -23,11 +24,13 @@ pub fn run_table(by_trial: &ByTrial) -> Table {
     Table::new("Every run by itself, with 95 % intervals", &head, rows.collect::<Vec<_>>())
 }
 
-fn standing(value: &FittedValue) -> String {
-    match value.standing {
-        Standing::Identified => "identified".to_owned(),
-        Standing::Absorbed => format!("absorbed by {}", value.absorbed_by.join(", ")),
-        Standing::Free => "free".to_owned(),
+fn knowledge(value: &Identified) -> String {
+    match value.knowledge {
+        Knowledge::Determined => "yes".to_owned(),
+        _ if !value.like.is_empty() => format!("only with {}", value.like.join(", ")),
+        Knowledge::Weakly => "weakly".to_owned(),
+        Knowledge::Not => "no".to_owned(),
+        Knowledge::Dead => "no, it does nothing".to_owned(),
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) fn method_names(
 ) -> Vec<String> {
     let name = |method: &str| {
         let found = calibrated.iter().find(|(name, _)| *name == method);
-        match found.map(|(_, c)| &c.calibration.model) {
+        match found.map(|(_, c)| &c.calibration.spec().model) {
             Some(Model::Surfaces { .. }) if !method.contains("linear") => {
                 format!("non-linear ({method})")
             }

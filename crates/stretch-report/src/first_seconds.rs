@@ -82,6 +82,9 @@ fn to_do(d: &Diagnosis) -> String {
         VerdictKind::Effect | VerdictKind::Partial => {
             "Run an experiment that tells them apart before you build on one."
         }
+        _ if d.is_faint() => {
+            "Check whether the noise is larger than stated. If it is not, something small is missing."
+        }
         VerdictKind::Parameters => "Set them, then diagnose again.",
         VerdictKind::Record => "Put the record right, then diagnose again.",
         VerdictKind::Unknown => "Look where the gap sits, below; give the catalogue what it lacks.",
@@ -155,6 +158,9 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         (VerdictKind::Unknown, _) => {
             "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
         }
+        _ if d.is_faint() => {
+            "More is left than the stated noise explains, but too little to name a cause.".to_owned()
+        }
         _ => "What is left is within the noise on trials that were not fitted.".to_owned(),
     };
     let gain = match d.verdict {
@@ -164,6 +170,12 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             "A record from which something can be learnt.".to_owned()
         }
         VerdictKind::Record => format!("{gain} Then what effects do can be seen."),
+        VerdictKind::Parameters if d.is_faint() => {
+            format!(
+                "With re-tuned parameters {} times the noise is left.",
+                number(multiple(d.gap.retuned), 4)
+            )
+        }
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
         VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
     };
@@ -206,23 +218,4 @@ pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
 
 fn unit_number(x: f64, unit: &str) -> String {
     with_unit(&number(x, 3), shown_unit(unit))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_tie_is_told_as_a_tie() {
-        let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
-        assert_eq!(to_add(&names(&["slip", "lag"]), &[]), "slip and lag");
-        assert_eq!(
-            to_add(&names(&["slip"]), &names(&["lag"])),
-            "slip or lag: these data cannot tell which"
-        );
-        assert!(
-            to_add(&names(&["slip", "sag"]), &names(&["lag"]))
-                .contains("or lag in the place of one")
-        );
-    }
 }

@@ -127,14 +127,20 @@ pub(crate) fn shown(subject: &Subject<'_>, stage: usize) -> Option<Shown> {
     let begin = begin_of(subject, segment.trial);
     let time: Vec<f64> = range.clone().map(|i| (i - begin) as f64 * dt_s).collect();
     let residual = &subject.evidence.stages[stage].residual_retuned[range.clone()];
-    let length = ((WINDOW_S / dt_s) as usize).min(residual.len());
-    let step = (length / 16).max(1);
-    let sum = |from: usize| residual[from..from + length].iter().map(|r| r * r).sum::<f64>();
-    let starts = (0..=(residual.len() - length) / step).map(|k| k * step);
-    let from = starts.max_by(|a, b| sum(*a).total_cmp(&sum(*b)))?;
-    let (start, end) = (time[from], time[(from + length).min(time.len()) - 1]);
+    let look = worst_window(residual, dt_s)?;
+    let (start, end) = (time[look.start], time[look.end - 1]);
     let name = subject.simulator.trials()[segment.trial].name.clone();
     (end > start).then_some(Shown { name, samples: range, time_s: time, window: start..end })
+}
+
+/// The eight seconds with the largest error.
+pub(crate) fn worst_window(error: &[f64], dt_s: f64) -> Option<Range<usize>> {
+    let length = ((WINDOW_S / dt_s) as usize).max(1).min(error.len());
+    let step = (length / 16).max(1);
+    let sum = |from: usize| error[from..from + length].iter().map(|r| r * r).sum::<f64>();
+    let starts = (0..=(error.len() - length) / step).map(|k| k * step);
+    let from = starts.max_by(|a, b| sum(*a).total_cmp(&sum(*b)))?;
+    Some(from..from + length)
 }
 
 fn worst_segment<'a>(subject: &'a Subject<'_>, stage: usize) -> Option<&'a stretch_gap::Segment> {

@@ -7,6 +7,6 @@ pub use crate::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
     canvas::{Canvas, Ink, STEPS},
     figure::{Area, Axes, Chart, Drawn, Figure, FigureSize, TEXT_PX, dot, plot, px, stroke, words},
-    markup::{fixed, number, percent},
+    markup::{escape, fixed, number, percent},
     page::{Page, Table},
 };

@@ -14,7 +14,6 @@ mod error_figure;
 mod estimate_figure;
 mod figure;
 mod first_seconds;
-mod foretell_page;
 mod gap_figures;
 pub mod kit;
 mod limit_table;
@@ -25,8 +24,8 @@ mod multiple;
 mod output_table;
 mod page;
 mod plain;
+mod predict_page;
 mod script;
-mod sleeve_figure;
 mod slice_figure;
 mod subject;
 mod surface_figure;
@@ -40,14 +39,13 @@ pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{
     baseline_table, candidate_numbers_table, candidate_table, stage_table, transfer_table,
 };
-pub use foretell_page::{foretell_page, foretell_table};
 pub use limit_table::limit_table;
 pub use markup::percent;
 pub use multiple::times;
 pub use output_table::output_table;
 pub use page::Table;
 pub use plain::{number, transfer_in_words};
-pub use sleeve_figure::{channels_figure, seconds_figure};
+pub use predict_page::{predict_page, predict_table};
 pub use subject::Subject;
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! Text and numbers as they stand on a page.
 
 /// Text that is safe between tags and in double quotes, and well-formed in XML.
-pub(crate) fn escape(text: &str) -> String {
+///
+/// ```
+/// assert_eq!(stretch_report::kit::escape("a < b"), "a &lt; b");
+/// ```
+pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -21,7 +21,7 @@ const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
 /// Whether an estimate depends on more than the signal and its rate.
 pub(crate) fn remembers(calibrated: &Calibrated) -> bool {
     matches!(
-        calibrated.calibration.model,
+        calibrated.calibration.spec().model,
         Model::History(_) | Model::Observer(_) | Model::Diagnosed(_)
     )
 }
@@ -36,8 +36,9 @@ struct Answer {
 impl Answer {
     fn new(calibration: &Calibration, seconds: f64, share: impl Fn(f64) -> f64) -> Option<Self> {
         let mut live = LiveReceptor::new(calibration).ok()?;
-        let (low, span) = (calibration.signal_range.min(), calibration.signal_range.span());
-        let dt_s = calibration.sample_rate_hz.period_s();
+        let (low, span) =
+            (calibration.spec().signal_range.min(), calibration.spec().signal_range.span());
+        let dt_s = calibration.spec().sample_rate_hz.period_s();
         let count = (seconds / dt_s).clamp(2.0, 200_000.0) as usize;
         let mut answer = Self { time_s: Vec::new(), signal: Vec::new(), estimate: Vec::new() };
         for n in 0..count {
@@ -114,7 +115,7 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             "This calibration needs more than the signal: it cannot be shown alone.",
         );
     };
-    let labels = [&*calibration.signal.to_string(), &labelled("estimate", unit)];
+    let labels = [&*calibration.spec().signal.to_string(), &labelled("estimate", unit)];
     let axes = Axes::new(padded(&x, 0.02), padded(&y, 0.06), labels);
     let legend = PERIODS_S.iter().zip(INKS).map(|(s, ink)| (ink, format!("up and down in {s} s")));
     Figure::new(&format!("Estimate of {name} over the signal on triangles of three speeds"))

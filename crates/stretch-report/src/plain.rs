@@ -59,21 +59,3 @@ pub fn number(x: f64) -> String {
         format!("{x:.3e}")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_calibration_that_gets_worse_is_explained() {
-        let error = |sim, sim_with_effect| TransferError { real: 1.0, sim, sim_with_effect };
-        let words = |linear, poly13| {
-            transfer_in_words(&Transfer { linear, poly13, unit: "percent_full_scale".into() })
-        };
-        assert_eq!(words(error(3.0, 1.1), error(2.0, 2.01)), None);
-        let small = words(error(1.42, 1.40), error(2.0, 2.01)).expect("neither changes");
-        assert!(small.contains("too small to matter") && small.contains("0.02 %"), "{small}");
-        let said = words(error(3.0, 1.1), error(2.0, 2.2)).expect("poly13 got worse");
-        assert!(said.contains("the non-linear calibration"), "not beside the linear one: {said}");
-    }
-}

@@ -1,5 +1,7 @@
 //! Properties of every report, for any data.
 
+use std::sync::OnceLock;
+
 use stretch_calibrate::{
     Calibrated, Candidate, Evaluation, MethodErrors, ModelKind, Options, TrialErrors, calibrate,
     evaluate,
@@ -37,6 +39,12 @@ struct Made {
 }
 
 impl Made {
+    /// Judged on one recording, which most tests need.
+    fn on_tuesday() -> &'static Self {
+        static MADE: OnceLock<Made> = OnceLock::new();
+        MADE.get_or_init(|| Self::new(&[recording("tuesday", 1.3, 3000)]))
+    }
+
     fn new(tests: &[Trial]) -> Self {
         let fit = [recording("monday", 1.1, 4000)];
         let options = Options {
@@ -133,7 +141,7 @@ fn assert_numbers(page: &str) {
 
 #[test]
 fn a_page_is_one_well_formed_file_with_every_figure() {
-    let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
+    let made = Made::on_tuesday();
     let page = made.page(&context("tuesday"));
     let all = elements(&page);
     let count = |name: &str| all.iter().filter(|e| *e == name).count();
@@ -149,7 +157,7 @@ fn a_page_is_one_well_formed_file_with_every_figure() {
 
 #[test]
 fn a_page_needs_no_network_and_runs_its_own_script_alone() {
-    let page = Made::new(&[recording("tuesday", 1.3, 3000)]).page(&context("tuesday"));
+    let page = Made::on_tuesday().page(&context("tuesday"));
     let page = without_program(&page);
     for reach in ["http:", "https:", "//", "url(", "@import", "<link", "src=", "href="] {
         assert!(!page.contains(reach), "{reach}");
@@ -162,7 +170,7 @@ fn a_page_needs_no_network_and_runs_its_own_script_alone() {
 
 #[test]
 fn inline_figures_take_their_colours_from_the_page() {
-    let page = Made::new(&[recording("tuesday", 1.3, 3000)]).page(&context("tuesday"));
+    let page = Made::on_tuesday().page(&context("tuesday"));
     let page = without_program(&page);
     let (_, body) = page.split_once("</head>").unwrap();
     assert!(body.contains("class=\"line ink-3\""));
@@ -188,7 +196,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
         let (_, rest) = page.split_once("<p class=\"verdict\">").unwrap();
         rest.split_once("</p>").unwrap().0.to_owned()
     };
-    let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
+    let made = Made::on_tuesday();
     let [raw, linear, poly13] = &made.evaluation.pooled[..] else { unreachable!() };
     assert!(poly13.rmse < linear.rmse);
     let deg = |m: &MethodErrors| format!("{}\u{a0}deg", number(m.rmse, 3));
@@ -212,7 +220,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
 
 #[test]
 fn a_picture_stands_before_the_first_table() {
-    let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
+    let made = Made::on_tuesday();
     let html = made.page(&context("tuesday"));
     let [picture, table] = ["<figure>", "<table"].map(|element| html.find(element).unwrap());
     assert!(picture < table);
@@ -285,7 +293,7 @@ fn a_large_evaluation_stays_a_small_file() {
 
 #[test]
 fn a_picture_stands_alone() {
-    let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
+    let made = Made::on_tuesday();
     let svg = readme_picture(&made.calibrated(), &made.evaluation);
     elements(&svg);
     assert_eq!(svg.matches("http").count(), 1, "the namespace alone");

@@ -1,8 +1,8 @@
-//! What can be wrong with a rig, its effects or its inputs.
+//! Errors of a rig, its effects or its inputs.
 
 use crate::nearest::suggestion;
 
-/// Why a rig, an effect or an input was refused; carries the evidence.
+/// Why a rig, an effect or an input was refused, with the offending values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimError {
@@ -33,14 +33,14 @@ pub enum SimError {
         name: String,
         /// The value that was given.
         value: f64,
-        /// Least value allowed.
+        /// Smallest allowed value.
         min: f64,
-        /// Greatest value allowed.
+        /// Largest allowed value.
         max: f64,
         /// Unit of the three.
         unit: String,
     },
-    /// A parameter that has to be given is not there.
+    /// A required parameter is missing.
     #[error("`{owner}` lacks the parameter `{name}`")]
     MissingParameter {
         /// The effect or table.
@@ -48,7 +48,7 @@ pub enum SimError {
         /// The parameter.
         name: String,
     },
-    /// A parameter that must be positive (or must not be negative) is neither.
+    /// A parameter that must be positive (or not negative) is not.
     #[error("`{owner}`: {name} = {value} must be {needs}")]
     BadParameter {
         /// The table.
@@ -81,7 +81,7 @@ pub enum SimError {
     SlackSleeve {
         /// Strain at the supply pressure.
         strain: f64,
-        /// Least strain allowed.
+        /// Smallest allowed strain.
         least: f64,
     },
     /// An opening outside 0..1, or not a number.
@@ -114,18 +114,18 @@ pub enum SimError {
         /// Delay of the grid, s.
         found: f64,
     },
-    /// A column that is needed is not there.
+    /// A required column is missing.
     #[error("the trial has no column `{name}`")]
     MissingColumn {
         /// The column.
         name: &'static str,
     },
-    /// A column asks for what cannot be done.
+    /// A column requests something impossible.
     #[error("column {name}: {problem}")]
     Column {
         /// The column.
         name: String,
-        /// What is wrong with it, and what would do.
+        /// What is wrong with it, and what would be valid.
         problem: String,
     },
     /// Slices that must have the same (or a derived) length do not.

@@ -15,7 +15,7 @@ use crate::{
 /// The nominal gauge: y = offset + gain e, e = (x - zero)/span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaugeSpec {
-    /// Reference at e = 0: its least over the fit trials.
+    /// Reference at e = 0: its minimum over the fit trials.
     pub zero: f64,
     /// Range of the reference over the fit trials.
     pub span: f64,
@@ -23,14 +23,15 @@ pub struct GaugeSpec {
     pub offset: f64,
     /// Change of the signal over the range.
     pub gain: f64,
-    /// Pressure that stands for P_ref in `pressure_crosstalk`, in the unit of the pressure given; none without one.
+    /// Reference pressure P_ref of `pressure_crosstalk`, in the unit of the given pressure; `None`
+    /// without one.
     pub pressure_scale: Option<f64>,
 }
 
-/// A gauge alone, prepared. The effects of `sensing` act on e in place of the strain, on 1 + (y - offset)/gain in
-/// place of the resistance, on (y - offset)/gain in place of the voltage; those of `reference` act on e as it is
-/// measured, and are undone before it drives the gauge. `amplifier_saturation` takes no part, nor does
-/// `pressure_crosstalk` without a pressure.
+/// A gauge alone, prepared. The effects of `sensing` act on e instead of the strain, on 1 + (y -
+/// offset)/gain instead of the resistance, and on (y - offset)/gain instead of the voltage. The
+/// effects of `reference` act on e as it is measured, and are undone before it drives the gauge.
+/// `amplifier_saturation` is not used, nor is `pressure_crosstalk` without a pressure.
 #[derive(Debug)]
 pub struct Gauge {
     spec: GaugeSpec,
@@ -63,7 +64,7 @@ impl Gauge {
         strokes.find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1)
     }
 
-    /// Where an effect is looked for in a gauge alone.
+    /// Where an effect is searched in a gauge alone.
     pub fn search(effect: &Effect, alone: &Alone) -> Search {
         let units: Vec<f64> = effect.fitted().map(Self::unit).collect();
         let mut search = Search::of(effect, &Extent::between(0.0, 1.0)).times(&units);
@@ -86,7 +87,8 @@ impl Gauge {
     /// Prepares a gauge for records sampled every `dt_s`.
     ///
     /// # Errors
-    /// A span or gain that is zero or not finite, a sample time that is not positive, an effect that cannot act here.
+    /// A span or gain that is zero or not finite, a sample time that is not positive, an effect
+    /// that cannot act here.
     pub fn new(spec: GaugeSpec, effects: &EffectSet, dt_s: f64) -> Result<Self, SimError> {
         for (name, value) in [("span of the reference", spec.span), ("gain", spec.gain.abs())] {
             if !(value.is_finite() && value > 0.0) {
@@ -118,7 +120,7 @@ impl Gauge {
         })
     }
 
-    /// What an effect may know of a gauge alone.
+    /// The surroundings of an effect in a gauge alone.
     pub fn surroundings<'a>(spec: &GaugeSpec, grid: &'a Grid) -> Surroundings<'a> {
         Surroundings::of_gauge(spec.pressure_scale, grid)
     }
@@ -128,11 +130,11 @@ impl Gauge {
         Memory::with_cells(self.sites.record.end())
     }
 
-    /// Signal y at every sample, from the measured (smoothed) reference at the same samples. The pressure may be empty
-    /// unless an effect needs it.
+    /// Signal y at every sample, from the measured (smoothed) reference at the same samples. The
+    /// pressure may be empty unless an effect needs it.
     ///
     /// # Errors
-    /// Slices of different lengths, a pressure that is needed and absent.
+    /// Slices of different lengths, or a missing pressure that an effect needs.
     pub fn run(
         &self,
         memory: &mut Memory,

@@ -6,16 +6,16 @@ use stretch_data::{Parameter, RigFile};
 
 use crate::{EffectSet, GaugeSpec, SimError, Tolerance, nearest::nearest};
 
-/// What `kind` says of a gauge alone.
+/// Value of `kind` for a gauge alone.
 const KIND: &str = "gauge";
 
-/// The one table of the file.
+/// The only table of the file.
 const TABLE: &str = "sensing";
 
-/// Parameters that must be there; `pressure_scale` may be.
+/// Required parameters; `pressure_scale` is optional.
 const REQUIRED: [&str; 4] = ["zero", "span", "offset", "gain"];
 
-/// A gauge alone as it should be: its numbers, how far offset and gain may be wrong, and its effects.
+/// The nominal gauge alone: its numbers, the tolerances of offset and gain, and its effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GaugeRig {
     /// Numbers.
@@ -29,8 +29,9 @@ pub struct GaugeRig {
 }
 
 impl GaugeRig {
-    /// The gauge that a file of `kind = "gauge"` describes. Offset and gain are exact unless they have a tolerance, as
-    /// every parameter of a rig file; a gauge has no stock values, so each must be there.
+    /// The gauge that a file of `kind = "gauge"` describes. Offset and gain are exact unless they
+    /// have a tolerance, as every parameter of a rig file. A gauge has no stock values, so every
+    /// number is required.
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -54,8 +55,8 @@ impl GaugeRig {
     /// ```
     ///
     /// # Errors
-    /// Another kind, a table, parameter or effect that is not known, a parameter
-    /// that is missing, or a span or gain that is not usable.
+    /// Another kind, an unknown table, parameter or effect, a missing parameter, or an unusable
+    /// span or gain.
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         let unknown = SimError::unknown_parameter;
         let kind = file.kind.as_deref().unwrap_or("rig");
@@ -87,7 +88,7 @@ impl GaugeRig {
         for entry in &file.effects {
             effects.insert_in(entry, crate::Gauge::unit)?;
         }
-        // whatever cannot run is refused here, not at the first trial
+        // refuse a gauge that cannot run here, not at the first trial
         crate::Gauge::new(spec, &effects, 0.01)?;
         let tolerance = |name: &str| table.get(name).map_or(Tolerance::Exact, Tolerance::of);
         Ok(Self { spec, offset: tolerance("offset"), gain: tolerance("gain"), effects })

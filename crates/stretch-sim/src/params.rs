@@ -6,7 +6,8 @@ use stretch_data::Parameter;
 
 use stretch_effects::{Grid, RigStage, Surroundings};
 
-/// How far a nominal parameter may be wrong without that being an unmodelled effect: one standard deviation.
+/// How far a nominal parameter may be wrong before the deviation counts as an unmodelled effect:
+/// one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Tolerance {
     /// Known exactly: never re-tuned.
@@ -34,7 +35,7 @@ impl Tolerance {
         }
     }
 
-    /// What a rig file says: exact where it gives no tolerance, or none above zero.
+    /// Tolerance in a rig file: exact if it is missing or not above zero.
     pub(crate) fn of(parameter: &Parameter) -> Self {
         match (parameter.tolerance_abs, parameter.tolerance) {
             (Some(sd), _) if sd > 0.0 => Self::Absolute(sd),
@@ -54,7 +55,7 @@ impl Tolerance {
     }
 }
 
-/// What is known of one nominal parameter.
+/// Description of one nominal parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterInfo {
     /// Which one.
@@ -89,7 +90,7 @@ macro_rules! parameters {
         },)*];
 
         impl Key {
-            /// How many nominal parameters there are.
+            /// Number of nominal parameters.
             pub const COUNT: usize = [$(Key::$key),*].len();
         }
     };
@@ -130,7 +131,7 @@ parameters! {
 }
 
 impl Key {
-    /// What is known of it.
+    /// Its description.
     pub fn info(self) -> &'static ParameterInfo {
         &PARAMETERS[self as usize]
     }
@@ -171,12 +172,12 @@ impl RigParams {
         &self.0
     }
 
-    /// All values, to be changed.
+    /// All values, mutable.
     pub fn values_mut(&mut self) -> &mut [f64; Key::COUNT] {
         &mut self.0
     }
 
-    /// What an effect may know of a rig with these values.
+    /// The surroundings of an effect in a rig with these values.
     pub fn surroundings<'a>(&self, grid: &'a Grid) -> Surroundings<'a> {
         let (stretch, k_max) = (1.0 + self[Key::E0], self[Key::KMax]);
         Surroundings {

@@ -4,7 +4,7 @@ use crate::{Key, Rig, SimError};
 
 /// A hand-set rig on which the paper's method gives figures like the published ones.
 ///
-/// | what the paper's figures show | what stands for it here |
+/// | what the paper's figures show | how it is modelled here |
 /// | --- | --- |
 /// | the voltage leads the length when it moves fast | `gauge_relaxation` c = 0.4, tau = 0.26 s |
 /// | inflation and deflation differ | `muscle_hysteresis` h = 0.22, s = 0.01 |
@@ -13,12 +13,14 @@ use crate::{Key, Rig, SimError};
 /// | ramps that last | valves of about 0.35e-9 m3/(s Pa) |
 /// | residual floors of 2 to 3 % | noise of 1 % of the voltage's range |
 ///
-/// Fitted as published to twelve ramps (seed 3), beside the paper's figures: linear 1.04 V + 0.16, r^2 0.964 (0.974 V + 0.176,
-/// 0.968); poly13 on inflations RMSE 2.8 % (2.85 %), on deflations 2.2 % (1.82 %). Not reproduced: by how much the two
-/// surfaces differ (0.05 of the stroke at V = 0.65, published 0.20).
+/// Models fitted to twelve ramps (seed 3) as published; the paper's figures are in parentheses:
+/// linear 1.04 V + 0.16, r^2 0.964 (0.974 V + 0.176, 0.968); poly13 on inflations RMSE 2.8 % (2.85
+/// %), on deflations 2.2 % (1.82 %). The distance between the two surfaces is not reproduced (0.05
+/// of the stroke at V = 0.65, published 0.20).
 ///
-/// It is *not* the explanation of the paper's rig. Another set, with no trim error at all, a lagging gauge (c = -0.3, tau = 2 s) and
-/// thrice the hysteresis, comes as close: on ramps the effects trade against each other.
+/// It is *not* the explanation of the paper's rig. Another set, without any trim error, with a
+/// lagging gauge (c = -0.3, tau = 2 s) and three times the hysteresis, fits as well: on ramps the
+/// effects compensate for each other.
 ///
 /// # Errors
 /// None.
@@ -35,10 +37,12 @@ pub fn paper_preset() -> Result<Rig, SimError> {
     Ok(rig)
 }
 
-/// The rig of the demonstration: that of [`paper_preset`] with effects that its own recordings tell apart.
+/// The rig of the demonstration: that of [`paper_preset`] with effects that its own recordings can
+/// distinguish.
 ///
-/// It has no cross-talk, which on ramps trades against the gauge's nonlinearity, and c = -0.06 of the latter, within the range that the catalogue
-/// gives it. So a diagnosis can be right, and a second one, of the simulator with what was named, finds nothing.
+/// It has no cross-talk, because on ramps this compensates for the gauge's nonlinearity, and it has
+/// c = -0.06 of the latter, within the catalogue's range. Therefore a diagnosis can be right, and a
+/// second one, of the simulator with the named effects, finds nothing.
 ///
 /// ```
 /// let rig = stretch_sim::demo_preset()?;

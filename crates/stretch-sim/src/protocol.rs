@@ -1,4 +1,4 @@
-//! Protocols: what the valves do, trial after trial.
+//! Protocols: commands of the valves, trial after trial.
 
 use stretch_data::{Channel, Split, Trial, TrialKind};
 
@@ -8,25 +8,26 @@ use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
 pub const RATE_HZ: f64 = 100.0;
 /// Openings of the paper's ramps.
 pub const OPENINGS: [f64; 6] = [0.0025, 0.125, 0.25, 0.5, 0.75, 1.0];
-/// Seconds between trials: the clock runs, the excitation is off, the muscle is filled or vented anew.
+/// Seconds between trials: the clock runs, the excitation is off, the muscle is filled or vented.
 pub const PAUSE_S: f64 = 15.0;
 /// Samples of rest at every trial's start, both valves shut.
 const REST: usize = 100;
 const RAMP_S: f64 = 15.0;
 const LONG_S: f64 = 60.0;
 
-/// What the valves do in one trial, and what the trial is called.
+/// Commands of the valves in one trial, and the names of the trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrialPlan {
     /// File to be written.
     pub file: String,
-    /// What is done in it.
+    /// Kind of the trial.
     pub kind: TrialKind,
-    /// The one opening that is held, when there is one.
+    /// The opening that is held, if there is only one.
     pub opening: Option<f64>,
-    /// What it may be used for.
+    /// Its use.
     pub split: Split,
-    /// Whether the chamber starts full (settled at the supply pressure); else it starts vented.
+    /// Whether the chamber starts full (settled at the supply pressure); otherwise it starts
+    /// vented.
     pub full: bool,
     /// Samples a second.
     pub rate_hz: f64,
@@ -36,15 +37,18 @@ pub struct TrialPlan {
     pub outlet: Vec<f64>,
     /// Excitation of the bridge, a share of the rig's.
     pub excitation: f64,
-    /// Length that is set from outside (clamped, or held by gauge blocks), mm, one value a sample; none where the muscle moves freely.
+    /// Length that is imposed from outside (clamped, or held by gauge blocks), mm, one value per
+    /// sample; `None` if the muscle moves freely.
     pub set_length_mm: Option<Vec<f64>>,
-    /// Share by which a shunt lowers the trim of the bridge, one value a sample; none without a shunt.
+    /// Share by which a shunt lowers the trim of the bridge, one value per sample; `None` without a
+    /// shunt.
     pub shunt: Option<Vec<f64>>,
-    /// Session time at which it begins, s; none where it follows the trial before after the usual pause.
+    /// Session time at which the trial begins, s; `None` if it follows the previous trial after the
+    /// usual pause.
     pub start_s: Option<f64>,
 }
 
-/// Columns of a trial that say what is done beside the valves' openings.
+/// Columns of a trial that describe the excitation, in addition to the valve openings.
 const EXCITATION: &str = "excitation_share";
 const SET_LENGTH: &str = "set_length_mm";
 const SHUNT: &str = "shunt_share";
@@ -148,22 +152,23 @@ impl TrialPlan {
         plans
     }
 
-    /// What a recorded (or invented) trial does, to be replayed.
+    /// The plan of a recorded (or invented) trial, for a replay.
     ///
-    /// | column | what is done with it |
+    /// | column | use |
     /// | --- | --- |
-    /// | `inlet`, `outlet` | the openings; needed |
-    /// | `excitation_share` | excitation of the bridge, a share of the rig's, the same throughout; 1 where it is missing |
-    /// | `set_length_mm` | the length is set from outside, mm |
-    /// | `shunt_share` | a shunt lowers the trim of the bridge by this share; at a set length only |
-    /// | another `set_...` or `..._share` | refused: it asks for what this rig cannot do |
-    /// | any other | passed over: it was recorded |
+    /// | `inlet`, `outlet` | the openings; required |
+    /// | `excitation_share` | excitation of the bridge, a share of the rig's, constant; 1 if it is missing |
+    /// | `set_length_mm` | the length is imposed from outside, mm |
+    /// | `shunt_share` | a shunt lowers the trim of the bridge by this share; only at an imposed length |
+    /// | another `set_...` or `..._share` | refused: this rig cannot do it |
+    /// | any other | ignored: it was recorded |
     ///
-    /// A first pressure above half of `supply_kpa` starts the replay full; without a pressure column it starts vented.
+    /// A first pressure above half of `supply_kpa` starts the replay full; without a pressure
+    /// column it starts vented.
     ///
     /// # Errors
-    /// `inlet` or `outlet` is not there, an opening outside 0..1, fewer than two samples, time that is not uniform, and
-    /// columns as above.
+    /// A missing `inlet` or `outlet`, an opening outside 0..1, fewer than two samples, time that is
+    /// not uniform, and columns as above.
     ///
     /// ```
     /// use stretch_data::{Channel, Trial};
@@ -193,7 +198,8 @@ impl TrialPlan {
         steps.sort_by(f64::total_cmp);
         let expected = steps[steps.len() / 2];
         let even = |step: f64| (step - expected).abs() <= 0.01 * expected;
-        // Times are written with a few decimals: a hundredth of a step is rounding, more is a gap.
+        // Times are written with a few decimals: up to a hundredth of a step is rounding, more is a
+        // gap.
         if let Some(i) = time.windows(2).position(|t| !even(t[1] - t[0])) {
             return Err(SimError::NotUniform {
                 sample: i + 1,
@@ -201,7 +207,8 @@ impl TrialPlan {
                 found: time[i + 1] - time[i],
             });
         }
-        // The rate of the whole, snapped to a whole number where rounding of the times explains the rest.
+        // The mean rate, rounded to a whole number if rounding of the times explains the
+        // difference.
         let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
         let rate_hz = if (rate - rate.round()).abs() < 1e-6 * rate { rate.round() } else { rate };
         let supply_kpa = 1e-3 * rig[Key::PS];
@@ -230,7 +237,7 @@ impl TrialPlan {
         })
     }
 
-    /// What it does beside the openings, as columns of a trial: those that a replay reads.
+    /// Inputs other than the valve openings, as columns of a trial. A replay reads these columns.
     pub(crate) fn more_columns(&self) -> Vec<Channel> {
         let column =
             |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
@@ -242,12 +249,13 @@ impl TrialPlan {
     }
 }
 
-/// The stream of random commands of a numbered trial of its kind; beyond 2^40 trials they come round again.
+/// The stream of random commands of a numbered trial of its kind; beyond 2^40 trials streams
+/// repeat.
 fn stream(number: usize, kind: u64) -> u64 {
     Random::PROTOCOL.wrapping_add((number as u64).wrapping_mul(2)).wrapping_add(kind)
 }
 
-/// Refuses columns of other lengths than the time.
+/// Refuses columns whose length differs from that of the time.
 fn check_lengths(trial: &Trial) -> Result<(), SimError> {
     let expected = trial.len();
     match trial.channels.iter().find(|channel| channel.values.len() != expected) {
@@ -259,7 +267,7 @@ fn check_lengths(trial: &Trial) -> Result<(), SimError> {
     }
 }
 
-/// Refuses columns that ask for what the rig cannot do.
+/// Refuses columns that request something the rig cannot do.
 fn check_columns(trial: &Trial) -> Result<(), SimError> {
     let known = [EXCITATION, SET_LENGTH, SHUNT];
     let asks = |name: &str| name.starts_with("set_") || name.ends_with("_share");
@@ -291,7 +299,7 @@ fn excitation(trial: &Trial) -> Result<f64, SimError> {
     }
 }
 
-/// Shares of a shunt, where there is one.
+/// Shares of a shunt, if there is one.
 fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
     let Some(shares) = trial.channel(SHUNT) else { return Ok(None) };
     let fail = |problem: String| Err(SimError::Column { name: SHUNT.to_owned(), problem });

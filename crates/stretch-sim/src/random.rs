@@ -58,7 +58,7 @@ mod tests {
         let n = 100_000;
         let x: Vec<f64> = (0..n).map(|_| random.gauss()).collect();
         let moment = |k: i32| x.iter().map(|x| x.powi(k)).sum::<f64>() / n as f64;
-        // Five standard errors of each moment of so many samples.
+        // Five standard errors of each moment of this many samples.
         let error = 5.0 / (n as f64).sqrt();
         assert_abs_diff_eq!(moment(1), 0.0, epsilon = error);
         assert_abs_diff_eq!(moment(2), 1.0, epsilon = error * 2f64.sqrt());

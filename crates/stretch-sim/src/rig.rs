@@ -14,7 +14,7 @@ use crate::{
     random::Random,
 };
 
-/// Least gauge strain over the stroke of a rig whose sleeve stays stretched.
+/// Smallest gauge strain over the stroke of a rig whose sleeve stays stretched.
 pub const LEAST_STRAIN: f64 = 0.004;
 /// Table of a rig file that says how a simulation was run.
 const SIMULATION: &str = "simulation";
@@ -41,10 +41,11 @@ impl Default for Rig {
     }
 }
 
-/// How a simulation was run: what a written rig file holds beside the rig.
+/// How a simulation was run. A written rig file holds this in addition to the rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunSettings {
-    /// Seed of noise and protocols, below 2^53 (it stands in the file as a number).
+    /// Seed of noise and protocols, below 2^53 because the file stores it as a floating-point
+    /// number.
     pub seed: u64,
     /// Longest step of integration, s.
     pub step_s: f64,
@@ -59,16 +60,16 @@ impl Default for RunSettings {
 }
 
 impl Rig {
-    /// The rig that a file describes: the one meaning of a rig file, for simulation and diagnosis alike.
+    /// The rig that a file describes. Simulation and diagnosis read rig files in the same way.
     ///
-    /// | the file says | value | tolerance |
+    /// | the file has | value | tolerance |
     /// | --- | --- | --- |
     /// | a value and a tolerance | the file's | the file's: a diagnosis may re-tune it |
-    /// | a value alone | the file's | exact: it stays put |
-    /// | nothing of the parameter | the stock rig's | the stock rig's |
+    /// | only a value | the file's | exact: it is not re-tuned |
+    /// | nothing for the parameter | the stock rig's | the stock rig's |
     ///
-    /// Its effects are part of the rig. The table `[simulation]`, in which a simulation says how it was run, is
-    /// [`RunSettings::from_file`]'s and is passed over here.
+    /// Its effects are part of the rig. The table `[simulation]`, in which a simulation says how it
+    /// was run, is read by [`RunSettings::from_file`] and ignored here.
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -84,8 +85,9 @@ impl Rig {
     /// ```
     ///
     /// # Errors
-    /// A table, parameter or effect that is not known, a parameter that is not positive or beyond its limits,
-    /// a sleeve that goes slack within the stroke, or a rig file of another kind (`kind = "gauge"`).
+    /// An unknown table, parameter or effect, a parameter that is not positive or beyond its
+    /// limits, a sleeve that goes slack within the stroke, or a rig file of another kind (`kind =
+    /// "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
             let kind = format!("kind = \"{kind}\"");
@@ -119,7 +121,7 @@ impl Rig {
     /// Whether every parameter is within its physical limits.
     ///
     /// # Errors
-    /// The first that is not, or [`SimError::SlackSleeve`].
+    /// The first parameter that is not, or [`SimError::SlackSleeve`].
     pub fn check(&self) -> Result<(), SimError> {
         for info in &PARAMETERS {
             let value = self.params[info.key];
@@ -159,22 +161,23 @@ impl Rig {
         Ok(())
     }
 
-    /// Gauge strain at the supply pressure, the least of the nominal stroke.
+    /// Gauge strain at the supply pressure, the smallest of the nominal stroke.
     pub fn least_strain(&self) -> f64 {
         let k = StaticLaw::new(&self.params).contraction(1e-3 * self.params[Key::PS]);
         Bridge::new(&self.params).strain(self.params[Key::L0] * (1.0 - k))
     }
 
-    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value here, never below a
-    /// hundredth of it.
+    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value,
+    /// but at least a hundredth of it.
     pub fn bounds(&self, key: Key) -> (f64, f64) {
         let value = self.params[key];
         let sd = self.tolerances[key as usize].sd(value);
         ((value - 3.0 * sd).max(0.01 * value), value + 3.0 * sd)
     }
 
-    /// Another copy of this rig as it might be built: every parameter drawn from its tolerance, a Gaussian cut at
-    /// 2.5 sd and at 0.2 of the value, redrawn until the sleeve stays stretched. None when it never does.
+    /// Another copy of this rig as it might be built: every parameter is drawn from its tolerance,
+    /// a Gaussian cut at 2.5 sd and at 0.2 of the value, and redrawn until the sleeve stays
+    /// stretched. `None` if it never does.
     pub fn draw(&self, seed: u64) -> Option<Self> {
         let mut random = Random::new(seed, Random::RIG);
         (0..1000).find_map(|_| {
@@ -215,13 +218,13 @@ impl Rig {
 }
 
 impl RunSettings {
-    /// Greatest seed that a rig file can hold.
+    /// Largest seed that a rig file can hold.
     pub const MOST_SEED: u64 = (1 << 53) - 1;
 
-    /// Those that a file holds, when it was written by a simulation.
+    /// The settings in a file that a simulation wrote.
     ///
     /// # Errors
-    /// A setting that is unknown or makes no sense.
+    /// An unknown or invalid setting.
     pub fn from_file(file: &RigFile) -> Result<Option<Self>, SimError> {
         let Some(table) = file.stages.get(SIMULATION) else { return Ok(None) };
         let mut settings = Self::default();

@@ -1,4 +1,4 @@
-//! A session: trials one after the other, with everything that lasts from one to the next.
+//! A session: trials one after the other, with all states that last from one to the next.
 
 use stretch_data::{Channel, Trial, TrialEntry};
 
@@ -9,8 +9,9 @@ use crate::{
     random::Random,
 };
 
-/// Simulates trials as they would be recorded: memories of muscle and gauge, travel, drift and the clock go on from
-/// trial to trial; in the pause before each the chamber is filled or vented through the fully open valve.
+/// Simulates trials as they would be recorded: memories of muscle and gauge, travel, drift and the
+/// clock continue from trial to trial. In the pause before each trial the chamber is filled or
+/// vented through the fully open valve.
 ///
 /// ```
 /// use stretch_sim::{Rig, RunSettings, Session, TrialPlan};
@@ -28,7 +29,7 @@ use crate::{
 pub struct Session {
     rig: Rig,
     settings: RunSettings,
-    /// Rate and excitation that the rig is prepared for, the rig, and its memory.
+    /// Rate and excitation for which the rig is prepared, the rig, and its memory.
     prepared: Option<([f64; 2], Chain, ChainMemory)>,
     /// Session time at which the last trial ended, s.
     end_s: f64,
@@ -36,17 +37,17 @@ pub struct Session {
     last_kpa: f64,
 }
 
-/// What the channels are written to: finer than any converter, coarse enough for short numbers.
+/// Resolution of the written channels: finer than any converter, coarse enough for short numbers.
 const PLACES: [f64; 3] = [1e6, 1e6, 1e7];
 
 /// The longest pause that is simulated, in samples: a day at 100 Hz, which takes half a gigabyte.
 const MOST_PAUSE: f64 = 8_640_000.0;
 
 impl Session {
-    /// A session that has not begun.
+    /// A session before its first trial.
     ///
     /// # Errors
-    /// A rig that fails its check, settings that make no sense.
+    /// A rig that fails its check, or invalid settings.
     pub fn new(rig: &Rig, settings: &RunSettings) -> Result<Self, SimError> {
         rig.check()?;
         if !(settings.step_s.is_finite() && settings.step_s > 0.0) {
@@ -65,12 +66,12 @@ impl Session {
         })
     }
 
-    /// Simulates the next trial; returns its entry for a data set and its recording: `inlet`, `outlet`,
-    /// `pressure_kpa`, `length_mm`, `bridge_v`, and what the plan does beside the openings.
+    /// Simulates the next trial. Returns its entry for a data set and its recording: `inlet`,
+    /// `outlet`, `pressure_kpa`, `length_mm`, `bridge_v`, and the plan's other inputs.
     ///
     /// # Errors
-    /// Openings outside 0..1, valves with different numbers of samples, a rate that is not positive, a start before the trial
-    /// before has ended.
+    /// Openings outside 0..1, valves with different numbers of samples, a rate that is not
+    /// positive, a start before the end of the previous trial.
     pub fn run(&mut self, plan: &TrialPlan) -> Result<(TrialEntry, Trial), SimError> {
         let openings = Openings { inlet: &plan.inlet, outlet: &plan.outlet };
         let samples = openings.check()?;
@@ -84,7 +85,8 @@ impl Session {
             None => self.prepare(wanted)?,
         };
         if found != wanted {
-            // Same effects, same memory; only the steps of time and the excitation differ.
+            // The effects are the same, so the memory fits; only the time steps and the excitation
+            // differ.
             chain = self.prepare(wanted)?.1;
         }
         let full_kpa = 1e-3 * self.rig.params[Key::PS];
@@ -140,9 +142,9 @@ impl Session {
         Ok((entry, trial))
     }
 
-    /// Session time at which a trial begins, and how long the pause before it is, s.
+    /// Session time at which a trial begins, and the length of the pause before it, s.
     fn clock(&self, plan: &TrialPlan) -> Result<(f64, f64), SimError> {
-        // Rounded to a millionth: sums of sample times would print long.
+        // Rounded to a millionth, because sums of sample times would print long.
         let rounded = |s: f64| (s * 1e6).round() / 1e6;
         let usual = if self.trials == 0 { 0.0 } else { rounded(self.end_s + PAUSE_S) };
         let start_s = plan.start_s.unwrap_or(usual);
@@ -160,7 +162,7 @@ impl Session {
         params
     }
 
-    /// For a rate and an excitation.
+    /// Prepares the rig for a rate and an excitation.
     fn prepare(&self, wanted: [f64; 2]) -> Result<([f64; 2], Chain, ChainMemory), SimError> {
         let (params, dt_s) = (self.excited(wanted[1]), 1.0 / wanted[0]);
         let chain = Chain::new(&params, &self.rig.effects, dt_s, self.settings.step_s)?;
@@ -168,7 +170,8 @@ impl Session {
         Ok((wanted, chain, memory))
     }
 
-    /// Fills or vents the chamber in the pause before a trial; before the first only when it starts full.
+    /// Fills or vents the chamber in the pause before a trial; before the first trial only if it
+    /// starts full.
     fn pause(
         &self,
         chain: &Chain,

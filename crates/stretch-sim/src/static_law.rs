@@ -2,16 +2,16 @@
 
 use crate::params::{Key, RigParams};
 
-/// Intervals to one reference pressure.
+/// Number of intervals per reference pressure.
 const DENSITY: usize = 128;
-/// Most reference pressures that the table spans.
+/// Largest number of reference pressures in the table.
 const MOST: f64 = 16.0;
 
 /// Static contraction of the muscle without force, from gauge pressure:
 /// p/P_ref = a0 (1 - exp(-a1 x)) exp(a3 x^2), k_s = k_max x, x = 0 for p <= 0.
 ///
-/// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Contraction is held
-/// beyond 1.5 times the supply's or the reference pressure.
+/// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Contraction
+/// is constant beyond 1.5 times the supply's or the reference pressure.
 #[derive(Debug, Clone)]
 pub struct StaticLaw {
     per_kpa: f64,
@@ -46,7 +46,7 @@ impl StaticLaw {
                 let change = (goal - u) / du;
                 next += change;
                 if change.abs() <= 1e-9 * (1.0 + next) {
-                    // Newton squares the error: this change was the last that shows.
+                    // Newton squares the error, so this was the last significant change.
                     rise = law(next).1;
                     break;
                 }

@@ -1,4 +1,4 @@
-//! What must hold of every effect of the catalogue.
+//! Properties of every effect of the catalogue.
 
 use stretch_sim::{
     Alone, CATALOGUE, Effect, EffectSet, Extent, Gauge, Place, Role, Scale, Search, effect_named,
@@ -15,7 +15,7 @@ fn every_effect_is_described() {
             assert!(!text.is_empty(), "{}", effect.name);
         }
         assert!(effect.parameters[0].off().is_some(), "{}: a strength comes first", effect.name);
-        // Forms may be left out at the end, and what is found in a record stands behind them.
+        // Forms may be omitted at the end; their record-dependent values come last.
         let rank = |role: Role| match role {
             Role::Strength { .. } => 0,
             Role::Shape => 1,
@@ -69,7 +69,7 @@ fn every_effect_is_looked_for_within_its_ranges() {
             check_starts(effect, &Gauge::search(effect, &alone), "in a gauge alone");
         }
     }
-    // A user's own effect that says nothing is looked for at points of its ranges.
+    // A user's effect without starts is searched at points of its ranges.
     let own = Effect { starts: None, ..*effect_named("muscle_creep").unwrap() };
     let search = Search::of(&own, &extent(&own));
     check_starts(&own, &search, "at points");

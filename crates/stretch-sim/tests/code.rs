@@ -13,7 +13,8 @@ use stretch_sim::{
     Action, CATALOGUE, Effect, Grid, Language, Operator, Quantity, RigParams, Role, Sketch, Start,
 };
 
-/// What separates two libraries of mathematics over four seconds of memory, as a share of the greatest value.
+/// Difference between two mathematics libraries over four seconds of memory, as a share of the
+/// largest value.
 const SAME: f64 = 1e-9;
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 400;
@@ -47,7 +48,7 @@ fn course() -> Vec<f64> {
     (0..SAMPLES).map(at).collect()
 }
 
-/// Inputs of the code row by row, and what our own operator makes of them.
+/// Inputs of the code row by row, and the output of our operator.
 struct Trace {
     rows: Vec<Vec<f64>>,
     expected: Vec<f64>,
@@ -198,7 +199,7 @@ fn python_program(sketch: &Sketch, name: &str) -> String {
 
 fn octave_program(sketch: &Sketch, name: &str) -> String {
     let call = arguments(sketch, "rows(i, #)");
-    // Columns count from 1 there.
+    // Columns are numbered from 1 there.
     let call = (0..sketch.inputs.len())
         .rev()
         .fold(call, |call, i| call.replace(&format!("(i, {i})"), &format!("(i, {})", i + 1)));
@@ -255,7 +256,7 @@ fn agrees(
     }
 }
 
-/// A sketch beside what the operator makes of its inputs.
+/// A sketch, and what the operator makes of its inputs.
 struct Case {
     name: &'static str,
     which: usize,
@@ -293,7 +294,7 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// A channel from -1 to 2 with another one beside it.
+/// A channel from -1 to 2, with a second channel.
 fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Trace {
     let grid = Grid::samples(DT_S).unwrap();
     let course = course();
@@ -301,7 +302,7 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
     let beside: Vec<f64> = course.iter().rev().map(|x| 1.6 * x - 0.7).collect();
     let load: Vec<f64> = course.iter().map(|x| 5.0 * x * x - 2.0).collect();
     let span = Span { strain: &beside, load: &load, ..Span::whole(&grid) };
-    // What travels begins where it is, a signal where the signal is.
+    // A travel begins at its own value, a signal at the signal's.
     let begins_beside = sketch.state.iter().any(|cell| ["e", "p"].contains(&cell.begins));
     let first = if begins_beside { beside[0] } else { x[0] };
     let expected = run(&*(kind.operator)(values, extent, &grid), &span, first, &x);

@@ -1,4 +1,5 @@
-//! What must hold whatever the numbers: physical ranges, conserved mass, limits and symmetries of the effects.
+//! Properties for all numbers: physical ranges, conserved mass, limits and symmetries of the
+//! effects.
 
 use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq, relative_eq};
 use proptest::prelude::*;
@@ -92,7 +93,7 @@ proptest! {
         let volume = effects.find("chamber_volume").is_some();
         for (p, (l, v)) in p.iter().zip(l.iter().zip(&v)) {
             prop_assert!(p.is_finite() && l.is_finite() && v.is_finite());
-            // A chamber that is squeezed by the muscle's own stretch may pass the supply.
+            // A chamber that is squeezed by the muscle's stretch may exceed the supply.
             if !volume {
                 prop_assert!(*p >= -1e-9 && *p <= supply + 1e-9, "{p} kPa");
             }
@@ -133,7 +134,7 @@ proptest! {
         let [p, _, _] = simulate(&params, &EffectSet::new(), &shut, &shut, kpa);
         // Gauge pressure is a difference of absolute ones.
         prop_assert!(p.iter().all(|x| abs_diff_eq!(*x, kpa, epsilon = 1e3 * F64_ROUNDING)));
-        // With a volume that follows the muscle, p V stays while the muscle moves on.
+        // With a volume that follows the muscle, p V is constant while the muscle moves.
         let mut set = one("chamber_volume", &[("g", g)]);
         set.insert("muscle_creep", &[("c", 0.3), ("tau", 0.5)]).unwrap();
         let mut open = shut.clone();
@@ -194,7 +195,7 @@ proptest! {
         let mut length = vec![0.0; SAMPLES];
         stage.run(&mut stage.memory(), Start::Settled, openings, 0.0, &mut out, &mut length).unwrap();
         prop_assert_eq!((&out, &length), (&p, &l));
-        // A chamber that follows the muscle has no pressure of its own.
+        // A chamber that follows the muscle has no independent pressure.
         let half = stage.run_pressure(&mut stage.memory(), Start::Settled, openings, 0.0, &mut Vec::new());
         prop_assert!(half.is_err());
     }
@@ -224,7 +225,7 @@ fn limits_of_time_constants_and_widths() {
     let (inlet, outlet) = loop_commands();
     let plain = nominal(&inlet, &outlet);
     let run = |set: &EffectSet| simulate(&RigParams::default(), set, &inlet, &outlet, 0.0);
-    // A mean that follows at once, or a width of nothing, leaves the nominal rig.
+    // A mean that follows at once, or a width of zero, leaves the nominal rig unchanged.
     for (name, values) in [
         ("muscle_creep", &[0.3, 1e-9][..]),
         ("gauge_relaxation", &[0.6, 1e-9]),
@@ -282,7 +283,7 @@ fn symmetries_and_scaling() {
         );
     }
     assert_eq!(up[1][0], 180.0);
-    // Hum is as large as asked, about the voltage without it.
+    // Hum has the requested size about the voltage without it.
     let hum = run("mains_hum", &[("a", 0.05)]);
     let size = largest(&hum[2], &plain[2]);
     assert!([0.05, 0.0].iter().any(|a| abs_diff_eq!(size, *a, epsilon = SHIFTED_V)), "{size}");
@@ -372,7 +373,8 @@ fn a_leak_beside_a_full_inlet_comes_to_rest() {
             0.0,
         );
         let end = &p[500..];
-        // A millionth of full scale: steps a hundred times too long for the smallest leak still end on the balance.
+        // A millionth of full scale: steps a hundred times too long for the smallest leak still end
+        // on the balance.
         assert!(largest(end, &vec![end[0]; end.len()]) < 1e-6 * 620.0, "{c}: {:?}", &end[..4]);
         assert!(end[0] < 620.0 && end[0] > 610.0, "{c}: {}", end[0]);
     }

@@ -9,7 +9,7 @@ use stretch_sim::{
 };
 use testkit::tolerance::{F64_ROUNDING, WHOLE_CODE};
 
-/// FNV-1a of the bits: any change of any number shows.
+/// FNV-1a of the bits, so that any change of any number is visible.
 fn fingerprint(trials: &[Trial]) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
     for trial in trials {
@@ -92,7 +92,7 @@ fn the_papers_session() {
 fn what_lasts_from_trial_to_trial() {
     let quiet = RunSettings { noise: false, ..RunSettings::default() };
     let plans = [TrialPlan::inflation(1.0), TrialPlan::deflation(1.0), TrialPlan::inflation(1.0)];
-    // The nominal rig forgets; noise aside the third trial is the first again.
+    // The nominal rig has no memory: without noise the third trial equals the first.
     let trials = simulate(&Rig::default(), &quiet, &plans);
     assert_eq!(trials[0].channels, trials[2].channels);
     for (name, values) in [
@@ -108,7 +108,7 @@ fn what_lasts_from_trial_to_trial() {
         assert!((end(&trials[0]) - end(&trials[2])).abs() > 1e-3, "{name} lasts");
         assert_eq!(trials[1].channel("pressure_kpa").unwrap()[0], 620.0);
     }
-    // Heating starts anew with the excitation.
+    // Heating starts again with the excitation.
     let mut rig = Rig::default();
     rig.effects.insert("self_heating", &[("h", 0.05)]).unwrap();
     let trials = simulate(&rig, &quiet, &plans);

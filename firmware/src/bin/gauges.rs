@@ -3,13 +3,13 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use stretch_core::{ArrayCalibration, Design, Stage};
+use stretch_core::{Design, Stage};
 use stretch_firmware::{
     gauges::{GAUGES, answer, samples},
     measure::{load, replay},
     trial,
 };
-use stretch_receptor::{ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld};
+use stretch_sleeve::{ArrayCalibration, ArrayMemory, ArrayReading, ArrayReceptor, ArrayWithheld};
 
 static RECORD: &[u8] = include_bytes!("../../data/gauges.postcard");
 

@@ -10,18 +10,12 @@ use stretch_receptor::HistoryReceptor;
 type Receptor = HistoryReceptor<f32, SgRate<f32, 11, 2>>;
 
 fn make(calibration: Calibration) -> Receptor {
-    let rate = SgRate::new(calibration.sample_rate_hz).expect("a rate that can be designed");
+    let rate = SgRate::new(calibration.spec().sample_rate_hz).expect("a rate that can be designed");
     Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }
 
 program!(
     volts, Receptor, make,
-    "hysteresis" from "hysteresis",
-    "relaxation" from "relaxation",
-    "both" from "both",
     "history" from "history",
-    "hysteresis+rest" from "hysteresis-rest",
-    "relaxation+rest" from "relaxation-rest",
-    "both+rest" from "both-rest",
     "history+rest" from "history-rest",
 );

@@ -16,7 +16,7 @@ use stretch_receptor::{
     code::{AdcCode, CodeReading, FixedCalibration, FixedReceptor},
 };
 
-/// What `stretch calibrate --fixed` writes: the calibration over this board's
+/// What `stretch export --fixed` writes: the calibration over this board's
 /// converter, in integers.
 static RECORD: &[u8] = include_bytes!("../../data/poly13-fixed.postcard");
 

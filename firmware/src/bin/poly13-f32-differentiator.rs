@@ -10,7 +10,7 @@ use stretch_receptor::StretchReceptor;
 type Receptor = StretchReceptor<f32, Differentiator<f32>>;
 
 fn make(calibration: Calibration) -> Receptor {
-    let spec = LowPassSpec { cutoff: Hertz(5.0), sample_rate: calibration.sample_rate_hz };
+    let spec = LowPassSpec { cutoff: Hertz(5.0), sample_rate: calibration.spec().sample_rate_hz };
     let rate = Differentiator::new(spec).expect("a rate that can be designed");
     Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }

@@ -29,7 +29,7 @@ impl Stage<f32> for Rate {
 type Receptor = StretchReceptor<f32, Rate>;
 
 fn make(calibration: Calibration) -> Receptor {
-    let spec = TrackerSpec { tracking_index: 0.1, sample_rate: calibration.sample_rate_hz };
+    let spec = TrackerSpec { tracking_index: 0.1, sample_rate: calibration.spec().sample_rate_hz };
     let rate = Rate(Tracker::new(spec).expect("a rate that can be designed"));
     Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }

@@ -10,8 +10,8 @@ use stretch_receptor::StretchReceptor;
 type Receptor = StretchReceptor<f32, IntegerSgRate<11, 2>>;
 
 fn make(calibration: Calibration) -> Receptor {
-    let rate =
-        IntegerSgRate::new(calibration.sample_rate_hz, 3.3).expect("a rate that can be designed");
+    let rate = IntegerSgRate::new(calibration.spec().sample_rate_hz, 3.3)
+        .expect("a rate that can be designed");
     Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }
 

@@ -10,7 +10,7 @@ use stretch_receptor::StretchReceptor;
 type Receptor = StretchReceptor<f32, SgRate<f32, 11, 2>>;
 
 fn make(calibration: Calibration) -> Receptor {
-    let rate = SgRate::new(calibration.sample_rate_hz).expect("a rate that can be designed");
+    let rate = SgRate::new(calibration.spec().sample_rate_hz).expect("a rate that can be designed");
     Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }
 

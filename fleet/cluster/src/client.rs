@@ -12,11 +12,11 @@ use std::sync::Arc;
 use crate::codec::{Marked, Release};
 
 /// A session that sends its queries to the scheduler at `url`, such as `df://10.0.0.1:50050`, with
-/// all functions registered. Paths of tables are read by the executors: they must see the lake where
-/// this machine sees it.
+/// all functions registered. Executors read the paths of tables, so they must see the lake at the
+/// same path as this machine.
 ///
 /// # Errors
-/// A URL that names no scheduler. One that does not answer is an error of the first query.
+/// A URL that names no scheduler. A scheduler that does not answer is an error of the first query.
 pub async fn connect(
     url: &str,
     config: SessionConfig,

@@ -1,8 +1,9 @@
-//! Plans that say which release of the functions they were made with.
+//! Plans that state the release of their functions.
 //!
-//! A function goes into a plan by its name alone; what answers to that name on another machine may
-//! compute something else. So the release goes with it, and who decodes a plan of another release
-//! refuses it by name: the scheduler what a client sends, an executor what the scheduler sends.
+//! A plan names a function only by its name, and another machine may compute something else under
+//! that name. Therefore the release is sent with it, and a receiver refuses a plan of another
+//! release with an error that names it: the scheduler for plans of a client, an executor for plans
+//! of the scheduler.
 
 use std::{fmt::Debug, sync::Arc};
 

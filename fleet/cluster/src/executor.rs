@@ -22,13 +22,13 @@ pub struct ExecutorOptions {
     /// The scheduler: host:port.
     #[arg(long, default_value = "127.0.0.1:50050")]
     pub scheduler: String,
-    /// Address to listen on; that under which the scheduler sees this machine where there is none.
+    /// Address to listen on; if missing, the one under which the scheduler sees this machine.
     #[arg(long)]
     pub bind_host: Option<String>,
-    /// Host under which other machines reach this one, where it is not that address.
+    /// Host under which other machines reach this one, if it is not that address.
     #[arg(long)]
     pub external_host: Option<String>,
-    /// Allow an address that other machines reach, though nobody is asked who they are.
+    /// Allow an address that other machines reach, although there is no authentication.
     #[arg(long)]
     pub insecure: bool,
     /// Port on which others fetch results; 0 is a free one.
@@ -37,14 +37,14 @@ pub struct ExecutorOptions {
     /// Tasks at once; 0 is one a core.
     #[arg(long, default_value_t = 0)]
     pub tasks: usize,
-    /// Folder for what stages hand on; a temporary one where there is none.
+    /// Folder for intermediate results of stages; a temporary one if missing.
     #[arg(long)]
     pub work_dir: Option<PathBuf>,
     /// Memory for all tasks, in megabytes, beyond which groups spill to the folder; nine tenths of
-    /// the machine where there is none.
+    /// the machine if missing.
     #[arg(long)]
     pub memory_mb: Option<u64>,
-    /// Claims another release than this program is of, to see how a cluster takes it.
+    /// Claims another release than that of this program, to test a cluster's reaction.
     #[arg(long, hide = true)]
     pub claim_release: Option<String>,
 }
@@ -52,8 +52,9 @@ pub struct ExecutorOptions {
 /// Runs an executor until it is stopped. Waits up to a minute for its scheduler.
 ///
 /// # Errors
-/// A scheduler that does not answer, a port that is taken, an address that other machines reach without
-/// [`insecure`](ExecutorOptions::insecure), one that they do not reach where the scheduler would send them.
+/// A scheduler that does not answer, a port in use, an address that other machines reach without
+/// [`insecure`](ExecutorOptions::insecure), or one that they do not reach although the scheduler
+/// would send them there.
 pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let (host, port) = options
         .scheduler
@@ -66,7 +67,7 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let seen_as = address_towards(host, scheduler_port)?;
     let listens_on = options.bind_host.as_deref().map_or(Ok(seen_as), address)?;
     guard("executor", listens_on, options.insecure)?;
-    // what others are told must be where it listens
+    // the address that others receive must be the one it listens on
     ensure!(
         options.external_host.is_some() || !listens_on.is_loopback() || seen_as.is_loopback(),
         "--bind-host {listens_on}: no other machine reaches it there, and the scheduler at {host} would send them; leave it out, \

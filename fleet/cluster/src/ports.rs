@@ -1,4 +1,4 @@
-//! Where a process of the cluster listens, chosen and told.
+//! Chooses and prints the address where a process of the cluster listens.
 
 use std::{
     fmt,
@@ -16,7 +16,7 @@ pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
     Ok(found.with_context(|| format!("{host} has no address"))?.ip())
 }
 
-/// An address as it stands before a port.
+/// An address in the form that precedes a port.
 pub(crate) fn before_port(address: IpAddr) -> String {
     match address {
         IpAddr::V4(address) => address.to_string(),
@@ -24,7 +24,7 @@ pub(crate) fn before_port(address: IpAddr) -> String {
     }
 }
 
-/// The address under which this machine is seen from another one; nothing is sent.
+/// The address under which another machine sees this one; nothing is sent.
 pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
     let to = address(host)?;
     let any: IpAddr = match to {
@@ -37,7 +37,8 @@ pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
     Ok(socket.local_addr().with_context(told)?.ip())
 }
 
-/// Refuses to listen where other machines reach this one unless that was asked for, and says loudly what it means.
+/// Refuses to listen on an address that other machines reach unless that was requested, and prints
+/// a clear warning.
 pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow::Result<()> {
     if listens_on.is_loopback() {
         return Ok(());
@@ -47,7 +48,7 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
         "a {who} on {listens_on} obeys everybody who reaches it: nothing is encrypted, nobody is asked who they are, and queries \
          read and write files as this user. Listen on 127.0.0.1, or give the cluster a network of its own and say --insecure"
     );
-    // there is nobody to tell where even this cannot be written
+    // if even this cannot be written, the error cannot be reported
     let _ = writeln!(
         io::stderr().lock(),
         "WARNING: INSECURE: this {who} on {listens_on} obeys everybody who reaches it; keep that network closed"
@@ -55,7 +56,8 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
     Ok(())
 }
 
-/// The port itself, or a free one for 0: what is announced to others must be known before it is bound.
+/// The port itself, or a free one for 0, because what is announced to others must be known before
+/// it is bound.
 pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     if port != 0 {
         return Ok(port);
@@ -65,7 +67,7 @@ pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     Ok(listener.local_addr()?.port())
 }
 
-/// Tells where it is; whoever has closed standard output does not want to know.
+/// Prints its address; a closed standard output is ignored.
 pub(crate) fn say(line: fmt::Arguments<'_>) {
     let _ = writeln!(io::stdout().lock(), "{line}");
 }

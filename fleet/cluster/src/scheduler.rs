@@ -31,7 +31,7 @@ pub struct SchedulerOptions {
     /// Seconds without a sign of life after which an executor's tasks go to others.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(2..))]
     pub executor_timeout_s: u64,
-    /// Allow an address that other machines reach, though nobody is asked who they are.
+    /// Allow an address that other machines reach, although there is no authentication.
     #[arg(long)]
     pub insecure: bool,
 }
@@ -39,7 +39,8 @@ pub struct SchedulerOptions {
 /// Runs a scheduler until it is stopped. Prints one line when it is about to listen.
 ///
 /// # Errors
-/// A port that is taken, an address that is none, one that other machines reach without [`insecure`](SchedulerOptions::insecure).
+/// A port in use, an invalid address, one that other machines reach without
+/// [`insecure`](SchedulerOptions::insecure).
 pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
     let host = address(&options.bind_host)?;
     guard("scheduler", host, options.insecure)?;
@@ -50,7 +51,7 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
         bind_host: before_port(host),
         external_host: before_port(host),
         bind_port: address.port(),
-        // executors ask for work: one that hangs is never waited for
+        // executors ask for work, so a hanging one is never waited for
         scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: timeout,
         expire_dead_executor_interval_seconds: (timeout / 2).max(1),

@@ -20,10 +20,11 @@ use datafusion::{
 use stretch_fleet_cluster::connect;
 use tempfile::TempDir;
 
-/// Seconds after which a silent executor is given up: more than one is kept waiting where others use the machine.
+/// Seconds after which a silent executor is given up: more than it may be delayed on a shared
+/// machine.
 const TIMEOUT_S: u64 = 15;
 
-/// No test takes longer, however slow the machine: what hangs is found out.
+/// No test takes longer, however slow the machine, so a hang is detected.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 const FILES: usize = 12;
@@ -194,7 +195,7 @@ async fn alone(lake: &TempDir) -> Answer {
     ask(&session, lake).await.unwrap()
 }
 
-/// Merged in another order, triangles round otherwise; nothing else differs.
+/// Triangles merged in another order have other rounding; nothing else differs.
 fn assert_same(found: &Answer, expected: &Answer) {
     assert_eq!(found.len(), expected.len());
     for ((sensor, found), (its, expected)) in found.iter().zip(expected) {
@@ -295,7 +296,8 @@ fn nobody_listens_to_other_machines_unless_that_was_asked_for() {
     assert!(line.starts_with("WARNING: INSECURE: this scheduler on 0.0.0.0 obeys"), "{line}");
 }
 
-/// An executor listens where the scheduler sees it, and says so; where nobody would find it, it does not begin.
+/// An executor listens where the scheduler sees it, and says so. If it could not be found there, it
+/// does not start.
 #[test]
 fn an_executor_listens_where_it_is_said_to_be() {
     let executor = env!("CARGO_BIN_EXE_stretch-executor");

@@ -1,15 +1,15 @@
-//! How long fits take, beside reading the columns alone.
+//! How long fits take, compared with reading the columns alone.
 //!
 //! ```sh
-//! cargo build --release --workspace --example speed
+//! cargo build --release -p stretch-fleet --example speed
 //! target/release/examples/speed rows FOLDER 20000000 100    # rows, sensors; the files stay for others to read
 //! target/release/examples/speed once FOLDER 1000000000 10000 # the same, scan and fit alone, once: for minutes of rows
 //! target/release/examples/speed groups 10000 2000           # sensors, rows of each, in turn
 //! target/release/examples/speed states FOLDER 10000 365     # sensors, states of each
 //! ```
 //!
-//! Each line is a query: threads, seconds (the shortest of seven), nanoseconds a row by the clock and computed by all threads,
-//! and the most memory that the process had until then.
+//! Each line is a query: threads, seconds (the shortest of seven), nanoseconds per row by the clock
+//! and summed over all threads, and the peak memory of the process so far.
 
 use std::{fs, path::Path, sync::Arc, time::Instant};
 
@@ -24,7 +24,7 @@ use datafusion::{
     prelude::{ParquetReadOptions, SessionConfig, SessionContext},
 };
 use stretch_core::Degree;
-use stretch_fit::SurfaceAccumulator;
+use stretch_fit::{Sample, SurfaceAccumulator};
 
 /// Rows of a file.
 const FILE: usize = 1 << 20;
@@ -68,7 +68,7 @@ fn schema() -> SchemaRef {
     ]))
 }
 
-/// Rate, signal and reference of a gauge, and noise in all digits as measured numbers have it.
+/// Rate, signal and reference of a gauge, with noise in all digits as in measured numbers.
 fn row(k: usize) -> [f64; 3] {
     let noise = |salt: u64| {
         let mixed = (k as u64 ^ salt).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -98,7 +98,7 @@ fn session(threads: usize) -> SessionContext {
     session
 }
 
-/// Seconds that all threads of this process have computed: on a machine with other work, what counts.
+/// CPU seconds of all threads of this process, which are what counts on a shared machine.
 fn computed_s() -> f64 {
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields = stat.rsplit(") ").next().unwrap_or_default().split_whitespace();
@@ -106,14 +106,15 @@ fn computed_s() -> f64 {
     fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
-/// The most memory that this process has had, in megabytes.
+/// Peak memory of this process, in megabytes.
 fn most_memory_mb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok()).unwrap_or(0) / 1024
 }
 
-/// Asks queries in turn, so that what else the machine does meets all of them alike, and tells the shortest of each.
+/// Runs queries in turn, so that other load on the machine affects all of them alike, and reports
+/// the shortest time of each.
 async fn timed(
     session: &SessionContext,
     (threads, rows, times): (usize, usize, usize),
@@ -140,17 +141,19 @@ async fn timed(
     Ok(())
 }
 
-/// The fit in one thread over numbers in memory: what an aggregate can at best be.
+/// The fit in one thread over numbers in memory: the best that an aggregate can achieve.
 fn plain(rows: usize) {
     let numbers: Vec<[f64; 3]> = (0..rows.min(FILE)).map(row).collect();
     let mut shortest = f64::INFINITY;
     for _ in 0..TIMES {
         let begin = Instant::now();
-        let mut sides = [(); 2]
-            .map(|()| SurfaceAccumulator::<f64, 7, 128>::new(Degree::POLY13).expect("seven terms"));
-        for [rate, signal, reference] in &numbers {
-            let side = &mut sides[usize::from(*rate < 0.0)];
-            side.push(*rate, *signal, *reference).expect("finite numbers");
+        let mut sides = [(); 2].map(|()| {
+            SurfaceAccumulator::<f64, { Degree::POLY13.terms() }>::new(Degree::POLY13)
+                .expect("seven terms")
+        });
+        for &[rate, volts, value] in &numbers {
+            let side = &mut sides[usize::from(rate < 0.0)];
+            side.push(Sample { rate, volts, value }).expect("finite numbers");
         }
         std::hint::black_box(sides.map(|side| side.fit().expect("a fit")));
         shortest = shortest.min(begin.elapsed().as_secs_f64());

@@ -1,4 +1,4 @@
-//! What a record says of its columns beside numbers.
+//! What a record says of its columns in addition to numbers.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub const SAMPLE_RATE_KEY: &str = "stretch.sample_rate_hz";
 /// Metadata of a field: the estimator of the rates, the JSON of [`RateEstimator`].
 pub const RATE_ESTIMATOR_KEY: &str = "stretch.rate_estimator";
 
-/// The columns that a fit is of, and how their rates came about.
+/// The columns of a fit, and how their rates were estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct About {
     pub signal: String,
@@ -27,7 +27,7 @@ pub(crate) struct About {
 }
 
 impl About {
-    /// Of the last two of the columns; what is known of rates stands on any of them.
+    /// Of the last two of the columns; what is known of rates is stored with any of them.
     pub(crate) fn new(fields: &[FieldRef]) -> Result<Self> {
         let [.., signal, reference] = fields else {
             return Err(plan_datafusion_err!("a fit takes a signal and a reference"));

@@ -26,7 +26,7 @@ use crate::{
 
 const NAME: &str = "agreement";
 
-/// What is told of a group beside its counts.
+/// What is reported of a group in addition to its counts.
 const FIGURES: [(&str, Figure); 13] = [
     ("bias", |a| a.errors().bias()),
     ("mae", |a| a.errors().mae()),
@@ -37,10 +37,10 @@ const FIGURES: [(&str, Figure); 13] = [
     ("rmse_percent", |a| a.rmse_percent(Delta::Truth)),
     ("r_squared", Agreement::r_squared),
     ("correlation", Agreement::correlation),
-    ("reference_min", |a| a.truth_range().map(|range| range.0)),
-    ("reference_max", |a| a.truth_range().map(|range| range.1)),
-    ("estimate_min", |a| a.estimate_range().map(|range| range.0)),
-    ("estimate_max", |a| a.estimate_range().map(|range| range.1)),
+    ("reference_min", |a| a.truth_range().map(|range| range.min)),
+    ("reference_max", |a| a.truth_range().map(|range| range.max)),
+    ("estimate_min", |a| a.estimate_range().map(|range| range.min)),
+    ("estimate_max", |a| a.estimate_range().map(|range| range.max)),
 ];
 
 type Figure = fn(&Agreement<f64>) -> Option<f64>;

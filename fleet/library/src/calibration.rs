@@ -1,4 +1,4 @@
-//! From two triangles to a calibration that `stretch apply` takes.
+//! Makes a calibration that `stretch apply` takes from two triangles.
 
 use stretch_calibrate::calibration_to_json;
 use stretch_core::{
@@ -17,7 +17,7 @@ pub(crate) struct Side<const TERMS: usize> {
     pub fit: Fit<f64, TERMS>,
 }
 
-/// A fit that stands: a line, or inflation and deflation.
+/// A complete fit: a line, or inflation and deflation.
 pub(crate) struct Whole<'a, const TERMS: usize> {
     pub sides: &'a [Side<TERMS>],
     pub polarity: Polarity,
@@ -38,10 +38,10 @@ const SIGNAL: usize = 1;
 const REFERENCE: usize = 2;
 
 impl<const TERMS: usize> Whole<'_, TERMS> {
-    /// The record in JSON, sealed; none where nobody said how the rates were estimated.
+    /// The record in JSON, sealed; `None` if it is unknown how the rates were estimated.
     ///
-    /// Signal and target are normalised to 0..1 over what the rows span, and the surfaces are those
-    /// about the least signal: coefficients about zero volts would cancel.
+    /// Signal and target are normalised to 0..1 over the range of the rows, and the surfaces are
+    /// about the smallest signal, because coefficients about zero volts would cancel.
     pub(crate) fn record(&self, about: &About) -> Result<Option<String>, String> {
         let (Some(hz), Some(rate_estimator)) = (about.sample_rate_hz, about.rate_estimator) else {
             return Ok(None);
@@ -66,7 +66,6 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
             rate_source: RateSource::Voltage,
             dead_band: 0.0,
             model,
-            turns: None,
             provenance: Provenance::new("", []),
         };
         let calibration = Calibration::new(spec).map_err(|e| e.to_string())?;
@@ -110,8 +109,8 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
     }
 }
 
-/// The surface over normalised signal and rate, to the normalised target; `rate` is what a
-/// normalised rate is multiplied by to be one of the signal.
+/// The surface over normalised signal and rate, to the normalised target; `rate` is the factor from
+/// a normalised rate to one of the signal.
 fn normalised<const TERMS: usize>(
     side: &Side<TERMS>,
     frame: &Frame,

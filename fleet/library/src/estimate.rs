@@ -15,7 +15,7 @@ use datafusion::{
 };
 use stretch_calibrate::calibration_from_json;
 use stretch_core::{Branch, Model, RateEstimator};
-use stretch_receptor::{BlendedReceptor, StretchReceptor};
+use stretch_receptor::StretchReceptor;
 
 use crate::{about::rate_estimator, columns::floats};
 
@@ -94,7 +94,7 @@ fn texts(array: &ArrayRef) -> Result<Box<dyn Iterator<Item = Option<&str>> + '_>
     }
 }
 
-/// The record of the latest row: rows of one sensor stand together.
+/// The record of the latest row, because rows of one sensor are adjacent.
 struct Latest {
     estimator: Option<RateEstimator>,
     known: Option<(String, Map)>,
@@ -116,61 +116,51 @@ impl Latest {
     }
 }
 
-/// A calibration that needs no memory: a line, or a surface a branch.
+/// A calibration that needs no memory: a line, or one surface per branch.
 struct Map {
-    across: Across,
+    receptor: StretchReceptor<f64, ()>,
     sign: f64,
-}
-
-/// What happens inside the dead band.
-enum Across {
-    Jump(StretchReceptor<f64, ()>),
-    Blend(BlendedReceptor<f64, ()>),
 }
 
 impl Map {
     fn new(record: &str, estimator: Option<RateEstimator>) -> Result<Self> {
         let refuse = |error: &dyn std::fmt::Display| exec_datafusion_err!("{NAME}: {error}");
         let calibration = calibration_from_json(record, "record").map_err(|e| refuse(&e))?;
-        if let Some(estimator) = estimator.filter(|e| *e != calibration.rate_estimator) {
+        if let Some(estimator) = estimator.filter(|e| *e != calibration.spec().rate_estimator) {
             return exec_err!(
                 "{NAME}: the rates are by {} ({estimator:?}), and the record was fitted on those by {} ({:?}): ingest \
                  again with the record's estimator, or fit a record of this lake",
                 estimator.name(),
-                calibration.rate_estimator.name(),
-                calibration.rate_estimator
+                calibration.spec().rate_estimator.name(),
+                calibration.spec().rate_estimator
             );
         }
-        let across = match calibration.model {
+        let receptor = match calibration.spec().model {
             Model::Linear(_) | Model::Surfaces { .. } => {
-                StretchReceptor::with_rate(&calibration, ()).map(Across::Jump)
-            }
-            Model::Blended { .. } => {
-                BlendedReceptor::with_rate(&calibration, ()).map(Across::Blend)
+                StretchReceptor::with_rate(&calibration, ())
             }
             _ => {
                 return exec_err!(
                     "{NAME}: the record's model, {}, remembers what was before, and rows of a table have no order: use \
                      stretch apply on the trial",
-                    calibration.model.name()
+                    calibration.spec().model.name()
                 );
             }
         };
-        Ok(Self { across: across.map_err(|e| refuse(&e))?, sign: calibration.polarity.sign() })
+        Ok(Self {
+            receptor: receptor.map_err(|e| refuse(&e))?,
+            sign: calibration.spec().polarity.sign(),
+        })
     }
 
-    /// The estimate of a row. Inside the dead band a live receptor keeps its branch; here the sign of
-    /// the rate alone decides, for rows have no order.
+    /// The estimate of a row. Inside the dead band a live receptor keeps its branch. Here only the
+    /// sign of the rate decides, because rows have no order.
     fn at(&self, rate: f64, signal: f64) -> Option<f64> {
         if !(rate.is_finite() && signal.is_finite()) {
             return None;
         }
         let rises = self.sign * rate >= 0.0;
         let branch = if rises { Branch::Inflation } else { Branch::Deflation };
-        let reading = match &self.across {
-            Across::Jump(receptor) => receptor.at(branch, rate, signal),
-            Across::Blend(receptor) => receptor.at(branch, rate, signal),
-        };
-        Some(reading.estimate)
+        Some(self.receptor.at(branch, rate, signal).estimate)
     }
 }

@@ -25,6 +25,10 @@ use crate::{
     triangles::{Outcome, Triangles},
 };
 
+/// Capacity for the terms of the fits that most queries need.
+const LINE: usize = Degree::LINE.terms();
+const POLY13: usize = Degree::POLY13.terms();
+
 /// Which fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Kind {
@@ -86,7 +90,7 @@ impl FitFunction {
                 Degree::new(rate, signal)
                     .map_err(|error| plan_datafusion_err!("polyij_fit: {error}"))
             }
-            Kind::Line => Degree::new(0, 1).map_err(|error| plan_datafusion_err!("{error}")),
+            Kind::Line => Ok(Degree::LINE),
             _ => Ok(Degree::POLY13),
         }
     }
@@ -109,7 +113,8 @@ impl FitFunction {
 
 /// A power that is written in the query.
 fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
-    // what needs no column is known before there are rows; asked in this way it may be another library's, too
+    // a literal can be evaluated without rows; evaluating it also works for expressions of another
+    // library
     let nothing = RecordBatch::new_empty(Arc::new(Schema::empty()));
     match expr.evaluate(&nothing) {
         Ok(ColumnarValue::Scalar(ScalarValue::Int64(Some(power))))
@@ -145,8 +150,10 @@ impl AggregateUDFImpl for FitFunction {
         let name = self.name();
         let degree = self.degree(&args)?;
         Ok(match degree.terms() {
-            0..=2 => Box::new(One::new(name, self.fits::<2>(degree, &args)?)),
-            3..=7 => Box::new(One::new(name, self.fits::<7>(degree, &args)?)),
+            terms if terms <= LINE => Box::new(One::new(name, self.fits::<LINE>(degree, &args)?)),
+            terms if terms <= POLY13 => {
+                Box::new(One::new(name, self.fits::<POLY13>(degree, &args)?))
+            }
             _ => Box::new(One::new(name, self.fits::<MAX_TERMS>(degree, &args)?)),
         })
     }
@@ -161,8 +168,8 @@ impl AggregateUDFImpl for FitFunction {
     ) -> Result<Box<dyn GroupsAccumulator>> {
         let degree = self.degree(&args)?;
         Ok(match degree.terms() {
-            0..=2 => Box::new(self.fits::<2>(degree, &args)?),
-            3..=7 => Box::new(self.fits::<7>(degree, &args)?),
+            terms if terms <= LINE => Box::new(self.fits::<LINE>(degree, &args)?),
+            terms if terms <= POLY13 => Box::new(self.fits::<POLY13>(degree, &args)?),
             _ => Box::new(self.fits::<MAX_TERMS>(degree, &args)?),
         })
     }
@@ -219,7 +226,7 @@ impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
         }
         let columns = values[self.kind.literals()..].iter().map(floats);
         let columns = match columns.collect::<Result<Vec<_>>>()?[..] {
-            // a line has no rate: the signal stands in its place and is multiplied by nothing
+            // a line has no rate: the signal takes its place and is multiplied by nothing
             [signal, reference] => [signal, signal, reference],
             [rate, signal, reference] => [rate, signal, reference],
             _ => return Err(plan_datafusion_err!("{}: columns are missing", self.kind.name())),

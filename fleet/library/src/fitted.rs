@@ -17,7 +17,7 @@ use crate::{
     triangles::Outcome,
 };
 
-/// The columns of numbers that stand between the counts and the coefficients.
+/// The columns of numbers between the counts and the coefficients.
 const NUMBERS: [&str; 7] =
     ["rmse", "rate_min", "rate_max", "signal_min", "signal_max", "reference_min", "reference_max"];
 
@@ -45,7 +45,7 @@ struct Answer<const TERMS: usize> {
     refused: Option<String>,
 }
 
-/// The answers of many groups, as an array of structs. A line has no rate.
+/// The results of many groups, as an array of structs. A line has no rate.
 pub(crate) fn answers<const TERMS: usize>(
     degree: Degree,
     is_line: bool,
@@ -109,7 +109,7 @@ fn answer<const TERMS: usize>(
             let dof = sides.iter().fold(0, |dof: u64, side| dof.saturating_add(side.fit.dof()));
             let sse: f64 = sides.iter().map(|side| side.fit.sse()).sum();
             let whole = Whole { sides: &sides, polarity, span };
-            // a text that this library wrote; of damaged bytes nothing is known
+            // a text that this library wrote; damaged bytes tell nothing
             let about = serde_json::from_str::<About>(&partial.about).ok();
             let record = about.map_or(Ok(None), |about| whole.record(&about));
             Answer {
@@ -184,8 +184,7 @@ fn polarity<const TERMS: usize>(
     for factor in factors {
         all.merge(&factor).map_err(sentence)?;
     }
-    let line = Degree::new(0, 1).map_err(|error| error.to_string())?;
-    let fit = all.fit_degree(line).map_err(sentence)?;
+    let fit = all.fit_degree(Degree::LINE).map_err(sentence)?;
     let falls = fit.coefficients().get(1).is_some_and(|slope| *slope < 0.0);
     Ok(if falls { Polarity::Falling } else { Polarity::Rising })
 }

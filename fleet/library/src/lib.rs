@@ -22,7 +22,7 @@ use datafusion::{
 pub use about::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
 pub use state::{STATE_VERSION, StateError, poly13_factors};
 
-/// The release of the functions: machines that answer one query together must have the same.
+/// The release of the functions. All machines that answer one query together must have the same.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The aggregates, for a session or the registry of an executor.

@@ -43,7 +43,8 @@ impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
         self.groups.merge_batch(states, &self.zeros, 1)
     }
 
-    /// The answer so far. A window asks again after more rows, so that what was answered goes on.
+    /// The result so far. A window asks again after more rows, so the state must survive the
+    /// answer.
     fn evaluate(&mut self) -> Result<ScalarValue> {
         let state = self.state()?;
         let arrays = state.iter().map(ScalarValue::to_array).collect::<Result<Vec<_>>>()?;

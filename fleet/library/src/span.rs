@@ -1,6 +1,6 @@
 //! What rows span.
 
-/// Least and greatest rate, signal and reference of some rows.
+/// Smallest and largest rate, signal and reference of some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Span {
     /// Rate, signal, reference.

@@ -39,7 +39,7 @@ pub(crate) struct Partial<const TERMS: usize> {
     pub sides: [Option<(Factor<f64, TERMS>, Span)>; 2],
 }
 
-/// What stands in a state.
+/// The content of a state.
 #[derive(Debug, Clone)]
 pub(crate) enum Stored<const TERMS: usize> {
     Partial(Partial<TERMS>),
@@ -76,13 +76,13 @@ pub enum StateError {
         /// What was merged before.
         expected: String,
     },
-    /// A state that stands for a refusal.
+    /// A state that records a refusal.
     #[error("{sentence}")]
     Refused {
         /// Why.
         sentence: String,
     },
-    /// Too few or too many bytes, or numbers that no fit leaves behind.
+    /// Too few or too many bytes, or numbers that no fit can produce.
     #[error("it is damaged ({what}): compute it again from its rows")]
     Damaged {
         /// What is wrong.
@@ -105,7 +105,7 @@ pub(crate) fn write<const TERMS: usize>(
     out.extend_from_slice(&[STATE_VERSION, kind, degree.rate(), degree.volts()]);
     out.extend_from_slice(&partial.left_out.to_le_bytes());
     let about = partial.about.as_bytes();
-    // a text of names and an estimator; one that is longer says nothing
+    // a text of names and an estimator; a longer one is ignored
     let about = if about.len() <= usize::from(u16::MAX) { about } else { &[] };
     out.extend_from_slice(&(about.len() as u16).to_le_bytes());
     out.extend_from_slice(about);
@@ -120,7 +120,7 @@ pub(crate) fn write<const TERMS: usize>(
         let terms = degree.terms();
         let rows = spec.r[..terms].iter().enumerate();
         let triangle = rows.flat_map(|(k, row)| &row[k..terms]);
-        let head = [spec.centre, spec.residual.0, spec.residual.1];
+        let head = [spec.centre, spec.residual, spec.residual_rounding];
         let numbers = head.iter().chain(triangle).chain(&spec.q[..terms]);
         for x in numbers.chain(&span.least).chain(&span.most) {
             out.extend_from_slice(&x.to_le_bytes());
@@ -178,13 +178,15 @@ pub(crate) fn read<const TERMS: usize>(
     Ok(Stored::Partial(Partial { left_out, about, sides }))
 }
 
-/// The triangles of a state of `poly13_state`, of rows whose rate is not below zero and of those below: for tests between
-/// stored states, a day each.
+/// The triangles of a state of `poly13_state`, of rows whose rate is not below zero and of those
+/// below. Use them for tests between stored states, one per day.
 ///
 /// # Errors
-/// [`StateError`]; a refused fit is one of another kind.
-pub fn poly13_factors(state: &[u8]) -> Result<[Option<Factor<f64, 7>>; 2], StateError> {
-    match read::<7>(state, 2, Degree::POLY13, &Arc::from(""))? {
+/// [`StateError`]; a refused fit counts as another kind.
+pub fn poly13_factors(
+    state: &[u8],
+) -> Result<[Option<Factor<f64, { Degree::POLY13.terms() }>>; 2], StateError> {
+    match read::<{ Degree::POLY13.terms() }>(state, 2, Degree::POLY13, &Arc::from(""))? {
         Stored::Partial(partial) => Ok(partial.sides.map(|side| side.map(|(factor, _)| factor))),
         Stored::Refusal(sentence) => {
             Err(StateError::Kind { found: sentence, expected: Degree::POLY13.to_string() })
@@ -237,7 +239,7 @@ impl<'a> Bytes<'a> {
         let folds = self.count()?;
         let mut head = [0.0; 3];
         self.fill(&mut head)?;
-        let [centre, sum, lost] = head;
+        let [centre, residual, residual_rounding] = head;
         let (mut r, mut q) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
         let terms = degree.terms().min(TERMS);
         for (k, row) in r[..terms].iter_mut().enumerate() {
@@ -247,8 +249,7 @@ impl<'a> Bytes<'a> {
         let mut span = Span::EMPTY;
         self.fill(&mut span.least)?;
         self.fill(&mut span.most)?;
-        let residual = (sum, lost);
-        let spec = FactorSpec { degree, centre, r, q, residual, samples, folds };
+        let spec = FactorSpec { degree, centre, r, q, residual, residual_rounding, samples, folds };
         let factor = Factor::new(spec).map_err(|_| damaged("a number that is not finite"))?;
         let ordered = span.least.iter().zip(&span.most).all(|(a, b)| a <= b && (b - a).is_finite());
         if ordered { Ok(Some((factor, span))) } else { Err(damaged("its ranges")) }

@@ -17,10 +17,10 @@ use crate::{
     state::{Partial, StateError, Stored, read, write, write_refusal},
 };
 
-/// Rows of a group and branch that wait until they are folded together.
+/// Rows of a group and branch that are collected before they are folded together.
 pub(crate) const ROWS: usize = 128;
 
-/// The largest size of a number that is taken: powers of what is beyond leave `f64`.
+/// The largest accepted number, because powers of larger ones overflow `f64`.
 const MOST: f64 = 1e15;
 
 /// Rows that wait: rates, signals, references.
@@ -28,8 +28,8 @@ type Waiting = [[f64; ROWS]; 3];
 
 /// Partial fits, flat: a side is a branch of a group, and place `group * sides + side` holds it.
 ///
-/// A group costs a triangle and, once rows of its own come, `3 ROWS` numbers a side: 7.4 kB for
-/// poly13, 14 kB for the widest surface. The block that folds is one for all groups.
+/// A group costs a triangle and, once it receives rows, `3 ROWS` numbers a side: 7.4 kB for poly13,
+/// 14 kB for the widest surface. All groups share the block that folds.
 #[derive(Debug)]
 pub(crate) struct Triangles<const TERMS: usize> {
     degree: Degree,
@@ -41,7 +41,7 @@ pub(crate) struct Triangles<const TERMS: usize> {
     waiting: Vec<Waiting>,
     filled: Vec<u8>,
     left_out: Vec<u64>,
-    /// What is known of the columns: of these rows, and of states that were merged.
+    /// Metadata of the columns: of these rows, and of merged states.
     own: Arc<str>,
     about: Vec<Arc<str>>,
     refused: Vec<Option<Box<str>>>,
@@ -103,8 +103,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
         }
     }
 
-    /// Takes rows in: `rate` of a surface, `signal` and `reference`. What is null, not finite or
-    /// larger than [`MOST`] is left out and counted; what the filter drops is not a row.
+    /// Takes rows: `rate` of a surface, `signal` and `reference`. Values that are null, not finite
+    /// or larger than [`MOST`] are left out and counted; rows that the filter drops do not count.
     pub(crate) fn rows(
         &mut self,
         [rate, signal, reference]: [&Float64Array; 3],
@@ -130,7 +130,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         while row < groups.len() {
             let mut end = row + 1;
             if is_row(row) && is_sound(row) {
-                // rows of a trial come one after the other, and a branch lasts for many of them
+                // rows of a trial are consecutive, and a branch lasts for many of them
                 let own = place(row);
                 while end < groups.len() && is_row(end) && is_sound(end) && place(end) == own {
                     end += 1;
@@ -183,8 +183,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// Takes stored states in, one a group index; a null is no state. What cannot be used refuses
-    /// its group by a sentence.
+    /// Takes stored states, one per group index; a null is no state. An unusable state refuses its
+    /// group with an error text.
     pub(crate) fn states<'a>(
         &mut self,
         states: impl Iterator<Item = Option<&'a [u8]>>,
@@ -215,7 +215,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
     fn merge(&mut self, group: usize, other: &Partial<TERMS>) -> Result<(), StateError> {
         let mine = group * self.sides..(group + 1) * self.sides;
         if *other.about != *self.about[group] {
-            // the columns of a merge are states: what they were of the first of them says
+            // the columns of a merge are states; the first one states its source columns
             let fresh = self.factors[mine.clone()].iter().all(|factor| factor.samples() == 0);
             if !fresh || self.left_out[group] > 0 {
                 let (found, expected) = (other.about.to_string(), self.about[group].to_string());

@@ -22,12 +22,12 @@ const SHOWN: usize = 20;
 
 /// Fit a calibration to every sensor of a lake
 ///
-///   stretch fleet calibrate --lake lake --out calibrations
-///   stretch fleet calibrate --lake lake --out january --from 2026-01-01 --to 2026-01-31
+///   stretch-fleet calibrate --lake lake --out calibrations
+///   stretch-fleet calibrate --lake lake --out january --from 2026-01-01 --to 2026-01-31
 ///
-/// Writes a record a sensor, which stretch apply takes, and calibrations.parquet with what there is to say of each fit. Partial
-/// fits, a day each, are stored in the lake's folder states as they are computed: a run that was killed goes on where it was,
-/// and a year is merged in seconds.
+/// Writes one record per sensor, which stretch apply takes, and calibrations.parquet with the
+/// results of each fit. Partial fits, one per day, are stored in the lake's folder states as they
+/// are computed. A run that was killed continues where it stopped, and a year is merged in seconds.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

@@ -1,4 +1,4 @@
-//! Files that are to be trials of a lake, and which of them are copies.
+//! Files that may become trials of a lake, and which of them are copies.
 
 use std::{collections::HashMap, path::Path};
 
@@ -18,7 +18,7 @@ pub(crate) struct Candidate<'a> {
     pub digest: String,
 }
 
-/// The files that can be read and whose place is known, and of the others why they are none.
+/// The files that can be read and whose place is known, and for the others the reason.
 pub(crate) fn candidates(sources: &[Source]) -> (Vec<Candidate<'_>>, Vec<(&Path, String)>) {
     let all: Vec<Result<Candidate<'_>, String>> = sources.par_iter().map(candidate).collect();
     let (mut found, mut refused) = (Vec::new(), Vec::new());
@@ -40,8 +40,8 @@ fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
     Ok(Candidate { source, place, digest })
 }
 
-/// Why each file is a byte-identical copy of another one, or none where it is the one that counts: that at the place where the
-/// lake has it, else the first of the list.
+/// Why each file is a byte-identical copy of another one, or `None` if it is the one that counts.
+/// That is the file at the place where the lake has it, otherwise the first of the list.
 pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<String>> {
     let in_lake: HashMap<&str, &LakeFile> =
         there.iter().map(|file| (file.footer.digest.as_str(), file)).collect();

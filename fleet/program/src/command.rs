@@ -17,9 +17,9 @@ use crate::{
     sql,
 };
 
-/// Years of logs and thousands of sensors: a lake of trials, and what to ask of it.
+/// Years of logs and thousands of sensors: a lake of trials, and queries of it.
 #[derive(Debug, Parser)]
-#[command(name = "stretch-fleet", bin_name = "stretch fleet", version, max_term_width = 100)]
+#[command(name = "stretch-fleet", version, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -36,23 +36,23 @@ enum Command {
     Diagnose(diagnose::Args),
 }
 
-/// What the shell is told when Ctrl-C ended the program.
+/// Exit status if Ctrl-C ended the program.
 const INTERRUPTED: u8 = 130;
 
-/// The program `stretch-fleet`, asked by its name and words.
+/// The program `stretch-fleet`, called with its name and arguments.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = Cli::parse_from(words);
     tell_in_a_line();
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(e) => {
-            warn(format!("stretch fleet: no thread can be started: {e}"));
+            warn(format!("stretch-fleet: no thread can be started: {e}"));
             return ExitCode::FAILURE;
         }
     };
     runtime.spawn(async {
-        if tokio::signal::ctrl_c().await.is_ok() && stretch_files::interrupt() == 0 {
-            std::process::exit(INTERRUPTED.into());
+        if tokio::signal::ctrl_c().await.is_ok() {
+            stretch_data::files::clean_up_and_exit(INTERRUPTED);
         }
     });
     let work = async {
@@ -66,13 +66,12 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
         }
     };
-    // what a query panics on, such as rows that are damaged, ends the command like any other error
+    // a panic of a query, for example on damaged rows, ends the command like any other error
     let result = catch_unwind(AssertUnwindSafe(|| runtime.block_on(work)));
     match result.unwrap_or_else(|panic| Err(gave_up(panic.as_ref()))) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if stretch_files::interrupted() => ExitCode::from(INTERRUPTED),
         Err(error) => {
-            warn(format!("stretch fleet: {}", sentence(&error)));
+            warn(format!("stretch-fleet: {}", sentence(&error)));
             ExitCode::FAILURE
         }
     }
@@ -85,7 +84,7 @@ fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
     )
 }
 
-/// The error and its causes; a cause that is told already is not told again.
+/// The error and its causes; a cause that the text already contains is not repeated.
 fn sentence(error: &anyhow::Error) -> String {
     let mut told = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -93,14 +92,14 @@ fn sentence(error: &anyhow::Error) -> String {
             told = format!("{told}: {cause}");
         }
     }
-    stretch_files::without_temporary_names(&told)
+    stretch_data::files::without_temporary_names(&told)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What the pages ask of the program, it understands: words, options and values.
+    /// The commands on the documentation pages are valid: words, options and values.
     #[test]
     fn every_command_of_the_pages_is_one() {
         let pages = [
@@ -116,10 +115,10 @@ mod tests {
         let lines = pages.iter().flat_map(|page| page.lines());
         let lines = lines.map(|line| line.trim_start_matches("///").trim());
         let mut count = 0;
-        for line in lines.filter(|line| line.starts_with("stretch fleet ") && !line.contains("..."))
+        for line in lines.filter(|line| line.starts_with("stretch-fleet ") && !line.contains("..."))
         {
             let words = shlex::split(line).expect(line);
-            let asked = Cli::try_parse_from(&words[1..]);
+            let asked = Cli::try_parse_from(&words);
             assert!(
                 asked.is_ok(),
                 "{line}: {}",

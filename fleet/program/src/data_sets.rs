@@ -40,7 +40,7 @@ pub(crate) enum By {
 /// Site, rig, sensor, and which time of it.
 pub(crate) type Name = [String; 4];
 
-/// A lake that holds trials; files that it cannot use are told.
+/// A lake that holds trials; files that it cannot use are reported.
 pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
     let lake = Lake::open(folder)?;
     tell_unfit(&lake);
@@ -79,7 +79,7 @@ pub(crate) fn trials(files: &[&LakeFile]) -> anyhow::Result<Vec<SessionTrial>> {
     Ok(trials)
 }
 
-/// A trial as it was recorded: samples that were lost are lost again.
+/// A trial as it was recorded: lost samples are marked as lost again.
 fn trial(file: &LakeFile) -> anyhow::Result<SessionTrial> {
     let shown = || file.path.display().to_string();
     let batch = read(std::slice::from_ref(&file.path))?;

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use datafusion::arrow::{
     array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array},
     datatypes::{Field, Schema},
@@ -21,13 +21,14 @@ use crate::{
 
 /// Say of every sensor and day which effect causes a gap
 ///
-///   stretch fleet diagnose --lake lake --out verdicts
-///   stretch fleet diagnose --lake lake --out verdicts --by sensor --share 1/3
+///   stretch-fleet diagnose --lake lake --out verdicts
+///   stretch-fleet diagnose --lake lake --out verdicts --by sensor --share 1/3
 ///
-/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a data set: of a whole rig where they have
-/// the openings inlet and outlet, of a gauge alone where they have not. A verdict is written whole as it comes, and not asked
-/// for again by the next run; verdicts.parquet holds all of them. Diagnoses do not depend on each other: with --share 1/3, 2/3
-/// and 3/3 three machines share them.
+/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a data set: of a
+/// whole rig if they have the openings inlet and outlet, otherwise of a gauge alone. A verdict is
+/// written as soon as it is complete, and the next run does not compute it again; verdicts.parquet
+/// holds all of them. Diagnoses do not depend on each other: with --share 1/3, 2/3 and 3/3 three
+/// machines share them.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -67,7 +68,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let sets = data_sets(&lake, args.by);
     let parts = args.out.join("verdicts");
     std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
-    // shares write side by side: nobody has the folder alone
+    // shares are written in parallel, so no process has the folder alone
     remove_abandoned(&args.out, 1)?;
     let (which, of) = args.share;
     let open: Vec<_> = sets
@@ -81,7 +82,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     for (path, name, files) in &open {
         bar.set_message(name.join("/"));
         let verdict = verdict(&lake, files, &args);
-        ensure!(!stretch_files::interrupted(), "interrupted");
         write_parquet(path, &row(name, files.len(), verdict)?, Vec::new(), None)?;
         bar.inc(1);
     }
@@ -109,7 +109,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// The name of a verdict: with other trials it is another.
+/// The name of a verdict, which changes with its trials.
 fn part(name: &Name, files: &[&LakeFile], seed: u64) -> String {
     let seed = seed.to_le_bytes();
     let of = files.iter().map(|file| file.footer.digest.as_bytes());
@@ -136,10 +136,11 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
         };
         GaugeSimulator::new(&setup)?.into()
     };
-    Ok(problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?.diagnosis)
+    Ok(problem.examine(&options, false, &|_| (), &|| false)?.diagnosis)
 }
 
-/// A verdict as a row: what is named, how probable that is, how much of the held-out gap it closes, and what is left.
+/// A verdict as a row: the named effects, their probability, the share of the held-out gap that
+/// they close, and what is left.
 fn row(
     name: &Name,
     trials: usize,

@@ -27,11 +27,12 @@ use crate::{
 
 /// Say which sensors moved from one month to another
 ///
-///   stretch fleet drift --lake lake --from 2026-01 --to 2026-02 --out drift.parquet
+///   stretch-fleet drift --lake lake --from 2026-01 --to 2026-02 --out drift.parquet
 ///
-/// Each sensor's surfaces of one month are held against those of the other. Days are taken for independent of each other, rows of
-/// a day are not: how far days scatter about their month says what is no drift. Of the sensors that are said to have moved a share
-/// of --false-discoveries at most is expected not to have (Benjamini and Hochberg).
+/// Each sensor's surfaces of one month are compared with those of the other. Days are treated as
+/// independent of each other, rows of a day are not: the scatter of days about their month shows
+/// what is no drift. Of the sensors that are reported as moved a share of --false-discoveries at
+/// most is expected not to have (Benjamini and Hochberg).
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

@@ -1,8 +1,9 @@
 //! Which of many tests to believe.
 
-/// The q-value of each P: the least false-discovery rate at which it would be called (Benjamini and Hochberg 1995, doi
-/// 10.1111/j.2517-6161.1995.tb02031.x). Of those with q up to 0.05 one in twenty is expected to be a false alarm, whether the
-/// tests are independent or rise together.
+/// The q-value of each P: the smallest false-discovery rate at which it would be reported
+/// (Benjamini and Hochberg 1995, doi 10.1111/j.2517-6161.1995.tb02031.x). Of those with q up to
+/// 0.05 one in twenty is expected to be a false alarm, whether the tests are independent or
+/// positively correlated.
 pub(crate) fn q_values(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[b].total_cmp(&p[a]));

@@ -1,4 +1,4 @@
-//! Answers of a query as plain columns: what is a struct becomes a column a field.
+//! Answers of a query as plain columns: a struct becomes one column per field.
 
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ use datafusion::arrow::{
 /// Fields that are too long for a table.
 const LONG: [&str; 2] = ["record", "state"];
 
-/// All batches as one without structs. A field keeps its name where that is the only one of its kind, else its struct's name
-/// stands before it.
+/// Merges all batches into one without structs. A field keeps its name if the name is unique,
+/// otherwise its struct's name precedes it.
 pub(crate) fn flat(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
     let first = batches.first().context("the query has no answer")?;
     let whole = concat_batches(&first.schema(), batches)?;
@@ -52,7 +52,7 @@ pub(crate) fn column<'a>(batch: &'a RecordBatch, name: &str) -> Option<&'a Array
     Some(batch.column(place))
 }
 
-/// As a table; what is too long for one is left out where there is anything else.
+/// As a table; columns that are too long for one are left out if there is anything else.
 pub(crate) fn table(batch: &RecordBatch) -> anyhow::Result<String> {
     let schema = batch.schema();
     let is_short = |i: &usize| {

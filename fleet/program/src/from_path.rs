@@ -1,14 +1,15 @@
-//! Site, rig, sensor and date from where a file stands.
+//! Site, rig, sensor and date from the path of a file.
 
 use std::{path::Path, str::FromStr};
 
-/// A pattern of the last parts of a path: `{site}/{rig}/{sensor}/{date}_*.csv`. `*` stands for anything within a part.
+/// A pattern of the last parts of a path: `{site}/{rig}/{sensor}/{date}_*.csv`. `*` matches
+/// anything within a part.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pattern(Vec<Vec<Piece>>);
 
 #[derive(Debug, Clone, PartialEq)]
 enum Piece {
-    /// As it stands.
+    /// Literal text.
     Text(String),
     /// Anything.
     Any,
@@ -67,7 +68,7 @@ fn pieces(part: &str) -> Result<Vec<Piece>, String> {
 }
 
 impl Pattern {
-    /// What a path says of site, rig, sensor and date; none where it does not fit the pattern.
+    /// What a path says of site, rig, sensor and date; `None` if it does not match the pattern.
     pub(crate) fn read(&self, path: &Path) -> Option<[Option<String>; 4]> {
         let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy()).collect();
         let last = parts.len().checked_sub(self.0.len()).map(|from| &parts[from..])?;
@@ -79,7 +80,8 @@ impl Pattern {
     }
 }
 
-/// An open piece ends where the text behind it first stands; the last one where the part ends.
+/// An open piece ends at the first occurrence of the text behind it; the last one ends with the
+/// part.
 fn fits(pieces: &[Piece], part: &str, found: &mut [Option<String>; 4]) -> Option<()> {
     let Some((piece, rest)) = pieces.split_first() else {
         return part.is_empty().then_some(());
@@ -115,7 +117,7 @@ mod tests {
         let told = ["ulm", "r2", "0042", "20260103"].map(|x| Some(x.to_owned()));
         assert_eq!(found, Some(told));
         let found = read("sleeve-{sensor}-{date}.csv", "sleeve-a-7-2026-01-03.csv").unwrap();
-        // the first place where what stands behind a name is found ends it
+        // the first occurrence of the text behind a name ends the name
         assert_eq!(found[2].as_deref(), Some("a"));
         assert_eq!(found[3].as_deref(), Some("7-2026-01-03"));
         assert_eq!(read("{site}/{sensor}.csv", "ulm/7.npz"), None);

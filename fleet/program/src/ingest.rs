@@ -28,13 +28,14 @@ use crate::{
 
 /// Bring trials into a lake, rates computed
 ///
-///   stretch fleet ingest logs --lake lake --from-path '{site}/{rig}/{sensor}/{date}_*.csv'
-///   stretch fleet ingest monday/*.csv --lake lake --sensor 0042 --date 2026-11-21
+///   stretch-fleet ingest logs --lake lake --from-path '{site}/{rig}/{sensor}/{date}_*.csv'
+///   stretch-fleet ingest monday/*.csv --lake lake --sensor 0042 --date 2026-11-21
 ///
-/// A trial is a recording in any format that stretch reads; a folder with a dataset.toml stands for its trials, any other
-/// folder for every file below it. Each becomes one Parquet file, whole or not at all. What is in the lake already is
-/// left as it is; what cannot be read is named in the lake's folder refused, and the rest goes on. Where anything was refused
-/// the exit status is 1. Of files with the same bytes one counts, whatever their names and dates.
+/// A trial is a recording in any format that stretch reads; a folder with a dataset.toml gives its
+/// trials, any other folder every file below it. Each becomes one Parquet file, whole or not at
+/// all. Trials that are already in the lake are left unchanged. Files that cannot be read are named
+/// in the lake's folder refused, and the rest continues. If anything was refused the exit status is 1.
+/// Of files with the same bytes only one counts, whatever their names and dates.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -115,7 +116,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let rests = rest_lengths(&there);
     let bar = bar("trials", sources.len());
     let summary = Mutex::new(summary);
-    // trials of one sensor in order: the first says what its rest length is
+    // trials of one sensor in order, because the first one defines its rest length
     by_gauge.par_iter().try_for_each(|(gauge, candidates)| {
         let mut rest = rests.get(gauge).copied();
         for candidate in candidates {
@@ -163,7 +164,8 @@ impl Args {
     }
 }
 
-/// What the lake says of itself; of a new one what was asked for, at the rate of the first trial that can be read.
+/// The lake's description of itself; for a new lake the requested one, at the rate of the first
+/// readable trial.
 fn about(args: &Args, sources: &[Source]) -> anyhow::Result<About> {
     let there = About::read(&args.lake)?;
     let said = |given: &Option<String>, own: Option<&String>, usual: &str| {
@@ -246,7 +248,6 @@ impl Ingest<'_> {
         });
         let (footer, samples) = match made {
             Ok(made) => made,
-            Err(why) if stretch_files::interrupted() => return Err(why),
             Err(why) => return refused(&format!("{why:#}")),
         };
         let claimed = match self.known.lock() {

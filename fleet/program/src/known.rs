@@ -20,7 +20,8 @@ impl Known {
         known
     }
 
-    /// Takes a trial in that is about to be written, or says why the lake has it already in another file.
+    /// Adds a trial that is about to be written, or says in which other file the lake already has
+    /// it.
     pub(crate) fn claim(&mut self, footer: &Footer, place: &Place) -> Result<(), String> {
         if let Some(other) = self.by_samples.get(&footer.samples) {
             return Err(format!(

@@ -1,4 +1,4 @@
-//! One command at a time writes into a folder, and what a killed one left there is removed.
+//! Only one command at a time writes into a folder, and leftovers of killed commands are removed.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 
 use crate::{lake::below, show::warn};
 
@@ -18,23 +18,24 @@ const FILE: &str = ".stretch-lock";
 /// How long a waiting command sleeps between two tries.
 const TRY_AGAIN: Duration = Duration::from_millis(50);
 
-/// How deep the records of a calibration stand below their folder: site, rig, sensor.
+/// Depth of the records of a calibration below their folder: site, rig, sensor.
 pub(crate) const RECORDS_DEPTH: usize = 3;
 
-/// A folder that no other command of the fleet writes into for as long as this lives.
+/// A folder into which no other command of the fleet writes while this exists.
 ///
-/// The system holds the lock and takes it from a process that ends, however it ends: nobody's lock outlives its owner.
+/// The operating system holds the lock and releases it when the process ends, however it ends.
+/// Therefore a lock never outlives its owner.
 #[derive(Debug)]
 pub(crate) struct Lock {
     _file: File,
 }
 
 impl Lock {
-    /// Waits until no other command writes into a folder that is there, and removes the temporary files that killed ones
-    /// left at most `depth` folders below it.
+    /// Waits until no other command writes into an existing folder, and removes temporary files of
+    /// killed commands at most `depth` folders below it.
     ///
     /// # Errors
-    /// A folder that cannot be written into, a file system without locks, an interrupt while it waits.
+    /// A folder without write permission, a file system without locks.
     pub(crate) fn of(folder: &Path, depth: usize) -> anyhow::Result<Self> {
         let path = folder.join(FILE);
         let told = || format!("{}: it cannot be locked", path.display());
@@ -55,7 +56,6 @@ impl Lock {
                 }
                 Err(TryLockError::WouldBlock) => {}
             }
-            ensure!(!stretch_files::interrupted(), "interrupted");
             sleep(TRY_AGAIN);
         }
         remove_abandoned(folder, depth)?;
@@ -63,7 +63,8 @@ impl Lock {
     }
 }
 
-/// Removes temporary files whose writers are gone: a writer holds the lock of its file for as long as it has that name.
+/// Removes temporary files whose writers have ended: a writer holds the lock of its file as long as
+/// it has that name.
 ///
 /// # Errors
 /// A folder that cannot be read, a file that cannot be removed.
@@ -73,7 +74,7 @@ pub(crate) fn remove_abandoned(folder: &Path, depth: usize) -> anyhow::Result<()
         let is_dead = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
         if is_dead {
             match fs::remove_file(path) {
-                // somebody else found it dead as well
+                // another process found it dead as well
                 Err(e) if e.kind() == ErrorKind::NotFound => {}
                 removed => removed.with_context(|| path.display().to_string())?,
             }
@@ -82,7 +83,7 @@ pub(crate) fn remove_abandoned(folder: &Path, depth: usize) -> anyhow::Result<()
     Ok(())
 }
 
-/// Whether a file has the name that `stretch_files` writes under: `.stretch-`, six letters or digits, `.tmp`.
+/// Whether a file has the name that `stretch_data::files` writes under: `.stretch-`, six letters or digits, `.tmp`.
 fn is_temporary(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let letters = name.strip_prefix(".stretch-").and_then(|rest| rest.strip_suffix(".tmp"));

@@ -22,11 +22,12 @@ use crate::{
 
 /// Write a lake of simulated sensors: S sensors by D days, a trial each
 ///
-///   stretch fleet make --lake lake --sensors 100 --days 60 --drifting 0.1
+///   stretch-fleet make --lake lake --sensors 100 --days 60 --drifting 0.1
 ///
-/// Each sensor is a sleeve of its own gain, offset and lag over a muscle that moves at two speeds at once. Gain and offset
-/// scatter from day to day, as they do on measured sleeves; from the middle day on a share of the sensors drifts. Which do is
-/// in made.json. What is there already is left as it is.
+/// Each sensor is a sleeve with its own gain, offset and lag over a muscle that moves at two speeds
+/// at once. Gain and offset scatter from day to day, as they do on measured sleeves; from the
+/// middle day on a share of the sensors drifts. made.json lists them. Existing files are left
+/// unchanged.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -74,7 +75,8 @@ struct Made {
     seed: u64,
     sensors: u32,
     days: u32,
-    /// Of all sensors and days, those that were there already among them: a killed command made some.
+    /// For all sensors and days, including existing ones, because a killed command may have made
+    /// some.
     rows: u64,
     drifting: Vec<String>,
 }
@@ -118,7 +120,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         drifting: drifting.collect(),
     };
     let text = serde_json::to_string_pretty(&made)? + "\n";
-    stretch_files::write_whole(lake.join("made.json"), |out| out.write_all(text.as_bytes()))?;
+    stretch_data::files::write_whole(lake.join("made.json"), |out| out.write_all(text.as_bytes()))?;
     if args.json {
         return say_json(&made);
     }
@@ -130,8 +132,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Chance of a sensor and a day: each begins at a number of its own, for streams of one seed that stand side by side are each other's,
-/// moved on by a few draws.
+/// Random generator of a sensor and a day. Each begins at a different number, because neighbouring
+/// streams of one seed are copies of each other, shifted by a few draws.
 fn dice(seed: u64, of: [u32; 2]) -> RandomGenerator {
     let seed = of.iter().fold(seed, |seed, &part| RandomGenerator::new(seed, part.into()).bits());
     RandomGenerator::new(seed, 0)

@@ -5,11 +5,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use stretch_fit::{Factor, Fit};
 
 /// The triangles of a day: rows whose rate is not below zero, and those below.
-pub(crate) type Day = [Option<Factor<f64, 7>>; 2];
+pub(crate) type Day = [Option<Factor<f64, TERMS>>; 2];
 
-const TERMS: usize = 7;
+const TERMS: usize = stretch_core::Degree::POLY13.terms();
 
-/// Fewest days of a month that its scatter can be told from.
+/// Fewest days of a month from which its scatter can be estimated.
 const LEAST_DAYS: usize = 4;
 
 /// What a comparison of two months says.
@@ -22,19 +22,22 @@ pub(crate) struct Compared {
     /// Statistic, and its degrees of freedom.
     pub f: f64,
     pub freedom: [f64; 2],
-    /// Probability of so large a change where the sensor has not moved.
+    /// Probability of at least this change if the sensor has not moved.
     pub p: f64,
 }
 
 /// Tests whether one pair of surfaces fits both months.
 ///
-/// With `u_d` the score of a day at the fit to both months, `U` their sum over the first month, and `H` its share of the
-/// information, `Q = U^T (H (1 - H))^-1 U` is what two fits explain over one: were residuals white, `Q` would be chi-square. They
-/// are not: rows of a day share its temperature, its donning, its slow motion. So days are taken for independent, and no row is:
-/// the scatter of the `u_d` about their month's mean gives the covariance of `U`, and `K = (H (1 - H))^-1 Cov(U)` its design
-/// effects. `Q` over their sum is referred to F with `(tr K)^2 / tr K^2` and that times the days less two degrees of freedom (Rao
-/// and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of
-/// both branches are tested as one model, each in units of its own residual.
+/// Let `u_d` be the score of a day at the fit to both months, `U` their sum over the first month,
+/// and `H` its share of the information. Then `Q = U^T (H (1 - H))^-1 U` is what two fits explain
+/// more than one. If residuals were white, `Q` would be chi-square. They are not, because rows of a
+/// day share its temperature, its donning and its slow motion. Therefore days are treated as
+/// independent, but rows are not. The scatter of the `u_d` about their month's mean gives the
+/// covariance of `U`, and the eigenvalues of `K = (H (1 - H))^-1 Cov(U)` are its design effects.
+/// `Q` over their sum is compared with F with `(tr K)^2 / tr K^2` degrees of freedom, and that
+/// times the days minus two (Rao and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas
+/// and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of both branches are tested as one model, each
+/// in units of its own residual.
 pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String> {
     for (which, days) in [("first", first), ("second", second)] {
         if days.len() < LEAST_DAYS {
@@ -158,24 +161,24 @@ fn change(branches: &[Branch; 2], apart: &DVector<f64>) -> f64 {
 mod tests {
     use super::*;
     use stretch_core::Degree;
-    use stretch_fit::SurfaceAccumulator;
+    use stretch_fit::{Sample, SurfaceAccumulator};
     use stretch_gap::RandomGenerator;
 
-    /// A day whose rows share an error, beside one that goes slowly: white noise would be a wrong null.
+    /// A day whose rows share an error, plus a slow one: white noise would be a wrong null.
     fn day(dice: &mut RandomGenerator, gain: f64) -> Day {
         let degree = Degree::POLY13;
-        let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, 7, 64>::new(degree).unwrap());
+        let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, TERMS>::new(degree).unwrap());
         let (shared, mut slow) = (0.004 * dice.gauss(), 0.0);
         let begin = 6.0 * dice.unit();
         for n in 0..200 {
             let t = begin + 0.15 * f64::from(n);
-            let (v, rate) = (
+            let (volts, rate) = (
                 0.5 - 0.5 * (1.3 * t).cos() + 0.2 * (3.1 * t).sin(),
                 (1.3 * t).sin() + (3.1 * t).cos(),
             );
             slow = 0.97 * slow + 0.001 * dice.gauss();
-            let x = 0.16 * gain * (v - 0.1 * rate + 0.1 * v * v) + shared + slow;
-            sides[usize::from(rate < 0.0)].push(rate, v, x).unwrap();
+            let value = 0.16 * gain * (volts - 0.1 * rate + 0.1 * volts * volts) + shared + slow;
+            sides[usize::from(rate < 0.0)].push(Sample { rate, volts, value }).unwrap();
         }
         sides.map(|side| Some(side.factor()))
     }
@@ -184,9 +187,9 @@ mod tests {
         (0..days).map(|_| day(dice, gain)).collect()
     }
 
-    /// Under the null P below 0.05 comes in a twentieth of the sensors, whatever rows of a day share: of 400 in 20 +- 4.4 where P
-    /// is exact. The F of the second order is an approximation, so that up to twice as many are let pass; white noise would call
-    /// nearly all of them.
+    /// Under the null P is below 0.05 for a twentieth of the sensors, whatever rows of a day share:
+    /// 20 +- 4.4 of 400 if P is exact. The F of the second order is an approximation, so up to
+    /// twice as many are accepted; white noise would report nearly all of them.
     #[test]
     fn p_is_what_it_says_where_nothing_has_moved() {
         let mut dice = RandomGenerator::new(5, 0);

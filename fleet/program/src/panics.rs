@@ -1,8 +1,9 @@
-//! A panic of a reader is the fault of one file, and told as an error.
+//! A panic of a reader concerns only one file and is reported as its error.
 //!
-//! The readers of Parquet and of the Arrow schema in its footer panic on some damaged files: `arrow-ipc` has an `unimplemented!` or an
-//! `unwrap` for what a schema may not hold. Nothing of theirs switches that off for every reader: a query reads the embedded schema
-//! whatever the options of its table. So a footer is read here before any query reads it, and a panic is caught.
+//! The readers of Parquet and of the Arrow schema in its footer panic on some damaged files:
+//! `arrow-ipc` has an `unimplemented!` or an `unwrap` for invalid schemas. No option switches that
+//! off for every reader, because a query reads the embedded schema whatever the options of its
+//! table. Therefore a footer is read here before any query reads it, and a panic is caught.
 
 use std::{
     any::Any,
@@ -14,18 +15,19 @@ use std::{
 use crate::show::warn;
 
 thread_local! {
-    /// Whether whoever called this thread's work tells its panic as an error.
+    /// Whether the caller of this thread's work reports its panic as an error.
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// From here on a panic is one line on standard error, without a backtrace, and nothing where [`caught`] makes it an error.
+/// From here on a panic is one line on standard error, without a backtrace, and nothing if
+/// [`caught`] makes it an error.
 pub(crate) fn tell_in_a_line() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         set_hook(Box::new(|info| {
             if !IS_CAUGHT.get() {
                 let line = info.to_string().replace('\n', " ");
-                warn(format!("stretch fleet: a thread {line}"));
+                warn(format!("stretch-fleet: a thread {line}"));
             }
         }));
     });
@@ -34,7 +36,7 @@ pub(crate) fn tell_in_a_line() {
 /// What a reader answers.
 ///
 /// # Errors
-/// What it panicked with. What the reader made is lost by then, and nothing else may be changed by it.
+/// The panic message. The reader's result is lost, so the reader must not change anything else.
 pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> anyhow::Result<T> {
     let outer = IS_CAUGHT.replace(true);
     let answer = catch_unwind(AssertUnwindSafe(read));

@@ -1,11 +1,10 @@
-//! `stretch-fleet prior`: what all sensors of a lake say of the next one.
+//! `stretch-fleet prior`: a prior for the next sensor, learnt from all sensors of a lake.
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
 use rayon::{iter::Either, prelude::*};
-use stretch_calibrate::{Expected, Prior, Session, SessionOptions};
 use stretch_data::Trial;
+use stretch_sleeve::{Expected, Prior, Session, SessionOptions};
 
 use crate::{
     data_sets::{By, Name, data_sets, lake_with_trials, trials},
@@ -15,12 +14,13 @@ use crate::{
 
 /// Learn what the sensors of a lake say of the next one
 ///
-///   stretch fleet prior --lake lake --out prior.json
+///   stretch-fleet prior --lake lake --out prior.json
 ///   stretch calibrate --prior prior.json --of rig-1/s042 today.csv --out cal.json
 ///
-/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a session. Sessions vary around their sensor,
-/// sensors around their rig and rigs around their site, as far as there are several, each by a covariance of its own; stretch
-/// calibrate --prior then needs ten seconds to a minute of reference, or none. A session that cannot be used is told, and left
+/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a session.
+/// Sessions vary around their sensor, sensors around their rig and rigs around their site, as far
+/// as there are several, each with a separate covariance; stretch calibrate --prior then needs ten
+/// seconds to a minute of reference, or none. A session that cannot be used is reported, and left
 /// out.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -52,11 +52,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             found.map_or_else(|why| Either::Right(refused(why)), Either::Left)
         });
     bar.finish_and_clear();
-    ensure!(!stretch_files::interrupted(), "interrupted");
     warn_of("no session:", &refused);
     let prior = Prior::learn(&sessions)?;
     let text = prior.to_json()?;
-    stretch_files::write_whole(&args.out, |out| out.write_all(text.as_bytes()))?;
+    stretch_data::files::write_whole(&args.out, |out| out.write_all(text.as_bytes()))?;
     if args.json {
         return say_json(&serde_json::json!({
             "sessions": prior.sessions, "refused": refused, "signals": prior.signals,
@@ -85,7 +84,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// What a sensor is of, from the coarsest to the finest.
 const LEVELS: [&str; 3] = ["site", "rig", "sensor"];
 
-/// How many levels have one name only, before the first that has several: nothing varies there.
+/// Number of levels with only one name, before the first that has several, because nothing varies
+/// there.
 fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
     let is_one = |level: &usize| {
         let mut all = names.clone().map(|name| &name[*level]);
@@ -97,7 +97,6 @@ fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
 
 /// A data set as the sums that a prior is learnt from.
 fn session(lake: &Lake, name: &Name, above: usize, files: &[&LakeFile]) -> anyhow::Result<Session> {
-    ensure!(!stretch_files::interrupted(), "interrupted");
     let recorded: Vec<Trial> = trials(files)?.into_iter().map(|t| t.trial).collect();
     let of = name[above..LEVELS.len()].join("/");
     let options = SessionOptions::new([&*lake.about.signal], &lake.about.reference).of(&of);

@@ -12,7 +12,8 @@ use crate::{
     lake::{Lake, LakeFile, Refused, check_name},
 };
 
-/// Writes a record a row, in folders of site and rig where the answer has them; rows whose fit or record is refused come back with the reason.
+/// Writes one record per row, in folders of site and rig if the answer has them; refused rows are
+/// returned with the reason.
 pub(crate) fn write_records(
     lake: &Lake,
     answer: &RecordBatch,
@@ -39,7 +40,8 @@ pub(crate) fn write_records(
             keys.iter().map(|(key, own)| (*key, own[row].as_str())).collect();
         let names: Vec<&str> = of.iter().map(|(_, name)| *name).collect();
         let name = if names.is_empty() { "record".to_owned() } else { names.join("/") };
-        // a query may call anything a sensor: its record stands in the folder all the same, and beside no other of its name
+        // A query may return anything as a sensor name, so check that its record gets its own place in
+        // the folder.
         let place = of.iter().try_for_each(|(key, name)| check_name(key, name));
         let place = place.and_then(|()| match taken.insert(name.clone()) {
             true => Ok(()),
@@ -57,7 +59,7 @@ pub(crate) fn write_records(
             Ok(text) => {
                 let path = folder.join(format!("{name}.json"));
                 std::fs::create_dir_all(path.parent().unwrap_or(folder))?;
-                stretch_files::write_whole(path, |out| out.write_all(text.as_bytes()))?;
+                stretch_data::files::write_whole(path, |out| out.write_all(text.as_bytes()))?;
                 written += 1;
             }
             Err(why) => refused.push(Refused { file: name, why: format!("{why:#}") }),
@@ -66,10 +68,11 @@ pub(crate) fn write_records(
     Ok((written, refused))
 }
 
-/// A fit's record with what only the lake knows: the length behind a contraction, the dead band, and the trials.
+/// A fit's record with the lake's knowledge: the length that belongs to a contraction, the dead
+/// band, and the trials.
 ///
-/// A dead band cannot be told from sums. It is the median of those of the trials, three standard deviations of their rate's
-/// noise, as calibrate takes it.
+/// Sums do not determine a dead band. It is the median of the dead bands of the trials, three
+/// standard deviations of their rate's noise, as calibrate takes it.
 pub(crate) fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<String> {
     let is_of = |file: &&LakeFile| {
         of.iter().all(|(key, value)| match *key {

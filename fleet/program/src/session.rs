@@ -9,18 +9,19 @@ use datafusion::{
 };
 use stretch_fleet_cluster::connect;
 
-/// How much of the listing of a lake is kept from query to query: some hundred bytes a file.
+/// Size of the cached listing of a lake: about a hundred bytes per file.
 const LISTING_BYTES: usize = 256 << 20;
 
 /// A session with the functions of the library.
 ///
 /// # Errors
-/// A URL that names no scheduler. One that does not answer is an error of the first query.
+/// A URL that names no scheduler. A scheduler that does not answer is an error of the first query.
 pub(crate) async fn session(
     cluster: Option<&str>,
     threads: Option<usize>,
 ) -> anyhow::Result<SessionContext> {
-    // Statistics of a file leave NaN out: a column of one number and NaN beside it would be read as that number throughout.
+    // Statistics of a file ignore NaN: a column of one number and NaN would be read as that number
+    // throughout.
     let mut config =
         SessionConfig::new().with_information_schema(true).with_collect_statistics(false);
     if let Some(threads) = threads {
@@ -37,8 +38,8 @@ pub(crate) async fn session(
 
 /// Answers of several questions, one behind the other.
 ///
-/// Each is answered by one thread, which takes files and rows in their order, and all of them at once: sums have the same bits in
-/// every run, however many questions there are.
+/// Each query is answered by one thread, which takes files and rows in their order, and all queries
+/// run at once. Therefore sums have the same bits in every run, however many queries there are.
 pub(crate) async fn in_order(
     session: &SessionContext,
     questions: Vec<String>,

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::lake::Refused;
 
-/// Files that are told one by one.
+/// Files that are listed one by one.
 const MOST_TOLD: usize = 20;
 
 /// Prints a line; a reader that has gone is no error.
@@ -26,9 +26,9 @@ pub(crate) fn say_json(value: &impl Serialize) -> anyhow::Result<()> {
     say(serde_json::to_string_pretty(value)?)
 }
 
-/// Says something beside the answer, on standard error.
+/// Writes a message to standard error, separate from the answer.
 pub(crate) fn warn(text: impl std::fmt::Display) {
-    // there is nobody to tell where even this cannot be written
+    // if even this cannot be written, the error cannot be reported
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn warn_of(what: &str, refused: &[Refused]) {
 /// A bar on standard error, seen on a terminal only.
 pub(crate) fn bar(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
-    // the template is a constant: were it wrong, the plain bar is shown
+    // the template is a constant; if it were wrong, the plain bar is shown
     if let Ok(style) =
         ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go")
     {

@@ -1,4 +1,4 @@
-//! Which trials are to be brought into a lake, and where each belongs.
+//! Which trials are to be added to a lake, and where each belongs.
 
 use std::{
     fs,
@@ -58,7 +58,7 @@ impl Where {
 #[derive(Debug)]
 pub(crate) struct Source {
     pub path: PathBuf,
-    /// Where it belongs, or why nobody knows.
+    /// Where it belongs, or why that is unknown.
     pub place: anyhow::Result<Place>,
     /// Its line in a dataset.toml, and the folder of that.
     entry: Option<(PathBuf, TrialEntry)>,
@@ -95,8 +95,8 @@ impl Source {
     }
 }
 
-/// The trials of some paths: a file is one, a folder with a dataset.toml stands for all of its trials, any other folder for
-/// every file below it.
+/// The trials of some paths: a file is one trial, a folder with a dataset.toml gives its trials,
+/// any other folder every file below it.
 pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<Source>> {
     let mut found = Vec::new();
     let mut rest: Vec<PathBuf> = paths.iter().rev().cloned().collect();
@@ -112,7 +112,7 @@ pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<S
             let mut below = Vec::new();
             for entry in fs::read_dir(&path).with_context(|| path.display().to_string())? {
                 let entry = entry?;
-                // what a killed writer left is nobody's trial
+                // temporary files of a killed writer are no trials
                 if !entry.file_name().to_string_lossy().starts_with(".stretch-") {
                     below.push(entry.path());
                 }

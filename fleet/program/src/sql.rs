@@ -16,12 +16,13 @@ use crate::{
 
 /// Ask a lake in SQL
 ///
-///   stretch fleet sql --lake lake "select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor"
-///   stretch fleet sql --lake lake "select ..." --records calibrations
+///   stretch-fleet sql --lake lake "select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor"
+///   stretch-fleet sql --lake lake "select ..." --records calibrations
 ///
-/// The table trials has the columns of all trials, and site, rig, sensor and date. Functions beside those of DataFusion:
-/// poly13_fit(rate, signal, reference), linear_fit(signal, reference), polyij_fit(i, j, rate, signal, reference),
-/// poly13_state(...) and poly13_merge(state), agreement(reference, estimate), strain_estimate(record, rate, signal).
+/// The table trials has the columns of all trials, and site, rig, sensor and date. Functions in
+/// addition to those of DataFusion: poly13_fit(rate, signal, reference), linear_fit(signal,
+/// reference), polyij_fit(i, j, rate, signal, reference), poly13_state(...) and
+/// poly13_merge(state), agreement(reference, estimate), strain_estimate(record, rate, signal).
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -35,7 +36,8 @@ pub(crate) struct Args {
     /// Write the records of the fits, a file a row, into a folder: stretch apply takes them
     #[arg(long, value_name = "DIR")]
     records: Option<PathBuf>,
-    /// Allow what writes, such as copy ... to, insert, create and set; without it a question only reads
+    /// Allow statements that write, such as copy ... to, insert, create and set; without it a query
+    /// only reads
     #[arg(long)]
     write: bool,
 }
@@ -55,7 +57,8 @@ pub(crate) struct On {
 }
 
 impl On {
-    /// The lake, what was noticed of it told, and a session that has it as the table `trials`. Nothing is written.
+    /// Opens the lake, reports its problems, and returns it with a session in which it is the table
+    /// `trials`. Nothing is written.
     pub(crate) async fn open(&self) -> anyhow::Result<(Lake, SessionContext)> {
         let lake = Lake::open(&self.lake)?;
         tell_unfit(&lake);
@@ -66,13 +69,15 @@ impl On {
         Ok((lake, session))
     }
 
-    /// Among how many threads of this machine a command shares its work; none where a cluster answers.
+    /// Number of threads of this machine among which a command shares its work; `None` if a cluster
+    /// answers.
     pub(crate) fn shares(&self) -> Option<usize> {
         let all = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         self.cluster.is_none().then(|| self.threads.unwrap_or_else(all).max(1))
     }
 
-    /// The same for a command that writes partial fits into the lake: no other one writes until the lock is gone.
+    /// The same for a command that writes partial fits into the lake: no other command writes until
+    /// the lock is released.
     pub(crate) async fn open_to_write(&self) -> anyhow::Result<(Lock, Lake, SessionContext)> {
         ensure!(self.lake.is_dir(), "{}: there is no such folder", self.lake.display());
         let lock = Lock::of(&self.lake, usize::MAX)?;
@@ -123,7 +128,7 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     })
 }
 
-/// Whether a query was refused for what it would write: DDL, DML, or a statement such as `set`.
+/// Whether a query was refused because it would write: DDL, DML, or a statement such as `set`.
 fn is_of_writing(error: &DataFusionError) -> bool {
     matches!(error.find_root(), DataFusionError::Plan(text) if text.contains("not supported: "))
 }

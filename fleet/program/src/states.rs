@@ -1,4 +1,4 @@
-//! Partial fits, a day each: computed once, stored, and merged by whoever asks.
+//! Partial fits, one per day: computed once, stored, and merged by each query.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -27,7 +27,7 @@ use crate::{
 /// The key of what a file of states was computed from.
 const SOURCES: &str = "stretch.sources";
 
-/// Trials of a rig in a month: what one file of states is of.
+/// Trials of a rig in a month: the content of one file of states.
 struct Unit<'a> {
     path: PathBuf,
     month: String,
@@ -35,7 +35,7 @@ struct Unit<'a> {
 }
 
 impl Unit<'_> {
-    /// A digest of the trials and of the functions' release: with other ones it is another.
+    /// A digest of the trials and of the functions' release; it changes with either.
     fn sources(&self) -> String {
         let version = format!("poly13 {} {}", stretch_fleet::VERSION, stretch_fleet::STATE_VERSION);
         let names = self.files.iter().map(|file| file.footer.digest.as_bytes());
@@ -53,8 +53,9 @@ impl Unit<'_> {
 
     /// Computes the states of all sensors and days in one pass, and writes them whole.
     ///
-    /// Threads of this machine share the sensors: each takes the rows of its own in their order, so that sums have the same bits
-    /// in every run. Machines of a cluster share the rows, and sums come in the order in which they are done.
+    /// Threads of this machine share the sensors. Each takes the rows of its sensors in their
+    /// order, so that sums have the same bits in every run. Machines of a cluster share the rows,
+    /// and sums are added in the order in which they finish.
     async fn compute(
         &self,
         lake: &Lake,
@@ -100,7 +101,7 @@ pub(crate) fn shared<T: Copy>(all: impl IntoIterator<Item = T>, shares: usize) -
     all.chunks(all.len().div_ceil(shares.max(1)).max(1)).map(<[T]>::to_vec).collect()
 }
 
-/// The states as this program stores them, whatever types the engine gave texts.
+/// The states as this program stores them, whatever types the engine used for texts.
 fn schema() -> SchemaRef {
     Arc::new(Schema::new(vec![
         Field::new("sensor", DataType::Utf8, true),
@@ -120,10 +121,10 @@ fn plain(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
     Ok(RecordBatch::try_new(schema, columns)?)
 }
 
-/// Computes the states that are not stored yet, or no longer of the trials that are there, and makes all of them the table
-/// `states`: site, rig, sensor, date, state. How many months were computed comes back.
+/// Computes missing states, and those whose trials have changed, and registers all of them as the
+/// table `states`: site, rig, sensor, date, state. Returns how many months were computed.
 ///
-/// A month of a rig is written whole; what a kill left undone is all that the next run does.
+/// A month of a rig is written completely, so the next run only computes what a kill left undone.
 pub(crate) async fn bring_up(
     lake: &Lake,
     session: &SessionContext,
@@ -150,7 +151,6 @@ pub(crate) async fn bring_up(
         bar.set_message(format!("month {} of a rig", unit.month));
         unit.compute(lake, session, shares).await?;
         bar.inc(1);
-        anyhow::ensure!(!stretch_files::interrupted(), "interrupted");
     }
     bar.finish_and_clear();
     register_folder(session, "states", &folder, &["site", "rig"], schema())?;

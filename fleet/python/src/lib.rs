@@ -1,4 +1,4 @@
-//! The functions of `stretch-fleet` in `datafusion-python`: they cross as capsules of `datafusion-ffi`.
+//! The functions of `stretch-fleet` in `datafusion-python`, passed as capsules of `datafusion-ffi`.
 
 use std::{ffi::CStr, sync::Arc};
 
@@ -72,7 +72,7 @@ fn scalars(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     PyList::new(py, stretch_fleet::scalars().into_iter().map(Scalar).collect::<Vec<_>>())
 }
 
-/// Adds all functions to a `datafusion.SessionContext`: its SQL knows them from then on.
+/// Adds all functions to a `datafusion.SessionContext`, so that its SQL knows them.
 #[pyfunction]
 fn register(context: &Bound<'_, PyAny>) -> PyResult<()> {
     let datafusion = context.py().import("datafusion")?;

@@ -84,7 +84,8 @@ pub(crate) enum Wrong {
     Exchange,
 }
 
-/// Builds the servo as an FMU; none, and a word about it, where there is no compiler or it is not known what to build for.
+/// Builds the servo as an FMU; `None`, with a message, if there is no compiler or the target is
+/// unknown.
 pub(crate) fn servo(fmi: u8, wrong: Wrong) -> Option<Built> {
     let platform = match (std::env::consts::OS, std::env::consts::ARCH, fmi) {
         ("linux", "x86_64", 2) => "linux64",
@@ -99,7 +100,7 @@ pub(crate) fn servo(fmi: u8, wrong: Wrong) -> Option<Built> {
     fs::create_dir_all(&binaries).unwrap();
     let library = binaries.join("servo.so");
     let mut gcc = Command::new("gcc");
-    // Products and sums each with roundings of their own, as Rust has them.
+    // Products and sums are rounded separately, as in Rust.
     gcc.args(["-std=c11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Wall"]);
     gcc.arg(format!("-DFMI={fmi}")).arg("-o").arg(&library);
     if wrong == Wrong::Function {
@@ -156,7 +157,7 @@ pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, Sourc
     Ok(trials.flat_map(|t| angle(session.dt_s, gain, tau, brake, &u[t.samples.clone()])).collect())
 }
 
-/// Two recordings of a servo that brakes with 2 degrees, and a simulator that knows of brakes but has none on.
+/// Two recordings of a servo that brakes with 2 degrees, and a simulator with a brake that is off.
 pub(crate) fn spec() -> ProblemSpec {
     let trial = |index: u64| {
         let mut random = RandomGenerator::new(3, index);
@@ -184,7 +185,7 @@ pub(crate) fn spec() -> ProblemSpec {
         ..Parameter::default()
     };
     let argument =
-        Argument { unit: "deg".into(), min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
+        Argument { unit: "deg".into(), range: [0.0, 20.0], off: Some(0.0), ..Argument::default() };
     ProblemSpec {
         stages: vec![StageEntry {
             name: "servo".into(),

@@ -16,6 +16,7 @@ from .diagnosis import Diagnosis, diagnose
 from .evaluation import Evaluation, evaluate
 from .fix import Fix
 from .problem import Argument, Effect, Parameter, Stage, Trial
+from .reading import Recording, convert, read
 
 __all__ = [
     "Argument",
@@ -28,12 +29,15 @@ __all__ = [
     "Parameter",
     "Reading",
     "Receptor",
+    "Recording",
     "Refused",
     "Stage",
     "StretchError",
     "Trial",
     "__version__",
     "calibrate",
+    "convert",
     "diagnose",
     "evaluate",
+    "read",
 ]

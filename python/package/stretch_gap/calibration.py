@@ -227,9 +227,9 @@ def calibrate(
     `signal` and `reference` are one array each, or lists of arrays, one a recording; with either the samples a second or
     the time stamps in seconds.
 
-    `model`: `linear`, `polyIJ` (a surface of degree I in the rate and J in the signal, a branch each way), `blended`,
-    `hysteresis`, `relaxation`, `both`, `history`, `observer`, the last five also with `+rest`; `auto` takes the best on
-    recordings left out of the fit; `diagnosed` builds on the effects that a diagnosis of the gauge names.
+    `model`: `linear`, `polyIJ` (a surface of degree I in the rate and J in the signal, a branch each way),
+    `history` or `observer`, the last two also with `+rest`; `auto` takes the best on recordings left out of the fit;
+    `diagnosed` builds on the effects that a diagnosis of the gauge names.
 
     `reference_name` carries the unit as its last part (`angle_deg`); a length (`length_mm`) is calibrated as contraction
     from `rest_length`, by default its greatest value. `rate` spells the rate estimator (`savgol:11,2`), `robust` weighs

@@ -38,7 +38,7 @@ class Diagnosis:
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
-        """From what `to_json` or `stretch diagnose --json-out` wrote; figures are not in there."""
+        """From what `to_json` or `stretch diagnose --json=FILE` wrote; figures are not in there."""
         return Diagnosis(json.loads(text))
 
     @property
@@ -298,14 +298,15 @@ def diagnose(
         else:
             noise_in = dict(noise)
         problem = {
-            "stages": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
-            "inputs": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
-            "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
-            "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
+            "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
+            "input": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
+            "parameter": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
+            "effect": [entries.effect(key, value) for key, value in (effects or {}).items()],
             "wrap": wrappers,
             "without": list(without),
             "beside": list(beside),
-            "sensor": {"reference": reference, "signal": output or listed[-1].output} if reference else None,
+            "reference": reference,
+            "signal": (output or listed[-1].output) if reference else None,
         }
         wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
         checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))

@@ -178,10 +178,10 @@ def effect(name: str, given: EffectLike) -> dict[str, Any]:
             "or a stretch_gap.Effect"
         )
     arguments = [
-        {"name": key, "unit": a.unit, "min": float(a.min), "max": float(a.max), "off": a.off, "log": a.log}
+        {"name": key, "unit": a.unit, "range": [float(a.min), float(a.max)], "off": a.off, "log": a.log}
         for key, a in given.arguments.items()
     ]
-    return {"name": name, "arguments": arguments, "stages": list(given.stages), "twins": list(given.twins)}
+    return {"name": name, "argument": arguments, "stages": list(given.stages), "twins": list(given.twins)}
 
 
 def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str, float]) -> dict[str, Any]:

@@ -52,12 +52,7 @@ impl Job {
             let asked = scope.spawn(|| -> anyhow::Result<(Problem, Examined)> {
                 let problem = sessions.problem(&options.signal)?;
                 let options = stretch_gap::Options { responses: true, ..Default::default() };
-                let examined = problem.examine(
-                    &options,
-                    true,
-                    &told_on(&asking),
-                    &stretch_files::interrupted,
-                )?;
+                let examined = problem.examine(&options, true, &told_on(&asking), &|| false)?;
                 asking.finish_and_clear();
                 Ok((problem, examined))
             });
@@ -103,7 +98,7 @@ impl Calibrations {
         for kind in names.iter().filter(|_| names.len() > 1) {
             let own = sessions.test.iter().filter(|(k, _)| k == kind);
             let trials: Vec<Trial> = own.map(|(_, trial)| trial.clone()).collect();
-            kinds.push((kind.name().to_owned(), evaluate(&methods, &trials)?.pooled));
+            kinds.push((kind.to_string(), evaluate(&methods, &trials)?.pooled));
         }
         Ok(Self { linear, surfaces, chosen, choice, name, evaluation, kinds })
     }

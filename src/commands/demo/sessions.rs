@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    ffi::OsStr,
     fs,
     path::{Path, PathBuf},
 };
@@ -24,7 +25,6 @@ const OTHERS: [&str; 3] = ["inlet", "outlet", "pressure_kpa"];
 /// What the user says of measured sessions.
 #[derive(Debug, Default)]
 pub(super) struct Wanted<'a> {
-    pub(super) sessions: Option<&'a str>,
     pub(super) reference: Option<&'a str>,
     pub(super) signal: Option<&'a str>,
 }
@@ -49,11 +49,15 @@ pub(super) struct Sessions {
 
 impl Sessions {
     /// Reads a folder with a `dataset.toml`; a folder of CSV files, of which those that differ
-    /// in a last `_1`, `_2`, ... belong together; or one file with several sessions.
+    /// in a last `_1`, `_2`, ... belong together, or one such group of it by its name; or one file with several sessions.
     ///
     /// # Errors
     /// What cannot be read, has no session to test on, or needs naming.
     pub(super) fn read(path: &Path, wanted: &Wanted<'_>) -> anyhow::Result<Self> {
+        let (path, group) = match path.parent() {
+            Some(folder) if !path.exists() && has_groups(folder) => (folder, path.file_name()),
+            _ => (path, None),
+        };
         ensure!(
             path.exists(),
             "{}: there is no such folder; the sessions of a knee in a knitted sleeve are public: \
@@ -62,7 +66,7 @@ impl Sessions {
         );
         let is_set = path.join("dataset.toml").is_file();
         let (name, fit, test, note) =
-            if is_set { data_set(path)? } else { loose(path, wanted.sessions)? };
+            if is_set { data_set(path)? } else { loose(path, group.and_then(OsStr::to_str))? };
         let columns = fit.first().map_or(&[][..], |(_, trial)| trial.channels.as_slice());
         let has = |name: &str| columns.iter().any(|c| c.name == name);
         let usual = || REFERENCES.into_iter().find(|name| has(name));
@@ -135,7 +139,6 @@ fn data_set(folder: &Path) -> anyhow::Result<Parts> {
         let load = |entry: &TrialEntry| Recording::of_entry(entry, folder, &ReadOptions::new());
         let trials =
             entries.map(|e| Ok((e.kind, load(e)?.trial))).collect::<anyhow::Result<Vec<_>>>()?;
-        let split = split.name();
         ensure!(
             !trials.is_empty(),
             "{}: no trial has split = \"{split}\"; the job needs trials to fit and to test on",
@@ -145,6 +148,13 @@ fn data_set(folder: &Path) -> anyhow::Result<Parts> {
     };
     let note = format!("The data set {} of {}.", set.name, name_of(folder));
     Ok((name_of(folder), of(Split::Fit)?, of(Split::Test)?, note))
+}
+
+/// Whether a folder has groups of sessions, and no `dataset.toml`.
+fn has_groups(folder: &Path) -> bool {
+    folder.is_dir()
+        && !folder.join("dataset.toml").exists()
+        && groups(folder).is_ok_and(|groups| !groups.is_empty())
 }
 
 /// One group of files without a `dataset.toml`: the last session is tested on.
@@ -185,7 +195,7 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
         note += &format!(" Read as the authors published them ({REPOSITORY}, commit {COMMIT}).");
     }
     if !others.is_empty() {
-        note += &format!(" There are also {} (--sessions).", others.join(", "));
+        note += &format!(" There are also {} (--data FOLDER/GROUP).", others.join(", "));
     }
     Ok((name.to_owned(), fit, test, note))
 }
@@ -221,21 +231,21 @@ mod tests {
     #[ignore = "needs measured data: ../shared/data, or what STRETCH_DATA names; ./ci.sh runs it"]
     fn with_data_files_as_published_hold_the_same_as_files_a_session() {
         let sleeve = testkit::measured::folder("knit_sleeve");
+        let folder = tempfile::tempdir().unwrap();
+        let own = folder.path().join("sessions");
+        fs::create_dir(&own).unwrap();
         let mut text = String::from("\u{feff}");
         for session in ["heel_curl_90_1.csv", "heel_curl_90_2.csv"] {
+            fs::copy(sleeve.join(session), own.join(session)).unwrap();
             for line in fs::read_to_string(sleeve.join(session)).unwrap().lines().skip(1) {
                 let (_, values) = line.split_once(',').expect("a time and values");
                 text += &format!("{values},0.1,-0.9,0.2,1,2,3\r\n");
             }
         }
-        let folder = tempfile::tempdir().unwrap();
         let published = folder.path().join("S15_16_HC90.csv");
         fs::write(&published, text).unwrap();
-        let wanted = Wanted { sessions: Some("heel_curl_90"), ..Wanted::default() };
-        let [one, other] = [
-            Sessions::read(&sleeve, &wanted).unwrap(),
-            Sessions::read(&published, &Wanted::default()).unwrap(),
-        ];
+        let [one, other] =
+            [&own, &published].map(|path| Sessions::read(path, &Wanted::default()).unwrap());
         assert_eq!((&one.reference, &one.signals), (&other.reference, &other.signals));
         for (a, b) in [(&one.fit, &other.fit), (&one.test, &other.test)] {
             assert_eq!((a.len(), b.len()), (1, 1));

@@ -17,6 +17,8 @@ pub(crate) struct Status {
     /// difference; none where the calibration cannot answer.
     pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,
+    /// The last estimate of the board's.
+    pub(super) newest: Option<f64>,
     /// Frames beside which the board's clock had not gone on although the calibration's period is a tick of it or more.
     pub(super) standing: u64,
     /// Rows that were recorded, at the end of a recording.
@@ -27,6 +29,15 @@ impl Status {
     /// Nothing has come yet.
     pub(super) fn of(unit: &str) -> Self {
         Self { unit: unit.to_owned(), ..Self::default() }
+    }
+
+    /// What one line of a terminal shows while samples come.
+    pub(super) fn live_line(&self) -> String {
+        let newest = self.newest.map_or_else(
+            || "no estimate yet".to_owned(),
+            |estimate| format!("{estimate:.3} {}", self.unit).trim_end().to_owned(),
+        );
+        format!("{newest}; {}", self.line())
     }
 
     pub(super) fn line(&self) -> String {
@@ -56,7 +67,7 @@ impl Status {
         if *beyond > 0 {
             text += &format!(
                 "; {beyond} codes up to {largest} are beyond a converter of {adc_bits} bits and no rows: name its bits \
-                 with --adc-bits"
+                 with --adc"
             );
         }
         match self.compared {

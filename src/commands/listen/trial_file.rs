@@ -40,16 +40,7 @@ impl Sample {
             push_number(line, signal);
         }
         // writing to memory cannot fail
-        let _ = match self.frame.answer {
-            Answer::Reading { thousandths, branch, domain } => {
-                let (sign, size) =
-                    (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
-                let (whole, rest) = (size / 1000, size % 1000);
-                writeln!(line, ",{},{sign}{whole}.{rest:03},{branch},{domain}", self.frame.code)
-            }
-            Answer::Warming => writeln!(line, ",{},,,warming", self.frame.code),
-            Answer::Missing => writeln!(line, ",{},,,missing", self.frame.code),
-        };
+        let _ = writeln!(line, ",{},{}", self.frame.code, self.frame.answer);
     }
 }
 

@@ -12,9 +12,6 @@ pub(crate) struct Twin {
     pub signal: String,
     /// Unit of the estimate; empty where the record does not say.
     pub unit: String,
-    /// The estimates that were calibrated, from and to; shown on a screen, which only Unix has.
-    #[cfg_attr(not(unix), expect(dead_code))]
-    pub span: Option<[f64; 2]>,
     /// Seconds a sample, where the record says so.
     pub period_s: Option<f64>,
     receptor: Own,
@@ -28,7 +25,7 @@ enum Own {
 }
 
 impl Twin {
-    /// Any record of `stretch calibrate`: of `--out`, or of `--fixed`.
+    /// Any record of `stretch calibrate` or of `stretch export --fixed`.
     pub(crate) fn read(path: &Path, adc_bits: u8) -> anyhow::Result<Self> {
         let Some(receptor) = BoardReceptor::read(path) else {
             return Self::of(&read_calibration(path)?);
@@ -36,31 +33,27 @@ impl Twin {
         let bits = receptor.adc_bits();
         anyhow::ensure!(
             bits == adc_bits,
-            "{}: this record is for a converter of {bits} bits; name it with --adc-bits {bits}",
+            "{}: this record is for a converter of {bits} bits; name it with --adc {bits},ZERO_V,FULL_SCALE_V",
             path.display()
         );
         Ok(Self {
             signal: "signal".to_owned(),
             unit: String::new(),
-            span: None,
             period_s: None,
             receptor: Own::Codes(receptor),
         })
     }
 
     fn of(calibration: &Calibration) -> anyhow::Result<Self> {
-        let (range, target) = (calibration.target_range, calibration.target);
-        let [a, b] = [range.min(), range.max()].map(|t| target.to_reference(t));
-        let receptor = match (Receptor::new(calibration), calibration.rate_estimator) {
+        let receptor = match (Receptor::new(calibration), calibration.spec().rate_estimator) {
             (Ok(receptor), _) => Own::Volts(Box::new(Runner::new(receptor))),
             (Err(_), RateEstimator::CentralDifference) => Own::Silent,
             (Err(error), _) => return Err(error.into()),
         };
         Ok(Self {
-            signal: calibration.signal.as_str().to_owned(),
-            unit: calibration.reference.unit().to_owned(),
-            span: Some([a.min(b), a.max(b)]),
-            period_s: Some(calibration.sample_rate_hz.period_s()),
+            signal: calibration.spec().signal.as_str().to_owned(),
+            unit: calibration.spec().reference.unit().to_owned(),
+            period_s: Some(calibration.spec().sample_rate_hz.period_s()),
             receptor,
         })
     }

@@ -1,4 +1,6 @@
-//! What is shown: a plot on a terminal, lines elsewhere. No recording waits for it.
+//! What is seen while `listen` runs: CSV rows on standard output, a status line on a terminal.
+//!
+//! A thread of its own writes both, so that a slow reader or a stopped terminal cannot hold up a recording.
 
 use std::{
     io::{self, BufWriter, IsTerminal, Write},
@@ -11,140 +13,129 @@ use std::{
     time::{Duration, Instant},
 };
 
-use anyhow::Context;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::{screen::Screen, trial_file::Sample, twin::Twin};
+use super::trial_file::Sample;
 use crate::{
     commands::stop,
-    display::{Output, warn},
+    display::{Output, shows_progress, warn},
 };
 
-/// Blocks that wait for a reader of standard output beside a recording; a block is what was read
-/// from the port at once, 4096 bytes at most, so that all of them are 64 MB at most.
+/// Blocks that may wait for a reader of standard output while a recording goes on. A block is what was read from the port at
+/// once, 4096 bytes at most, so that all of them are 64 MB at most.
 const WAITING: usize = 16_384;
 
 /// How long Ctrl-C leaves a reader of standard output that does not read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-pub(crate) enum View {
-    Screen {
-        screen: Box<Screen>,
-        drawn: Instant,
-    },
-    Lines {
-        blocks: SyncSender<Shown>,
-        /// Nobody reads any more.
-        gone: Arc<AtomicBool>,
-        done: Receiver<()>,
-        /// A recording does not wait for a reader; what is not recorded does.
-        waits: bool,
-        unseen: u64,
-    },
-    /// A terminal that went away.
-    Gone,
+/// Time between two states of the status line.
+const REFRESH: Duration = Duration::from_millis(100);
+
+pub(crate) struct View {
+    blocks: SyncSender<Shown>,
+    /// Whether rows go to standard output at all.
+    has_rows: bool,
+    /// Set once a write to standard output failed.
+    gone: Arc<AtomicBool>,
+    done: Receiver<()>,
+    /// Without a recording the port waits for the reader of the rows.
+    waits: bool,
+    unseen: u64,
+    refreshed: Instant,
 }
 
-/// For the thread that shows.
-pub(crate) enum Shown {
-    Lines(Vec<u8>),
+/// What the thread gets to write.
+enum Shown {
+    Rows(Vec<u8>),
     Note(String),
+    Status(String),
 }
 
 impl View {
-    pub(crate) fn open(twin: &Twin, header: &str, is_recorded: bool) -> anyhow::Result<Self> {
-        if cfg!(unix) && io::stdout().is_terminal() && io::stdin().is_terminal() {
-            let screen = Box::new(Screen::open(twin).context("the terminal")?);
-            return Ok(Self::Screen { screen, drawn: Instant::now() });
-        }
+    /// `has_rows`: whether samples go to standard output. `waits`: whether the port waits for their reader.
+    pub(crate) fn open(header: &str, has_rows: bool, waits: bool) -> Self {
         let (blocks, shown) = sync_channel(WAITING);
         let (finished, done) = channel();
         let gone = Arc::new(AtomicBool::new(false));
         let is_gone = gone.clone();
-        let header = Shown::Lines(header.as_bytes().to_vec());
+        let header = has_rows.then(|| Shown::Rows(header.as_bytes().to_vec()));
         thread::spawn(move || {
             let mut out = BufWriter::new(Output);
-            for block in [header].into_iter().chain(shown) {
+            let bar = status_line(has_rows);
+            for block in header.into_iter().chain(shown) {
                 match block {
-                    Shown::Note(text) => warn(format!("stretch: {text}")),
-                    Shown::Lines(_) if is_gone.load(SeqCst) => {}
+                    Shown::Status(text) => bar.set_message(text),
+                    Shown::Note(text) => bar.suspend(|| warn(format!("stretch: {text}"))),
+                    Shown::Rows(_) if is_gone.load(SeqCst) => {}
                     // `Output` keeps the failure, and the end of the program reports it
-                    Shown::Lines(lines) => {
-                        if out.write_all(&lines).and_then(|()| out.flush()).is_err() {
+                    Shown::Rows(rows) => {
+                        if out.write_all(&rows).and_then(|()| out.flush()).is_err() {
                             is_gone.store(true, SeqCst);
                         }
                     }
                 }
             }
+            bar.finish_and_clear();
             let _ = finished.send(());
         });
-        Ok(Self::Lines { blocks, gone, done, waits: !is_recorded, unseen: 0 })
+        Self { blocks, has_rows, gone, done, waits, unseen: 0, refreshed: Instant::now() }
     }
 
-    /// Whether nobody looks any more.
+    /// Whether the reader of the rows has gone.
     pub(crate) fn is_gone(&self) -> bool {
-        match self {
-            Self::Screen { .. } => false,
-            Self::Lines { gone, .. } => gone.load(SeqCst),
-            Self::Gone => true,
-        }
+        self.gone.load(SeqCst)
     }
 
     pub(crate) fn push(&mut self, samples: &[Sample]) {
-        match self {
-            Self::Screen { screen, .. } => samples.iter().for_each(|sample| screen.push(sample)),
-            Self::Lines { blocks, waits, unseen, .. } if !samples.is_empty() => {
-                let mut lines = Vec::with_capacity(64 * samples.len());
-                samples.iter().for_each(|sample| sample.push_line(&mut lines));
-                if *waits {
-                    // the thread lives as long as this does
-                    let _ = blocks.send(Shown::Lines(lines));
-                } else if let Err(TrySendError::Full(_)) = blocks.try_send(Shown::Lines(lines)) {
-                    *unseen += samples.len() as u64;
-                }
-            }
-            Self::Lines { .. } | Self::Gone => {}
+        if !self.has_rows || samples.is_empty() {
+            return;
+        }
+        let mut rows = Vec::with_capacity(64 * samples.len());
+        samples.iter().for_each(|sample| sample.push_line(&mut rows));
+        if self.waits {
+            // the thread lives as long as this does
+            let _ = self.blocks.send(Shown::Rows(rows));
+        } else if let Err(TrySendError::Full(_)) = self.blocks.try_send(Shown::Rows(rows)) {
+            self.unseen += samples.len() as u64;
         }
     }
 
+    /// A note on standard error, which is dropped if too much waits already.
     pub(crate) fn note(&self, text: &str) {
-        if let Self::Lines { blocks, .. } = self {
-            // as with rows: nothing waits for a reader of standard error
-            let _ = blocks.try_send(Shown::Note(text.to_owned()));
+        let _ = self.blocks.try_send(Shown::Note(text.to_owned()));
+    }
+
+    /// Renews the status line, ten times a second at most.
+    pub(crate) fn refresh(&mut self, status: &super::Status) {
+        if self.refreshed.elapsed() >= REFRESH {
+            self.refreshed = Instant::now();
+            let _ = self.blocks.try_send(Shown::Status(status.live_line()));
         }
     }
 
-    pub(crate) fn draw(&mut self, status: &super::Status) {
-        if let Self::Screen { screen, drawn } = self
-            && drawn.elapsed() >= Duration::from_millis(50)
-        {
-            *drawn = Instant::now();
-            if screen.draw(status).is_err() {
-                *self = Self::Gone;
-            }
-        }
-    }
-
-    pub(crate) fn asked_to_stop(&mut self) -> bool {
-        let Self::Screen { screen, .. } = self else { return false };
-        match screen.asked_to_stop() {
-            Ok(asked) => asked,
-            Err(_) => {
-                *self = Self::Gone;
-                false
-            }
-        }
-    }
-
-    /// Waits until all is shown, after Ctrl-C not for long; gives how many samples were not.
+    /// Waits until all is shown, after Ctrl-C for a second at most; returns how many samples were not shown.
     pub(crate) fn close(self) -> u64 {
-        let Self::Lines { blocks, done, unseen, .. } = self else { return 0 };
-        drop(blocks);
+        drop(self.blocks);
         let mut asked = None;
-        while let Err(RecvTimeoutError::Timeout) = done.recv_timeout(Duration::from_millis(20)) {
+        while let Err(RecvTimeoutError::Timeout) = self.done.recv_timeout(Duration::from_millis(20))
+        {
             if stop::ended() && asked.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
                 break;
             }
         }
-        unseen
+        self.unseen
     }
+}
+
+/// A line on standard error that is drawn again and again. Nothing is drawn if that is no terminal, or if rows scroll by on a
+/// terminal.
+fn status_line(has_rows: bool) -> ProgressBar {
+    let bar = ProgressBar::no_length();
+    if let Ok(style) = ProgressStyle::with_template("{wide_msg}") {
+        bar.set_style(style);
+    }
+    if !shows_progress() || (has_rows && io::stdout().is_terminal()) {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    bar
 }

@@ -1,8 +1,9 @@
 //! Puts the page into one file: HTML, style, scripts, and the WASM in it, packed.
 //!
-//! `stretch-pack PAGE.wasm SOURCES OUT` writes `OUT/index.html` from `SOURCES/index.html`, whose lines `<!-- style FILE -->`,
-//! `<!-- script FILE ... -->`, `<!-- worker FILE ... -->`, `<!-- wasm -->` and `POLICY` it replaces. What a browser may do with the
-//! page is named by digests: those of its scripts, and that of the reports' script, for a report opens inside.
+//! `stretch-pack PAGE.wasm SOURCES OUT` writes `OUT/index.html` from `SOURCES/index.html`, whose
+//! lines `<!-- style FILE -->`, `<!-- script FILE ... -->`, `<!-- worker FILE ... -->`, `<!-- wasm
+//! -->` and `POLICY` it replaces. The policy names what a browser may run by digests: those of the
+//! page's scripts, and that of the reports' script, because a report opens inside.
 
 use std::{env, error::Error, fs, io::Write, path::Path};
 
@@ -60,7 +61,8 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// What a browser may do: the scripts with these digests, WASM, workers made of the page's own text, and nothing else; no request.
+/// The content policy: the scripts with these digests, WASM, workers made from the page's own text,
+/// and nothing else; no request.
 fn policy(digests: &[String]) -> String {
     format!(
         "default-src 'none'; script-src {} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; worker-src blob:; frame-src blob:; \
@@ -76,7 +78,7 @@ fn report_digest() -> Outcome<String> {
     Ok(found.ok_or("the reports' policy names no digest")?.to_owned())
 }
 
-/// The module, and what wasm-bindgen puts beside it.
+/// The module, and the JavaScript that wasm-bindgen generates for it.
 struct Glue {
     js: String,
     wasm: Vec<u8>,
@@ -105,7 +107,7 @@ fn joined(sources: &Path, files: &[&str]) -> Outcome<String> {
     checked(text)
 }
 
-/// A text that can stand in an element.
+/// A text that may be the content of an element.
 fn checked(text: String) -> Outcome<String> {
     match text.contains("</script") || text.contains("<!--") {
         true => Err("a script holds what ends an element".into()),

@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
     Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options, calibrate,
-    calibration_to_json, candidate_models, choose_among, evaluate, explains_little,
-    explains_nothing, judge_model, parse_adc, without_gross_errors,
+    candidate_models, choose_among, evaluate, explains_little, explains_nothing, judge_model,
+    parse_adc, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
-use stretch_export::header;
+use stretch_export::gauge_header;
 use stretch_problem::Causes;
 use stretch_report::{Context, calibration_page};
+use stretch_sleeve::{GaugeCalibration, calibrate_gauge};
 
 use crate::{
     files::Files,
@@ -46,7 +47,7 @@ impl Choices {
         })
     }
 
-    /// Trials to fit, without what no motion can have made, and what was left out.
+    /// Trials to fit, without samples that no motion can have caused, and the removed samples.
     fn trials(&self, files: &Files) -> Result<(Vec<Trial>, Vec<String>), Said> {
         let trials = files.trials(Split::Fit)?;
         if trials.is_empty() {
@@ -134,22 +135,29 @@ impl Made {
     pub(crate) fn told(&self) -> Result<String, Said> {
         to_json(&Told {
             model: self.options.model.to_string(),
-            unit: self.calibrated.calibration.reference.unit(),
+            unit: self.calibrated.calibration.spec().reference.unit(),
             models: self.choice.as_ref().map_or(&[], |choice| &choice.rows),
             notes: &self.calibrated.notes,
         })
     }
 
+    /// The calibration with where its movements turned.
+    fn gauge(&self) -> Result<GaugeCalibration, Said> {
+        let calibration = self.calibrated.calibration.clone();
+        Ok(calibrate_gauge(calibration, &self.trials, &self.options)?)
+    }
+
     pub(crate) fn record(&self) -> Result<String, Said> {
-        Ok(calibration_to_json(&self.calibrated.calibration)?)
+        Ok(self.gauge()?.to_json()?)
     }
 
     pub(crate) fn header(&self, adc: &str) -> Result<String, Said> {
         let options = stretch_export::Options { form: None, adc: parse_adc(adc)? };
-        Ok(header(&self.calibrated.calibration, &options)?.text)
+        Ok(gauge_header(&self.gauge()?, &options)?.text)
     }
 
-    /// Errors on what was fitted, where no trial is for testing, beside a line: the yardstick of every surface.
+    /// Errors on the fitted trials if no trial is for testing, together with those of a line, the
+    /// baseline for every surface.
     pub(crate) fn judged(&mut self, files: &Files) -> Result<&Judgement, Said> {
         if self.judged.is_none() {
             let options = Options { model: ModelKind::Linear, ..self.options.clone() };

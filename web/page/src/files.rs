@@ -25,13 +25,9 @@ impl Asked {
         if !self.time.is_empty() {
             options = options.time(&self.time);
         }
-        options = match self.time_unit.as_str() {
-            "s" => options.time_unit(TimeUnit::Seconds),
-            "ms" => options.time_unit(TimeUnit::Milliseconds),
-            "us" => options.time_unit(TimeUnit::Microseconds),
-            "ns" => options.time_unit(TimeUnit::Nanoseconds),
-            _ => options,
-        };
+        if let Some(unit) = TimeUnit::abbreviated(&self.time_unit) {
+            options = options.time_unit(unit);
+        }
         if !self.columns.is_empty() {
             options = options.columns(self.columns.split(',').map(str::trim));
         }
@@ -100,9 +96,9 @@ impl Files {
             let record = calibration_from_json(text(name, bytes)?, name)?;
             return Ok(Read::Record {
                 name: name.to_owned(),
-                signal: record.signal.as_str().to_owned(),
-                reference: record.reference.as_str().to_owned(),
-                rate_hz: record.sample_rate_hz.hz(),
+                signal: record.spec().signal.as_str().to_owned(),
+                reference: record.spec().reference.as_str().to_owned(),
+                rate_hz: record.spec().sample_rate_hz.hz(),
             });
         }
         let entry = self.set.iter().flat_map(|set| &set.trials).find(|entry| entry.file == name);

@@ -1,17 +1,16 @@
-//! The same bits here as on a desk and on boards: every receptor of `firmware/` replays the trial that boards replay.
+//! The same bits here as on a computer and on boards: every receptor of `firmware/` replays the
+//! trial that boards replay.
 
 use std::fmt::Write;
 
 use serde::Deserialize;
-use stretch_core::{
-    ArrayCalibration, Calibration, Design, Hertz, RateEstimator, Stage, Volts, record,
-};
+use stretch_core::{Calibration, Design, Hertz, RateEstimator, Stage, Volts, record};
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
-    ArrayReceptor, BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
-    StretchReceptor, Withheld,
+    DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
     code::{AdcCode, CodeCalibration, CodeReading, CodeReceptor, Fixed, FixedObserver},
 };
+use stretch_sleeve::{ArrayCalibration, ArrayReceptor};
 
 use crate::said::Said;
 
@@ -55,7 +54,7 @@ pub(crate) fn checksums() -> Result<String, Said> {
     let mut out = String::new();
     let poly13: Calibration = record!("poly13");
     let linear: Calibration = record!("linear");
-    let hz = poly13.sample_rate_hz;
+    let hz = poly13.spec().sample_rate_hz;
     let sg = SgRate::<f32, 11, 2>::new(hz)?;
     let low_pass = LowPassSpec { cutoff: Hertz(5.0), sample_rate: hz };
     let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
@@ -78,18 +77,9 @@ pub(crate) fn checksums() -> Result<String, Said> {
     volts(&mut out, &named("differentiator"), StretchReceptor::with_rate(&poly13, rate)?);
     let rate = RateFilter::<f32>::new(tracker, hz)?;
     volts(&mut out, &named("tracker"), StretchReceptor::with_rate(&poly13, rate)?);
-    volts(&mut out, "blended", BlendedReceptor::with_rate(&record!("blended"), sg)?);
 
-    let histories: [(&str, Calibration); 8] = [
-        ("hysteresis", record!("hysteresis")),
-        ("relaxation", record!("relaxation")),
-        ("both", record!("both")),
-        ("history", record!("history")),
-        ("hysteresis+rest", record!("hysteresis-rest")),
-        ("relaxation+rest", record!("relaxation-rest")),
-        ("both+rest", record!("both-rest")),
-        ("history+rest", record!("history-rest")),
-    ];
+    let histories: [(&str, Calibration); 2] =
+        [("history", record!("history")), ("history+rest", record!("history-rest"))];
     for (model, calibration) in histories {
         volts(&mut out, model, HistoryReceptor::with_rate(&calibration, sg)?);
     }

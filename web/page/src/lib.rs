@@ -1,7 +1,7 @@
 //! The crates of stretch behind a page: recordings in, calibrations and diagnoses out.
 //!
-//! What crosses the border to JavaScript is bytes and JSON; nothing here knows the page, and no mathematics is of this crate.
-//! Errors are sentences: those of the program.
+//! Only bytes and JSON cross the border to JavaScript. This crate does not know the page and
+//! contains no mathematics. Errors are the sentences of the program.
 
 mod calibration;
 mod diagnosis;
@@ -21,15 +21,15 @@ use said::{Said, from_json, to_json};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Told in words what goes on.
+    /// Called with a text that describes the progress.
     #[wasm_bindgen(js_name = stretchProgress)]
     fn progress(text: &str);
-    /// Told why the program ended.
+    /// Called with the reason why the program ended.
     #[wasm_bindgen(js_name = stretchFailed)]
     fn failed(text: &str);
 }
 
-/// What lies on the desk: files that were read, the calibration and the diagnosis that came of them.
+/// State of the page: the files that were read, and the resulting calibration and diagnosis.
 #[wasm_bindgen]
 #[derive(Debug, Default)]
 pub struct Desk {
@@ -56,7 +56,8 @@ impl Desk {
         Ok(to_json(&self.files.take(name, bytes, &asked)?)?)
     }
 
-    /// Keeps the recordings of these names, a JSON list, to test on; `dataset.toml`, where there is one, says so itself.
+    /// Keeps the recordings with these names, a JSON list, for testing; a `dataset.toml` decides
+    /// this itself.
     ///
     /// # Errors
     /// What is no list of names.
@@ -70,7 +71,7 @@ impl Desk {
         self.files.points(name, [reference, signal], most)
     }
 
-    /// What a diagnosis of the gauge alone names, for models that build on it.
+    /// The effects that a diagnosis of the gauge alone names, for models that build on it.
     ///
     /// # Errors
     /// Files that do not belong together.
@@ -108,7 +109,7 @@ impl Desk {
         Ok(told)
     }
 
-    /// Errors of the calibration beside the raw signal and a line.
+    /// Errors of the calibration, of the raw signal and of a line.
     ///
     /// # Errors
     /// What the program says.
@@ -171,7 +172,7 @@ fn nothing() -> Said {
     Said("nothing has been worked out yet".to_owned())
 }
 
-/// The sample that a newcomer may try: the paper's session, simulated. A list of files.
+/// The sample for new users: the paper's session, simulated. A list of files.
 ///
 /// # Errors
 /// None that a sound build gives.
@@ -195,7 +196,7 @@ pub fn golden() -> Result<String, JsError> {
     Ok(golden::checksums()?)
 }
 
-/// How many receptors answer here, bit by bit, what they answer on a desk and on boards.
+/// Number of receptors whose bits here equal those on a computer and on boards.
 ///
 /// # Errors
 /// A browser in which one does not.
@@ -210,7 +211,7 @@ pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()
 }
 
-/// Something that happened, with its kind beside.
+/// An event and its kind.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum Read {

@@ -1,4 +1,5 @@
-//! A board's live link, or bare numbers a line: shown, recorded, and estimated where there is a record.
+//! A board's live link, or one number per line: shown, recorded, and estimated if there is a
+//! record.
 
 use std::fmt::Write;
 
@@ -58,13 +59,14 @@ impl Live {
     }
 
     fn of(source: Source, calibration: Option<Calibration>) -> Self {
-        let signal = calibration.as_ref().map_or("bridge_v", |c| c.signal.as_str()).to_owned();
-        let unit = calibration.as_ref().map_or("", |c| c.reference.unit()).to_owned();
+        let signal =
+            calibration.as_ref().map_or("bridge_v", |c| c.spec().signal.as_str()).to_owned();
+        let unit = calibration.as_ref().map_or("", |c| c.spec().reference.unit()).to_owned();
         Self { source, signal, unit, lines: String::new() }
     }
 
-    /// Takes what came, at a time of the browser's clock; gives time, signal and estimate of each sample, flat, NaN where
-    /// there is none.
+    /// Takes the received bytes, at a time of the browser's clock; returns time, signal and
+    /// estimate of each sample, flat, NaN for a missing value.
     pub fn take(&mut self, bytes: &[u8], now_s: f64) -> Vec<f64> {
         let mut out = Vec::new();
         for &byte in bytes {
@@ -113,20 +115,20 @@ fn read(record: &str) -> Result<Option<Calibration>, Said> {
     }
 }
 
-/// Frames of the live link, on one time line over restarts of the board.
+/// Frames of the live link, on one time line across restarts of the board.
 #[derive(Debug)]
 struct Frames {
     decoder: Decoder,
     adc: Adc,
     time_line: TimeLine,
     twin: Option<Runner<Receptor<f64>>>,
-    /// Estimates held against those here, and the largest difference.
+    /// Estimates compared with those computed here, and the largest difference.
     compared: (u64, f64),
     /// Samples that the board did not get.
     missing: u64,
     /// Codes that the converter cannot give, and the largest.
     beyond: (u64, i32),
-    /// Frames at which the board's clock stood still.
+    /// Frames at which the board's clock had stopped.
     standing: u64,
 }
 
@@ -135,7 +137,9 @@ impl Frames {
         Ok(Self {
             decoder: Decoder::new(),
             adc,
-            time_line: TimeLine::new(calibration.map_or(1e-3, |c| c.sample_rate_hz.period_s())),
+            time_line: TimeLine::new(
+                calibration.map_or(1e-3, |c| c.spec().sample_rate_hz.period_s()),
+            ),
             twin: calibration.map(Receptor::new).transpose()?.map(Runner::new),
             compared: (0, 0.0),
             missing: 0,
@@ -165,7 +169,7 @@ impl Frames {
             }
             _ => f64::NAN,
         };
-        // a sample whose time nobody knows is no row
+        // a sample without a known time becomes no row
         let Some(time_s) = time_s else {
             self.standing += 1;
             return None;
@@ -215,16 +219,8 @@ fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame) {
     push(lines, time_s);
     lines.push(',');
     push(lines, signal);
-    let code = frame.code;
     // a string takes every write
-    let _ = match frame.answer {
-        Answer::Reading { thousandths, branch, domain } => {
-            let (sign, size) = (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
-            writeln!(lines, ",{code},{sign}{}.{:03},{branch},{domain}", size / 1000, size % 1000)
-        }
-        Answer::Warming => writeln!(lines, ",{code},,,warming"),
-        Answer::Missing => writeln!(lines, ",{code},,,missing"),
-    };
+    let _ = writeln!(lines, ",{},{}", frame.code, frame.answer);
 }
 
 fn push(lines: &mut String, value: f64) {

@@ -21,7 +21,7 @@ impl From<Said> for wasm_bindgen::JsError {
 }
 
 impl<E: Error> From<E> for Said {
-    /// The error and its causes; a cause that is already told is not told again.
+    /// The error and its causes; a cause that the text already contains is not repeated.
     fn from(error: E) -> Self {
         let mut told = error.to_string();
         let mut cause = error.source();

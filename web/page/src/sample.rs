@@ -1,4 +1,4 @@
-//! The sample: the paper's session on a rig with the paper's effects, as `stretch simulate --preset paper` writes it.
+//! The sample: the paper's session on a rig with the paper's effects, as `stretch simulate --rig paper` writes it.
 
 use serde::Serialize;
 use stretch_data::DataSet;
@@ -6,14 +6,14 @@ use stretch_sim::{Rig, RunSettings, Session, TrialPlan, paper_preset};
 
 use crate::{progress, said::Said};
 
-/// A file as it would stand on a disk.
+/// A file as it would be on a disk.
 #[derive(Debug, Serialize)]
 pub(crate) struct File {
     name: String,
     text: String,
 }
 
-/// All files of the data set, but the rig's own with its effects: that is the answer.
+/// All files of the data set except the rig's own with its effects, because that is the answer.
 pub(crate) fn files(seed: u64) -> Result<Vec<File>, Said> {
     let rig = paper_preset()?;
     let settings = RunSettings { seed, ..RunSettings::default() };

@@ -1,4 +1,4 @@
-//! One case of a plant, drawn: parameters, effects with strengths and forms, inputs, noise.
+//! Draws one case of a plant: parameters, effects with strengths and forms, inputs, noise.
 
 use super::{
     excess::excess,
@@ -24,7 +24,7 @@ pub(super) struct Drawn {
     pub(super) label: OpenLabel,
 }
 
-/// What of a case its number decides: effects come in turn, levels in turn, families in turn.
+/// Properties of a case that follow from its number: effects, levels and families alternate.
 pub(super) fn draw(
     plant: &'static PlantSpec,
     seed: u64,
@@ -136,7 +136,8 @@ fn parameters(plant: &PlantSpec, level: Level, random: &mut RandomGenerator) -> 
         .collect()
 }
 
-/// The strength at which the effect alone has this excess, by halving; the greatest strength where none has.
+/// The strength at which the effect alone has this excess, by halving; the largest strength if none
+/// has.
 fn at_excess(plant: &PlantSpec, p: &[f64], act: Act, drives: &[Drive], target: f64) -> Act {
     let (off, most) = act.candidate.range;
     let with = |share: f64| Act { strength: off + (most - off) * share, ..act };

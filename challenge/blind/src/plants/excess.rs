@@ -1,10 +1,10 @@
-//! How visible an effect is once the nominal parameters are re-tuned, to first order.
+//! Visibility of an effect once the nominal parameters are re-tuned, to first order.
 
 use super::plant::{Act, Drive, PlantSpec};
 
-/// Reduced chi-square minus one that the re-tuned nominal keeps of the noise-free difference, the sum of both stages over all
-/// trials: |d - S q|^2/n + |q|^2/n at the q that makes it least, d the difference in units of the noise and S its slopes by one
-/// tolerance.
+/// Reduced chi-square minus one that the re-tuned nominal simulator keeps of the noise-free
+/// difference, the sum of both stages over all trials: the minimum over q of |d - S q|^2/n +
+/// |q|^2/n, where d is the difference in units of the noise and S are its slopes per tolerance.
 pub(super) fn excess(plant: &PlantSpec, p: &[f64], acts: &[Act], drives: &[Drive]) -> f64 {
     (0..2).map(|stage| in_stage(plant, stage, p, acts, drives)).sum()
 }
@@ -38,7 +38,8 @@ fn in_stage(plant: &PlantSpec, stage: usize, p: &[f64], acts: &[Act], drives: &[
     left(&gap, &slopes) / gap.len() as f64
 }
 
-/// The least |d - S q|^2 + |q|^2, by Gram and Schmidt on the columns of S with the rows of the prior below them.
+/// The minimum of |d - S q|^2 + |q|^2, by Gram and Schmidt on the columns of S with the rows of the
+/// prior below them.
 fn left(gap: &[f64], slopes: &[Vec<f64>]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut rest = gap.to_vec();

@@ -1,4 +1,5 @@
-//! Families that the forms of effects and the disturbances are drawn from; one may come from a file that is not published.
+//! Families from which the forms of effects and the disturbances are drawn; one may come from an
+//! unpublished file.
 
 use std::{fs, path::Path};
 
@@ -6,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{error::BlindError, random::RandomGenerator};
 
-/// How an effect departs from its textbook form; all 0 is the textbook's.
+/// Deviation of an effect from its textbook form; all 0 is the textbook's.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Form {
     /// How round its corners are, 0 .. 1.
@@ -17,7 +18,7 @@ pub struct Form {
     pub spread: f64,
 }
 
-/// Ranges that forms and disturbances of a case are drawn from, uniformly.
+/// Ranges from which forms and disturbances of a case are drawn, uniformly.
 ///
 /// ```
 /// let names: Vec<String> = stretch_blind::FormFamily::published().into_iter().map(|f| f.name).collect();
@@ -56,7 +57,7 @@ impl FormFamily {
         ]
     }
 
-    /// Reads one from a JSON file of the same fields, which whoever seals a set keeps.
+    /// Reads one from a JSON file of the same fields. The person who seals a set keeps this file.
     ///
     /// # Errors
     /// A file that cannot be read, a field that is missing or out of its range.

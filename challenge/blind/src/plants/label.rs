@@ -37,7 +37,8 @@ pub struct OpenLabel {
     pub places: Vec<String>,
     /// Reduced chi-square minus one of the re-tuned nominal simulator, to first order.
     pub excess: f64,
-    /// Share of that which the true effects with the true forms close on the test trials, noise included.
+    /// Share of it that the true effects with the true forms close on the test trials, noise
+    /// included.
     pub oracle_closed: f64,
     /// Family of its forms and its noise.
     pub family: String,
@@ -67,7 +68,8 @@ pub struct OpenTruth {
     pub cases: BTreeMap<String, OpenLabel>,
 }
 
-/// Where the labels of a set lie: in the folder `DIR-sealed` beside the set, which is kept back when the set is given away.
+/// Where the labels of a set are: in the folder `DIR-sealed` next to the set, which is kept back
+/// when the set is given away.
 #[must_use]
 pub fn sealed_beside(set: &Path) -> PathBuf {
     let mut name = set.file_name().unwrap_or_default().to_os_string();
@@ -76,7 +78,7 @@ pub fn sealed_beside(set: &Path) -> PathBuf {
 }
 
 impl OpenTruth {
-    /// Writes the labels to `truth.json` of a folder; hands back their SHA-256.
+    /// Writes the labels to `truth.json` of a folder; returns their SHA-256.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -84,10 +86,10 @@ impl OpenTruth {
         seal::close(&folder.join("truth.json"), self)
     }
 
-    /// Opens the labels of a set, if they are those whose hash the set holds; hands the hash back, too.
+    /// Opens the labels of a set, if they match the hash in the set; also returns the hash.
     ///
     /// # Errors
-    /// A broken seal, a file that is missing or not what it should be.
+    /// A broken seal, or a file that is missing or invalid.
     pub fn open(set: &Path) -> Result<(Self, String), BlindError> {
         seal::open(&sealed_beside(set).join("truth.json"), &set.join("seal.sha256"))
     }

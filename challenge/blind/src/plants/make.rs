@@ -1,4 +1,5 @@
-//! A set of cases of a plant, written: problem files, trials, simulators, and labels apart from them.
+//! Writes a set of cases of a plant: problem files, trials, simulators, and labels in a separate
+//! folder.
 
 use std::{collections::BTreeMap, fmt::Write as _, fs, path::Path};
 
@@ -36,13 +37,14 @@ const SIMULATORS: [(&str, &str); 4] = [
     ("thermal.py", include_str!("../../../python/thermal.py")),
 ];
 
-/// Makes `cases` cases of a plant in a new folder `set`, with labels in `SET-sealed`; hands back the SHA-256 of the labels.
+/// Makes `cases` cases of a plant in a new folder `set`, with labels in `SET-sealed`; returns the
+/// SHA-256 of the labels.
 ///
-/// Levels come in turn, so that a fifth of the cases is of each. `private` is a family of forms and noise beside the
-/// published ones; the rig has five of its own and takes none.
+/// Levels alternate, so that a fifth of the cases has each level. `private` is a family of forms
+/// and noise in addition to the published ones. The rig has five families and does not use it.
 ///
 /// # Errors
-/// A folder that holds something, a file that cannot be written, a private family for the rig.
+/// A folder that is not empty, a file that cannot be written, a private family for the rig.
 ///
 /// ```
 /// let dir = tempfile::tempdir()?;
@@ -63,7 +65,7 @@ pub fn make_set(
     make_set_apart(plant, (set, &sealed_beside(set)), cases, seed, private)
 }
 
-/// As [`make_set`], with the labels in a folder that is named: both may be drafts that get their names later.
+/// As [`make_set`], with the labels in a given folder: both may be drafts that are renamed later.
 ///
 /// # Errors
 /// As [`make_set`].

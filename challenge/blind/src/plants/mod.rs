@@ -1,4 +1,4 @@
-//! Sets that strangers solve: a plant and a seed go in, folders of cases and sealed labels come out.
+//! Sets that strangers solve: makes folders of cases and sealed labels from a plant and a seed.
 //!
 //! `servo` and `thermal` are two plants of two stages; `plant` integrates them with `operators` around; `family` draws the forms of
 //! effects, `excess` says how visible one is, `draw` makes a case, `make` writes a set, `rig` gives the rig's cases the same layout,

@@ -1,8 +1,9 @@
-//! What stands in front of or behind a stage, on sampled signals, each in a form that the catalogue need not have.
+//! Operators in front of or behind a stage, on sampled signals, each in a form that need not be in
+//! the catalogue.
 
 use super::family::Form;
 
-/// y(t) = x(t - delay), a part `softness` of it as a lag in place of a dead time.
+/// y(t) = x(t - delay), with a part `softness` of it as a lag instead of a dead time.
 pub(super) fn delay(x: &[f64], delay_s: f64, form: &Form, dt_s: f64) -> Vec<f64> {
     let dead = delay_s * (1.0 - form.softness) / dt_s;
     let (whole, rest) = (dead.floor() as usize, dead.fract());
@@ -41,7 +42,8 @@ pub(super) fn dead_zone(x: &[f64], width: f64, form: &Form) -> Vec<f64> {
     x.iter().map(|&x| if width < 1e-12 { x } else { rise(x - up) - rise(-x - down) }).collect()
 }
 
-/// Values end at `limit` (below at its negative): y = x (1 + |x/limit|^q)^(-1/q), q = 2/softness, and a clamp at a softness of 0.
+/// Values are limited to `limit` (and its negative): y = x (1 + |x/limit|^q)^(-1/q), q =
+/// 2/softness, and clamped at a softness of 0.
 pub(super) fn saturation(x: &[f64], limit: f64, form: &Form) -> Vec<f64> {
     x.iter()
         .map(|&x| {
@@ -55,7 +57,7 @@ pub(super) fn saturation(x: &[f64], limit: f64, form: &Form) -> Vec<f64> {
         .collect()
 }
 
-/// One element with play: it stays until x is farther off than `radius`.
+/// One element with play: it is constant until x is further away than `radius`.
 fn play(x: &[f64], radius: f64) -> Vec<f64> {
     let mut y = x[0];
     x.iter()
@@ -74,7 +76,8 @@ pub(super) fn backlash(x: &[f64], width: f64, form: &Form) -> Vec<f64> {
     (0..x.len()).map(|i| plays.iter().map(|p| p[i]).sum::<f64>() / 4.0 + shift).collect()
 }
 
-/// x less a share of what plays of the radii `scale` {1, 1/2, 1/4} hold back, weighted by the spread.
+/// x minus a share of what plays of the radii `scale` {1, 1/2, 1/4} hold back, weighted by the
+/// spread.
 pub(super) fn hysteresis(x: &[f64], share: f64, scale: f64, form: &Form) -> Vec<f64> {
     let plays = [1.0, 0.5, 0.25].map(|r| play(x, scale * r));
     let weights = [1.0, 1.0 + form.spread, 1.0 - 0.5 * form.spread];
@@ -87,7 +90,8 @@ pub(super) fn hysteresis(x: &[f64], share: f64, scale: f64, form: &Form) -> Vec<
         .collect()
 }
 
-/// x plus a share of its distance from a lagged copy: it overshoots a change, or creeps after it where the share is negative.
+/// x plus a share of its distance from a lagged copy: it overshoots a change, or creeps after it if
+/// the share is negative.
 pub(super) fn relaxation(x: &[f64], share: f64, tau_s: f64, form: &Form, dt_s: f64) -> Vec<f64> {
     let spread = 1.0 + 3.0 * form.spread;
     let (fast, slow) = (

@@ -1,4 +1,5 @@
-//! A plant of two stages, of which the second is driven by what the first gave: parameters, candidates, equations.
+//! A plant of two stages, the second driven by the output of the first: parameters, candidates,
+//! equations.
 
 use super::{family::Form, operators};
 
@@ -20,7 +21,7 @@ pub(super) struct Candidate {
     pub(super) name: &'static str,
     pub(super) stage: usize,
     pub(super) action: Action,
-    /// Strength that is hardly there, and the greatest one drawn.
+    /// A hardly visible strength, and the largest one that is drawn.
     pub(super) range: (f64, f64),
 }
 
@@ -54,7 +55,8 @@ pub(super) enum Action {
     Relaxation(f64),
     /// Behind the stage: share; the largest radius.
     Hysteresis(f64),
-    /// Inside the differential equation: what it takes from the drive, given state, strength, form and input.
+    /// Effect inside the differential equation: what it subtracts from the drive, given state,
+    /// strength, form and input.
     Inside(fn(f64, f64, &Form, f64) -> f64),
 }
 
@@ -66,7 +68,7 @@ pub(super) struct Act {
     pub(super) form: Form,
 }
 
-/// One trial: its input, and where in the session it begins and how fast it passes, as shares of the session.
+/// One trial: its input, its beginning in the session and its speed, as shares of the session.
 #[derive(Debug, Clone)]
 pub(super) struct Drive {
     pub(super) input: Vec<f64>,
@@ -87,7 +89,7 @@ pub(super) struct StageSpec {
     pub(super) rest: [f64; 2],
     /// Which state is the output.
     pub(super) shown: usize,
-    /// Whether the input is held between samples, or drawn through them by straight lines.
+    /// Whether the input is held between samples, or linearly interpolated.
     pub(super) is_held: bool,
 }
 
@@ -110,7 +112,7 @@ pub(super) struct PlantSpec {
     pub(super) effects: &'static str,
 }
 
-/// Steps of integration between two samples; the simulators that are handed out take four.
+/// Steps of integration between two samples; the distributed simulators take four.
 const SUBSTEPS: usize = 12;
 
 impl PlantSpec {

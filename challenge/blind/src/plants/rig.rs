@@ -29,7 +29,7 @@ pub(super) fn make_rig(set: &Path, cases: usize, seed: u64) -> Result<OpenTruth,
         &fs::read_to_string(seal.path()).map_err(BlindError::io(seal.path()))?,
     )
     .map_err(BlindError::json(seal.path()))?;
-    // these labels move to the folder beside
+    // move these labels to the neighbouring folder
     let inside = set.join("sealed");
     fs::remove_dir_all(&inside).map_err(BlindError::io(&inside))?;
     let mut opened = BTreeMap::new();

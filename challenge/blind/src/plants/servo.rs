@@ -5,7 +5,8 @@
 use super::family::Form;
 use super::plant::{Action, Candidate, Parameter, PlantSpec, StageSpec};
 
-/// Dry friction in the drive, rad/s: f tanh(w/width), more of it at small speeds where the spread is not zero.
+/// Dry friction in the drive, rad/s: f tanh(w/width), larger at small speeds if the spread is not
+/// zero.
 fn friction(w: f64, f: f64, form: &Form, _: f64) -> f64 {
     let direction = 1.0 + form.asymmetry * w.signum();
     let slow = 1.0 + form.spread * (-(w / 6.0).powi(2)).exp();
@@ -16,7 +17,8 @@ fn drag(w: f64, c: f64, form: &Form, _: f64) -> f64 {
     c * w * w.abs().powf(1.0 + form.softness) / 100f64.powf(1.0 + form.softness)
 }
 
-/// Torque that goes with the supply: the drive loses more, the more it is asked for. Not in the catalogue.
+/// A supply that weakens under load: the drive loses more, the more it has to do. Not in the
+/// catalogue.
 fn sagging(_: f64, c: f64, _: &Form, u: f64) -> f64 {
     20.0 * c * u * u.abs() / 6.0
 }

@@ -10,7 +10,7 @@ fn radiation(t: f64, c: f64, form: &Form, _: f64) -> f64 {
     c * 293.15f64.powi(4) / 1e9 * (ratio.powf(power) - 1.0)
 }
 
-/// A draught that blows while the block is hot, W: h rises with a soft step at 50 degC.
+/// A draught while the block is hot, W: h rises with a soft step at 50 degC.
 fn fan(t: f64, c: f64, form: &Form, _: f64) -> f64 {
     let width = 1.0 + 8.0 * form.softness + 4.0 * form.spread;
     c * (t - 20.0) / (1.0 + ((50.0 + 20.0 * form.asymmetry - t) / width).exp())

@@ -6,7 +6,7 @@ use super::outcome::{LEAST_PROBABILITY, Outcome};
 use super::read::Said;
 use crate::{plants::Level, random::RandomGenerator, score::quantile};
 
-/// A figure, the 95 % interval of it when cases are drawn anew, and how many cases it is of.
+/// A figure, its 95 % interval under resampling of cases, and the number of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Interval {
     /// The figure; absent where no case counts.
@@ -31,7 +31,7 @@ const BINS: usize = 10;
 pub struct Figures {
     /// Exactly what is missing, over all cases.
     pub exact: Interval,
-    /// The same, a declared tie of two that holds the one effect counted right.
+    /// The same, with a declared tie of two that holds the one effect counted as right.
     pub exact_or_tied: Interval,
     /// Exactly what is missing, over cases of one strong effect.
     pub strong: Interval,

@@ -1,4 +1,5 @@
-//! What methods say of a set: `read` checks a submission, `outcome` holds each answer against its label, `figures` sums them up.
+//! Submissions: `read` checks a submission, `outcome` compares each answer with its label,
+//! `figures` sums them up.
 
 mod figures;
 mod outcome;

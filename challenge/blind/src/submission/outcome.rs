@@ -10,7 +10,8 @@ use crate::{
     plants::{Level, OpenLabel, OpenTruth},
 };
 
-/// Least probability in the logarithmic score: what is held impossible and true costs ln 1000.
+/// Smallest probability in the logarithmic score: a true cause that was held impossible costs ln
+/// 1000.
 pub(super) const LEAST_PROBABILITY: f64 = 1e-3;
 /// Probability that a covering set reaches.
 const COVERED: f64 = 0.95;
@@ -28,9 +29,10 @@ pub struct Outcome {
     pub named: Vec<String>,
     /// What was true; `unknown` for a cause that is no candidate.
     pub truth: Vec<String>,
-    /// Whether exactly that was named, nothing where nothing was, `unknown` where it is no candidate.
+    /// Whether exactly that was named: nothing if nothing was missing, `unknown` if the cause is no
+    /// candidate.
     pub is_exact: bool,
-    /// Whether it is exact, or a declared tie of two holds the one effect that is at work.
+    /// Whether it is exact, or a declared tie of two holds the one active effect.
     pub is_exact_or_tied: bool,
     /// Greatest probability given.
     pub confidence: f64,
@@ -111,7 +113,7 @@ impl Outcome {
         // of equals the one that is listed first
         believed.sort_by(|a, b| b.1.total_cmp(&a.1));
         let (first, confidence) = believed.first().cloned().unwrap_or_default();
-        // of what is said to be an effect, the most probable one that is
+        // the most probable effect among the answers
         let effects = |e: &&(Vec<String>, f64)| !e.0.is_empty() && e.0 != [UNKNOWN];
         let named = match answer.verdict {
             Said::Effect if answer.named.is_some() => {

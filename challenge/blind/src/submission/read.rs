@@ -1,4 +1,4 @@
-//! A submission: what a method says of every case of a set, checked before it is scored.
+//! A submission: the answers of a method to every case of a set, checked before it is scored.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,13 @@ worded! {
         Parameters "parameters",
         /// The most probable effects are missing.
         Effect "effect",
-        /// Something is missing that is not among the candidates.
+        /// The cause is not among the candidates.
         Unknown "unknown",
     }
 }
 
-/// Effects that together are all that is missing, and how probable that is: none for nothing, `unknown` for whatever is no candidate.
+/// Effects that together are all that is missing, and the probability of that: an empty list for
+/// nothing, `unknown` for a cause that is no candidate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Believed {
@@ -38,7 +39,7 @@ pub struct Answer {
     pub probabilities: Vec<Believed>,
     /// What is said.
     pub verdict: Said,
-    /// Effects that an `effect` names; the most probable ones without it.
+    /// Effects that an `effect` names; if they are missing, the most probable ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub named: Option<Vec<String>>,
     /// Names that the data cannot tell from the one named.
@@ -47,7 +48,7 @@ pub struct Answer {
     /// Stage of the gap; absent where there is none.
     #[serde(default)]
     pub place: Option<String>,
-    /// Share of the gap of the test trials that what is named closes.
+    /// Share of the gap of the test trials that the named effects close.
     #[serde(default)]
     pub closed_share: f64,
     /// Time it took, s.
@@ -75,17 +76,18 @@ pub struct Submission {
     pub cases: BTreeMap<String, Answer>,
 }
 
-/// How far the probabilities of a case may sum beside 1.
+/// Largest deviation from 1 of the sum of a case's probabilities.
 const SUM_TOLERANCE: f64 = 1e-6;
-/// What stands for a cause that is no candidate.
+/// Name of a cause that is no candidate.
 pub(super) const UNKNOWN: &str = "unknown";
 
 impl Submission {
-    /// Holds a submission against the set whose labels hash to `hash`.
+    /// Checks a submission against the set whose labels have the hash `hash`.
     ///
     /// # Errors
-    /// The first field that is wrong: another schema or set, a case that is missing or not in the set, a name or place that
-    /// the set does not have, a number out of its range, probabilities that do not sum to 1, hypotheses given twice.
+    /// The first wrong field: another schema or set, a case that is missing or not in the set, a
+    /// name or place that the set does not have, a number out of its range, probabilities that do
+    /// not sum to 1, repeated hypotheses.
     pub fn check(&self, truth: &OpenTruth, hash: &str) -> Result<(), BlindError> {
         ensure(self.schema == 1, "schema", || format!("{} is not 1", self.schema))?;
         ensure(!self.method.trim().is_empty(), "method", || "it has no name".to_owned())?;

@@ -1,10 +1,6 @@
 //! Several gauges in `float`.
 
-use stretch_core::ArrayCalibration;
-use stretch_receptor::{
-    ArrayReceptor, ShiftWatch,
-    numbers::{ArrayGainNumbers, ArrayNumbers},
-};
+use stretch_sleeve::{ArrayCalibration, ArrayGainNumbers, ArrayNumbers, ArrayReceptor, ShiftWatch};
 
 use crate::{
     constants::{Constants, comment_safe},
@@ -25,7 +21,7 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
             "of a channel: its signal, and its memory",
         )
         .define("TERMS", numbers.terms as i32, "of a channel");
-    let names = calibration.channels.iter().map(|c| comment_safe(c.signal.as_str()));
+    let names = calibration.spec().channels.iter().map(|c| comment_safe(c.signal.as_str()));
     let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
     constants.word("SIGNALS", format!("{{{}}}", names.join(", ")), "the columns of the channels");
     let mut has = vec!["array"];

@@ -1,17 +1,17 @@
 //! `diagnosed` and `diagnosed+rest` in `float`.
 
 use stretch_core::{Calibration, RestLevel};
-use stretch_filter::FilterError;
 use stretch_receptor::{
     Defects, DiagnosedReceptor,
-    numbers::{Bound, Diagnosed, LEAST_ANSWER, LEAST_RUN, SMOOTH},
+    model::Diagnosed,
+    numbers::{Bound, LEAST_ANSWER, LEAST_RUN, SMOOTH},
 };
 
 use crate::{ExportError, constants::Constants, part::Part};
 
 /// The constants and the step of a gauge with named defects: of those that it has.
 pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportError> {
-    let receptor = DiagnosedReceptor::<f32>::new(calibration).map_err(FilterError::from)?;
+    let receptor = DiagnosedReceptor::<f32>::new(calibration)?;
     let model = receptor.model();
     let mut constants = Constants::default();
     filter(&mut constants, model);

@@ -1,6 +1,6 @@
 //! `observer` and `observer+rest` in integers.
 
-use stretch_receptor::code::{IntegerObserver, Numbers, Rest};
+use stretch_receptor::code::{IntegerObserver, ObserverNumbers, RestNumbers};
 
 use crate::{constants::Constants, part::Part};
 
@@ -41,7 +41,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         .define("OUTPUT_SHIFT", 26 + i32::from(n.output_bits), "")
         .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
     if follows {
-        let Rest { level, pull, leak, average, most, furthest } = n.rest;
+        let RestNumbers { level, pull, leak, average, most, furthest } = n.rest;
         constants
             .define("AT_REST", *at_rest, "the signal where the target rests, memory settled")
             .define("REST_LEVEL", level, "the resting signal")
@@ -60,7 +60,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
 }
 
 /// What the gauge remembers. C has no arrays of nothing: those that are not used stay, as zeros.
-fn memory(constants: &mut Constants, n: &Numbers) {
+fn memory(constants: &mut Constants, n: &ObserverNumbers) {
     constants
         .define("LEAD", n.lead, "samples by which the signal leads")
         .define("RELAXATIONS", i32::from(n.relaxations), "")

@@ -1,8 +1,7 @@
 //! `observer` and `observer+rest` in `float`.
 
 use stretch_core::{Calibration, RestLevel};
-use stretch_filter::FilterError;
-use stretch_receptor::{ObserverReceptor, numbers::Observer};
+use stretch_receptor::{ObserverReceptor, model::Observer};
 
 use crate::{ExportError, constants::Constants, part::Part};
 
@@ -11,7 +10,7 @@ const LEAST_RUN: f32 = 0.01;
 
 /// The constants and the step of an observer.
 pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportError> {
-    let receptor = ObserverReceptor::<f32>::new(calibration).map_err(FilterError::from)?;
+    let receptor = ObserverReceptor::<f32>::new(calibration)?;
     let o = receptor.model();
     let follows = o.rest.follows();
     let mut constants = Constants::default();

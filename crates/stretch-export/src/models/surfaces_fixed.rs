@@ -1,7 +1,7 @@
 //! `linear` and `poly13` in integers.
 
 use stretch_core::{Poly13, fixed::FixedPoly13};
-use stretch_receptor::code::{FixedNumbers, RangedSurface, RangedSurfaces, Scaled, Span};
+use stretch_receptor::code::{CodeMap, CodeSurface, FixedNumbers, Scaled, Span};
 
 use crate::{
     constants::{Constants, Literal},
@@ -16,7 +16,7 @@ const STEP: &str = include_str!("../c/surfaces_fixed_step.h");
 pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
     let adc_bits = u32::from((*adc_bits).min(16));
-    let (factor, shift) = rate.change;
+    let (factor, shift) = (rate.change_factor, rate.change_shift);
     let mut constants = Constants::default();
     constants
         .define("CODES", 1u32 << adc_bits, "the first number that is no code")
@@ -42,7 +42,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             "all ones where a rising signal means a falling target",
         );
     let (model, surface) = match surfaces {
-        RangedSurfaces::Line(ranged) => {
+        CodeMap::Line(ranged) => {
             let Scaled { of, thousandths } = ranged.surface;
             let (intercept, slope) = <(i32, i32)>::from(of);
             let signal = span(&ranged.signal);
@@ -50,7 +50,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             constants.surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
             ("linear", include_str!("../c/line_fixed.h"))
         }
-        RangedSurfaces::Poly13([inflation, deflation]) => {
+        CodeMap::Poly13([inflation, deflation]) => {
             constants.surfaces(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_fixed.h"))
         }
@@ -68,7 +68,7 @@ fn span(span: &Span) -> String {
 }
 
 /// The surface of one branch with its ranges.
-fn poly13(ranged: &RangedSurface<Scaled<FixedPoly13>>) -> String {
+fn poly13(ranged: &CodeSurface<Scaled<FixedPoly13>>) -> String {
     let Scaled { of, thousandths } = ranged.surface;
     // all of them integers of 32 bits: nothing is lost
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = of.coefficients();

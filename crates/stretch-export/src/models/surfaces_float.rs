@@ -3,7 +3,7 @@
 use stretch_core::{Branch, Calibration, Poly13, RateEstimator};
 use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::{
-    StretchReceptor,
+    ReceptorError, StretchReceptor,
     numbers::{Line, Map, RangedSurface},
 };
 
@@ -20,14 +20,15 @@ const STEP: &str = include_str!("../c/surfaces_float_step.h");
 /// The constants and the step of a line, or of surfaces without a term beyond poly13.
 pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = StretchReceptor::<f32>::new(calibration)?;
-    let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.rate_estimator else {
-        return Err(ExportError::Rate { rate: format!("{:?}", calibration.rate_estimator) });
+    let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.spec().rate_estimator
+    else {
+        return Err(ExportError::Rate { rate: format!("{:?}", calibration.spec().rate_estimator) });
     };
     let [window, degree, delay] = [window, degree.into(), delay].map(usize::from);
     let shape = SgShape { window, degree, order: 1, delay };
     // the filter that the receptor runs: see `RateFilter`
-    let filter = SgFilter::<f32>::new(shape, calibration.sample_rate_hz)
-        .map_err(stretch_filter::FilterError::from)?;
+    let filter = SgFilter::<f32>::new(shape, calibration.spec().sample_rate_hz);
+    let filter = filter.map_err(ReceptorError::from)?;
     let model = receptor.model();
     let direction = model.direction();
     let [rising, falling] = match direction.rising {

@@ -1,13 +1,13 @@
 //! The watch of a gauge's zero in `float`.
 
-use stretch_core::{Calibration, Turns};
-use stretch_receptor::ZeroWatch;
+use stretch_core::Polarity;
+use stretch_sleeve::{Turns, ZeroWatch};
 
 use crate::{constants::Constants, part::Part};
 
-/// A part with the watch behind its step, where the record holds where movements turn.
-pub(crate) fn with_zero(mut part: Part, calibration: &Calibration) -> Part {
-    let Some(watch) = ZeroWatch::<f32>::new(calibration) else { return part };
+/// A part with the watch behind its step.
+pub(crate) fn with_zero(mut part: Part, polarity: Polarity, turns: &Turns) -> Part {
+    let watch = ZeroWatch::<f32>::new(polarity, turns);
     let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
     let mut constants = Constants::default();
     constants
@@ -21,7 +21,7 @@ pub(crate) fn with_zero(mut part: Part, calibration: &Calibration) -> Part {
         .define("ZERO_MEAN_LIMIT", watch.mean_limit, "how far their running mean may be off")
         .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in it")
         .define("ZERO_MOST", most, "what a level counts for at most in a zero that is followed")
-        .define("ZERO_FOLLOW", watch.following(calibration).follow, "the share by which it moves")
+        .define("ZERO_FOLLOW", watch.following(turns).follow, "the share by which it moves")
         .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
     part.constants.push_str(&constants.into_text());
     // the last part of a step ends the compiler's rules for floats

@@ -37,7 +37,7 @@ impl Grid {
     }
 }
 
-/// What stands between two samples when [`resample`] fills a grid.
+/// The value between two samples when [`resample`] fills a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Between {

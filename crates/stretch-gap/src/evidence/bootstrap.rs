@@ -18,11 +18,12 @@ pub(crate) struct Closed {
     pub(crate) after: f64,
     pub(crate) closed: f64,
     pub(crate) interval: [f64; 2],
-    /// Whether the mean square falls for certain, at the same level.
+    /// Whether the mean square falls significantly, at the same level.
     pub(crate) falls: bool,
 }
 
-/// CGF = 1 - sum max(0, excess after)/sum max(0, excess before), channels in step: a block is drawn for all of them.
+/// CGF = 1 - sum max(0, excess after)/sum max(0, excess before). The same blocks are drawn for all
+/// channels.
 pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64) -> Closed {
     let whole = |blocks: &[Vec<f64>]| -> f64 { blocks.iter().map(|b| gap(mean_square(b))).sum() };
     let closed = |before: f64, after: f64| {
@@ -63,7 +64,8 @@ mod tests {
     use approx::assert_relative_eq;
     use testkit::tolerance::F64_ROUNDING;
 
-    /// Blocks of a mean square around `mean`, as uneven as those of ten independent squares: standard deviation 0.45 of it.
+    /// Blocks of a mean square around `mean`, as variable as those of ten independent squares:
+    /// standard deviation 0.45 of it.
     fn blocks(mean: f64, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         let square = |random: &mut RandomGenerator| random.gauss().powi(2);
         (0..count).map(|_| mean * (0..10).map(|_| square(random)).sum::<f64>() / 10.0).collect()
@@ -92,7 +94,8 @@ mod tests {
         assert_eq!((closed.after, closed.closed, closed.interval), (0.0, 1.0, [1.0; 2]));
     }
 
-    /// Without a gap before there is nothing to close, whatever is left; without a block there is nothing at all.
+    /// Without a gap before there is nothing to close, whatever is left; without a block there is
+    /// no result.
     #[test]
     fn nothing_is_closed_where_there_was_no_gap() {
         let worse = closed_interval(&[vec![0.9; 20]], &[vec![3.0; 20]], 1);
@@ -108,8 +111,8 @@ mod tests {
         assert_eq!((worse.closed, worse.interval, worse.falls), (-2.0, [-2.0; 2], false));
     }
 
-    /// A second channel that is the first one's copy adds no evidence and takes none: blocks are drawn for both at once, and the ratio of
-    /// doubled gaps is the same to the bit.
+    /// A second channel that is a copy of the first adds no evidence and removes none, because
+    /// blocks are drawn for both at once. The ratio of doubled gaps is the same to the bit.
     #[test]
     fn channels_are_drawn_in_step() {
         let mut random = RandomGenerator::new(4, 0);
@@ -133,12 +136,15 @@ mod tests {
             (0..40).map(|_| width(count, random)).sum::<f64>()
         };
         let (few, many) = (mean(30, &mut random), mean(120, &mut random));
-        // Four times the blocks: half the width. A width from 400 draws is known to 7 %, the mean of forty to 2 %; a tenth is five of these.
+        // Four times the blocks: half the width. A width from 400 draws is known to 7 %, the mean
+        // of forty to 2 %; the tolerance of a tenth is five of these.
         assert!((few / many / 2.0 - 1.0).abs() < 0.1, "{few} {many}");
     }
 
-    /// Of 400 records 95 % should be held; percentiles of a ratio from sixty blocks hold some 93 % (its draws are skewed, and narrower by
-    /// sqrt(59/60)). Three standard deviations of the count, 5 each, below that, and not so wide that nothing is said.
+    /// Of 400 records 95 % should be held. Percentiles of a ratio from sixty blocks hold about 93 %
+    /// (its draws are skewed, and narrower by sqrt(59/60)). The lower limit is three standard
+    /// deviations of the count, 5 each, below that; the upper limit excludes intervals that always
+    /// hold.
     #[test]
     fn intervals_hold_the_true_share_as_often_as_they_say() {
         let truth = 1.0 - 1.0 / 5.0;
@@ -152,8 +158,8 @@ mod tests {
         assert!((357..400).contains(&held), "{held} of 400");
     }
 
-    /// Where nothing changed the mean square falls for certain in 2.5 of 100 records: 10 of 400, standard deviation 3.1; some 12 for the
-    /// same reason as above. 22 is three of these above.
+    /// If nothing changed, the mean square falls significantly in 2.5 of 100 records: 10 of 400,
+    /// standard deviation 3.1; about 12 for the same reason as above. 22 is three of these above.
     #[test]
     fn chance_is_seldom_confirmed() {
         let mut random = RandomGenerator::new(7, 0);

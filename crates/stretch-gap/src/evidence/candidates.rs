@@ -14,8 +14,7 @@ use stretch_effects::EffectParameter;
 use crate::{
     evidence::{
         bootstrap::closed_interval,
-        excess::Excess,
-        gathered::{Blocks, Evidence, StageEvidence},
+        gathered::{Blocks, Evidence, Excess, StageEvidence},
         localise::location::StageGap,
         probability::{Function, Gap, Posterior, Standing, Weighed, allowed, weigh},
     },

@@ -1,10 +1,14 @@
-//! The evidence: every trial before and after, test trials included, which nothing has read until here.
+//! The evidence: every trial before and after, including the test trials, which have not been read
+//! before.
 //!
-//! Noise is what no model could remove. Where the best set leaves a reduced chi-square X < 1 over the samples that were looked at, the noise was
-//! taken too large: its variance is X of what it was, and every excess (reduced chi-square minus one) counts from there.
+//! Noise is what no model could remove. If the best set leaves a reduced chi-square X < 1 over the
+//! fitted and held-out samples, the noise was overestimated. Its variance is then X times the
+//! estimate, and every excess (reduced chi-square minus one) is relative to it.
+
+use serde::{Deserialize, Serialize};
 
 use crate::{
-    evidence::{excess::Excess, response::Responses},
+    evidence::responses::Responses,
     fit::{
         hypothesis::Hypothesis,
         prepared::PreparedProblem,
@@ -19,37 +23,51 @@ use crate::{
     search::selection::Found,
 };
 
-/// One stage over the whole session, all trials end to end.
+/// One stage over the whole session, all trials concatenated.
 #[derive(Debug, Clone)]
 pub struct StageEvidence {
     /// Output simulated with the parameters as shipped.
     pub raw: Vec<f64>,
-    /// Output of the re-tuned nominal.
+    /// Output of the re-tuned nominal simulator.
     pub retuned: Vec<f64>,
     /// Output with the best set of effects.
     pub after: Vec<f64>,
-    /// Residual of the re-tuned nominal in multiples of the noise, slow drift and trial offsets taken out.
+    /// Residual of the re-tuned nominal simulator in multiples of the noise, without slow drift and
+    /// trial offsets.
     pub residual_retuned: Vec<f64>,
-    /// Residual of the best set of effects in multiples of the noise, slow drift and trial offsets taken out.
+    /// Residual of the best set of effects in multiples of the noise, without slow drift and trial
+    /// offsets.
     pub residual_after: Vec<f64>,
     /// Noise, one standard deviation in the unit of the output.
     pub noise: f64,
     /// Excess on the test trials with the parameters as shipped.
     pub excess_raw: f64,
-    /// Excess of the re-tuned nominal on the test trials.
+    /// Excess of the re-tuned nominal simulator on the test trials.
     pub excess_retuned: f64,
     /// Excess with the effects on the test trials.
     pub excess_after: f64,
 }
 
-/// Everything that a report draws, beside the measured channels that the simulator holds.
+/// Excess (reduced chi-square minus one) summed over channels, as the verdict uses it: the larger
+/// of fitted and test trials.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Excess {
+    /// Parameters as shipped, test trials only.
+    pub raw: f64,
+    /// Parameters re-tuned.
+    pub retuned: f64,
+    /// With the best set of effects, whether it is named or not.
+    pub left: f64,
+}
+
+/// Everything that a report draws, except the measured channels, which the simulator holds.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// Traces of every stage.
     pub stages: Vec<StageEvidence>,
-    /// How the session was cut.
+    /// Roles of the samples of the session.
     pub roles: SampleRoles,
-    /// Re-tuned nominal.
+    /// Re-tuned nominal simulator.
     pub retuned: Model,
     /// Best set of effects, whether the verdict names it or not.
     pub best: Model,
@@ -57,27 +75,28 @@ pub struct Evidence {
     pub step: f64,
     /// Fitted model of every candidate, in the order of the diagnosis.
     pub candidates: Vec<Model>,
-    /// One standard deviation of every nominal parameter of the re-tuned nominal, 0 where it is exact.
+    /// One standard deviation of every re-tuned nominal parameter, 0 if it is exact.
     pub retuned_sd: Vec<f64>,
     /// One standard deviation of every nominal parameter of every candidate.
     pub candidate_sds: Vec<Vec<f64>>,
     /// One standard deviation of every nominal parameter with the best set.
     pub(crate) best_sd: Vec<f64>,
-    /// Reduced chi-square of the re-tuned nominal by block, one per stage.
+    /// Reduced chi-square of the re-tuned nominal simulator by block, one entry per stage.
     pub(crate) nominal_blocks: Vec<Blocks>,
-    /// Variance of the noise by stage, as a share of what it was taken for: see the module's head.
+    /// Variance of the noise by stage, relative to its estimate: see the module's head.
     levels: Vec<f64>,
     /// The strongest effect of the best set.
     pub(crate) best_effect: Option<usize>,
     /// Size of the gap.
     pub(crate) gap: Excess,
-    /// How the stage with the largest gap answers to the numbers of the best set; none unless [asked for](crate::Options::responses), or
-    /// where no effect acts in it.
+    /// Responses of the stage with the largest gap to the parameters of the best set; `None` unless
+    /// [requested](crate::Options::responses), or if no effect acts in it.
     pub responses: Option<Responses>,
 }
 
-/// Reduced chi-square of a model in one stage by block: of the trials that were looked at in variances of the noise as it was taken, of the
-/// test trials in variances of the noise that the best set leaves.
+/// Reduced chi-square of a model in one stage by block. For fitted and held-out trials it is in
+/// variances of the estimated noise, for test trials in variances of the noise that the best set
+/// leaves.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Blocks {
     pub(crate) fit: Vec<f64>,
@@ -93,7 +112,7 @@ struct Traces {
 }
 
 impl Traces {
-    /// `level` is the variance of the noise as a share of what it was taken for.
+    /// `level` is the variance of the noise relative to its estimate.
     fn of(
         problem: &PreparedProblem<'_>,
         stage: usize,
@@ -114,8 +133,8 @@ impl Traces {
     }
 }
 
-/// A difference of outputs in multiples of the noise, and that without the most likely nuisances; without the lines that a model leaves where it is not
-/// fitted. Both are linear in it.
+/// A difference of outputs in multiples of the noise, and the same without the most likely
+/// nuisances and without the unfitted spectral lines of a model. Both are linear in the difference.
 pub(crate) fn held_out(
     problem: &PreparedProblem<'_>,
     stage: usize,
@@ -138,8 +157,9 @@ pub(crate) fn held_out(
     (whole, residual)
 }
 
-/// Mean r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts. Means are over what
-/// was measured, whose noise `sd` is finite; a block without any is no gap.
+/// Mean r V^-1 r by block. V^-1 r is the residual without its most likely nuisances, so their
+/// improbability counts as well. Means are over measured samples, whose noise `sd` is finite; a
+/// block without any is no gap.
 fn blocks_of(
     roles: &SampleRoles,
     role: Role,
@@ -205,24 +225,24 @@ impl Evidence {
         })
     }
 
-    /// The gap that a hypothesis leaves of the trials that may be looked at, summed over stages.
+    /// The gap that a hypothesis leaves on fitted and held-out trials, summed over stages.
     pub(crate) fn fitted_gap(&self, problem: &PreparedProblem<'_>, hypothesis: &Hypothesis) -> f64 {
         fitted(problem, &hypothesis.misfits, &self.levels)
     }
 
-    /// The gap of some misfits in the trials that may be looked at, summed over stages.
+    /// The gap of some misfits on fitted and held-out trials, summed over stages.
     pub(crate) fn gap_of(&self, problem: &PreparedProblem<'_>, misfits: &[Misfit]) -> f64 {
         fitted(problem, misfits, &self.levels)
     }
 
-    /// What the best set leaves of a stage, as [`held_out`] gives it.
+    /// Residual of the best set in a stage, as [`held_out`] returns it.
     pub(crate) fn left(&self, problem: &PreparedProblem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
         let measured = problem.simulator().measured(stage).iter();
         let apart: Vec<f64> = measured.zip(&self.stages[stage].after).map(|(m, s)| m - s).collect();
         held_out(problem, stage, &self.best, &apart)
     }
 
-    /// Variance of a stage's noise as a share of what it was taken for.
+    /// Variance of a stage's noise relative to its estimate.
     pub(crate) fn level(&self, stage: usize) -> f64 {
         self.levels[stage]
     }
@@ -238,7 +258,8 @@ impl Evidence {
     }
 }
 
-/// Variance of a stage's noise as a share of what it was taken for. Without an effect there nothing says that it was too high.
+/// Variance of a stage's noise relative to its estimate. Without an effect in the stage nothing
+/// shows that the estimate was too high.
 fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 {
     let effects = problem.simulator().effects();
     let mut acting = best.effects.iter();
@@ -248,7 +269,8 @@ fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 
     }
 }
 
-/// Of the fitted and the test trials the greater: a gap that only one of them shows is a gap.
+/// The larger of those on fitted and test trials, because a gap that only one of them shows is a
+/// gap.
 fn gap(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

@@ -1,9 +1,11 @@
-//! One posterior over everything that a gap may be put down to: nothing, each set of effects, and what the catalogue lacks.
+//! One posterior over all causes of a gap: nothing, each set of effects, and a cause outside the
+//! catalogue.
 //!
-//! Scores S_h are log-likelihood ratios in nats of hypotheses that all are wrong in form: the parameters re-tuned within their tolerances, the
-//! effects fitted, each paid for. What a hypothesis h leaves of the gap, g_h, is noise that is known to a share only and its model discrepancy,
-//! which is no larger than a share of what it closes; something else leaves more. With D_h, the probability that noise and discrepancy leave as
-//! much,
+//! Scores S_h are log-likelihood ratios in nats of hypotheses whose forms are all wrong: the
+//! parameters are re-tuned within their tolerances, the effects are fitted, and each parameter is
+//! penalised. The part of the gap that a hypothesis h leaves, g_h, is noise that is known only to a
+//! share, and model discrepancy, which is at most a share of what it closes; something else leaves
+//! more. With D_h, the probability that noise and discrepancy leave as much,
 //!
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
@@ -11,15 +13,20 @@
 //! w_unknown = max(sum over h of exp(S_h/t) (1 - D_h), o exp(S_f/t) D_f),     t = T + rho g_best/g_retuned
 //! ```
 //!
-//! f is a hypothesis of its own beside the catalogue: a [function](crate::evidence::function) of what was recorded, where no set leaves as little as
-//! noise and discrepancy would. It pays for its parameters and for the choice of its terms; o are the odds of what the catalogue lacks before the data.
-//! It is one of the things that something else may be, so that the greater of the two weights counts.
+//! f is one more hypothesis, outside the catalogue: a [function](crate::evidence::term_sum) of what
+//! was recorded, used if no set leaves as little as noise and discrepancy would. It is penalised
+//! for its parameters and for the choice of its terms; o are the prior odds of a cause that the
+//! catalogue lacks. It is one form of "something else", so the larger of the two weights counts.
 //!
-//! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
-//! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
-//! o, u, v and s are calibrated on development cases. Where nothing is missing there is no model discrepancy: noise alone leaves the gap, normal
-//! with what it is known to, u, and what its chance leaves in 19 of 20 records, b, while something else leaves any as soon as another. A set that closes less than 0.3 of the gap, of the fitted or of the test trials as either is the greater, is no hypothesis; of
-//! one whose strongest effect stands at an end of its range the odds o_h are ten times as large, for it may stand in for something else.
+//! Probabilities are these weights as shares of their sum. The temperature t tempers the
+//! posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set
+//! leaves, the less its form is that of the rig, and the less a difference of scores says. T, rho,
+//! o, u, v and s are calibrated on development cases. If nothing is missing there is no model
+//! discrepancy: noise alone leaves the gap, which is normal with the standard deviation of its
+//! estimate, u, and what its chance leaves in 19 of 20 records, b. Something else leaves any gap
+//! with equal probability. Sets that explain less than 30 % of the gap are discarded; the gap is
+//! the larger of those on fitted and test trials. If the strongest effect of a set is at an end of
+//! its range, the odds o_h are ten times as large, because it may compensate for something else.
 
 use crate::{
     fit::hypothesis::Hypothesis,
@@ -29,25 +36,25 @@ use crate::{
 /// Probability that the 95 % set holds.
 const COVERED: f64 = 0.95;
 
-/// What the sum needs of a hypothesis.
+/// What the posterior needs of a hypothesis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Standing {
-    /// Score against the re-tuned nominal, nats.
+    /// Score against the re-tuned nominal simulator, nats.
     pub(crate) score: f64,
-    /// Excess that it leaves: of the fitted and the test trials the greater.
+    /// Excess that it leaves: the larger of those on fitted and test trials.
     pub(crate) left: f64,
-    /// Whether its strongest effect stands at an end of its range.
+    /// Whether its strongest effect is at an end of its range.
     pub(crate) is_at_bound: bool,
-    /// Whether it says that nothing is missing.
+    /// Whether it is the hypothesis that nothing is missing.
     pub(crate) is_nothing: bool,
 }
 
-/// A function of what was recorded, which the catalogue lacks, as the sum needs it.
+/// A function of what was recorded, outside the catalogue, as the posterior needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Function {
-    /// Score against the re-tuned nominal, nats.
+    /// Score against the re-tuned nominal simulator, nats.
     pub(crate) score: f64,
-    /// Excess that it leaves: of the fitted and the test trials the greater.
+    /// Excess that it leaves: the larger of those on fitted and test trials.
     pub(crate) left: f64,
 }
 
@@ -71,16 +78,17 @@ pub(crate) struct Weighed {
 /// The posterior.
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
-    /// Sets of effects, the most probable first; behind them the empty one, which says that nothing is missing.
+    /// Sets of effects, the most probable first; the empty set, which says that nothing is missing,
+    /// comes last.
     pub(crate) sets: Vec<Weighed>,
-    /// Probability that it is something that the catalogue lacks.
+    /// Probability of a cause outside the catalogue.
     pub(crate) unknown: f64,
-    /// What it would be, where that was asked.
+    /// The function that describes this cause, if it was requested.
     pub(crate) function: Option<Function>,
 }
 
-/// The hypotheses that are weighed: the best set, those in which a rival stands in the place of one of its effects, those without its weakest
-/// effects, and nothing at all.
+/// The hypotheses that are weighed: the best set, the sets in which an alternative replaces one of
+/// its effects, the sets without its weakest effects, and the empty set.
 pub(crate) fn hypotheses(
     best: &Hypothesis,
     rivals: &[(usize, Hypothesis)],
@@ -90,7 +98,7 @@ pub(crate) fn hypotheses(
     let mut all = vec![best.clone()];
     for (slot, rival) in rivals {
         let mut hypothesis = rival.clone();
-        // The rival stands where the effect stood.
+        // The alternative takes the effect's position.
         let at = best.effects.iter().position(|e| e == slot);
         let newcomer = rival.effects.iter().find(|e| !best.effects.contains(e));
         if let (Some(at), Some(newcomer)) = (at, newcomer) {
@@ -106,7 +114,8 @@ pub(crate) fn hypotheses(
     all
 }
 
-/// The sum of the module's head: the probability of every hypothesis, and that of what the catalogue lacks.
+/// The posterior of the module's head: the probability of every hypothesis, and of a cause outside
+/// the catalogue.
 pub(crate) fn probabilities(
     thresholds: &Thresholds,
     gap: Gap,
@@ -143,8 +152,8 @@ pub(crate) fn probabilities(
     (all, unknown / total)
 }
 
-/// Whether an effect is named: what is missing is most probably of the catalogue, and the gap counts. Probabilities are those of effects, of nothing,
-/// and of what the catalogue lacks.
+/// Whether an effect is named: the cause is most probably in the catalogue, and the gap counts.
+/// Probabilities are those of effects, of nothing, and of a cause outside the catalogue.
 pub(crate) fn names(
     [effects, nothing, unknown]: [f64; 3],
     retuned: f64,
@@ -153,16 +162,16 @@ pub(crate) fn names(
     unknown < nothing.max(effects) && effects > nothing && retuned > thresholds.least_gap
 }
 
-/// Ratio of probabilities from which two sets are equally probable.
+/// Two sets are equally probable if the ratio of their probabilities is at least this.
 const EVEN: f64 = 0.99;
 
-/// The most probable of some sets, and those that are as probable, by their places.
+/// The most probable of some sets, and those that are equally probable, by index.
 pub(crate) fn most_probable(probabilities: &[f64]) -> Vec<usize> {
     let most = probabilities.iter().copied().fold(0.0, f64::max);
     (0..probabilities.len()).filter(|&i| probabilities[i] >= EVEN * most).collect()
 }
 
-/// Weighs hypotheses with what they leave.
+/// Weighs hypotheses with their misfits.
 pub(crate) fn weigh(
     thresholds: &Thresholds,
     gap: Gap,
@@ -175,7 +184,7 @@ pub(crate) fn weigh(
     let mut sets: Vec<Weighed> = weighed
         .map(|((hypothesis, standing), probability)| Weighed { hypothesis, standing, probability })
         .collect();
-    // Nothing stands behind the sets, however probable: who wants the best set finds it first.
+    // The empty set comes last, however probable it is, because callers expect the best set first.
     let is_nothing = |w: &Weighed| w.hypothesis.effects.is_empty();
     sets.sort_by(|a, b| {
         is_nothing(a).cmp(&is_nothing(b)).then(b.probability.total_cmp(&a.probability))
@@ -189,16 +198,18 @@ pub(crate) fn allowed(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * closed
 }
 
-/// Times by which something else is likelier where the strongest effect of a set stands at an end of its range.
+/// Factor on the odds of something else if the strongest effect of a set is at an end of its range.
 const AT_BOUND: f64 = 10.0;
 
-/// Odds that something else than noise and model discrepancy leaves as much: o_h of the module's head.
+/// Odds that another cause than noise and model discrepancy leaves as much: o_h of the module's
+/// head.
 fn odds_of_else(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
     let beyond = (left.max(f64::MIN_POSITIVE) / allowed(retuned, left, thresholds)).ln();
     thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp()
 }
 
-/// Odds that something else than noise leaves as much where nothing is missing: o_nothing of the module's head.
+/// Odds that another cause than noise leaves as much if nothing is missing: o_nothing of the
+/// module's head.
 fn odds_beside_nothing(gap: Gap, thresholds: &Thresholds) -> f64 {
     let ratio = gap.retuned.max(0.0) / thresholds.unknown_excess.hypot(gap.null_band);
     thresholds.unknown_odds * ratio * (0.5 * (ratio * ratio - 1.0)).exp()
@@ -217,7 +228,7 @@ impl Posterior {
     }
 }
 
-/// How many of some probabilities, the greatest first, hold 95 % of their sum.
+/// Number of probabilities, the largest first, that hold 95 % of their sum.
 pub(crate) fn covering(probabilities: &[f64]) -> usize {
     let all: f64 = probabilities.iter().sum();
     let mut sum = 0.0;
@@ -267,7 +278,7 @@ mod tests {
         (hypothesis(effects, score), Standing { score, left, is_at_bound: false, is_nothing })
     }
 
-    /// A gap in a record in which chance leaves hardly anything.
+    /// A gap in a record in which chance leaves almost nothing.
     fn of_size(retuned: f64) -> Gap {
         Gap { retuned, null_band: 0.01 }
     }
@@ -293,7 +304,7 @@ mod tests {
         assert!(all.sets.iter().all(|w| (0.0..=1.0).contains(&w.probability)));
     }
 
-    /// ln p_i/p_j = (S_i - S_j)/(T + rho share) where both leave the same.
+    /// ln p_i/p_j = (S_i - S_j)/(T + rho share) if both leave the same.
     #[test]
     fn odds_are_the_tempered_likelihood_ratio() {
         let thresholds = Thresholds::frozen();
@@ -311,7 +322,8 @@ mod tests {
         }
     }
 
-    /// Of two sets of one score the one that leaves less is the more probable; beside what leaves nothing something else is improbable.
+    /// Of two sets with equal scores, the one that leaves less is more probable. If a set leaves
+    /// nothing, something else is improbable.
     #[test]
     fn what_leaves_less_is_the_more_probable() {
         let all = posterior(&[(100.0, 0.1), (100.0, 5.0)]);
@@ -321,7 +333,7 @@ mod tests {
         assert!(unknown[0] < 1e-6 && unknown[4] > 0.9, "{unknown:?}");
     }
 
-    /// What stands at the end of its range is something else the sooner.
+    /// An effect at the end of its range makes something else more probable.
     #[test]
     fn a_set_at_its_bound_may_stand_in_for_something_else() {
         let of = |is_at_bound, left| {
@@ -335,7 +347,8 @@ mod tests {
         }
     }
 
-    /// Where nothing is found and hundreds of times the noise's variance are left, nothing is no explanation.
+    /// If nothing is found and hundreds of times the noise's variance are left, "nothing" is no
+    /// explanation.
     #[test]
     fn nothing_does_not_explain_a_large_gap() {
         let of = |retuned: f64| {
@@ -345,15 +358,16 @@ mod tests {
         assert!(of(0.02).nothing() > 0.9, "{:?}", of(0.02));
         let falling = [0.0, 0.05, 0.2, 0.4, 30.0].map(|gap| of(gap).nothing());
         assert!(falling.windows(2).all(|pair| pair[0] > pair[1]), "{falling:?}");
-        // A fifth more than noise of a level that is known, where chance leaves a hundredth.
+        // A fifth more than noise of a known level, where chance leaves a hundredth.
         assert!(of(0.2).unknown > 0.5, "{:?}", of(0.2));
-        // The same where chance alone leaves as much.
+        // The same if chance alone leaves as much.
         let chance = Gap { retuned: 0.2, null_band: 0.3 };
         let short = weigh(&Thresholds::frozen(), chance, vec![fitted(&[], 0.0, 0.2)], None);
         assert!(short.nothing() > 0.8, "{short:?}");
     }
 
-    /// A function that explains what no set does is something that the catalogue lacks; one that explains less changes hardly anything.
+    /// A function that explains more than every set is a cause outside the catalogue; one that
+    /// explains less changes almost nothing.
     #[test]
     fn a_function_that_leaves_less_stands_beside_the_catalogue() {
         let of = |function| {
@@ -381,7 +395,7 @@ mod tests {
         let far = posterior(&[(0.0, 0.0), (-1e4, 0.0), (-1e5, 0.0)]);
         assert!(far.sets.iter().all(|w| w.probability.is_finite()));
         assert_eq!(far.sets[1].probability, 0.0);
-        // Where there is no gap at all the least one that counts stands in the share.
+        // If there is no gap at all, the share is relative to the smallest gap that counts.
         let none = weigh(&Thresholds::frozen(), of_size(0.0), vec![fitted(&[0], 0.0, 0.0)], None);
         assert!(none.sets.iter().all(|w| w.probability.is_finite()) && none.unknown.is_finite());
     }
@@ -389,7 +403,7 @@ mod tests {
     #[test]
     fn a_rival_stands_where_the_effect_stood_and_nothing_is_last() {
         let best = hypothesis(&[4, 2, 7], 100.0);
-        // The search lists what it kept first, the newcomer last.
+        // The search lists the kept effects first and the new one last.
         let rival = (2, hypothesis(&[4, 7, 5], 95.0));
         let less = [
             (7, hypothesis(&[4, 2], 60.0)),

@@ -1,26 +1,64 @@
-//! Gathers how a stage answers to the numbers of its effects: a run for each value.
+//! Computes how a stage responds to the parameters of its effects, with one run per value.
 
 use rayon::prelude::*;
 
 use stretch_effects::EffectParameter;
 
+/// Responses of a stage to the parameters of the effects that act in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Responses {
+    /// The stage.
+    pub stage: usize,
+    /// Every varied parameter, in the order of the effects.
+    pub parameters: Vec<Response>,
+    /// Products under the metric of the noise, averaged over the blocks of the test trials: first
+    /// the residual of the best set, then every response in the order of parameters and values; row
+    /// by row, symmetric. The first is 1 + the excess.
+    pub products: Vec<Vec<f64>>,
+}
+
+/// Response of a stage to one parameter of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// The effect.
+    pub effect: String,
+    /// Parameter of that effect.
+    pub name: String,
+    /// Unit of the parameter.
+    pub unit: String,
+    /// Fitted value.
+    pub fitted: f64,
+    /// Other values, ascending, and the changes that they make.
+    pub answers: Vec<Answered>,
+}
+
+/// The change that one value of the parameter makes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answered {
+    /// Value of the parameter.
+    pub value: f64,
+    /// Output minus that of the fitted value, in the unit of the stage, all trials concatenated.
+    pub output: Vec<f64>,
+    /// Change of the output in multiples of the noise, without slow drift and trial offsets: what
+    /// the value subtracts from [`residual_after`](crate::StageEvidence::residual_after).
+    pub residual: Vec<f64>,
+}
+
 use crate::{
-    evidence::{
-        gathered::{Evidence, held_out},
-        response::{Answered, Response, Responses},
-    },
+    evidence::gathered::{Evidence, held_out},
     fit::{hypothesis::Hypothesis, levenberg_marquardt::possible, prepared::PreparedProblem},
     numerics::linear::dot,
     problem::{error::GapError, sample_roles::Role},
 };
 
-/// Where the values lie: shares of the reach on either side of the fitted one.
+/// Positions of the values: shares of the reach on either side of the fitted value.
 const STEPS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
-/// Reach in fitted values, or in standard deviations where that is more; of what is searched in equal ratios, a ratio.
+/// Reach in fitted values, or in standard deviations if that is more; for parameters on a
+/// logarithmic scale, a ratio.
 const DEVIATIONS: f64 = 3.0;
 const RATIO: f64 = 4.0;
 
-/// A number that is turned.
+/// A varied parameter.
 struct Turned<'a> {
     effect: usize,
     parameter: usize,
@@ -29,7 +67,8 @@ struct Turned<'a> {
     values: Vec<f64>,
 }
 
-/// The answers of a stage around the best set; none where no number of an effect acts in it that may be turned at no great cost.
+/// The responses of a stage around the best set; `None` if no parameter of an effect that is cheap
+/// to vary acts in the stage.
 pub(crate) fn responses(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
@@ -70,7 +109,7 @@ pub(crate) fn responses(
     Ok(Some(Responses { stage, parameters: parameters.collect(), products }))
 }
 
-/// The numbers of a set's effects that act in a stage and may be turned at no great cost.
+/// The parameters of a set's effects that act in a stage and are cheap to vary.
 fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) -> Vec<Turned<'a>> {
     let simulator = problem.simulator();
     let mut turned = Vec::new();
@@ -92,7 +131,7 @@ fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) ->
     turned
 }
 
-/// Values around a fitted one, within what is plausible.
+/// Plausible values around a fitted one.
 fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
     let at = |share: f64| match spec.is_log() && fitted > 0.0 {
         true => fitted * libm::pow(RATIO, share),
@@ -104,8 +143,8 @@ fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
     values
 }
 
-/// x' V^-1 y of every pair, a mean over the blocks of the test trials; `columns` hold x and V^-1 x, in multiples of the noise whose square is `level` of
-/// what they were taken for.
+/// x' V^-1 y of every pair, averaged over the blocks of the test trials. `columns` hold x and V^-1
+/// x, in multiples of the noise; the actual noise variance is `level` times the assumed one.
 fn products(
     problem: &PreparedProblem<'_>,
     level: f64,
@@ -124,7 +163,7 @@ fn products(
         blocks.iter().map(|b| dot(&x[b.clone()], &y[b.clone()])).sum::<f64>() / samples / level
     };
     let row = |(i, (x, _)): (usize, &(&[f64], &[f64]))| -> Vec<f64> {
-        // V^-1 is symmetric up to rounding: a pair has one number
+        // V^-1 is symmetric up to rounding: store one number per pair
         let pair = |j: usize, y: &[f64]| match j < i {
             true => product(columns[j].0, columns[i].1),
             false => product(x, y),

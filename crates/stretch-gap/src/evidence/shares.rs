@@ -1,9 +1,12 @@
-//! What each effect of the best set closes, so that an answer without a name still says what is known.
+//! Share of each effect of the best set, so that an answer without a name still reports what is
+//! known.
 //!
-//! Effects overlap: what each closes alone adds up to more than the whole. Taken out from the weakest to the strongest, with the rest
-//! fitted anew each time, their shares (gap without - gap with)/gap of the nominal telescope to what the set closes. Shares are of the gap in
-//! the test trials: what is fitted can close anything. The size of an effect is, as that of every gap, the greater of fitted and test trials: what
-//! acts in long trials alone (a creep of half a minute) closes little in short ones.
+//! Effects overlap: the shares that each closes alone add up to more than the whole. Therefore
+//! effects are removed from the weakest to the strongest, with the rest fitted again each time. The
+//! shares (gap without - gap with)/gap of the nominal simulator then add up to what the set closes.
+//! Shares are of the gap in the test trials, because a fit can close anything in the fitted ones.
+//! The size of an effect is, like that of every gap, the larger of fitted and test trials, because
+//! an effect that acts only in long trials (a creep of half a minute) closes little in short ones.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,22 +21,25 @@ use crate::{
     search::sets::Sets,
 };
 
-/// What one effect of the best set closes of the gap in the trials that were not fitted.
+/// Share of the gap on test trials that one effect of the best set closes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectShare {
     /// Effect.
     pub effect: String,
-    /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
-    /// before: the shares add up to what the set closes.
+    /// Share of the re-tuned nominal simulator's gap that opens again when the effect is removed,
+    /// after the weaker ones: the shares add up to what the set closes.
     pub closes: f64,
-    /// What it closes of the stage in which it closes most, in variances of the noise: of the fitted and the test trials the greater.
+    /// What it closes of the stage in which it closes most, in variances of the noise: the larger
+    /// of fitted and test trials.
     #[serde(default)]
     pub closes_excess: f64,
-    /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
+    /// Whether one of its parameters reached an end of its range. It then rather compensates for
+    /// something else.
     pub at_bound: bool,
 }
 
-/// The best set with its effects taken out one after the other, the weakest first: the effect, and what is left without it.
+/// Removes the effects of the best set one after the other, the weakest first: returns the effect,
+/// and what is left without it.
 pub(crate) fn eliminated(
     sets: &mut Sets<'_>,
     best: &Hypothesis,
@@ -55,14 +61,15 @@ pub(crate) fn eliminated(
     Ok(out)
 }
 
-/// What each effect closes of the held-out gap, the strongest first.
+/// Share of the held-out gap that each effect closes, the strongest first.
 pub(crate) fn shares(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
     eliminated: &[(usize, Hypothesis)],
 ) -> Result<Vec<EffectShare>, GapError> {
-    // Noise is known to some per cent: what the best set leaves is the noise where it is less than they say.
+    // The noise is known to a few per cent. If the best set leaves less than it, use what it
+    // leaves.
     let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
     let above =
         |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);

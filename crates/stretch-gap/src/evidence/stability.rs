@@ -1,9 +1,12 @@
-//! Stability of a name: in how many other records like this one it would stand.
+//! Stability of a name: the share of other records like this one in which it would be named.
 //!
-//! Blocks of each role are drawn with replacement as for the [interval of what closes](crate::evidence::bootstrap), the same for every set and
-//! channel. What the sets leave of a drawn record is a sum over its blocks, so that scores, gaps and probabilities follow without a simulation
-//! or a fit; the share of draws in which the most probable set holds an effect is its stability (Meinshausen and Buehlmann 2010, doi
-//! 10.1111/j.1467-9868.2010.00740.x). Sets whose probabilities differ by less than a hundredth share a draw, so that each of two twins has a half.
+//! Blocks of each role are drawn with replacement as for the [interval of what
+//! closes](crate::evidence::bootstrap), the same blocks for every set and channel. What the sets
+//! leave of a drawn record is a sum over its blocks, so scores, gaps and probabilities follow
+//! without a simulation or a fit. The share of draws in which the most probable set holds an effect
+//! is its stability (Meinshausen and Buehlmann 2010, doi 10.1111/j.1467-9868.2010.00740.x). Sets
+//! whose probabilities differ by less than a hundredth share a draw, so each of two twins has a
+//! half.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +26,7 @@ use crate::{
 /// Records that are drawn.
 const DRAWS: usize = 200;
 
-/// How firmly an effect stands in the most probable set of effects.
+/// How stable an effect is in the most probable set of effects.
 ///
 /// ```
 /// let found: stretch_gap::EffectStability =
@@ -66,7 +69,8 @@ struct Left {
 
 impl Left {
     fn of(misfits: &[Misfit], blocks: &[Blocks], drawn: &Drawn) -> Self {
-        // A misfit is that of its blocks, and what is too short for one, at equal noise transmitted.
+        // A misfit is that of its blocks plus stretches too short for one, at equal transmitted
+        // noise.
         let moved = |whole: f64, blocks: &[f64], times: &[f64]| match blocks.is_empty() {
             true => whole,
             false => {
@@ -86,13 +90,14 @@ impl Left {
         }
     }
 
-    /// Of the fitted and the test trials the greater gap, as everywhere.
+    /// The larger gap of fitted and test trials, as everywhere.
     fn gap(&self, problem: &PreparedProblem<'_>, evidence: &Evidence) -> f64 {
         evidence.gap_of(problem, &self.misfits).max(self.tested)
     }
 }
 
-/// The stability of every effect of the sets that are weighed, the firmest first; `blocks` holds what each of them leaves, in their order.
+/// The stability of every effect of the weighed sets, the most stable first; `blocks` holds what
+/// each set leaves, in their order.
 pub(crate) fn stabilities(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,

@@ -1,19 +1,24 @@
-//! Errors that outputs share, so that none of them counts as an explanation of the others.
+//! Accounts for errors that outputs share, so that none of them counts as an explanation of the
+//! others.
 //!
-//! An effect that reads another output as it was measured (crosstalk) reads the errors of that output, too. Outputs of one record seldom have errors
-//! of their own only: what the simulator lacks shows in all that see the same motion. Such an effect takes from one output what it has in
-//! common with the other, whatever the cause; round a circle of outputs each explains the next, and nothing is explained. That the
-//! errors are alike explains as much: as a vector they have a covariance C (seemingly unrelated regressions: Zellner 1962, doi
-//! 10.1080/01621459.1962.10480664), with correlations R,
+//! An effect that reads another measured output (crosstalk) also reads the errors of that output.
+//! Outputs of one record are seldom independent, because what the simulator lacks shows in all that
+//! see the same motion. Such an effect removes from one output what it has in common with the
+//! other, whatever the cause. In a circle of outputs each explains the next, and nothing is
+//! explained. The correlation of the errors explains as much: as a vector they have a covariance C
+//! (seemingly unrelated regressions: Zellner 1962, doi 10.1080/01621459.1962.10480664), with
+//! correlations R,
 //!
 //! ```text
 //! ln det C = sum over stages of ln X + ln det R,     A = (n/2) (ln det R_unread - ln det R)
 //! ```
 //!
-//! To take c times one output's error from another's leaves det C as it is, for the change of coordinates is triangular. So a set that holds
-//! such effects is scored with A, where R_unread are the correlations of what is left with nothing read: what they explain by errors alone
-//! counts for nothing, what they do beyond counts in full, and a set without them scores as ever. Nothing read, the parameters do what they can
-//! in the place of it: with d, what the effects do, and A, the sensitivities of the parameters, what is left is
+//! Subtracting c times one output's error from another's does not change det C, because the change
+//! of coordinates is triangular. Therefore a set with such effects is scored with A, where R_unread
+//! are the correlations of the residuals without any reading. What these effects explain only by
+//! errors does not count, what they explain beyond counts in full, and the score of a set without
+//! them does not change. Without reading, the parameters compensate as far as they can. With d, the
+//! contribution of the effects, and A, the sensitivities of the parameters, the residual is
 //!
 //! ```text
 //! r_unread = r + d - A (A'V^-1 A + b I)^-1 A'V^-1 d
@@ -27,7 +32,7 @@ use nalgebra::DMatrix;
 
 use crate::numerics::linear::Cholesky;
 
-/// What is left of an output, nuisance taken out, over fitted and over held-out samples.
+/// Residual of an output without its nuisances, over fitted and over held-out samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Errors {
     pub(crate) fit: Vec<f32>,
@@ -37,13 +42,14 @@ pub(crate) struct Errors {
 /// Errors of an output that another one reads, or that reads another one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Read {
-    /// As the model leaves them.
+    /// With the model.
     pub(crate) left: Arc<Errors>,
-    /// As the model leaves them without the effects that read.
+    /// With the model, but without the effects that read.
     pub(crate) unread: Arc<Errors>,
 }
 
-/// A of the module's head, nats; of every output its errors and how much they count, fitted and held out.
+/// A of the module's head, nats. For every output: its errors and their weights, fitted and held
+/// out.
 pub(crate) fn taken(read: &[(&Read, [f64; 2])]) -> f64 {
     let readers = || read.iter().filter(|(read, _)| !Arc::ptr_eq(&read.left, &read.unread));
     if readers().next().is_none() {
@@ -83,7 +89,8 @@ mod tests {
     const SAMPLES: usize = 4000;
     const OBSERVATIONS: [f64; 2] = [75.0, 25.0];
 
-    /// Score of what is left, by effects that read, of what is left with nothing read; both beside what the nominal leaves.
+    /// Score of the residual with effects that read other outputs, against the residual without
+    /// them; both relative to what the nominal simulator leaves.
     fn nats(nominal: &[Vec<f64>], left: &[Vec<f64>], unread: &[Vec<f64>]) -> f64 {
         let errors = |own: &[f64]| {
             let values: Vec<f32> = own.iter().map(|x| *x as f32).collect();
@@ -101,7 +108,8 @@ mod tests {
         0.5 * OBSERVATIONS.iter().sum::<f64>() * alone + taken(&read)
     }
 
-    /// Three outputs with one cause of what is left, as large as `size` beside an error of each one's own.
+    /// Three outputs whose residuals share one cause of the given `size`, each with an independent
+    /// error.
     fn outputs(size: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
         let mut random = RandomGenerator::new(5, 0);
         let cause: Vec<f64> = (0..SAMPLES).map(|_| random.gauss()).collect();
@@ -114,7 +122,8 @@ mod tests {
         of.iter().zip(other).map(|(x, other)| x - share * other).collect()
     }
 
-    /// What one output explains of another is the error that they share: by itself 80 nats. The cause of the error keeps its worth.
+    /// What one output explains of another is the error that they share: alone 80 nats. The cause
+    /// of the error keeps its score.
     #[test]
     fn a_shared_error_is_no_explanation_and_its_cause_is() {
         let (cause, nominal) = outputs(3.0);
@@ -131,7 +140,7 @@ mod tests {
         );
     }
 
-    /// What an effect reads of another output's true course, its error left alone, counts as ever.
+    /// What an effect reads of another output's true course, without its error, counts in full.
     #[test]
     fn what_is_read_of_errors_of_their_own_counts() {
         let (cause, errors) = outputs(0.0);

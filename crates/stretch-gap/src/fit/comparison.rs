@@ -1,4 +1,5 @@
-//! A simulator beside its measurements, every stage on its measured input and in its own metric.
+//! A simulator and its measurements, every stage driven by its measured input and judged in its own
+//! metric.
 
 use std::sync::Arc;
 
@@ -26,7 +27,7 @@ use crate::{
 /// Draws of the measured input's noise; the same for every model, so that differences of models are none of the draws'.
 const DRAWS: u64 = 4;
 
-/// A simulator beside its measurements, with the metric of every stage.
+/// A simulator and its measurements, with the metric of every stage.
 #[derive(Clone)]
 pub(crate) struct Comparison<'a> {
     pub(crate) runs: Runs<'a>,
@@ -72,7 +73,7 @@ impl<'a> Comparison<'a> {
         Ok(gained)
     }
 
-    /// The same session beside another simulator, in metrics of its own.
+    /// The same session with another simulator, in separate metrics.
     pub(crate) fn beside<'b>(
         &self,
         simulator: &'b dyn Simulator,
@@ -258,7 +259,8 @@ impl<'a> Comparison<'a> {
         Ok(arrived)
     }
 
-    /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one batch; none where a coordinate does not act.
+    /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one
+    /// batch; `None` for a coordinate that does not act.
     ///
     /// The moved runs may be taken from a run at the parameters `near`.
     pub(crate) fn sensitivities(

@@ -1,4 +1,5 @@
-//! Coordinates of a fit: every free parameter on a scale on which 1 is a large step, with its prior and its bounds.
+//! Coordinates of a fit: every free parameter, scaled such that 1 is a large step, with its prior
+//! and its bounds.
 //!
 //! | parameter | coordinate x | prior | bounds |
 //! | --- | --- | --- | --- |
@@ -7,8 +8,8 @@
 //! | shape, in equal ratios | ln value | Gaussian, the middle and half of its range | its range |
 //! | form | as above | Gaussian around its usual value, 0.35 of its range | its range |
 //!
-//! The prior's part of a cost is -ln p(x) without its constant. A flat prior on a strength makes the effect's absence no
-//! special case; the penalty for looking is the score's.
+//! The prior's part of a cost is -ln p(x) without its constant. A flat prior on a strength makes
+//! the absence of the effect no special case; the penalty for the choice is part of the score.
 
 use stretch_effects::EffectParameter;
 
@@ -24,9 +25,9 @@ pub(crate) const REACH: f64 = 3.0;
 pub(crate) enum Coordinate {
     /// A nominal parameter.
     Nominal { index: usize, nominal: f64, sd: f64 },
-    /// An effect's parameter in equal steps; a form has a usual place.
+    /// An effect's parameter on a linear scale; a form has a usual value.
     Linear { slot: usize, index: usize, range: f64, usual: Option<f64> },
-    /// An effect's parameter in equal ratios.
+    /// An effect's parameter on a logarithmic scale.
     Log { slot: usize, index: usize, middle: f64, half: f64, is_form: bool },
 }
 
@@ -48,10 +49,30 @@ impl Coordinate {
     }
 
     pub(crate) fn write(self, model: &mut Model, x: f64) {
+        let place = match self {
+            Self::Nominal { index, .. } => &mut model.parameters[index],
+            Self::Linear { slot, index, .. } | Self::Log { slot, index, .. } => {
+                &mut model.effects[slot].1[index]
+            }
+        };
+        *place = self.value(x);
+    }
+
+    /// The value at x.
+    pub(crate) fn value(self, x: f64) -> f64 {
         match self {
-            Self::Nominal { index, nominal, sd } => model.parameters[index] = nominal + sd * x,
-            Self::Linear { slot, index, range, .. } => model.effects[slot].1[index] = x * range,
-            Self::Log { slot, index, .. } => model.effects[slot].1[index] = x.exp(),
+            Self::Nominal { nominal, sd, .. } => nominal + sd * x,
+            Self::Linear { range, .. } => x * range,
+            Self::Log { .. } => x.exp(),
+        }
+    }
+
+    /// Change of the value for a change of x by 1, around a value.
+    pub(crate) fn slope(self, value: f64) -> f64 {
+        match self {
+            Self::Nominal { sd, .. } => sd,
+            Self::Linear { range, .. } => range,
+            Self::Log { .. } => value,
         }
     }
 
@@ -71,7 +92,8 @@ impl Coordinate {
         Prior { cost, slope, curvature }
     }
 
-    /// Step of a one-sided difference: small beside the curvature, large beside a simulation's rounding.
+    /// Step of a one-sided difference: small against the curvature, large against a simulation's
+    /// rounding.
     pub(crate) fn probe(self, x: f64) -> f64 {
         match self {
             Self::Nominal { .. } | Self::Log { .. } => 0.03,
@@ -79,7 +101,8 @@ impl Coordinate {
         }
     }
 
-    /// Longest step at once: beyond it a line says little. A logarithm goes a factor of three at most.
+    /// Longest single step, because beyond it the linearisation is poor. A logarithm changes by at
+    /// most a factor of three.
     pub(crate) fn stride(self) -> f64 {
         match self {
             Self::Nominal { .. } => 6.0,
@@ -98,7 +121,7 @@ impl Coordinate {
         }
     }
 
-    fn is_form(self) -> bool {
+    pub(crate) fn is_form(self) -> bool {
         match self {
             Self::Nominal { .. } => false,
             Self::Linear { usual, .. } => usual.is_some(),
@@ -116,7 +139,7 @@ pub(crate) fn coordinates(
     let specs = simulator.parameters();
     let mut own: Vec<usize> = Vec::new();
     for &index in stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters) {
-        // What acts in two stages is one coordinate.
+        // A parameter that acts in two stages is one coordinate.
         if specs[index].sd > 0.0 && !own.contains(&index) {
             own.push(index);
         }
@@ -139,7 +162,7 @@ fn of_effects(
     model.effects.iter().enumerate().flat_map(|(slot, (effect, values))| {
         let specs = &simulator.effects()[*effect].parameters;
         let free = specs.iter().enumerate().filter(|&(index, p)| {
-            // A second threshold that is off stays off: it is another form of the effect.
+            // A second threshold that is off stays off, because it is another form of the effect.
             let is_other = index > 0 || values.len() > 1;
             let is_off = p.off() == Some(values[index]) && values[index] != 0.0;
             p.is_fitted() && !(is_other && is_off)
@@ -151,7 +174,7 @@ fn of_effects(
 fn of_parameter(slot: usize, index: usize, p: &EffectParameter) -> (Coordinate, [f64; 2]) {
     if p.is_log() {
         let (a, b) = (p.min.ln(), p.max.ln());
-        // A form is looked for near its usual value, anything else in the whole range.
+        // A form is searched near its usual value, anything else in the whole range.
         let (middle, half) = match p.usual_form() {
             Some(usual) => (usual.ln(), FORM_SD * (b - a)),
             None => (0.5 * (a + b), 0.5 * (b - a)),
@@ -165,14 +188,14 @@ fn of_parameter(slot: usize, index: usize, p: &EffectParameter) -> (Coordinate, 
     }
 }
 
-/// -ln prior of the forms of a model's effects: what it costs to lie off their usual values.
+/// -ln prior of the forms of a model's effects: the cost of values away from the usual ones.
 pub(crate) fn form_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     let all = of_effects(simulator, model).map(|(coordinate, _)| coordinate);
     all.filter(|c| c.is_form()).map(|c| c.prior(c.read(model)).cost).sum()
 }
 
-/// -ln prior of the way in which an effect acts (a saturation at either end): each of n ways has the probability 1/n, so
-/// that one of them alone costs ln n.
+/// -ln prior of the way in which an effect acts (a saturation at either end): each of n ways has
+/// the probability 1/n, so choosing one costs ln n.
 pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = &simulator.effects()[*effect].parameters;
@@ -183,7 +206,8 @@ pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     model.effects.iter().map(one).sum()
 }
 
-/// Free parameters that the score counts: those of effects that are neither forms nor left off.
+/// Free parameters that the score counts: parameters of effects, except forms and parameters that
+/// are off.
 pub(crate) fn free_parameters(simulator: &dyn Simulator, model: &Model) -> usize {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = simulator.effects()[*effect].parameters.iter().zip(values);

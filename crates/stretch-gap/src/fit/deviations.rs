@@ -1,28 +1,32 @@
-//! Deviations of form: what a hypothesis explains without a further effect, for no effect of a catalogue has the form of a real one.
+//! Deviations of form: what a hypothesis explains without a further effect, because no effect of a
+//! catalogue has exactly the form of a real one.
 //!
-//! Let d be what an effect does to an output, in multiples of the noise: the residual without the effect less the residual with it. A real
-//! effect of the same kind has further poles, and a curve that bends otherwise. To first order it does
+//! Let d be the contribution of an effect to an output, in multiples of the noise: the residual
+//! without the effect minus the residual with it. A real effect of the same kind has further poles,
+//! and a curve that bends otherwise. To first order it contributes
 //!
 //! ```text
 //! d + sum_j c_j b_j,     b = d - L d with lags L of 3, 30 and 300 samples;  z d and (z^2 - 1/3) d,     c_j ~ N(0, s^2)
 //! ```
 //!
-//! with z the output, -1 to 1 over its span, and s the *model discrepancy*: the share of an effect's doing that another form of it does
-//! otherwise (embedded model error: Sargsyan, Najm and Ghanem 2015, doi 10.1002/kin.20906). With b_j as columns B beside the sensitivities A of
-//! the nominal parameters and of the effects' strengths, whose part a deviation must not take (Plumlee 2017, doi
-//! 10.1080/01621459.2016.1211016), coefficients x = (a, c) are those of
+//! with z the output, scaled to -1 to 1 over its span, and s the *model discrepancy*: the share of
+//! an effect's contribution that another form of it changes (embedded model error: Sargsyan, Najm
+//! and Ghanem 2015, doi 10.1002/kin.20906). The columns b_j form B. A are the sensitivities of the
+//! nominal parameters and of the effects' strengths; a deviation must not take their part (Plumlee
+//! 2017, doi 10.1080/01621459.2016.1211016). The coefficients x = (a, c) are those of
 //!
 //! ```text
 //! N x = [A B]'V^-1 r/b,     N = [A B]'V^-1 [A B]/b + diag(1, 1/s^2)
 //! ```
 //!
-//! They lower the reduced chi-square of fitted and of held-out samples, though fitted to the former alone, and cost, as Laplace's approximation has it,
+//! They lower the reduced chi-square of fitted and of held-out samples, although fitted only to the
+//! former. By Laplace's approximation they cost
 //!
 //! ```text
 //! sum x_i^2 prior_i/2 + (ln det N - ln det N_A + 2 n ln s)/2
 //! ```
 //!
-//! No simulation is needed but one without each effect.
+//! The only simulations needed are those without each effect.
 
 use nalgebra::DMatrix;
 
@@ -38,11 +42,13 @@ use crate::{
 /// Time constants of further poles, samples.
 const LAGS: [f64; 3] = [3.0, 30.0, 300.0];
 
-/// Standard deviations within which a coefficient stays: an effect that had to be another several times over is another effect.
+/// Standard deviations within which a coefficient stays: an effect that would have to change
+/// several times over is another effect.
 const MOST: f64 = 2.0;
 
 impl PreparedProblem<'_> {
-    /// A hypothesis with what deviations of its effects' forms explain besides; as it is where they explain nothing.
+    /// A hypothesis with the additional explanation by deviations of its effects' forms; unchanged
+    /// if they explain nothing.
     ///
     /// `share` is s of the module's head.
     pub(crate) fn with_deviations(
@@ -62,7 +68,7 @@ impl PreparedProblem<'_> {
         Ok(if deviating.score > set.score { deviating } else { set.clone() })
     }
 
-    /// What deviations make of one stage; none where no effect acts.
+    /// What deviations make of one stage; `None` if no effect acts.
     fn deviations_in(
         &self,
         stage: usize,
@@ -136,7 +142,8 @@ impl PreparedProblem<'_> {
         out
     }
 
-    /// What is left beside the likeliest coefficients, of which the first `begun` are A's, and what they cost, nats.
+    /// The residual at the most likely coefficients, of which the first `begun` belong to A, and
+    /// their cost, nats.
     fn explained(
         &self,
         stage: usize,
@@ -173,7 +180,7 @@ impl PreparedProblem<'_> {
     }
 }
 
-/// A stage beside deviations.
+/// A stage with its deviations.
 struct Deviating {
     misfit: Misfit,
     /// Nats.

@@ -1,4 +1,4 @@
-//! A hypothesis: which effects the rig has and the simulator lacks, with everything fitted under it.
+//! A hypothesis: the effects that the rig has and the simulator lacks, with all fitted parameters.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,11 @@ use crate::{
     problem::{simulator::Model, spec::EffectSpec},
 };
 
-/// A set of effects, fitted together with every nominal parameter; the re-tuned nominal is the one without effects.
+/// A set of effects, fitted together with every nominal parameter; the re-tuned nominal simulator
+/// is the one without effects.
 #[derive(Debug, Clone)]
 pub(crate) struct Hypothesis {
-    /// Indices of the effects, in the order in which they came in.
+    /// Indices of the effects, in the order in which they were added.
     pub(crate) effects: Vec<usize>,
     /// Maximum a posteriori.
     pub(crate) model: Model,
@@ -25,7 +26,8 @@ pub(crate) struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Whether a parameter of an effect stands at an end of its range: the effect may then stand in for something else.
+    /// Whether a parameter of an effect is at an end of its range. The effect may then compensate
+    /// for something else.
     pub(crate) fn is_at_bound(&self, effect: usize, catalogue: &[EffectSpec]) -> bool {
         self.model.effect(effect).is_some_and(|values| catalogue[effect].is_at_bound(values))
     }

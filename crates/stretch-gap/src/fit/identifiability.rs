@@ -1,14 +1,16 @@
 //! Which nominal parameters the data determine, and which not.
 //!
-//! A fit of the nominal parameters, in units of their tolerances, has the normal matrix N = D + I: what the data say and the prior. So
+//! A fit of the nominal parameters, in units of their tolerances, has the normal matrix N = D + I:
+//! the data's information and the prior. Then
 //!
 //! ```text
 //! sd_i = sqrt((N^-1)_ii),     alone_i = 1/sqrt(D_ii + 1),     like_ij = D_ij/sqrt(D_ii D_jj)
 //! ```
 //!
-//! are a parameter's posterior standard deviation, what it would be if all others were known, and how alike two parameters act. Without
-//! data sd_i is 1. A parameter with D_ii = 0 does nothing; two that are alike to within the noise of the data do the same (Raue et al. 2009,
-//! doi 10.1093/bioinformatics/btp358, for the terms).
+//! are a parameter's posterior standard deviation, the standard deviation if all others were known,
+//! and how alike two parameters act. Without data sd_i is 1. A parameter with D_ii = 0 does
+//! nothing; two that are alike to within the noise of the data do the same (Raue et al. 2009, doi
+//! 10.1093/bioinformatics/btp358, for the terms).
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -18,15 +20,17 @@ use crate::{
     problem::{simulator::Model, spec::ParameterSpec},
 };
 
-/// Share of its tolerance to which a parameter is known where the data determine it, and where they say little of it.
+/// A parameter is determined if it is known to this share of its tolerance, and weakly determined
+/// below the second share.
 const DETERMINED: f64 = 1.0 / 3.0;
 const WEAKLY: f64 = 0.9;
-/// Information, tolerances to the minus two, below which a parameter does nothing that could be seen.
+/// Information, tolerances to the minus two, below which a parameter has no visible effect.
 const DEAD: f64 = 1e-6;
-/// Likeness from which two parameters do the same, and by how much the others then blur each of them.
+/// Likeness from which two parameters do the same, and the factor by which the others then blur
+/// each of them.
 const ALIKE: f64 = 0.98;
 const BLURRED: f64 = 2.0;
-/// Share of the way to a bound within which a parameter stands at it.
+/// A parameter is at a bound if it has gone this share of the way to it.
 const AT_BOUND: f64 = 0.995;
 
 /// How well a parameter is known.
@@ -35,15 +39,15 @@ const AT_BOUND: f64 = 0.995;
 pub enum Knowledge {
     /// To a third of its tolerance or better.
     Determined,
-    /// Better than its tolerance says, but not by much.
+    /// Better than its tolerance, but not much.
     Weakly,
-    /// No better than its tolerance says.
+    /// Not better than its tolerance.
     Not,
-    /// The parameter changes nothing that was measured.
+    /// The parameter does not change any measured output.
     Dead,
 }
 
-/// What the data say of one nominal parameter.
+/// Information of the data about one nominal parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identified {
     /// Name of the parameter.
@@ -58,14 +62,14 @@ pub struct Identified {
     pub sd: f64,
     /// Standard deviation that the parameter would have if all others were known.
     pub sd_alone: f64,
-    /// Parameters that do the same as far as these data tell: only together are they known.
+    /// Parameters that do the same as far as these data show; only their combination is known.
     pub like: Vec<String>,
-    /// Whether the re-tuned value stands at the end of its tolerances or of its range.
+    /// Whether the re-tuned value is at the end of its tolerances or of its range.
     pub at_bound: bool,
 }
 
 impl Identified {
-    /// In a sentence; none for a parameter that is determined and within its bounds.
+    /// One sentence; `None` for a parameter that is determined and within its bounds.
     ///
     /// ```
     /// use stretch_gap::{Identified, Knowledge};
@@ -113,10 +117,10 @@ impl Identified {
     }
 }
 
-/// What a fit says of the nominal parameters that it moved: their indices, and N.
+/// Information of a fit about the nominal parameters that it moved: their indices, and N.
 pub(crate) type Information = (Vec<usize>, DMatrix<f64>);
 
-/// What some fits say of every parameter with a tolerance, in the order of the simulator.
+/// Information of some fits about every parameter with a tolerance, in the order of the simulator.
 pub(crate) fn identified(
     specs: &[ParameterSpec],
     retuned: &Model,

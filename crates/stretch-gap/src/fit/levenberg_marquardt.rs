@@ -49,8 +49,10 @@ pub(crate) struct Fitted {
     pub(crate) effect_sd: Vec<Vec<f64>>,
     /// One standard deviation of each nominal parameter that was re-tuned.
     pub(crate) parameter_sd: Vec<(usize, f64)>,
-    /// What the fit says of the nominal parameters, the effects' own held.
-    pub(crate) information: Information,
+    /// The coordinates that were fitted, with their bounds.
+    pub(crate) coordinates: Vec<(Coordinate, [f64; 2])>,
+    /// N of the module's head.
+    pub(crate) normal: DMatrix<f64>,
     /// Whether it stood still with sensitivities of where it stands, each simulated: a further fit from here would end at once.
     pub(crate) is_settled: bool,
     /// Fall of the cost in the last iteration, nats.
@@ -66,14 +68,21 @@ pub(crate) struct Effort {
     renewals: &'static [usize],
     /// Whether steps of the nominal parameters may be taken from a run at those that the fit starts from.
     is_rough: bool,
+    /// Whether the forms of effects keep the values of the start.
+    holds_forms: bool,
 }
 
 /// Enough to see which of several starts goes furthest.
-pub(crate) const GLANCE: Effort = Effort { iterations: 2, renewals: &[], is_rough: true };
+pub(crate) const GLANCE: Effort =
+    Effort { iterations: 2, renewals: &[], is_rough: true, holds_forms: false };
 /// Enough to see whether a candidate can compete.
-pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[2], is_rough: true };
+pub(crate) const COARSE: Effort =
+    Effort { iterations: 5, renewals: &[2], is_rough: true, holds_forms: false };
 /// Until nothing is gained.
-pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false };
+pub(crate) const FINE: Effort =
+    Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false, holds_forms: false };
+/// The same, the forms of effects held.
+pub(crate) const FINE_OF_FORM: Effort = Effort { holds_forms: true, ..FINE };
 
 /// Added to every diagonal: a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
@@ -104,7 +113,7 @@ impl Comparison<'_> {
         effort: Effort,
     ) -> Result<Fitted, GapError> {
         let near = effort.is_rough.then(|| start.parameters.clone());
-        let mut descent = Descent::new(self, stages, start, near)?;
+        let mut descent = Descent::new(self, stages, start, near, effort.holds_forms)?;
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
@@ -123,6 +132,33 @@ impl Comparison<'_> {
             }
         }
         Ok(descent.finish())
+    }
+
+    /// The same, with sensitivities of the nominal parameters around the start.
+    pub(crate) fn fit_linearised(
+        &self,
+        stages: &[usize],
+        start: Model,
+        effort: Effort,
+    ) -> Result<Fitted, GapError> {
+        if let Some(costly) = self.simulator().costly() {
+            for &stage in stages {
+                costly.linearise(stage, &start, self.roles.fit_trials)?;
+            }
+        }
+        self.fit(stages, start, &[], effort)
+    }
+}
+
+impl Fitted {
+    /// What the fit says of the nominal parameters, the effects' own held.
+    pub(crate) fn information(&self) -> Information {
+        let nominal = self.coordinates.iter().enumerate().filter_map(|(at, (c, _))| match c {
+            Coordinate::Nominal { index, .. } => Some((at, *index)),
+            _ => None,
+        });
+        let (kept, indices): (Vec<usize>, Vec<usize>) = nominal.unzip();
+        (indices, self.normal.select_rows(&kept).select_columns(&kept))
     }
 }
 
@@ -183,8 +219,10 @@ impl<'a, 'b> Descent<'a, 'b> {
         stages: &'a [usize],
         mut model: Model,
         near: Option<Vec<f64>>,
+        holds_forms: bool,
     ) -> Result<Self, GapError> {
-        let coordinates = coordinates(compare.simulator(), stages, &model);
+        let mut coordinates = coordinates(compare.simulator(), stages, &model);
+        coordinates.retain(|(c, _)| !(holds_forms && c.is_form()));
         for (c, b) in &coordinates {
             let x = c.read(&model);
             c.write(&mut model, x.clamp(b[0], b[1]));
@@ -312,7 +350,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
             // Where runs are counted, none is made for what the line itself says is nothing.
-            if is_counted && self.foretold(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
+            if is_counted && self.predicted_fall(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
                 return Ok(false);
             }
             let mut next = self.model.clone();
@@ -337,8 +375,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         Ok(false)
     }
 
-    /// Fall of the cost that the linearised residuals foretell of a step: -(g'd + d'N d/2).
-    fn foretold(&self, step: &[f64]) -> f64 {
+    /// Fall of the cost that the linearised residuals predict for a step: -(g'd + d'N d/2).
+    fn predicted_fall(&self, step: &[f64]) -> f64 {
         let d = DVector::from_column_slice(step);
         let slope: f64 = self.gradient.iter().zip(step).map(|(g, s)| g * s).sum();
         -(slope + 0.5 * d.dot(&(&self.normal * &d)))
@@ -348,31 +386,33 @@ impl<'a, 'b> Descent<'a, 'b> {
     fn finish(self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
-        let is_nominal = |i: &usize| matches!(self.coordinates[*i].0, Coordinate::Nominal { .. });
-        let kept: Vec<usize> = (0..self.coordinates.len()).filter(is_nominal).collect();
-        let of = self.coordinates.iter().filter_map(|(c, _)| match c {
-            Coordinate::Nominal { index, .. } => Some(*index),
-            _ => None,
-        });
-        let information = (of.collect(), self.normal.select_rows(&kept).select_columns(&kept));
-        let spread = spreads(self.normal);
+        let spread = spreads(self.normal.clone());
         let effects = self.model.effects.iter();
         let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
         let mut parameter_sd = Vec::new();
         for ((c, _), spread) in self.coordinates.iter().zip(spread) {
+            let sd = |value: f64| spread * c.slope(value);
             match *c {
-                Coordinate::Nominal { index, sd, .. } => parameter_sd.push((index, spread * sd)),
-                Coordinate::Linear { slot, index, range, .. } => {
-                    effect_sd[slot][index] = spread * range;
+                Coordinate::Nominal { index, .. } => {
+                    parameter_sd.push((index, sd(self.model.parameters[index])));
                 }
-                // d value = value d ln value
-                Coordinate::Log { slot, index, .. } => {
-                    effect_sd[slot][index] = spread * self.model.effects[slot].1[index];
+                Coordinate::Linear { slot, index, .. } | Coordinate::Log { slot, index, .. } => {
+                    effect_sd[slot][index] = sd(self.model.effects[slot].1[index]);
                 }
             }
         }
-        let Self { model, cost, is_settled, last_fall, .. } = self;
-        Fitted { model, cost, misfits, effect_sd, parameter_sd, information, is_settled, last_fall }
+        let Self { model, cost, coordinates, normal, is_settled, last_fall, .. } = self;
+        Fitted {
+            model,
+            cost,
+            misfits,
+            effect_sd,
+            parameter_sd,
+            coordinates,
+            normal,
+            is_settled,
+            last_fall,
+        }
     }
 }
 

@@ -6,12 +6,11 @@
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the
 //! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
 //! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]); what another form of the same effects explains ([`deviations`]); which parameters the data
-//! determine ([`identifiability`]); whether a drift swings ([`swing`]).
-//! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`], [`begun_anew`]).
+//! determine ([`identifiability`]); whether a drift swings ([`swing`]). Some samples fitted by themselves, after a diagnosis ([`sample_fit`]).
+//! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`]).
 //! Imports: `numerics`, `problem`.
 
 pub(crate) mod alike;
-pub(crate) mod begun_anew;
 pub(crate) mod comparison;
 pub(crate) mod coordinate;
 pub(crate) mod deviations;
@@ -25,6 +24,7 @@ pub(crate) mod noise_level;
 pub(crate) mod nuisance;
 pub(crate) mod octaves;
 pub(crate) mod prepared;
+pub(crate) mod sample_fit;
 pub(crate) mod score;
 pub(crate) mod starts;
 pub(crate) mod swing;

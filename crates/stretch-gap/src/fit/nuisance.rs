@@ -1,15 +1,16 @@
 //! Nuisances of one stretch of samples: slow drift and trial offsets of parameters, marginalised out of a residual.
 //!
-//! With columns C of what the nuisances could change (in multiples of the noise, per unit of each), amplitudes b with prior precision P and
-//! white noise of one multiple, a residual r has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//! The columns C are the changes that the nuisances can make (in multiples of the noise, per unit
+//! of each). With amplitudes b of prior precision P and white noise of unit variance, a residual r
+//! has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
 //!
 //! ```text
 //! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
 //! ```
 //!
-//! (Rasmussen and Williams 2006, appendix A.3), so that a product of two columns costs a projection and a triangular solve each,
-//! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
-//! b = (C'C + P)^-1 C'r.
+//! (Rasmussen and Williams 2006, appendix A.3). A product of two columns therefore costs a
+//! projection and a triangular solve each, and never a matrix as large as the record. The most
+//! likely amplitudes, with which a residual is drawn, are b = (C'C + P)^-1 C'r.
 
 use std::{ops::Range, sync::Arc};
 
@@ -18,8 +19,8 @@ use crate::numerics::{
     linear::dot,
 };
 
-/// Distance of the knots, s: the process is rough, and straight lines between wide knots would pass what it does on the way to a
-/// quicker one.
+/// Distance of the knots, s. The process is rough, and straight lines between wide knots would
+/// attribute its fast part to a quicker process.
 const KNOT_S: f64 = 0.1;
 
 /// Nuisances of one segment of one stage.
@@ -34,7 +35,7 @@ pub(super) struct Nuisance {
     ln_determinant: f64,
 }
 
-/// Sensitivity to an offset from one sample on, for as long as it lasts.
+/// Sensitivity to an offset from one sample on, as long as it lasts.
 #[derive(Debug, Clone)]
 pub(super) struct Patch {
     pub(super) from: usize,
@@ -62,12 +63,13 @@ impl Patch {
 
 /// Sensitivity to a drifting parameter, and the knots that each sample lies between.
 ///
-/// the drift is linear between knots: sample i at the share w between knots k and k + 1 moves by
-/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the time at which the drift last had a way into the output.
+/// The drift is linear between knots: sample i at the share w between knots k and k + 1 moves by
+/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the last time at which the drift could
+/// reach the output.
 #[derive(Debug, Clone)]
 pub(super) struct Drifting {
     sensitivity: Vec<f64>,
-    /// Knots of the segment, which may go on behind the samples.
+    /// Knots of the segment, which may extend beyond the samples.
     knots: Arc<Knots>,
     /// Correlation of neighbouring knots, exp(-distance/correlation time).
     kept: f64,
@@ -135,26 +137,26 @@ impl Nuisance {
         self.ln_determinant
     }
 
-    /// L^-1 C'x: what a product of columns loses to the nuisances.
+    /// L^-1 C'x: the part of a product of columns that the nuisances explain.
     pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
         let mut tail = project(&self.offsets, &self.drifting, x);
         self.factor.forward(&mut tail);
         tail
     }
 
-    /// Time between knots, s, and C'x at the knots of the drift of that place among the drifts.
+    /// Time between knots, s, and C'x at the knots of the drift with that index.
     pub(super) fn at_knots(&self, which: usize, x: &[f64]) -> (f64, Vec<f64>) {
         let drifting = &self.drifting[which];
         (drifting.knots.step_s, project(&[], std::slice::from_ref(drifting), x))
     }
 
-    /// C b: what a drift of these values at its knots does to the samples.
+    /// C b: the change of the samples by a drift with these values at its knots.
     pub(super) fn course(&self, which: usize, knots: &[f64]) -> Vec<f64> {
         let each = self.drifting[which].each();
         each.map(|(_, k, this, next)| this * knots[k] + next * knots[k + 1]).collect()
     }
 
-    /// Takes the most likely nuisance out of a residual.
+    /// Subtracts the most likely nuisance from a residual.
     pub(super) fn clean(&self, x: &mut [f64]) {
         let mut b = project(&self.offsets, &self.drifting, x);
         self.factor.solve(&mut b);
@@ -215,8 +217,9 @@ fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
             a.beside[k] += x * y;
             a.diagonal[k + 1] += y * y;
         }
-        // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
-        // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
+        // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho
+        // between neighbours: (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2)
+        // on the two secondary diagonals.
         let (knots, kept) = (drifting.knots.count, drifting.kept);
         let scale = 1.0 / (1.0 - kept * kept);
         for k in 0..knots {
@@ -269,7 +272,8 @@ mod tests {
         );
     }
 
-    /// Two equal offsets at the same samples have twice the variance of one; at other samples they do not know of each other.
+    /// Two equal offsets at the same samples have twice the variance of one; at other samples they
+    /// are independent.
     #[test]
     fn offsets_share_what_they_explain() {
         let mut random = RandomGenerator::new(5, 0);
@@ -288,7 +292,8 @@ mod tests {
         );
     }
 
-    /// An offset alone against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at c = 1/2.
+    /// A single offset against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at
+    /// c = 1/2.
     #[test]
     fn an_offset_is_taken_out_as_far_as_its_prior_says() {
         let nuisance = Nuisance::new(vec![patch(0, SAMPLES)], Vec::new());

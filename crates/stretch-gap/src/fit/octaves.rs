@@ -1,33 +1,40 @@
-//! Mean squares of a residual by octaves of time: what parts a rise from chance, whatever the residual's colour is.
+//! Mean squares of a residual by octaves of time. They separate a real rise from chance, whatever
+//! the residual's colour.
 //!
-//! A mean square over all frequencies is mostly that of the quick ones, for there are most of them; a slow regressor that takes 5 % of slow
-//! noise away is then credited with several nats where chance gives half a one. So a residual is turned by the orthonormal Haar transform
-//! (Mallat 1989, doi 10.1109/34.192463): neighbours a, b go to (a - b)/sqrt 2, the detail of this octave, and (a + b)/sqrt 2, which goes on
-//! to the next one. Coefficients of a stationary process are nearly independent, of one variance an octave (Whittle 1953,
-//! doi 10.1007/BF02590998, in the frequencies' place). With the variances of all octaves profiled out, two hypotheses differ in their
-//! Gaussian log-likelihoods, determinants included, by
+//! A mean square over all frequencies is dominated by the high ones, because there are most of
+//! them. A slow regressor that removes 5 % of slow noise is then credited with several nats where
+//! chance gives half a nat. Therefore a residual is transformed by the orthonormal Haar transform
+//! (Mallat 1989, doi 10.1109/34.192463): neighbours a, b give (a - b)/sqrt 2, the detail of this
+//! octave, and (a + b)/sqrt 2, which is passed to the next octave. Coefficients of a stationary
+//! process are nearly independent, with one variance per octave (Whittle 1953, doi
+//! 10.1007/BF02590998, for frequencies). With the variances of all octaves profiled out, two
+//! hypotheses differ in their Gaussian log-likelihoods, determinants included, by
 //!
 //! ```text
 //! S = sum over octaves j of (m_j/2) ln(P_j/P'_j),     m_j = n_j/(1 + u^2 n_j)
 //! ```
 //!
-//! with n_j coefficients of mean squares P_j and P'_j, and the share u to which noise is known as it is described. A regressor that does
-//! nothing brings half a nat at most in the mean, in noise of any colour. What acts between trials is seen once a trial, for what is as slow
-//! has as many coefficients.
+//! with n_j coefficients of mean squares P_j and P'_j, and the share u to which the noise is known.
+//! A regressor that does nothing yields at most half a nat on average, in noise of any colour. An
+//! effect that acts between trials is seen once per trial, because its octave has as many
+//! coefficients.
 //!
-//! This says whether something is more than chance. What is the greater cause it does not say: slow power of any size may be slow noise to
-//! it, so that causes are ranked by their [score](crate::fit::score).
+//! This shows whether an effect is more than chance. It does not show which cause is larger,
+//! because slow power of any size may be slow noise. Therefore causes are ranked by their
+//! [score](crate::fit::score).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::numerics::linear::dot;
 
-/// Octaves: the last holds what is slower than 2^10 samples, ten seconds at 100 Hz.
+/// Octaves: the last holds all that is slower than 2^10 samples, ten seconds at 100 Hz.
 const OCTAVES: usize = 11;
-/// Least mean square, in variances of the noise: noise may be predicted too large, but nothing is exact.
+/// Smallest mean square, in variances of the noise: noise may be predicted too large, but no model
+/// is exact.
 const LEAST: f64 = 0.05;
 
-/// Share to which the noise of an octave is known, whatever the number of its coefficients: no recorder's noise is as it was described.
+/// Share to which the noise of an octave is known, whatever the number of its coefficients, because
+/// no recorder's noise is exactly as described.
 const KNOWN: f64 = 0.03;
 
 /// Sums of squares by octave, and how many coefficients make each.
@@ -38,9 +45,10 @@ pub(crate) struct Octaves {
 }
 
 impl Octaves {
-    /// Adds a stretch without a break: the mean squares of what is `clean`, the residual r less its most likely nuisances N a. What these cost
-    /// themselves, r'V^-1 r = |r - N a|^2 + a'D^-1 a with their variances D, is seen once a stretch, in the last octave. Products of r and r - N a
-    /// octave by octave have the same sum and may be negative.
+    /// Adds a stretch without a break: the mean squares of what is `clean`, the residual r minus
+    /// its most likely nuisances N a. The cost of these nuisances, r'V^-1 r = |r - N a|^2 + a'D^-1
+    /// a with their variances D, is added once per stretch, in the last octave. Products of r and r -
+    /// N a by octave have the same sum and may be negative.
     pub(crate) fn add(&mut self, residual: &[f64], clean: &[f64]) {
         for (octave, x) in coefficients(clean).iter().enumerate() {
             self.sums[octave] += dot(x, x);
@@ -49,8 +57,8 @@ impl Octaves {
         self.sums[OCTAVES - 1] += (dot(residual, clean) - dot(clean, clean)).max(0.0);
     }
 
-    /// At equal noise transmitted, as mean squares are: `own` is what the hypothesis lets through, `larger` what noise that it does not
-    /// is multiplied by; a tenth stays at least.
+    /// Mean squares at equal transmitted noise: `own` is the noise that the hypothesis transmits,
+    /// `larger` the factor for noise that it does not transmit. At least a tenth is kept.
     pub(crate) fn at_equal_noise(mut self, nominal: &Self, own: &Self, larger: f64) -> Self {
         for ((x, nominal), own) in self.sums.iter_mut().zip(nominal.sums).zip(own.sums) {
             let known = if nominal > own { larger } else { 1.0 };
@@ -59,7 +67,8 @@ impl Octaves {
         self
     }
 
-    /// Moved as another residual goes `from` one `to` another; a tenth stays at least.
+    /// Scaled by the ratio of another residual's mean squares, `from` one `to` another; at least a
+    /// tenth is kept.
     pub(crate) fn moved(mut self, from: &Self, to: &Self) -> Self {
         for ((x, from), to) in self.sums.iter_mut().zip(from.sums).zip(to.sums) {
             *x = (*x + to - from).max(0.1 * *x);
@@ -73,14 +82,14 @@ impl Octaves {
         self
     }
 
-    /// Sums of squares of both: those of what does not know of the other.
+    /// Sums of squares of both, which are independent.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.sums.iter_mut().zip(other.sums).for_each(|(x, y)| *x += y);
         self
     }
 
-    /// Mean squares without what model discrepancy may have left of them: in each octave the share `of_closed` of what was closed of the `nominal` there, as
-    /// far as `next` leaves less.
+    /// Mean squares without possible model discrepancy: in each octave the share `of_closed` of
+    /// what was closed of the `nominal` there, as far as `next` leaves less.
     pub(crate) fn less_discrepancy(mut self, nominal: &Self, next: &Self, of_closed: f64) -> Self {
         for ((x, nominal), next) in self.sums.iter_mut().zip(nominal.sums).zip(next.sums) {
             let may_be_left = of_closed * (nominal - *x).max(0.0);
@@ -89,7 +98,7 @@ impl Octaves {
         self
     }
 
-    /// Mean squares of as many coefficients of noise as it is described.
+    /// Mean squares of noise as described, with as many coefficients.
     pub(crate) fn of_noise(&self) -> Self {
         Self { sums: self.counts, counts: self.counts }
     }
@@ -108,7 +117,8 @@ impl Octaves {
     }
 }
 
-/// Haar's coefficients by octave; a last sample without a neighbour goes on as it is, and the last octave holds what is left.
+/// Haar's coefficients by octave. A last sample without a neighbour is passed on unchanged, and the
+/// last octave holds the rest.
 fn coefficients(values: &[f64]) -> [Vec<f64>; OCTAVES] {
     let mut left = values.to_vec();
     std::array::from_fn(|octave| {
@@ -159,7 +169,8 @@ mod tests {
         }
     }
 
-    /// What is left where nothing was closed is no discrepancy; where much was, little more that closes is none of a further effect's.
+    /// If nothing was closed, the rest is no discrepancy. If much was closed, a small further
+    /// improvement is not credited to a further effect.
     #[test]
     fn discrepancy_is_a_share_of_what_was_closed_in_its_octave() {
         let of = |slow: f64, quick: f64| {
@@ -171,21 +182,23 @@ mod tests {
         let rise =
             |base: Octaves, next: Octaves| base.less_discrepancy(&nominal, &next, 0.03).rise(&next);
         let (base, next) = (of(9.0, 5.0), of(1.0, 1.0));
-        // of 392 closed slowly 11.8 may be left; of the quick part nothing was closed
+        // of 392 closed slowly 11.8 may be left; nothing was closed of the quick part
         approx::assert_relative_eq!(
             rise(base, next),
             of(1.0, 5.0).rise(&next),
             max_relative = FIT_WELL
         );
         assert!(rise(of(20.0, 1.0), next) > 12.0);
-        // what a further effect spoils counts as it is, and without a first effect there is no discrepancy
+        // what a further effect makes worse counts in full, and without a first effect there is no
+        // discrepancy
         assert_eq!(rise(next, base), next.rise(&base));
         assert_eq!(rise(nominal, next), nominal.rise(&next));
         assert_eq!(base.less_discrepancy(&nominal, &next, 0.0), base);
     }
 
-    /// Of a regressor that does nothing chance makes chi^2/2 nats with one degree of freedom: 0.5 in the mean, above 12 nats once in
-    /// 10^6, in white noise and with slow power beside it.
+    /// For a regressor without effect, chance yields chi^2/2 nats with one degree of freedom: 0.5
+    /// on average, above 12 nats once in 10^6. This holds in white noise, also with additional slow
+    /// power.
     #[test]
     fn a_regressor_that_does_nothing_rises_as_theory_says() {
         const DRAWS: usize = 200;
@@ -200,7 +213,7 @@ mod tests {
                         .map(|w| f64::sqrt(share) * w + f64::sqrt(1.0 - share) * random.gauss())
                         .collect();
                     let d = slow(12_000, regressor, &mut random);
-                    // Fitted as fits do, in the metric of white noise.
+                    // Fitted as in a real fit, in the metric of white noise.
                     let size = dot(&d, &noise) / dot(&d, &d);
                     let left: Vec<f64> = noise.iter().zip(&d).map(|(r, d)| r - size * d).collect();
                     rises.push(of(&noise).rise(&of(&left)));
@@ -208,7 +221,8 @@ mod tests {
                 let mean = rises.iter().sum::<f64>() / DRAWS as f64;
                 let most = rises.iter().copied().fold(0.0, f64::max);
                 let told = format!("{share} of {memory}, regressor {regressor}: {mean}, {most}");
-                // 200 draws tell the mean to 0.05; what fits for white noise gains less in coloured one.
+                // 200 draws determine the mean to 0.05; a fit for white noise gains less in
+                // coloured noise.
                 assert!((-0.5..0.7).contains(&mean) && most < 12.0, "{told}");
             }
         }

@@ -1,14 +1,16 @@
-//! The problem, prepared: a simulator beside its measurements, re-tuned, with everything that hypotheses are scored by.
+//! The prepared problem: a simulator and its measurements, re-tuned, with everything that scores
+//! hypotheses.
 //!
-//! Preparation runs once, in an order in which each part needs the ones before:
+//! Preparation runs once. Each step needs the previous ones:
 //!
 //! 1. the roles of the samples; noise and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
-//! 3. noise and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
-//! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
-//!    for every hypothesis.
+//! 3. noise and metrics around its result, because sensitivities have changed; a second re-tuning
+//!    in these metrics;
+//! 4. the effective sample size of every stage and the transmitted noise, both at the re-tuned
+//!    nominal simulator, so that they are the same for every hypothesis.
 //!
-//! What exists is complete: nothing of a [`PreparedProblem`] is set later.
+//! A [`PreparedProblem`] is complete: nothing in it is set later.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +37,8 @@ use crate::{
     },
 };
 
-/// Root mean square change in multiples of the noise that a halved step of integration may make: a tenth, a hundredth of the noise's variance.
+/// Largest root mean square change, in multiples of the noise, when the step of integration is
+/// halved: a tenth is a hundredth of the noise's variance.
 const SOLVED: f64 = 0.1;
 
 /// Steps of integration that are tried first, as a multiple of the simulator's own.
@@ -49,26 +52,27 @@ pub(crate) struct PreparedProblem<'a> {
     pub(crate) shipped: Model,
     /// Re-tuned, without effects.
     pub(crate) nominal: Hypothesis,
-    /// What the re-tuning says of the nominal parameters.
+    /// Information of the re-tuning about the nominal parameters.
     information: Vec<Information>,
-    /// By stage: sensitivities of its nominal parameters around the re-tuned nominal.
+    /// By stage: sensitivities of its nominal parameters around the re-tuned nominal simulator.
     pub(crate) sensitivities: Vec<Sensitivities>,
     /// By stage: samples that count as one observation.
     memory: Vec<f64>,
-    /// By stage: how much its samples count.
+    /// By stage: weights of its samples.
     observations: Vec<Observations>,
-    /// By stage: noise that the re-tuned nominal transmits.
+    /// By stage: noise that the re-tuned nominal simulator transmits.
     transmitted: Vec<Misfit>,
-    /// How often re-tuning was begun, and how often it ended where it stands.
+    /// Number of starts of re-tuning, and how many of them ended at the result.
     pub(crate) starts: Starts,
 }
 
 impl<'a> PreparedProblem<'a> {
-    /// SampleRoles, noise, metrics, re-tuning, sample sizes and noise transmitted.
+    /// Determines sample roles, noise, metrics, re-tuning, sample sizes and transmitted noise.
     ///
     /// # Errors
-    /// [`GapError::Solver`] when the step of integration shows, [`GapError::TooLittle`] without anything to fit,
-    /// [`GapError::Measured`] where measurements are missing, and what the simulator says.
+    /// [`GapError::Solver`] if the step of integration is visible, [`GapError::TooLittle`] without
+    /// anything to fit, [`GapError::Measured`] if measurements are missing, and errors of the
+    /// simulator.
     pub(crate) fn prepare(
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -76,7 +80,8 @@ impl<'a> PreparedProblem<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
-        // Twice the step, where that is within what half of it may change; runs that are counted may be another's program.
+        // Try twice the step, if the change from halving it stays within the limit. Not for counted
+        // runs, because these may be an external program's.
         if simulator.costly().is_none() {
             match Self::at(runs.at_step(LONGER), seed, progress) {
                 Err(GapError::Solver { .. }) => {}
@@ -98,7 +103,8 @@ impl<'a> PreparedProblem<'a> {
         Self::of(compare, shipped, &first.model)
     }
 
-    /// The problem with nuisances as large and as quick as a model leaves them; none where they are so already.
+    /// The problem with sizes and correlation times of its nuisances re-estimated under a model;
+    /// `None` if they do not change.
     pub(crate) fn adapted(&self, model: &Model, seed: u64) -> Result<Option<Self>, GapError> {
         let mut compare = self.compare.clone();
         if compare.adapt(model)? < LEARNT {
@@ -111,12 +117,12 @@ impl<'a> PreparedProblem<'a> {
         Ok(Some(other.with_starts(self.starts)))
     }
 
-    /// The same, re-tuned so often.
+    /// The same, with the number of re-tuning starts.
     pub(super) fn with_starts(self, starts: Starts) -> Self {
         Self { starts, ..self }
     }
 
-    /// Re-tuned in metrics that stand.
+    /// Re-tuned in given metrics.
     pub(super) fn of(
         compare: Comparison<'a>,
         shipped: Model,
@@ -160,7 +166,7 @@ impl<'a> PreparedProblem<'a> {
         })
     }
 
-    /// The same problem beside another simulator of the same stages and parameters.
+    /// The same problem with another simulator of the same stages and parameters.
     pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> PreparedProblem<'b>
     where
         'a: 'b,
@@ -186,7 +192,7 @@ impl<'a> PreparedProblem<'a> {
         self.compare.runs.stop()
     }
 
-    /// Whether the simulator's budget allows no more than what the answer itself needs.
+    /// Whether the simulator's budget allows only the runs that the answer itself needs.
     pub(crate) fn is_spent(&self) -> bool {
         self.compare.runs.is_spent()
     }
@@ -196,7 +202,7 @@ impl<'a> PreparedProblem<'a> {
         identified(self.simulator().parameters(), &self.nominal.model, &self.information)
     }
 
-    /// [`Comparison::fit`], misfits at equal noise transmitted.
+    /// [`Comparison::fit`], with misfits at equal transmitted noise.
     pub(crate) fn fit(
         &self,
         stages: &[usize],
@@ -220,7 +226,8 @@ impl<'a> PreparedProblem<'a> {
         Ok(fitted)
     }
 
-    /// What a model leaves of an output with the effects that read other outputs, and without; none where no effect of the catalogue reads it.
+    /// What a model leaves of an output with the effects that read other outputs, and without;
+    /// `None` if no effect of the catalogue reads it.
     fn read(&self, misfit: &Misfit, model: &Model) -> Result<Option<Read>, GapError> {
         let (stage, compare) = (misfit.stage, &self.compare);
         let effects = self.simulator().effects();
@@ -244,8 +251,8 @@ impl<'a> PreparedProblem<'a> {
         Ok(Some(Read { left: compare.errors(stage, &left), unread }))
     }
 
-    /// Score of a hypothesis's misfits and model against the re-tuned nominal, nats; what effects take of errors that outputs
-    /// [share](crate::fit::alike) does not count.
+    /// Score of a hypothesis's misfits and model against the re-tuned nominal simulator, nats. What
+    /// effects explain by errors that outputs [share](crate::fit::alike) does not count.
     pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model);
@@ -256,7 +263,8 @@ impl<'a> PreparedProblem<'a> {
             - choice_cost(simulator, model)
     }
 
-    /// What the effects of a model cost, nats: (k/2) ln(blocks) for k free parameters, and what their forms and choices do.
+    /// Penalty of a model's effects, nats: (k/2) ln(blocks) for k free parameters, and the costs of
+    /// their forms and choices.
     pub(crate) fn price(&self, model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model) as f64;
@@ -265,24 +273,25 @@ impl<'a> PreparedProblem<'a> {
             + choice_cost(simulator, model)
     }
 
-    /// Log-likelihood ratio of some misfits to others, nats, nothing paid for parameters.
+    /// Log-likelihood ratio of two lists of misfits, nats, without penalties.
     pub(crate) fn ratio(&self, base: &[Misfit], misfits: &[Misfit]) -> f64 {
         score(base, misfits, &self.observations, 0, 1.0)
     }
 
-    /// Stages whose parameters drift or are offset in each trial.
+    /// Stages with parameters that drift or have an offset in each trial.
     pub(crate) fn loose_stages(&self) -> impl Iterator<Item = usize> {
         let all = self.compare.metrics.iter().enumerate();
         all.filter(|(_, m)| !m.loose().is_empty()).map(|(stage, _)| stage)
     }
 
-    /// Effects that act in a stage with loose parameters: what they do, nuisances may have done.
+    /// Whether an effect acts in a stage with such loose parameters. Nuisances may then explain the
+    /// same as the effect.
     pub(crate) fn is_in_loose_stage(&self, effect: usize) -> bool {
         let touches = &self.simulator().effects()[effect].touches;
         self.loose_stages().any(|stage| touches.contains(&stage))
     }
 
-    /// Least spectral level of what a hypothesis leaves in each stage with loose parameters.
+    /// Smallest spectral level of a hypothesis's residual in each stage with loose parameters.
     pub(crate) fn levels(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
         let one = |stage| {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
@@ -291,8 +300,9 @@ impl<'a> PreparedProblem<'a> {
         self.loose_stages().map(one).collect()
     }
 
-    /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised and the sizes of these
-    /// integrated over, what the effects cost taken off, nats; `levels` as of [`PreparedProblem::levels`].
+    /// Log-likelihood of a hypothesis in the stages with loose parameters, nats. Their nuisances
+    /// are marginalised, the sizes of these integrated over, and the penalty of the effects is
+    /// subtracted; `levels` as of [`PreparedProblem::levels`].
     pub(crate) fn likelihood(
         &self,
         hypothesis: &Hypothesis,
@@ -309,14 +319,16 @@ impl<'a> PreparedProblem<'a> {
         Ok(sum)
     }
 
-    /// Log-likelihood of a hypothesis, nats: of the records themselves, so that two problems of the same records compare.
+    /// Log-likelihood of a hypothesis, nats: of the records themselves, so that two problems of the
+    /// same records can be compared.
     ///
     /// ```text
     /// l = -(1/block) sum over stages [ (N/2) ln max(X, 1) + (1/2) ln det V + sum ln s_i ] - penalties
     /// ```
     ///
-    /// with noise s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
-    /// noise, but noise that is foretold too large is no better for it. One observation a block, whatever the residual's own memory is.
+    /// with noise s_i, the metric V and the reduced chi-square X over fitted and held-out samples.
+    /// A model may leave more than its noise, but noise that is predicted too large does not
+    /// improve it. A block is one observation, whatever the residual's memory is.
     pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
         let (compare, roles) = (&self.compare, &self.compare.roles);
         let mut sum = 0.0;
@@ -330,14 +342,15 @@ impl<'a> PreparedProblem<'a> {
         -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
-    /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::fit::octaves) of what they leave, nats, beyond the share
-    /// `of_closed` of what the first closes in each octave.
+    /// Rise of the log-likelihood from one hypothesis to another by the
+    /// [octaves](crate::fit::octaves) of their residuals, nats, beyond the share `of_closed` of
+    /// what the first closes in each octave.
     pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis, of_closed: f64) -> f64 {
         let stages = 0..base.misfits.len();
         stages.map(|s| self.rise_in(base, s, &next.misfits[s].octaves, of_closed)).sum()
     }
 
-    /// The same in one stage, were noise alone left of it.
+    /// The same in one stage if only noise were left of it.
     pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize, of_closed: f64) -> f64 {
         self.rise_in(base, stage, &base.misfits[stage].octaves.of_noise(), of_closed)
     }
@@ -347,12 +360,13 @@ impl<'a> PreparedProblem<'a> {
         base.misfits[stage].octaves.less_discrepancy(nominal, next, of_closed).rise(next)
     }
 
-    /// Fall of a fit's cost that a gap stands for, nats: a block of the fitted samples counts as one.
+    /// Reduction of a fit's cost that corresponds to a gap, nats: a block of the fitted samples
+    /// counts as one.
     pub(crate) fn gain_of(&self, gap: f64) -> f64 {
         0.5 * self.compare.roles.blocks(Role::Fit) * gap
     }
 
-    /// Share of a stage's noise that noise of its measured input makes.
+    /// Share of a stage's noise that comes from noise of its measured input.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {
         self.transmitted[stage].fit
     }
@@ -362,8 +376,8 @@ impl<'a> PreparedProblem<'a> {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))
     }
 
-    /// What a hypothesis closes of one stage that another leaves. Noise is known to some per cent: what is closed below it
-    /// counts as well.
+    /// What a hypothesis closes of one stage's gap under another hypothesis. The noise is known to
+    /// a few per cent, so what is closed below it counts as well.
     pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
         let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
         mean_square(base) - mean_square(next)
@@ -374,21 +388,22 @@ impl<'a> PreparedProblem<'a> {
         (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
     }
 
-    /// Least samples per observation of all stages, as a share of a block.
+    /// Smallest number of samples per observation of all stages, as a share of a block.
     pub(crate) fn finest(&self) -> f64 {
         let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
         (memory / self.compare.roles.block as f64).min(1.0)
     }
 }
 
-/// Sensitivities of all stages around a model, where runs cost.
+/// Sensitivities of all stages around a model, if runs are costly.
 pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     let Some(costly) = compare.simulator().costly() else { return Ok(()) };
     let mut stages = 0..compare.metrics.len();
     stages.try_for_each(|stage| costly.linearise(stage, model, compare.roles.fit_trials))
 }
 
-/// Every stage re-tuned on its own, those that share a parameter together: without effects no other stage knows of it.
+/// Every stage re-tuned separately, stages that share a parameter together: without effects the
+/// other stages are independent of it.
 fn retuned(
     compare: &Comparison<'_>,
     start: &Model,
@@ -407,8 +422,8 @@ fn retuned(
         for &p in group.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
             model.parameters[p] = fitted.model.parameters[p];
         }
+        information.push(fitted.information());
         misfits.extend(fitted.misfits);
-        information.push(fitted.information);
     }
     misfits.sort_by_key(|misfit| misfit.stage);
     let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
@@ -416,7 +431,8 @@ fn retuned(
     Ok((all, information))
 }
 
-/// Refuses a simulator whose step of integration shows: its error would be named as an effect.
+/// Refuses a simulator whose step of integration is visible, because its error would be named as an
+/// effect.
 fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     for (stage, metric) in compare.metrics.iter().enumerate() {
         let run = Run::exact(stage, model, compare.roles.fit_trials);

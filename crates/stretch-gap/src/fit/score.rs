@@ -1,14 +1,16 @@
-//! What a residual says: reduced chi-square, effective sample size, and the score of one hypothesis beside another.
+//! Statistics of a residual: reduced chi-square, effective sample size, and the score of one
+//! hypothesis against another.
 //!
-//! Residuals r are in multiples of the noise, nuisance taken out. Their mean square is the *reduced chi-square*
+//! Residuals r are in multiples of the noise, without nuisances. Their mean square is the *reduced
+//! chi-square*
 //!
 //! ```text
 //! X = (1/N) sum r_i^2,     excess = X - 1
 //! ```
 //!
-//! 1 where only noise is left; the *excess* is what a model gets wrong, in units of the noise's variance. Neighbouring
-//! residuals are alike, so N samples count as the *effective sample size* N/m only, where the integral
-//! time of the squares is (Bartlett 1946, doi 10.2307/2983611)
+//! 1 if only noise is left; the *excess* is the model's error, in units of the noise's variance.
+//! Neighbouring residuals are correlated, so N samples count only as the *effective sample size*
+//! N/m, where the integral time of the squares is (Bartlett 1946, doi 10.2307/2983611)
 //!
 //! ```text
 //! m = 1 + 2 sum_k rho_k^2
@@ -40,41 +42,46 @@ pub(crate) struct Misfit {
     pub(crate) held: f64,
     /// Mean squares of fitted and held-out samples together, by octaves.
     pub(crate) octaves: Octaves,
-    /// What is left, where an effect of the catalogue reads it or would read others: see [`crate::fit::alike`].
+    /// The residual, if an effect of the catalogue reads this output or this output reads others:
+    /// see [`crate::fit::alike`].
     pub(crate) read: Option<Read>,
 }
 
-/// How much the samples of one stage count: fitted, held out.
+/// Weights of the samples of one stage: fitted, held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Observations {
     pub(crate) fit: f64,
     pub(crate) held: f64,
 }
 
-/// Rise of a likelihood, or fall of a cost, for which all is done again, nats: what a parameter costs.
+/// Rise of a likelihood, or reduction of a cost, that justifies repeating the search, nats: the
+/// penalty of a parameter.
 pub(crate) const LEARNT: f64 = 5.0;
-/// Share by which the noise of an input may be larger than was taken: heavy tails pass for little where a robust deviation is asked.
+/// Share by which the noise of an input may exceed its estimate, because a robust deviation
+/// underestimates heavy tails.
 const LARGER: f64 = 0.5;
-/// Share of a mean square that is left at least when noise is taken from it.
+/// Smallest share of a mean square that is kept when noise is subtracted from it.
 const LEAST_KEPT: f64 = 0.1;
 
-/// The one definition: reduced chi-square minus one.
+/// The only definition: reduced chi-square minus one.
 pub(crate) fn excess(reduced_chi_square: f64) -> f64 {
     reduced_chi_square - 1.0
 }
 
-/// The gap that an excess (reduced chi-square minus one) stands for: chance may leave less than the noise, which is no gap.
+/// The gap for an excess (reduced chi-square minus one). By chance the residual may be below the
+/// noise, which is no gap.
 pub(crate) fn gap(reduced_chi_square: f64) -> f64 {
     excess(reduced_chi_square).max(0.0)
 }
 
-/// Mean of the blocks' mean squares; 1, which is no excess, where there is no block.
+/// Mean of the blocks' mean squares; 1, which is no excess, without blocks.
 pub(crate) fn mean_square(blocks: &[f64]) -> f64 {
     if blocks.is_empty() { 1.0 } else { blocks.iter().sum::<f64>() / blocks.len() as f64 }
 }
 
 impl Misfit {
-    /// This misfit, at the noise that is transmitted, moved as its residual's own misfit goes `from` one `to` another.
+    /// This misfit, at the transmitted noise, scaled by the ratio of its residual's misfit, `from`
+    /// one `to` another.
     pub(crate) fn moved(&self, from: &Self, to: &Self) -> Self {
         let moved = |x: f64, from: f64, to: f64| (x + to - from).max(LEAST_KEPT * x);
         Self {
@@ -86,15 +93,18 @@ impl Misfit {
         }
     }
 
-    /// Misfit of a hypothesis beside the re-tuned nominal, each with the noise of the *measured input* that it transmits.
+    /// Misfit of a hypothesis against the re-tuned nominal simulator, each with the noise of the
+    /// *measured input* that it transmits.
     ///
-    /// X holds what arrives of that noise at the output. A slow amplifier or a slipping sleeve transmits less of it, and would
-    /// win wherever the input is noisy, whether it exists or not. So hypotheses are compared at equal noise transmitted:
-    /// X + k (T_nominal - T), where T is the noise transmitted, in multiples of the noise. It is known to a factor only, and a gap may be noise that is
-    /// larger than was taken: k is what would make the nominal's gap of it, [`LARGER`] at most, where less is transmitted.
+    /// X includes the input noise that arrives at the output. A slow amplifier or a slipping sleeve
+    /// transmits less of it, and would win for any noisy input, whether it exists or not. Therefore
+    /// hypotheses are compared at equal transmitted noise: X + k (T_nominal - T), where T is the
+    /// transmitted noise, in multiples of the noise. It is known only to a factor, and a gap may be
+    /// noise that is larger than estimated: k is the factor that would explain the nominal
+    /// simulator's gap, at most [`LARGER`], if less is transmitted.
     pub(crate) fn at_equal_noise(&self, nominal: &Self, own: &Self, gap: f64) -> Self {
         let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
-        // Where the noise is known too large, more could be taken away than there is.
+        // If the noise is overestimated, more could be subtracted than there is.
         let level = |x: f64, nominal: f64, own: f64| {
             let known = if nominal > own { larger } else { 1.0 };
             (x + known * (nominal - own)).max(LEAST_KEPT * x)
@@ -138,7 +148,8 @@ pub(crate) fn score(
     sum
 }
 
-/// What effects take of errors that outputs [share](crate::fit::alike), nats to be added to a score; `observations` by stage.
+/// What effects explain by errors that outputs [share](crate::fit::alike), nats to be added to a
+/// score; `observations` by stage.
 pub(crate) fn shared(misfits: &[Misfit], observations: &[Observations]) -> f64 {
     let read = misfits.iter().filter_map(|m| {
         let Observations { fit, held } = observations[m.stage];
@@ -179,10 +190,11 @@ mod tests {
         let of = |x: f64| Misfit { fit: x, held: x, ..Misfit::default() };
         let level = |gap| of(1.2).at_equal_noise(&of(0.5), &of(0.2), gap).fit;
         approx::assert_relative_eq!(level(0.0), 1.5, max_relative = F64_ROUNDING);
-        // A gap of a tenth could be noise a fifth larger; one of ten variances of the noise could not.
+        // A gap of a tenth could be noise that is a fifth larger; a gap of ten variances of the
+        // noise could not.
         approx::assert_relative_eq!(level(0.1), 1.56, max_relative = F64_ROUNDING);
         approx::assert_relative_eq!(level(10.0), 1.65, max_relative = F64_ROUNDING);
-        // What transmits more is helped by no doubt.
+        // A hypothesis that transmits more gains nothing from this.
         assert_eq!(of(1.0).at_equal_noise(&of(0.0), &of(5.0), 9.0).held, LEAST_KEPT);
     }
 }

@@ -19,8 +19,10 @@ use crate::{
     fit::{
         comparison::Comparison,
         coordinate::coordinates,
+        hypothesis::Hypothesis,
         levenberg_marquardt::{FINE, Fitted},
         metric::Metric,
+        prepared::{PreparedProblem, linearise},
         score::{LEARNT, Misfit, gap},
     },
     numerics::random::RandomGenerator,
@@ -80,8 +82,56 @@ impl Starts {
     }
 }
 
+impl PreparedProblem<'_> {
+    /// The problem re-tuned from several places, where a gap of more than `least_gap` is left.
+    pub(crate) fn retuned_from_starts(self, least_gap: f64, seed: u64) -> Result<Self, GapError> {
+        if self.gap(&self.nominal) <= least_gap {
+            return Ok(self);
+        }
+        let (better, starts) = self.better(least_gap, &Places::Tolerances(seed))?;
+        Ok(match better {
+            Some(model) => self.at_model(&model, seed)?.with_starts(starts),
+            None => self.with_starts(starts),
+        })
+    }
+
+    /// The problem re-tuned from the parameters of a set, where that ends lower: what they do without its effects is none of the effects'.
+    pub(crate) fn retuned_from(
+        &self,
+        set: &Hypothesis,
+        least_gap: f64,
+        seed: u64,
+    ) -> Result<Option<Self>, GapError> {
+        let (better, starts) = self.better(least_gap, &Places::At(&set.model))?;
+        let Some(model) = better else { return Ok(None) };
+        let starts = Starts { tried: self.starts.tried + 1, ..starts };
+        Ok(Some(self.at_model(&model, seed)?.with_starts(starts)))
+    }
+
+    fn better(
+        &self,
+        least_gap: f64,
+        places: &Places<'_>,
+    ) -> Result<(Option<Model>, Starts), GapError> {
+        let counts = |stage| self.gap_in(&self.nominal, stage) > least_gap;
+        let found = better_start(&self.compare, &self.nominal.model, counts, places)?;
+        if found.0.is_none() {
+            linearise(&self.compare, &self.nominal.model)?;
+        }
+        Ok(found)
+    }
+
+    /// The same problem around a model.
+    fn at_model(&self, model: &Model, seed: u64) -> Result<Self, GapError> {
+        let (runs, roles) = (self.compare.runs.clone(), self.compare.roles.clone());
+        let like = Some(self.compare.metrics.as_slice());
+        let compare = Comparison::around(runs, roles, model, like, seed)?;
+        Self::of(compare, self.shipped.clone(), model)
+    }
+}
+
 /// Where a re-tuning may begin beside the one that was made.
-pub(crate) enum Places<'m> {
+enum Places<'m> {
     /// Anywhere within the tolerances, drawn from a seed.
     Tolerances(u64),
     /// At the parameters of a model.
@@ -91,7 +141,7 @@ pub(crate) enum Places<'m> {
 /// A model whose re-tuned parameters leave less than those of `nominal`, none where there is none; and how the starts agreed.
 ///
 /// Groups of stages whose gap is at most `least_gap` are left as they are.
-pub(crate) fn better_start(
+fn better_start(
     compare: &Comparison<'_>,
     nominal: &Model,
     counts: impl Fn(usize) -> bool,
@@ -102,7 +152,7 @@ pub(crate) fn better_start(
         if !group.iter().any(|stage| counts(*stage)) || compare.runs.is_spent() {
             continue;
         }
-        let (ended, own) = Begun { compare, group: &group, nominal }.looked_at(places)?;
+        let (ended, own) = StartSearch { compare, group: &group, nominal }.best_end(places)?;
         starts = starts.beside(own);
         for &p in group.iter().flat_map(|stage| &compare.simulator().stages()[*stage].parameters) {
             best.parameters[p] = ended.as_ref().map_or(best.parameters[p], |m| m.parameters[p]);
@@ -112,21 +162,21 @@ pub(crate) fn better_start(
 }
 
 /// Stages that are re-tuned together, and where their re-tuning ended.
-struct Begun<'a, 'b> {
+struct StartSearch<'a, 'b> {
     compare: &'a Comparison<'b>,
     group: &'a [usize],
     nominal: &'a Model,
 }
 
-impl Begun<'_, '_> {
+impl StartSearch<'_, '_> {
     /// The model of a descent that ends lower, and how many ended there.
-    fn looked_at(&self, places: &Places<'_>) -> Result<(Option<Model>, Starts), GapError> {
+    fn best_end(&self, places: &Places<'_>) -> Result<(Option<Model>, Starts), GapError> {
         let mut models = vec![self.nominal.clone()];
         match places {
             Places::Tolerances(seed) => models.extend(self.hypercube(*seed)),
             Places::At(model) => models.push(Model { effects: Vec::new(), ..(*model).clone() }),
         }
-        let first = begun(self.compare, PARTS[0]);
+        let first = first_part(self.compare, PARTS[0]);
         let costs = self.costs(&models, [self.compare, &first])?;
         let found = costs[0].map_or(f64::INFINITY, |[whole, _]| whole);
         let others = models.into_iter().zip(costs).skip(1);
@@ -195,7 +245,7 @@ impl Begun<'_, '_> {
             if compare.runs.is_spent() {
                 break;
             }
-            let fitted = match self.fitted(compare, model) {
+            let fitted = match compare.fit_linearised(self.group, model, FINE) {
                 Ok(fitted) => fitted,
                 Err(error) if error.ends_all() => return Err(error),
                 Err(_) => break,
@@ -212,16 +262,6 @@ impl Begun<'_, '_> {
         Ok(best)
     }
 
-    /// One descent, with sensitivities around where it begins.
-    fn fitted(&self, compare: &Comparison<'_>, model: Model) -> Result<Fitted, GapError> {
-        if let Some(costly) = compare.simulator().costly() {
-            for &stage in self.group {
-                costly.linearise(stage, &model, compare.roles.fit_trials)?;
-            }
-        }
-        compare.fit(self.group, model, &[], FINE)
-    }
-
     /// Where a descent over growing parts of the trials ends; none where a part is left unexplained.
     fn grown(&self, mut model: Model) -> Result<Option<Fitted>, GapError> {
         let gap_of = |misfits: &[Misfit]| misfits.iter().map(|m| gap(m.fit)).sum::<f64>();
@@ -230,8 +270,8 @@ impl Begun<'_, '_> {
         let whole = self.group.iter().zip(&residuals).map(|(&s, r)| self.compare.misfit(s, r));
         let most = LEFT * gap_of(&whole.collect::<Vec<_>>());
         for part in PARTS {
-            let begun = begun(self.compare, part);
-            match self.descended(&begun, model)? {
+            let first = first_part(self.compare, part);
+            match self.descended(&first, model)? {
                 Some(fitted) if gap_of(&fitted.misfits) <= most => model = fitted.model,
                 _ => return Ok(None),
             }
@@ -241,7 +281,7 @@ impl Begun<'_, '_> {
 }
 
 /// A comparison of which only the first part of every fitted segment is fitted.
-fn begun<'a>(compare: &Comparison<'a>, part: f64) -> Comparison<'a> {
+fn first_part<'a>(compare: &Comparison<'a>, part: f64) -> Comparison<'a> {
     let mut roles = compare.roles.clone();
     for segment in roles.segments.iter_mut().filter(|s| s.role == Role::Fit) {
         let samples = (part * (segment.to - segment.from) as f64).ceil() as usize;

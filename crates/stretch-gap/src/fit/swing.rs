@@ -10,7 +10,7 @@
 //! A_k = U_k' V^-1 U_k,     q_k = U_k' V^-1 r
 //! ```
 //!
-//! with V the larger, where the median |q|^2 of the frequencies around f is larger than it foretells: what another form of an effect leaves is no line
+//! with V the larger, where the median |q|^2 of the frequencies around f is larger than it predicts: what another form of an effect leaves is no line
 //! (Rasmussen and Williams 2006, section 2.7; without a drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is the
 //! mean over amplitudes of a quarter to twice the drift and over all frequencies, of which those whose |q|^2 stands out most among
 //! their neighbours are computed and the others taken for 0, so that it errs to the side of the drift. The odds before the data are even.
@@ -99,8 +99,8 @@ impl Metric {
         for k in peaks {
             let (hertz, waves) = (hertz(k), waves(hertz(k)));
             let heard: Vec<Heard> = parts.iter().map(|part| part.line(&waves)).collect();
-            let foretold: f64 = heard.iter().map(|h| h.a[0] + h.a[2]).sum();
-            let times = (usual(&powers, k) / foretold).max(1.0);
+            let predicted: f64 = heard.iter().map(|h| h.a[0] + h.a[2]).sum();
+            let times = (usual(&powers, k) / predicted).max(1.0);
             let heard: Vec<Heard> = heard.into_iter().map(|h| h.in_noise(times)).collect();
             for amplitude in AMPLITUDES {
                 let precision = 2.0 / (amplitude * amplitude);
@@ -173,7 +173,7 @@ struct Heard {
 }
 
 impl Heard {
-    /// The same where the noise around the frequency is so many times as large as V foretells.
+    /// The same where the noise around the frequency is so many times as large as V predicts.
     fn in_noise(self, times: f64) -> Self {
         Self { a: self.a.map(|a| a / times), q: self.q.map(|q| q / times) }
     }

@@ -1,19 +1,22 @@
-//! Is it a function of what was recorded, or random in time? Two hypotheses, weighed on samples that neither was fitted to.
+//! Decides whether a residual is a function of what was recorded, or random in time. Two hypotheses
+//! are weighed on samples that neither was fitted to.
 //!
 //! | hypothesis | residual |
 //! | --- | --- |
 //! | function | many terms at once, or a few, and a stationary coloured process of what they leave |
 //! | coloured | a stationary coloured process alone, that looks at no input |
 //!
-//! Both processes are autoregressions, fitted by least squares on the fitted samples (Box and Jenkins 1970, chapter 7) to means over a
-//! tenth of a second, which know of the past 0.5 s; their one-step predictions of the held-out samples are scored by
+//! Both processes are autoregressions, fitted by least squares on the fitted samples (Box and
+//! Jenkins 1970, chapter 7) to means over a tenth of a second, with a memory of 0.5 s. Their
+//! one-step predictions of the held-out samples are scored by
 //!
 //! ```text
 //! L = -0.5 sum (ln 2 pi s^2 + e^2/s^2)
 //! ```
 //!
-//! A function of slow inputs is slow, so that a coloured process foretells it, too, but no better than the function does; noise that
-//! switches or jumps on its own is foretold no better by any term. A sum of k terms from a library of M has been chosen: ln M each.
+//! A function of slow inputs is slow, so a coloured process predicts it, too, but no better than
+//! the function does. Noise that switches or jumps independently is predicted no better by any
+//! term. A sum of k terms was chosen from a library of M, which costs ln M for each.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,10 +27,11 @@ use crate::{
 
 /// Order of the autoregression.
 const ORDER: usize = 5;
-/// Means a block.
+/// Means per block.
 const PER_BLOCK: usize = 5;
 
-/// ln of the odds of a function against the coloured process alone, nats; both residuals over whole segments, nuisances taken out.
+/// ln of the odds of a function against the coloured process alone, nats; both residuals over whole
+/// segments, without nuisances.
 pub(crate) fn odds(
     roles: &SampleRoles,
     alone: &[f64],
@@ -47,7 +51,8 @@ fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
         parts.map(|s| residual[s.from..s.to].chunks_exact(count).map(mean).collect()).collect()
     };
     let fitted = means(Role::Fit);
-    // Without anything held out both are scored on what they were fitted to; the cost of the choice is all that is left.
+    // Without held-out samples both are scored on the fitted ones; only the cost of the choice is
+    // left.
     let held = if roles.count(Role::Held) > 0 { means(Role::Held) } else { fitted.clone() };
     let weights = autoregression(&fitted);
     let (mut sum, mut n) = (0.0, 0.0);

@@ -1,4 +1,5 @@
-//! How something goes in time that no recorded signal explains: its time stamps jitter, it swings, jumps or drifts.
+//! Describes how a residual that no recorded signal explains behaves in time: its time stamps
+//! jitter, it swings, jumps or drifts.
 //!
 //! With a residual r in multiples of the noise, over stretches without a break:
 //!
@@ -13,18 +14,19 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use crate::missing::{digits::number, jitter::jitter_sd_s};
+use crate::missing::{jitter::jitter_sd_s, proposed::three_digits};
 
-/// Share of what is above the noise that makes a course.
+/// Share of what exceeds the noise that makes a course.
 const SHARE: f64 = 0.5;
-/// Multiples of the noise from which a change is a jump: chance makes one of 3e4 samples in a thousand records.
+/// A change of this many multiples of the noise is a jump: chance makes one of 3e4 samples in a
+/// thousand records.
 const JUMP: f64 = 6.0;
-/// Turns that a stretch must hold for a frequency to be one.
+/// Periods that a stretch must hold for a frequency to count.
 const TURNS: f64 = 3.0;
-/// Greatest frequency, in turns a sample.
+/// Largest frequency, in periods per sample.
 const QUICKEST: f64 = 0.4;
 
-/// The course of what no recorded signal explains, in the unit of its channel.
+/// The course of a residual that no recorded signal explains, in the unit of its channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Course {
@@ -51,14 +53,15 @@ pub enum Course {
     Drifts {
         /// Root mean square.
         size: f64,
-        /// Time after which it is forgotten, s.
+        /// Correlation time, s.
         correlation_s: f64,
     },
 }
 
 impl Course {
-    /// The course of a residual in multiples of the noise, which has the standard deviation `noise`; `dt_s` is the sample time, and `shown` what the
-    /// simulator makes of the same samples, in multiples of the noise as well. None where there is no more than noise.
+    /// The course of a residual in multiples of the noise, whose standard deviation is `noise`;
+    /// `dt_s` is the sample time, and `shown` is the simulator's output at the same samples, also
+    /// in multiples of the noise. `None` if there is only noise.
     pub(crate) fn of(
         stretches: &[&[f64]],
         shown: &[Vec<f64>],
@@ -89,32 +92,37 @@ impl Course {
 
     /// In words, with the unit of the channel.
     pub(crate) fn words(&self, unit: &str) -> String {
-        let sized = |size: f64| format!("{} {unit}", number(size)).trim_end().to_owned();
+        let sized = |size: f64| format!("{} {unit}", three_digits(size)).trim_end().to_owned();
         match *self {
             Self::Jitters { sd_s } => format!(
                 "time stamps jitter by about {} ms, which is noise that follows the rate",
-                number(1e3 * sd_s)
+                three_digits(1e3 * sd_s)
             ),
             Self::Swings { hertz, amplitude } => {
-                format!("it swings at {} Hz, {} to either side", number(hertz), sized(amplitude))
+                format!(
+                    "it swings at {} Hz, {} to either side",
+                    three_digits(hertz),
+                    sized(amplitude)
+                )
             }
             Self::Jumps { per_s, size } => {
                 format!(
                     "it jumps at random, some {} times a second, by {}",
-                    number(per_s),
+                    three_digits(per_s),
                     sized(size)
                 )
             }
             Self::Drifts { size, correlation_s } => format!(
                 "it drifts at random by {}, and is forgotten after {} s",
                 sized(size),
-                number(correlation_s)
+                three_digits(correlation_s)
             ),
         }
     }
 }
 
-/// The frequency, in turns a sample, whose sines take most of the squares, and how much they take.
+/// The frequency, in periods per sample, whose sines explain most of the squares, and how much they
+/// explain.
 fn strongest(stretches: &[&[f64]]) -> Option<(f64, f64)> {
     let longest = stretches.iter().map(|s| s.len()).max()? as f64;
     let step = 0.5 / longest;
@@ -124,7 +132,8 @@ fn strongest(stretches: &[&[f64]]) -> Option<(f64, f64)> {
     all.map(|turns| (turns, taken(turns))).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Sum of squares that a sine takes of a stretch: (2/n) |sum r exp(-i w t)|^2, by Goertzel's recursion (1958, doi 10.2307/2310304).
+/// Sum of squares that a sine explains of a stretch: (2/n) |sum r exp(-i w t)|^2, by Goertzel's
+/// recursion (1958, doi 10.2307/2310304).
 fn taken(stretch: &[f64], turns: f64) -> f64 {
     let twice = 2.0 * libm::cos(TAU * turns);
     let (mut last, mut before) = (0.0, 0.0);
@@ -158,7 +167,7 @@ fn forgotten_after(stretches: &[&[f64]]) -> usize {
     let least = product(1) / std::f64::consts::E;
     let mut lag = 1;
     while lag < longest && product(lag) > least {
-        // Every lag while they are few, then in steps of a twentieth.
+        // Every lag as long as they are few, then in steps of a twentieth.
         lag += 1 + lag / 20;
     }
     lag
@@ -171,7 +180,7 @@ mod tests {
 
     const DT_S: f64 = 0.01;
 
-    /// White noise of 1 beside a course, in multiples of it.
+    /// A course, in multiples of a white noise of 1 that is added to it.
     fn beside_noise(course: impl Fn(usize) -> f64, seed: u64) -> Vec<f64> {
         let mut random = RandomGenerator::new(seed, 0);
         (0..12_000).map(|i| course(i) + random.gauss()).collect()
@@ -179,7 +188,7 @@ mod tests {
 
     fn of(values: &[f64]) -> Option<Course> {
         let stretches: Vec<&[f64]> = values.chunks(6000).collect();
-        // Nothing moves, so that no time stamp shows.
+        // Nothing moves, so jitter of time stamps is invisible.
         let still: Vec<Vec<f64>> = stretches.iter().map(|s| vec![0.0; s.len()]).collect();
         Course::of(&stretches, &still, 0.002, DT_S)
     }
@@ -189,13 +198,14 @@ mod tests {
         for (hertz, size) in [(0.07, 3.0), (0.7, 1.5), (11.3, 4.0)] {
             let found = of(&beside_noise(|i| size * libm::sin(TAU * hertz * DT_S * i as f64), 1));
             let Some(Course::Swings { hertz: f, amplitude }) = found else { panic!("{found:?}") };
-            // Half a turn in the longest stretch is the grid; off it the sine takes less.
+            // The grid is half a period in the longest stretch; off the grid the sine explains
+            // less.
             assert!((f - hertz).abs() <= 0.5 / 60.0 + 1e-9, "{f} for {hertz}");
             assert!((amplitude / (0.002 * size) - 1.0).abs() < 0.25, "{amplitude} for {size}");
         }
     }
 
-    /// Steps that come twice a second in the mean.
+    /// Steps that occur twice a second on average.
     #[test]
     fn jumps_are_counted_and_measured() {
         let mut random = RandomGenerator::new(3, 1);
@@ -228,7 +238,7 @@ mod tests {
             .collect();
         let found = of(&beside_noise(|i| course[i], 4));
         let Some(Course::Drifts { size, correlation_s }) = found else { panic!("{found:?}") };
-        // 150 correlation times tell a variance to a tenth, and the time to a fifth or so.
+        // 150 correlation times determine a variance to a tenth, and the time to about a fifth.
         assert!((size / 0.006 - 1.0).abs() < 0.2, "{size}");
         assert!((0.5..1.2).contains(&correlation_s), "{correlation_s}");
     }

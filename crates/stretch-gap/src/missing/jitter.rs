@@ -1,44 +1,53 @@
-//! Do time stamps jitter? Then the noise follows the rate of the signal.
+//! Tests whether time stamps jitter. If they do, the noise follows the rate of the signal.
 //!
-//! A sample that is taken a random time away from its stamp shows the signal of that time: beside the noise of the sensor, r has a part of the
-//! standard deviation `sd_s |dy/dt|` that knows nothing of the sample before. What an autoregression does not foretell of r,
+//! A sample that is taken at a random time away from its stamp shows the signal of that time. In
+//! addition to the noise of the sensor, r then has a part of the standard deviation `sd_s |dy/dt|`
+//! that is independent of the previous sample. What an autoregression does not predict of r,
 //!
 //! ```text
 //! e_i = r_i - sum w_k r_{i-k},   var e_i = a + b g_i,   g_i = v_i^2 + sum w_k^2 v_{i-k}^2
 //! ```
 //!
-//! with v the rate of what the simulator makes, has b = `sd_s`^2 where time stamps jitter, whatever the colour of the rest. Three hypotheses are weighed by
-//! their likelihoods at their best scales:
+//! with v the rate of the simulated output, has b = `sd_s`^2 if time stamps jitter, whatever the
+//! colour of the rest. Three hypotheses are weighed by their likelihoods at their best scales:
 //!
 //! | hypothesis | scale of e |
 //! | --- | --- |
 //! | constant | a |
-//! | by level | a + b (y - mean)^2: a sensor whose noise grows with what it shows |
+//! | by level | a + b (y - mean)^2: a sensor whose noise grows with its value |
 //! | jitter | a + b g |
 //!
-//! e is Student's t of 3, 10 or so many degrees of freedom that it is Gaussian, in all three, so that a few jumps are no scale (Lange, Little and Taylor
-//! 1989, doi 10.1080/01621459.1989.10478852). The second number costs half of ln n. Jitter stands where it is the most likely and the noise that it makes
-//! takes the share of what is above the noise that makes a [course](super::course): what is late, or wrong whenever the signal moves, is foretold by the sample before and leaves little in e.
+//! e is Student's t of 3, 10 or so many degrees of freedom that it is Gaussian, in all three, so
+//! that a few jumps do not count as scale (Lange, Little and Taylor 1989, doi
+//! 10.1080/01621459.1989.10478852). The second parameter costs half of ln n. Jitter is accepted if
+//! it is the most likely and if its noise explains the share of what exceeds the noise that makes a
+//! [course](super::course). Errors of samples that are late, or wrong whenever the signal moves,
+//! are predicted by the previous sample and leave little in e.
 
-use crate::{
-    missing::coloured::{autoregression, innovations},
-    numerics::differences::central,
+use crate::missing::{
+    coloured::{autoregression, innovations},
+    term_inputs::central_differences,
 };
 
 /// Degrees of freedom; the last is Gaussian.
 const DEGREES: [f64; 3] = [3.0, 10.0, 1e6];
-/// Logarithms of b over a at the mean of what scales: jitter from a hundredth of the noise's variance to a million of it.
+/// Logarithms of b over a at the mean of the regressor: jitter from a hundredth of the noise's
+/// variance to a million times it.
 const RATIOS: [f64; 2] = [-4.6, 13.8];
-/// Steps of a golden section over them, which leave a hundredth, and of the scale's fixed point.
+/// Steps of a golden section over them, which leave a hundredth, and of the scale's fixed-point
+/// iteration.
 const SECTIONS: usize = 16;
 const ROUNDS: usize = 12;
-/// Samples below which nothing is weighed: a scale, a slope, and the weights of the past.
+/// Fewest samples for a comparison: a scale, a slope, and the weights of the past have to be
+/// estimated.
 const LEAST: usize = 60;
 
-/// Standard deviation of the time between samples and their stamps, s; none where something else explains the residual better.
+/// Standard deviation of the time between samples and their stamps, s; `None` if something else
+/// explains the residual better.
 ///
-/// `stretches` are residuals in multiples of the noise; of each sample `shown` is what the simulator makes of it in the same unit; `dt_s` is the sample time.
-/// Jitter has to make a sum of squares of `least`.
+/// `stretches` are residuals in multiples of the noise; `shown` is the simulated value of each
+/// sample in the same unit; `dt_s` is the sample time. Jitter has to explain a sum of squares of
+/// `least`.
 pub(super) fn jitter_sd_s(
     stretches: &[&[f64]],
     shown: &[Vec<f64>],
@@ -46,7 +55,7 @@ pub(super) fn jitter_sd_s(
     least: f64,
 ) -> Option<f64> {
     let parts: Vec<Vec<f64>> = stretches.iter().map(|s| s.to_vec()).collect();
-    let rates: Vec<Vec<f64>> = shown.iter().map(|y| central(y, dt_s)).collect();
+    let rates: Vec<Vec<f64>> = shown.iter().map(|y| central_differences(y, dt_s)).collect();
     let weights = autoregression(&parts);
     let order = weights.len() - 1;
     let e: Vec<f64> = parts.iter().flat_map(|part| innovations(part, &weights)).collect();
@@ -79,11 +88,11 @@ pub(super) fn jitter_sd_s(
 /// A hypothesis at its best scale.
 struct Scaled {
     log_likelihood: f64,
-    /// Variance for each of what scales.
+    /// Variance per unit of the regressor.
     slope: f64,
 }
 
-/// The best of all degrees of freedom and, where something scales, of all ratios.
+/// The best over all degrees of freedom and, with a regressor, over all ratios.
 fn best(e: &[f64], by: Option<&[f64]>) -> Scaled {
     let mean = by.map_or(1.0, |by| by.iter().sum::<f64>() / by.len() as f64);
     let one = |degrees: f64| {
@@ -120,8 +129,8 @@ fn section(at: impl Fn(f64) -> Scaled) -> Scaled {
     if a.log_likelihood >= b.log_likelihood { a } else { b }
 }
 
-/// ln of the likelihood of Student's t with the variance scale times a shape, less what every hypothesis of these degrees has, and the likeliest scale by
-/// its fixed point.
+/// ln of the likelihood of Student's t with the variance scale times a shape, without the constant
+/// of its degrees of freedom, and the most likely scale by a fixed-point iteration.
 fn scaled(e: &[f64], shape: impl Fn(usize) -> f64, degrees: f64) -> (f64, f64) {
     let n = e.len() as f64;
     let squares: Vec<f64> = e.iter().enumerate().map(|(i, e)| e * e / shape(i)).collect();

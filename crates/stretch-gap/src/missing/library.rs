@@ -1,6 +1,7 @@
-//! The library: every term that a stage may lack, written from physics before any of the cases that it is judged on.
+//! The library: every term that a stage may lack, written from physics before any of the cases that
+//! it is judged on.
 //!
-//! | kind | terms of a state x with rate v | stands for |
+//! | kind | terms of a state x with rate v | describes |
 //! | --- | --- | --- |
 //! | curve | x^p, (x - centre)^p, knees at quantiles, exp(-x/w) at either end, waves of x | scales, ends, contacts, threads |
 //! | friction | v, abs v, v^2, sign v, striction, each times x | viscous, dry, sticking |
@@ -9,7 +10,8 @@
 //! | crossing | one signal's x times another's x, v, memory | coupling |
 //! | commands | an opening, its lag, times x; as a rate that openings forget | valves, supply |
 //!
-//! A nominal's own constants take out what of a term they could have been, so that terms need not be centred.
+//! The constants of the nominal simulator remove the part of a term that they could explain, so
+//! terms need not be centred.
 
 use crate::missing::{
     term::{Factor, Passage, RateForm, Term},
@@ -44,7 +46,8 @@ struct Shelf<'a> {
     terms: Vec<Term>,
 }
 
-/// All terms of a stage; `is_commanded` says that it is driven by commands rather than by a measured input.
+/// All terms of a stage; `is_commanded` says whether it is driven by commands instead of a measured
+/// input.
 pub(crate) fn library(inputs: &TermInputs, roles: &SampleRoles, is_commanded: bool) -> Vec<Term> {
     let shortest = 3.0 * inputs.grid.dt_s();
     let ratio = (inputs.trial_s / shortest).max(1.0);
@@ -204,7 +207,7 @@ impl Shelf<'_> {
         }
     }
 
-    /// `s` times what another signal does.
+    /// `s` times the terms of another signal.
     fn crossing(&mut self, s: usize, other: usize) {
         let x = power(s, 1.0);
         if s < other {
@@ -243,7 +246,7 @@ impl Shelf<'_> {
         }
     }
 
-    /// What acts in the rate of an output that openings forget: the output is its integral.
+    /// Terms that act in the rate of an output that openings forget: the output is its integral.
     fn rates(&mut self, states: &[usize], commands: &[usize]) {
         let mut sources = vec![Vec::new(), vec![Session { power: 1.0 }], vec![Time { power: 1.0 }]];
         for &s in states {

@@ -41,7 +41,8 @@ pub(crate) struct Proposal {
     pub(crate) library: usize,
 }
 
-/// Proposes what is missing where most of a hypothesis's gap sits; none where no stage has one.
+/// Proposes what is missing in the stage with most of a hypothesis's gap; `None` if no stage has
+/// one.
 ///
 /// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is reported.
 pub(crate) fn propose(
@@ -78,9 +79,9 @@ struct Weighed {
     log_odds: f64,
     /// Whether the sum is that function.
     stands: bool,
-    /// Shares of the gap that the sum closes and that many terms foretell.
+    /// Shares of the gap that the sum closes and that many terms predict.
     closes: f64,
-    foretold: f64,
+    predicted: f64,
     /// How the residual goes in time, where it is no function of what was recorded.
     course: Option<Course>,
 }
@@ -126,7 +127,7 @@ fn weigh(
         log_odds,
         stands,
         closes: if stands { closes } else { 0.0 },
-        foretold: closed(squares(&alone), squares(&sum.beside_many), samples),
+        predicted: closed(squares(&alone), squares(&sum.beside_many), samples),
     })
 }
 
@@ -165,7 +166,7 @@ fn proposed(
         random: weighed.log_odds <= 0.0,
         course: weighed.course,
         log_odds: weighed.log_odds,
-        foretold: weighed.foretold,
+        predicted: weighed.predicted,
         sentence: String::new(),
     };
     proposed.sentence = sentence(&proposed, &spec.unit);
@@ -259,4 +260,23 @@ fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Resul
         }
     }
     Ok(closed(before, square(values), roles.count(Role::Test)))
+}
+
+/// The sum of terms that closes what the best set leaves where the set has `names`, else what the re-tuned nominal leaves, which may be `known`
+/// already; none that closes less than nothing of the trials that were not fitted.
+pub(crate) fn propose_for(
+    problem: &PreparedProblem<'_>,
+    best: &Hypothesis,
+    (names, known): (bool, Option<&Proposed>),
+    progress: &dyn Fn(&str),
+) -> Result<Option<Proposed>, GapError> {
+    let found = match known.filter(|_| !names) {
+        Some(known) => Some(known.clone()),
+        None => {
+            progress("what the catalogue lacks");
+            let from = if names { best } else { &problem.nominal };
+            propose(problem, from)?.map(|proposal| proposal.told)
+        }
+    };
+    Ok(found.filter(|p| p.random || p.terms.is_empty() || p.closes_test > 0.0))
 }

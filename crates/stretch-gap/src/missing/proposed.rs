@@ -1,10 +1,9 @@
-//! What is said of a term that the catalogue lacks.
+//! The report of a sum of terms outside the catalogue.
 
 use serde::{Deserialize, Serialize};
 
 use crate::missing::{
     course::Course,
-    digits::number,
     term::{Factor, Passage, RateForm, Term},
     term_inputs::TermInputs,
 };
@@ -12,7 +11,7 @@ use crate::missing::{
 /// A signal of a proposal and its scale: x = (signal - offset)/scale, v = (dx/dt)/`rate_per_s`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalScale {
-    /// Column; the stage's own channel stands for what the simulator makes of it before the terms.
+    /// Column; the stage's own channel means the simulator's output before the terms.
     pub name: String,
     /// Unit of offset and scale.
     pub unit: String,
@@ -22,7 +21,7 @@ pub struct SignalScale {
     pub scale: f64,
     /// dx/dt at v = 1, 1/s.
     pub rate_per_s: f64,
-    /// Whether it is commanded; what leaks does so by the sum of commands.
+    /// Whether it is a command. Terms that leak do so by the sum of commands.
     pub is_command: bool,
 }
 
@@ -41,46 +40,48 @@ pub struct ProposedTerm {
     pub form: Term,
 }
 
-/// A sum of terms that the simulator lacks and the catalogue does not hold, or that there is none to be found.
+/// A sum of terms that the simulator and the catalogue lack, or the statement that none was found.
 ///
-/// The sum can be computed from these fields alone: `channel += sum coefficient form`, memories at rest at the start of every trial.
+/// The sum can be computed from these fields alone: `channel += sum coefficient form`, memories at
+/// rest at the start of every trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Proposed {
-    /// Stage where most of what is left sits.
+    /// Stage with most of the remaining gap.
     pub stage: String,
     /// Output channel of that stage.
     pub channel: String,
-    /// Equation with numbers and units; empty where nothing was found.
+    /// Equation with numbers and units; empty if nothing was found.
     pub equation: String,
     /// Terms, in the order in which they were found.
     pub terms: Vec<ProposedTerm>,
-    /// Signals that terms speak of by number.
+    /// Signals that terms refer to by index.
     pub signals: Vec<SignalScale>,
-    /// What time in a trial and in the session is counted in, s.
+    /// Units of time in a trial and in the session, s.
     pub time_scales_s: [f64; 2],
-    /// How memories begin a trial.
+    /// Initial state of memories in a trial.
     pub initial: String,
-    /// Share of the stage's remaining gap that is closed on the samples that terms were chosen by.
+    /// Share of the stage's remaining gap that is closed on the samples by which terms were chosen.
     pub closes_held: f64,
-    /// Share of the gap that the sum closes on the test trials, which are read for this alone.
+    /// Share of the gap that the sum closes on the test trials, which are read only for this.
     pub closes_test: f64,
     /// Where the sum acts.
     pub acts: String,
-    /// Whether what is left is random in time: no function of what was recorded foretells it.
+    /// Whether the residual is random in time: no function of what was recorded predicts it.
     pub random: bool,
-    /// How it goes in time, where it is random in time.
+    /// Its course in time, if it is random in time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub course: Option<Course>,
     /// ln of the odds that it is a function of what was recorded rather than random in time.
     pub log_odds: f64,
-    /// Share of the remaining gap that many terms of the library foretell together on samples held out.
-    #[serde(default)]
-    pub foretold: f64,
+    /// Share of the remaining gap that many terms of the library predict together on held-out
+    /// samples.
+    #[serde(default, rename = "foretold")]
+    pub predicted: f64,
     /// All of this in one sentence.
     pub sentence: String,
 }
 
-/// Signals of a record that terms speak of.
+/// Signals of a record that terms refer to.
 pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
     let one = |s: &super::term_inputs::Signal| SignalScale {
         name: s.name.clone(),
@@ -93,7 +94,7 @@ pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
     inputs.signals.iter().map(one).collect()
 }
 
-/// `channel += ...`, and what its letters are.
+/// `channel += ...`, and the meaning of its letters.
 pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalScale]) -> String {
     if terms.is_empty() {
         return String::new();
@@ -102,7 +103,7 @@ pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalS
         .iter()
         .map(|t| {
             let unit = if t.unit.is_empty() { String::new() } else { format!(" {}", t.unit) };
-            format!("{}{unit} {}", number(t.coefficient), t.name)
+            format!("{}{unit} {}", three_digits(t.coefficient), t.name)
         })
         .collect();
     let speaks = |letter: &str, s: &SignalScale| {
@@ -115,14 +116,14 @@ pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalS
             let unit = if s.unit == "1" { "" } else { s.unit.as_str() };
             letters.push(format!(
                 "x[{name}] = ({name} - {} {unit})/({} {unit})",
-                number(s.offset),
-                number(s.scale)
+                three_digits(s.offset),
+                three_digits(s.scale)
             ));
         } else if speaks("x", s) {
             letters.push(format!("x[{name}] = {name}"));
         }
         if speaks("v", s) {
-            let rate = number(s.rate_per_s * s.scale);
+            let rate = three_digits(s.rate_per_s * s.scale);
             letters.push(format!("v[{name}] = (d {name}/dt)/({rate} {}/s)", s.unit));
         }
     }
@@ -136,11 +137,11 @@ pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
     let product = if factors.is_empty() { "1".to_owned() } else { factors.join(" ") };
     match term.passage {
         Passage::Direct => product,
-        Passage::Lag { tau_s } => format!("lag({product}, {} s)", number(tau_s)),
+        Passage::Lag { tau_s } => format!("lag({product}, {} s)", three_digits(tau_s)),
         Passage::Rest { tau_s } => {
-            format!("({product} - lag({product}, {} s))", number(tau_s))
+            format!("({product} - lag({product}, {} s))", three_digits(tau_s))
         }
-        Passage::Leak { tau_s } => format!("leak({product}, {} s)", number(tau_s)),
+        Passage::Leak { tau_s } => format!("leak({product}, {} s)", three_digits(tau_s)),
     }
 }
 
@@ -151,18 +152,24 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     match factor {
         Factor::Power { signal, power } => raised(x(signal), power),
         Factor::Centred { signal, at, power } => {
-            raised(format!("({} - {})", x(signal), number(at)), f64::from(power))
+            raised(format!("({} - {})", x(signal), three_digits(at)), f64::from(power))
         }
         Factor::Above { signal, at, power } => {
-            raised(format!("max(0, {} - {})", x(signal), number(at)), power)
+            raised(format!("max(0, {} - {})", x(signal), three_digits(at)), power)
         }
         Factor::Below { signal, at, power } => {
-            raised(format!("max(0, {} - {})", number(at), x(signal)), power)
+            raised(format!("max(0, {} - {})", three_digits(at), x(signal)), power)
         }
-        Factor::Low { signal, width } => format!("exp(-{}/{})", x(signal), number(width)),
-        Factor::High { signal, width } => format!("exp(-(1 - {})/{})", x(signal), number(width)),
-        Factor::Sine { signal, turns } => format!("sin(2 pi {} {})", number(turns), x(signal)),
-        Factor::Cosine { signal, turns } => format!("cos(2 pi {} {})", number(turns), x(signal)),
+        Factor::Low { signal, width } => format!("exp(-{}/{})", x(signal), three_digits(width)),
+        Factor::High { signal, width } => {
+            format!("exp(-(1 - {})/{})", x(signal), three_digits(width))
+        }
+        Factor::Sine { signal, turns } => {
+            format!("sin(2 pi {} {})", three_digits(turns), x(signal))
+        }
+        Factor::Cosine { signal, turns } => {
+            format!("cos(2 pi {} {})", three_digits(turns), x(signal))
+        }
         Factor::Rate { signal, form } => match form {
             RateForm::Linear => v(signal),
             RateForm::Magnitude => format!("|{}|", v(signal)),
@@ -175,13 +182,13 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
         },
         Factor::Bend { signal } => format!("step({})", v(signal)),
         Factor::Play { signal, width } => {
-            format!("({0} - play({0}, {1}))", x(signal), number(width))
+            format!("({0} - play({0}, {1}))", x(signal), three_digits(width))
         }
         Factor::Lag { signal, tau_s } => {
-            format!("({0} - lag({0}, {1} s))", x(signal), number(tau_s))
+            format!("({0} - lag({0}, {1} s))", x(signal), three_digits(tau_s))
         }
         Factor::Late { signal, delay_s } => {
-            format!("({0}(t - {1} s) - {0})", x(signal), number(delay_s))
+            format!("({0}(t - {1} s) - {0})", x(signal), three_digits(delay_s))
         }
         Factor::Peak { signal } => format!("(greatest {0} - {0})", x(signal)),
         Factor::Turned { signal, width } => {
@@ -189,15 +196,15 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
                 "sign({}) (1 - exp(-way since turn of {}/{}))",
                 v(signal),
                 x(signal),
-                number(width)
+                three_digits(width)
             )
         }
         Factor::Travel { signal, power } => raised(format!("travel({})", x(signal)), power),
         Factor::TravelFade { signal, width } => {
-            format!("exp(-travel({})/{})", x(signal), number(width))
+            format!("exp(-travel({})/{})", x(signal), three_digits(width))
         }
         Factor::Time { power } => raised("(time in trial/T)".into(), power),
-        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", number(tau_s)),
+        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", three_digits(tau_s)),
         Factor::Session { power } => raised("(session time/T)".into(), power),
     }
 }
@@ -214,7 +221,7 @@ pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
 /// The sentence.
 pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
     let Proposed { stage, channel, equation, closes_test, .. } = proposed;
-    // What the letters are stands with the equation.
+    // The equation explains its letters.
     let equation = equation.split(';').next().unwrap_or_default();
     match (proposed.random, proposed.terms.is_empty()) {
         (true, _) => {
@@ -231,5 +238,18 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
             "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.",
             100.0 * closes_test
         ),
+    }
+}
+
+/// Three significant digits.
+pub(super) fn three_digits(x: f64) -> String {
+    let size = x.abs();
+    if size == 0.0 {
+        return "0".into();
+    }
+    let digits = (2 - size.log10().floor() as i32).clamp(0, 12) as usize;
+    match size {
+        1e-6..1e6 => format!("{x:.digits$}"),
+        _ => format!("{x:.2e}"),
     }
 }

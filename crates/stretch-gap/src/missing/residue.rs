@@ -1,15 +1,17 @@
-//! What a model leaves in one stage, ready for sums of terms.
+//! The residual of a model in one stage, prepared for sums of terms.
 //!
-//! With the residual r at a model, sensitivities A of everything that was fitted, and values D of some terms, a sum with coefficients c
-//! and parameters moved by d leaves r - A d - D c. Coefficients and parameters are fitted together,
+//! With the residual r at a model, sensitivities A of everything that was fitted, and values D of
+//! some terms, a sum with coefficients c and parameters moved by d leaves r - A d - D c.
+//! Coefficients and parameters are fitted together,
 //!
 //! ```text
 //! J = 0.5/b (r - A d - D c)' V^-1 (r - A d - D c) - ln p(x + d) + 0.5 sum (c_k/s_k)^2
 //! ```
 //!
-//! in the metric V of the stage and with the priors and bounds of the [coordinates](crate::fit::coordinate); b are the samples of a block. The
-//! ridge s_k is the coefficient at which a term alone is as large as the residual. Everything that a choice of terms
-//! needs are products of columns, over the fitted samples and over those held out.
+//! in the metric V of the stage and with the priors and bounds of the
+//! [coordinates](crate::fit::coordinate); b are the samples of a block. The ridge s_k is the
+//! coefficient at which a term alone is as large as the residual. A choice of terms only needs
+//! products of columns, over the fitted and over the held-out samples.
 
 use nalgebra::DMatrix;
 
@@ -28,24 +30,24 @@ use crate::{
     },
 };
 
-/// Added to every diagonal: a coordinate that does nothing has no curvature.
+/// Added to every diagonal, because a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
 
-/// What a model leaves in a stage.
+/// The residual of a model in a stage.
 pub(crate) struct Residue<'a> {
     pub(crate) compare: &'a Comparison<'a>,
     pub(crate) stage: usize,
     pub(crate) model: Model,
-    /// Over the trials that fits run.
+    /// Over the trials that are fitted.
     pub(crate) residual: Column,
     pub(crate) inputs: TermInputs,
-    /// What is fitted together with the terms.
+    /// Coordinates that are fitted together with the terms.
     coordinates: Vec<(Coordinate, [f64; 2])>,
     /// -dr/dx of each.
     columns: Vec<Column>,
 }
 
-/// Products of the residual (first), the sensitivities and the terms, of which sums are made.
+/// Products of the residual (first), the sensitivities and the terms, from which sums are computed.
 #[derive(Clone)]
 pub(crate) struct Products {
     pub(crate) fit: DMatrix<f64>,
@@ -59,7 +61,7 @@ pub(crate) struct Fit {
     pub(crate) values: Vec<f64>,
     /// J.
     pub(crate) cost: f64,
-    /// Sum of squares over the samples held out.
+    /// Sum of squares over the held-out samples.
     pub(crate) held: f64,
 }
 
@@ -94,7 +96,7 @@ impl<'a> Residue<'a> {
         })
     }
 
-    /// How many sensitivities there are.
+    /// Number of sensitivities.
     pub(crate) fn parameters(&self) -> usize {
         self.columns.len()
     }
@@ -108,7 +110,7 @@ impl<'a> Residue<'a> {
         &self.columns
     }
 
-    /// A term in multiples of the noise, over the trials that fits run.
+    /// A term in multiples of the noise, over the trials that are fitted.
     pub(crate) fn values(&self, term: &Term) -> Vec<f64> {
         let mut values = term.values(&self.inputs, self.roles().fit_trials);
         let sds = &self.compare.metrics[self.stage].noise.sd;
@@ -116,7 +118,7 @@ impl<'a> Residue<'a> {
         values
     }
 
-    /// A term ready for products; none where the term is not finite or does nothing.
+    /// A term ready for products; `None` if the term is not finite or does nothing.
     pub(crate) fn column(&self, term: &Term) -> Option<Column> {
         let values = self.values(term);
         let acts = values.iter().any(|x| x.abs() > 1e-9) && values.iter().all(|x| x.is_finite());
@@ -137,7 +139,8 @@ impl<'a> Residue<'a> {
         products
     }
 
-    /// The normal equations with one column more; `before` are the columns that products are taken with.
+    /// The normal equations with one more column; `before` are the columns of the existing
+    /// products.
     pub(crate) fn with(
         &self,
         roles: &SampleRoles,
@@ -183,7 +186,8 @@ impl<'a> Residue<'a> {
         slope
     }
 
-    /// Minimises J around a model whose residual the products hold; parameters stay where they are unless they are `free`.
+    /// Minimises J around a model whose residual the products hold; parameters do not move unless
+    /// they are `free`.
     pub(crate) fn solve(&self, products: &Products, model: &Model, free: bool) -> Fit {
         let n = products.fit.nrows() - 1;
         let weight = self.compare.weight();
@@ -194,7 +198,7 @@ impl<'a> Residue<'a> {
         for (i, (c, bounds)) in self.coordinates.iter().enumerate() {
             let x = c.read(model);
             prior += c.prior(x).cost;
-            // At a bound it may only go back.
+            // At a bound it may only move back.
             low[i] = if free { (bounds[0] - x).max(-c.stride()).min(0.0) } else { 0.0 };
             high[i] = if free { (bounds[1] - x).min(c.stride()).max(0.0) } else { 0.0 };
         }
@@ -206,7 +210,8 @@ impl<'a> Residue<'a> {
         Fit { held: quadratic(&products.held, &values), cost, values }
     }
 
-    /// One standard deviation of each coefficient: of the inverse curvature, a block one observation.
+    /// One standard deviation of each coefficient: from the inverse curvature, with a block as one
+    /// observation.
     pub(crate) fn coefficient_sd(&self, products: &Products, model: &Model) -> Vec<f64> {
         let inverse = Cholesky::of(self.normal(products, model)).inverse();
         let diagonal = inverse.diagonal();

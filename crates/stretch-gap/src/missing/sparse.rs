@@ -1,23 +1,26 @@
 //! The sparse sum: terms are chosen one after the other, each on samples that were not fitted.
 //!
-//! Orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993, doi 10.1109/ACSSC.1993.342465): a term's promise is what it would
-//! lower the squared residual by once parameters and terms before it are projected out,
+//! Orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993, doi
+//! 10.1109/ACSSC.1993.342465): a term's gain is the reduction of the squared residual once
+//! parameters and previous terms are projected out,
 //!
 //! ```text
-//! gain = <d, r>^2/<d, d>     of what is left of d and r beside A and the terms before
+//! gain = <d, r>^2/<d, d>     of what is left of d and r after A and the previous terms
 //! ```
 //!
-//! Of every family (terms that differ in a width or a time alone) the most promising is fitted, the best of them are refined in
-//! their shapes, and the one that leaves least of the samples held out comes in, as long as it closes a share of their gap.
+//! The best term of every family (terms that differ only in a width or a time) is fitted, and the
+//! best of them are refined in their shapes. The one that leaves least of the held-out samples is
+//! added if it closes a share of their gap.
 
-use crate::missing::{
-    dense::{Rows, ridge},
-    library::library,
-    residue::{Fit, Products, Residue},
-    term::Term,
-};
+use nalgebra::{DMatrix, DVector};
+
 use crate::{
     fit::metric::Column,
+    missing::{
+        library::library,
+        residue::{Fit, Products, Residue},
+        term::Term,
+    },
     numerics::linear::{Cholesky, dot},
     problem::sample_roles::{Role, SampleRoles},
 };
@@ -27,19 +30,19 @@ const MOST: usize = 3;
 /// Families that are fitted, and those of them that are refined.
 const FITTED: usize = 10;
 const REFINED: usize = 5;
-/// Families that are asked together what they foretell.
+/// Families whose prediction is computed together.
 const MANY: usize = 60;
 /// Share of the held-out gap that a term closes at least.
 const LEAST: f64 = 0.03;
-/// Samples that a screen looks at: means of as many as that takes.
+/// Samples used for screening: means of as many samples as that requires.
 const SCREENED: usize = 8000;
-/// Share of a term that must be left beside what is in the sum already.
+/// Share of a term that must be independent of the terms already in the sum.
 const NEW: f64 = 1e-4;
 /// Largest and smallest step by which a shape is refined, as factors.
 const STEPS: (f64, f64) = (1.6, 1.05);
-/// Values that make sense of any shape.
+/// Plausible values of any shape.
 const REACH: std::ops::Range<f64> = 1e-3..1e4;
-/// Share of the fitted samples below which the held-out ones are too few to choose by.
+/// Held-out samples are too few for a choice below this share of the fitted ones.
 const FEW: f64 = 0.1;
 
 /// A sum of terms and what it leaves.
@@ -48,13 +51,14 @@ pub(crate) struct Sum {
     pub(crate) columns: Vec<Column>,
     pub(crate) products: Products,
     pub(crate) fit: Fit,
-    /// Terms that were to choose from.
+    /// Number of terms in the library.
     pub(crate) library: usize,
-    /// What many terms at once leave of the residual, nuisances taken out.
+    /// Residual of many terms at once, without nuisances.
     pub(crate) beside_many: Vec<f64>,
 }
 
-/// Which samples terms are chosen by: those held out, or every third trial where trials are too short for that.
+/// The samples by which terms are chosen: the held-out ones, or every third trial if trials are too
+/// short for that.
 pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
     let mut choice = roles.clone();
     if (roles.count(Role::Held) as f64) < FEW * roles.count(Role::Fit) as f64 {
@@ -68,13 +72,14 @@ pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
     choice
 }
 
-/// Means over a few samples of the segments in a role, at which noise of one multiple still has the variance 1.
+/// Means over a few samples of the segments in a role, scaled such that noise of unit variance
+/// still has the variance 1.
 fn means(roles: &SampleRoles, role: Role, values: &[f64], count: usize) -> Vec<f64> {
     let parts = roles.of_role(role).flat_map(|s| values[s.from..s.to].chunks_exact(count));
     parts.map(|part| part.iter().sum::<f64>() / (count as f64).sqrt()).collect()
 }
 
-/// A pursuit under way.
+/// A pursuit in progress.
 struct Pursuit<'a, 'b> {
     residue: &'a Residue<'b>,
     roles: &'a SampleRoles,
@@ -86,7 +91,7 @@ struct Pursuit<'a, 'b> {
     cleaned: Vec<Vec<f64>>,
 }
 
-/// Chooses a sum for a residue; `roles` says what it is fitted to and what it is chosen by.
+/// Chooses a sum for a residue; `roles` says which samples it is fitted to and chosen by.
 pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: bool) -> Sum {
     let products = residue.products(roles, &residue.residual);
     let fit = residue.solve(&products, &residue.model, true);
@@ -125,7 +130,7 @@ pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: b
     pursuit.sum
 }
 
-/// A sum with one term more.
+/// A sum with one more term.
 struct Next {
     term: Term,
     column: Column,
@@ -141,7 +146,7 @@ impl Pursuit<'_, '_> {
         self.cleaned.push(means(self.roles, Role::Fit, &values, self.count));
     }
 
-    /// The term that leaves least of what is held out.
+    /// The term that leaves least of the held-out samples.
     fn best(&self) -> Option<Next> {
         let terms = self.promising(FITTED);
         let gain = self.gain();
@@ -151,7 +156,7 @@ impl Pursuit<'_, '_> {
         fitted.min_by(|a, b| a.fit.held.total_cmp(&b.fit.held))
     }
 
-    /// What a term in means promises.
+    /// The gain of a term in means.
     fn gain(&self) -> impl Fn(&[f64]) -> f64 {
         let (residue, weight) = (self.residue, self.residue.compare.weight());
         let factor = Cholesky::of(residue.normal(&self.sum.products, &residue.model) / weight);
@@ -189,7 +194,7 @@ impl Pursuit<'_, '_> {
         out
     }
 
-    /// What is left beside the sensitivities and the most promising families together.
+    /// What remains after the sensitivities and the most promising families together.
     fn beside_many(&self) -> Vec<f64> {
         let mut columns: Vec<Vec<f64>> =
             self.residue.columns().iter().map(|c| c.values.clone()).collect();
@@ -219,7 +224,7 @@ impl Pursuit<'_, '_> {
         fit.cost.is_finite().then_some(Next { term, column, products, fit })
     }
 
-    /// A term with its shapes where it promises most.
+    /// A term with the shapes of its largest gain.
     fn refined(&self, mut term: Term, gain: &impl Fn(&[f64]) -> f64) -> Term {
         let of = |term: &Term| {
             gain(&means(self.roles, Role::Fit, &self.residue.values(term), self.count))
@@ -245,7 +250,42 @@ impl Pursuit<'_, '_> {
     }
 }
 
-/// What is alike in terms that differ in a shape alone.
+/// The common part of terms that differ only in a shape.
 fn family(term: &Term) -> Term {
     (0..term.shapes().len()).fold(term.clone(), |term, i| term.with_shape(i, 0.0))
+}
+
+/// Ridges that are tried, as shares of each diagonal element.
+const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+
+/// A residual and columns over the same means, in multiples of the noise.
+pub(crate) struct Rows {
+    pub(crate) residual: Vec<f64>,
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+/// Weights of the columns, fitted with the ridge that best predicts the held-out samples.
+///
+/// A ridge over many terms at once (Hoerl and Kennard 1970, doi 10.1080/00401706.1970.10488634)
+/// predicts more than a sum of a few, but gives nothing that could be written into a simulator. If
+/// it predicts little as well, the form was not the problem.
+pub(crate) fn ridge(fit: &Rows, held: &Rows) -> Vec<f64> {
+    let matrix = |rows: &Rows| {
+        DMatrix::from_fn(rows.residual.len(), rows.columns.len(), |i, j| rows.columns[j][i])
+    };
+    let (x, held_x) = (matrix(fit), matrix(held));
+    let (normal, right) = (x.tr_mul(&x), x.tr_mul(&DVector::from_column_slice(&fit.residual)));
+    let held_r = DVector::from_column_slice(&held.residual);
+    let weights = |ridge: f64| {
+        let mut lifted = normal.clone();
+        for i in 0..lifted.nrows() {
+            lifted[(i, i)] *= 1.0 + ridge;
+        }
+        let mut weights: Vec<f64> = right.iter().copied().collect();
+        Cholesky::of(lifted).solve(&mut weights);
+        let left = (&held_r - &held_x * DVector::from_column_slice(&weights)).norm_squared();
+        (left, weights)
+    };
+    let best = RIDGES.into_iter().map(weights).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(Vec::new, |(_, weights)| weights)
 }

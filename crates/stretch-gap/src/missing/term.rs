@@ -1,7 +1,9 @@
-//! Terms: what a simulator may lack, as products of factors of what was recorded, passed on at once or slowly.
+//! Terms that a simulator may lack: products of factors of what was recorded, passed on at once or
+//! slowly.
 //!
-//! A term is dimensionless; its coefficient has the unit of the stage's output. It can be written down and read back
-//! ([`serde`]), with the scales of its signals beside it, so that a simulator can be given it.
+//! A term is dimensionless; its coefficient has the unit of the stage's output. It can be written
+//! and read ([`serde`]) together with the scales of its signals, so that it can be added to a
+//! simulator.
 
 use serde::{Deserialize, Serialize};
 use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
@@ -22,9 +24,9 @@ pub enum RateForm {
     SignedSquare,
     /// sign(v) sqrt|v|
     SignedRoot,
-    /// tanh(v/0.1): the sign, smooth where noise would toss it.
+    /// tanh(v/0.1): a smooth sign, because noise would toss a hard one.
     Sign,
-    /// sign(v) exp(-|v|/0.3): friction that is gone once it slides.
+    /// sign(v) exp(-|v|/0.3): friction that vanishes once it slides.
     Striction,
     /// max(0, v)
     Rising,
@@ -33,10 +35,10 @@ pub enum RateForm {
 /// Share of the usual rate within which a sign is uncertain, and above which sticking is over.
 const AT_REST: f64 = 0.1;
 const SLIDING: f64 = 0.3;
-/// Way back, as a share of the range, that makes a turn.
+/// Way back, as a share of the range, that counts as a turn.
 const TURN: f64 = 0.01;
 
-/// One factor of a term; `signal` counts the signals of the proposal, x and v are on their scales.
+/// One factor of a term; `signal` is an index of the proposal's signals, x and v are scaled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "fields stand in the equation of their variant")]
@@ -92,7 +94,7 @@ pub enum Passage {
     Direct,
     /// Through a lag, z' = (g - z)/tau from 0.
     Lag { tau_s: f64 },
-    /// What a lag leaves, g - z from 0.
+    /// High-pass: the part that a lag does not pass, g - z from 0.
     Rest { tau_s: f64 },
     /// As a rate that an opening forgets, z' = g/tau - (sum of commands) z/tau from 0.
     Leak { tau_s: f64 },
@@ -101,7 +103,7 @@ pub enum Passage {
 /// A term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Term {
-    /// Factors that are multiplied; a product of none is 1.
+    /// Factors that are multiplied; an empty product is 1.
     pub factors: Vec<Factor>,
     /// How the product reaches the output.
     pub passage: Passage,
@@ -321,7 +323,7 @@ fn lagged(inputs: &TermInputs, x: &[f64], tau_s: f64, first: f64) -> Vec<f64> {
     out
 }
 
-/// Way since the last turn, and which way.
+/// Way since the last turn, and its direction.
 struct Turns {
     turn: f64,
     furthest: f64,
@@ -346,7 +348,7 @@ impl Turns {
     }
 }
 
-/// Way so far, both ways counted, beyond a turn's noise.
+/// Distance travelled so far in both directions, without the noise of a turn.
 #[derive(Default)]
 struct Travel {
     held: Option<f64>,
@@ -356,8 +358,8 @@ struct Travel {
 impl Travel {
     fn follow(&mut self, x: &[f64], i: usize) -> f64 {
         let held = self.held.unwrap_or(x[0]);
-        // A play of the turn's width: noise at rest is no travel.
-        let next = stretch_core::play(held, x[i], TURN);
+        // A play of the turn's width, because noise at rest is no travel.
+        let next = stretch_core::arithmetic::play(held, x[i], TURN);
         self.sum += (next - held).abs();
         self.held = Some(next);
         self.sum

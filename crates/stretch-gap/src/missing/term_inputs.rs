@@ -1,12 +1,13 @@
-//! What was recorded, as terms see it: signals on a scale of their own, so that no term depends on a unit.
+//! Recorded signals as terms use them: each scaled, so that no term depends on a unit.
 //!
 //! ```text
 //! x = (signal - offset)/scale      0 .. 1 over the samples that are fitted; a command as it is
 //! v = (dx/dt)/rate                 of root mean square 1 there
 //! ```
 //!
-//! Scales are taken from fitted samples only, memories begin anew with every trial and look back only, and rates are
-//! differences within what may be fitted or within what is tested: nothing that is fitted has seen a test sample.
+//! Scales are computed from fitted samples only. Memories begin anew in every trial and are causal.
+//! Rates are differences within the fitted part or within the test part. Therefore nothing that is
+//! fitted has seen a test sample.
 
 use std::ops::Range;
 
@@ -14,34 +15,32 @@ use stretch_effects::Grid;
 
 use stretch_data::ends;
 
-use crate::{
-    numerics::differences::central,
-    problem::{
-        error::GapError,
-        record_facts::Recorded,
-        sample_roles::{Role, SampleRoles},
-        simulator::Simulator,
-    },
+use crate::problem::{
+    error::GapError,
+    record_facts::Recorded,
+    sample_roles::{Role, SampleRoles},
+    simulator::Simulator,
 };
 
-/// A signal on its own scale.
+/// A scaled signal.
 #[derive(Debug, Clone)]
 pub(crate) struct Signal {
     pub(crate) name: String,
     pub(crate) unit: String,
     pub(crate) offset: f64,
     pub(crate) scale: f64,
-    /// What v is counted in, 1/s.
+    /// Unit of v, 1/s.
     pub(crate) rate: f64,
     pub(crate) is_command: bool,
-    /// x, all trials end to end.
+    /// x, all trials concatenated.
     pub(crate) x: Vec<f64>,
     /// v, the same.
     pub(crate) v: Vec<f64>,
 }
 
 impl Signal {
-    /// x about which a law is odd or even: where the signal is zero, which it passes through; else the middle of its range.
+    /// x about which a law is odd or even: the zero of a signal that passes through zero, otherwise
+    /// the middle of its range.
     pub(crate) fn centre(&self) -> f64 {
         let zero = -self.offset / self.scale;
         if (0.0..=1.0).contains(&zero) { zero } else { 0.5 }
@@ -54,21 +53,22 @@ pub(crate) struct TermInputs {
     pub(crate) signals: Vec<Signal>,
     /// Samples of each trial.
     pub(crate) trials: Vec<Range<usize>>,
-    /// Session time of each trial's first sample since the first one's, s.
+    /// Session time of each trial's first sample, relative to the first trial, s.
     pub(crate) starts_s: Vec<f64>,
-    /// Longest fitted stretch and length of the session up to the last fitted sample, s: what time is counted in.
+    /// Longest fitted stretch and length of the session up to the last fitted sample, s: the units
+    /// of time.
     pub(crate) trial_s: f64,
     pub(crate) session_s: f64,
-    /// One step a sample.
+    /// One step per sample.
     pub(crate) grid: Grid,
 }
 
-/// Squared correlation above which two signals say the same.
+/// Squared correlation above which two signals are redundant.
 const SAME: f64 = 0.998;
 
 impl TermInputs {
-    /// Signals that may act in a stage: everything recorded but its own channel, in whose place stands what the model makes
-    /// of it (`own`, all trials end to end), which holds no noise.
+    /// Signals that may act in a stage: everything recorded except its own channel. The model's
+    /// noise-free prediction of that channel (`own`, all trials concatenated) takes its place.
     pub(crate) fn of(
         simulator: &dyn Simulator,
         roles: &SampleRoles,
@@ -132,8 +132,8 @@ impl TermInputs {
     }
 }
 
-/// Everything that a missing term may be a function of: what the record says there is, or else what the stages are fed with, under
-/// the name of the channel before, or else the motion.
+/// Everything that a missing term may be a function of: the signals that the record lists, or else
+/// the inputs of the stages, named after the previous channel, or else the motion.
 fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
     let known = &simulator.record().signals;
     if !known.is_empty() {
@@ -153,7 +153,7 @@ fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
 }
 
 impl Signal {
-    /// The signal with its rate; none where it does not move in what is fitted.
+    /// The signal with its rate; `None` if it does not move in the fitted samples.
     fn of(recorded: Recorded, roles: &SampleRoles, dt_s: f64) -> Option<Self> {
         let Recorded { name, unit, mut values, is_command } = recorded;
         let (low, high) =
@@ -175,7 +175,7 @@ impl Signal {
     }
 }
 
-/// Central differences within what is tested and within what is not, 1/s.
+/// Central differences within the test part and within the rest, 1/s.
 fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
     let mut out = vec![0.0; x.len()];
     let mut parts: Vec<(usize, bool, Range<usize>)> = Vec::new();
@@ -191,7 +191,7 @@ fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
         }
     }
     for (_, _, range) in parts {
-        out[range.clone()].copy_from_slice(&central(&x[range], dt_s));
+        out[range.clone()].copy_from_slice(&central_differences(&x[range], dt_s));
     }
     out
 }
@@ -211,4 +211,13 @@ fn alike(a: &Signal, b: &Signal, roles: &SampleRoles) -> f64 {
     }
     let own = (xx - x * x / n) * (yy - y * y / n);
     if own > 0.0 { (xy - x * y / n).powi(2) / own } else { 0.0 }
+}
+
+/// The rate of a signal that was sampled at equal times: central differences, one-sided at both ends; a single sample has no rate.
+pub(super) fn central_differences(x: &[f64], dt_s: f64) -> Vec<f64> {
+    let rate = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));
+        if b > a { (x[b] - x[a]) / ((b - a) as f64 * dt_s) } else { 0.0 }
+    };
+    (0..x.len()).map(rate).collect()
 }

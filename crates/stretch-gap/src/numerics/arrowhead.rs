@@ -1,11 +1,11 @@
-//! Factor of a matrix that is tridiagonal but for a few last rows: chains of knots, and offsets beside them.
+//! Factor of a matrix that is tridiagonal except for a few last rows: chains of knots, and offsets.
 //!
 //! ```text
 //! A = [T B; B' D] = L L',     L = [L_T 0; G' L_D],     L_T G = B,     L_D L_D' = D - G'G
 //! ```
 //!
-//! L_T has two diagonals, so that a factor and a solution cost as many steps as there are knots (Golub and Van Loan 2013,
-//! section 4.3).
+//! L_T has two diagonals, so the cost of a factor and of a solution is proportional to the number
+//! of knots (Golub and Van Loan 2013, section 4.3).
 
 use nalgebra::DMatrix;
 
@@ -16,7 +16,7 @@ use crate::numerics::linear::{Cholesky, dot};
 pub(crate) struct Arrow {
     /// Diagonal of T.
     pub(crate) diagonal: Vec<f64>,
-    /// Beside it: element i couples i and i + 1.
+    /// The secondary diagonal: element i couples i and i + 1.
     pub(crate) beside: Vec<f64>,
     /// Columns of B.
     pub(crate) border: Vec<Vec<f64>>,

@@ -1,12 +1,14 @@
-//! What nalgebra lacks: a factor that survives rounding, and least squares within a box.
+//! Functions that nalgebra lacks: a factor that survives rounding, and least squares within a box.
 
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 
 /// Jitter, as a share of each diagonal element.
 ///
-/// A pivot of a Cholesky factor is what of a column the ones before do not explain. Of columns that are alike it is rounding, some
-/// n eps = 2e-14 of the element for a hundred columns, of either sign. Lifting the diagonal by more than that keeps the factor real and moves
-/// no solution by more than what rounding left open (Rasmussen and Williams 2006, section 3.4.3, "jitter").
+/// A pivot of a Cholesky factor is the part of a column that the previous ones do not explain. For
+/// similar columns it is rounding, about n eps = 2e-14 of the element for a hundred columns, of
+/// either sign. Raising the diagonal by more than that keeps the factor real and changes no
+/// solution by more than the uncertainty due to rounding (Rasmussen and Williams 2006, section
+/// 3.4.3, "jitter").
 const JITTER: f64 = 1e-13;
 
 /// Lower factor L of a symmetric positive semidefinite matrix, A = L L'.
@@ -17,11 +19,12 @@ impl Cholesky {
     /// Only the lower triangle is read.
     pub(crate) fn of(mut a: DMatrix<f64>) -> Self {
         for i in 0..a.nrows() {
-            // A column of zeros, of a parameter that does nothing, still gets a pivot.
+            // A column of zeros, from a parameter that does nothing, still gets a pivot.
             a[(i, i)] += JITTER * a[(i, i)].abs() + 1e-300;
         }
         let factor = nalgebra::Cholesky::new_with_substitute(a, f64::MIN_POSITIVE);
-        // With a positive substitute nothing is refused; a NaN stays one, and the fit turns back.
+        // With a positive substitute nothing is refused; a NaN stays a NaN, and the fit rejects the
+        // step.
         Self(factor.expect("a positive substitute"))
     }
 
@@ -67,8 +70,9 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Minimiser of 0.5 x'Ax + g'x with low <= x <= high, by an active set (Nocedal and Wright 2006, algorithm 16.3).
 ///
-/// Coordinates that would leave the box are held at its faces, one at a time, the others solved for; once none wants to leave, one that
-/// the slope Ax + g pulls back inside is released. It ends where the conditions of Karush, Kuhn and Tucker hold.
+/// Coordinates that would leave the box are held at its faces, one at a time, and the others are
+/// solved for. Once none would leave, one that the slope Ax + g pulls back inside is released. It
+/// ends when the conditions of Karush, Kuhn and Tucker hold.
 pub(crate) fn boxed(a: &DMatrix<f64>, g: &[f64], low: &[f64], high: &[f64]) -> Vec<f64> {
     let n = g.len();
     let mut x = DVector::zeros(n);
@@ -125,7 +129,8 @@ mod tests {
         assert_relative_eq!(held[0], -0.25, epsilon = 0.0, max_relative = FIT_WELL);
     }
 
-    /// Two equal columns, and one of zeros: the sum of the twins is determined, each is not, and all stays finite.
+    /// Two equal columns, and one of zeros: the sum of the twins is determined, each alone is not,
+    /// and all stays finite.
     #[test]
     fn survives_columns_that_are_alike() {
         let a = DMatrix::from_row_slice(3, 3, &[4.0, 4.0, 0.0, 4.0, 4.0, 0.0, 0.0, 0.0, 0.0]);

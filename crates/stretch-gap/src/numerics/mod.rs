@@ -1,11 +1,10 @@
-//! Arithmetic that knows nothing of simulators.
+//! Arithmetic that is independent of simulators.
 //!
-//! In: numbers. Out: factors of normal matrices and least squares within a box ([`linear`], [`arrowhead`]), seeded random
-//! numbers ([`random`]), rates ([`differences`]), and elapsed seconds ([`stopwatch`]).
-//! Nothing of the crate is imported here.
+//! Input: numbers. Output: factors of normal matrices and least squares within a box ([`linear`],
+//! [`arrowhead`]), seeded random numbers ([`random`]) and elapsed seconds ([`stopwatch`]). This
+//! module imports no other module of the crate.
 
 pub(crate) mod arrowhead;
-pub(crate) mod differences;
 pub(crate) mod linear;
 pub(crate) mod random;
 pub(crate) mod stopwatch;

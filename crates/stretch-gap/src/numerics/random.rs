@@ -1,7 +1,11 @@
 //! Seeded random numbers: the same on every machine.
 
-/// SplitMix64 (doi 10.1145/2660193.2660195): what a simulator draws from when it is asked for [another draw of the input noise](crate::Run::input_noise)
-/// its inputs.
+use rand_xoshiro::{
+    SplitMix64,
+    rand_core::{Rng, SeedableRng},
+};
+
+/// SplitMix64 (doi 10.1145/2660193.2660195), from which a simulator takes [another draw of the input noise](crate::Run::input_noise).
 ///
 /// ```
 /// use stretch_gap::RandomGenerator;
@@ -11,23 +15,20 @@
 /// assert_ne!(first, other.gauss());
 /// ```
 #[derive(Debug, Clone)]
-pub struct RandomGenerator(u64);
+pub struct RandomGenerator(SplitMix64);
 
 impl RandomGenerator {
     /// The generator of a seed and one of its streams.
     pub fn new(seed: u64, stream: u64) -> Self {
-        let mut random = Self(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let seed = seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut random = Self(SplitMix64::seed_from_u64(seed));
         random.bits();
         random
     }
 
     /// 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     /// Uniform in 0..1.
@@ -40,8 +41,9 @@ impl RandomGenerator {
         ((self.unit() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
-    /// Nearly normal with mean 0 and standard deviation 1: the sum of twelve uniform numbers, which needs no
-    /// transcendental function.
+    /// Nearly normal with mean 0 and standard deviation 1: the sum of twelve uniform numbers, which
+    /// needs no transcendental function. Published results depend on these numbers, so do not
+    /// replace it by another transform.
     pub fn gauss(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }

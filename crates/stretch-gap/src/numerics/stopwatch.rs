@@ -1,6 +1,6 @@
-//! How long it took, where there is a clock.
+//! Measures elapsed time on targets with a clock.
 
-/// A web page's WASM has no clock of its own, and asking for the time would end it.
+/// WASM in a web page has no clock, and asking for the time would abort it.
 const HAS_CLOCK: bool = cfg!(not(all(target_family = "wasm", target_os = "unknown")));
 
 /// When something began.
@@ -11,7 +11,7 @@ impl Stopwatch {
         Self(HAS_CLOCK.then(std::time::Instant::now))
     }
 
-    /// Seconds since; 0 where there is no clock, for whoever has one to fill in.
+    /// Seconds since the start; 0 on a target without a clock, where the caller can fill it in.
     pub(crate) fn elapsed_s(&self) -> f64 {
         self.0.map_or(0.0, |begun| begun.elapsed().as_secs_f64())
     }

@@ -1,4 +1,4 @@
-//! Linear algebra and random numbers beside nalgebra and theory.
+//! Linear algebra and random numbers, compared with nalgebra and theory.
 
 use nalgebra::{DMatrix, DVector};
 use proptest::{prelude::*, test_runner::RngSeed};
@@ -9,10 +9,12 @@ use crate::numerics::{
     random::RandomGenerator,
 };
 
-/// Relative to the largest value: matrices of up to 15 rows whose condition is held below 1e3, and a jitter of 1e-13 of the diagonal.
+/// Relative to the largest value: matrices of up to 15 rows with a condition below 1e3, and a
+/// jitter of 1e-13 of the diagonal.
 const SOLVED: f64 = 1e-9;
 
-/// B B' + I of a square matrix B of normal numbers: positive definite, of condition up to some hundred.
+/// B B' + I of a square matrix B of normal numbers: positive definite, with a condition of up to a
+/// few hundred.
 fn definite(n: usize, seed: u64) -> DMatrix<f64> {
     let mut random = RandomGenerator::new(seed, 1);
     let b = DMatrix::from_fn(n, n, |_, _| random.gauss());
@@ -49,8 +51,8 @@ proptest! {
         approx::assert_abs_diff_eq!(halves[..], x[..], epsilon = SOLVED);
     }
 
-    /// The conditions of Karush, Kuhn and Tucker: inside the slope is nought, at a face it points out of the box; nothing else is a minimum
-    /// of a convex function.
+    /// The conditions of Karush, Kuhn and Tucker: inside the slope is zero, at a face it points out
+    /// of the box; a convex function has no other minimum.
     #[test]
     fn a_boxed_minimum_meets_its_conditions(n in 1_usize..8, seed: u64, width in 0.01_f64..2.0) {
         let (a, g) = (definite(n, seed), vector(n, seed));
@@ -68,7 +70,7 @@ proptest! {
         }
     }
 
-    /// An arrow with any number of knots and border columns, none of either included.
+    /// An arrow with any number of knots and border columns, including none of either.
     #[test]
     fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
         prop_assume!(knots + columns > 0);
@@ -77,7 +79,7 @@ proptest! {
         let mut arrow = Arrow::zeros(knots, columns);
         arrow.beside.iter_mut().for_each(|x| *x = random.unit() - 0.5);
         arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (random.unit() - 0.5));
-        // More on the diagonal than beside it in every row: definite.
+        // Diagonally dominant in every row, therefore definite.
         arrow.diagonal.iter_mut().for_each(|x| *x = 2.0 + random.unit());
         for i in 0..columns {
             for j in 0..columns {
@@ -148,7 +150,8 @@ fn uniform_numbers_are_uniform_and_below_their_bound() {
     assert_eq!((random.below(1), random.below(0)), (0, 0));
 }
 
-/// Streams of one seed, and seeds of one stream, have nothing to do with each other: correlations of 10 000 draws stay within five of 1/100.
+/// Streams of one seed, and seeds of one stream, are independent: correlations of 10 000 draws stay
+/// within five of 1/100.
 #[test]
 fn streams_and_seeds_are_independent() {
     let draws = |seed, stream| {

@@ -1,7 +1,7 @@
 //! A simulator with other tolerances.
 //!
-//! Held (tolerance 0), a parameter stays as shipped: the ablation without re-tuning. Set loose, it shows whether it could explain what
-//! effects are credited with.
+//! A held parameter (tolerance 0) stays as shipped: the ablation without re-tuning. A parameter
+//! without a tolerance shows whether it could explain what effects are credited with.
 
 use crate::problem::{
     description::Description,
@@ -10,14 +10,14 @@ use crate::problem::{
     spec::ParameterSpec,
 };
 
-/// A simulator whose parameters are described another way: held, or set loose.
+/// A simulator with other descriptions of its parameters: held, or free.
 pub(crate) struct Altered<'a> {
     simulator: &'a dyn Simulator,
     about: Description,
 }
 
 impl<'a> Altered<'a> {
-    /// A simulator with every parameter, given with its index, as `altered` makes it.
+    /// A simulator in which `altered` maps every parameter, given with its index.
     pub(crate) fn of(
         simulator: &'a dyn Simulator,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

@@ -1,10 +1,10 @@
-//! Checks of what a description says: whatever indexes it afterwards cannot miss.
+//! Checks of a description, so that later indexing cannot fail.
 
 use stretch_effects::EffectParameter;
 
 use crate::problem::spec::{EffectSpec, ParameterSpec};
 
-/// What is wrong with a description: where, what was found, what to do.
+/// An error of a description: where, what was found, what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
@@ -16,25 +16,25 @@ pub enum DescriptionError {
         /// What the list is of.
         what: &'static str,
     },
-    /// Two entries have the same name, so that an answer could not tell them apart.
+    /// Two entries have the same name, so an answer could not distinguish them.
     #[error("{owner}: the name is given twice; rename one")]
     NamedTwice {
         /// The entry.
         owner: String,
     },
-    /// An index points behind the end of its list.
+    /// An index is beyond the end of its list.
     #[error("{owner}: {what} {index} is not among the {count} {what}s; count from 0")]
     Index {
         /// Entry that holds the index.
         owner: String,
-        /// What it points at.
+        /// What it refers to.
         what: &'static str,
         /// The index.
         index: usize,
-        /// How many there are.
+        /// Number of entries.
         count: usize,
     },
-    /// A number that does not do.
+    /// A number that is not allowed.
     #[error("{owner}: {what} is {value}; it must be {needs}")]
     Number {
         /// Entry that holds the number.
@@ -74,7 +74,8 @@ pub(super) fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError>
     let owner = || format!("parameter `{}`", p.name);
     number(&owner, "nominal", p.nominal, "finite", f64::is_finite)?;
     number(&owner, "sd", p.sd, "0 or more", |x| x >= 0.0)?;
-    // Minus infinity is no bound; a bound above the nominal value would leave the box of a fit empty.
+    // Minus infinity is no bound; a bound above the nominal value would leave the box of a fit
+    // empty.
     if p.least.is_nan() || p.least > p.nominal {
         let needs = "at most the nominal value";
         return Err(DescriptionError::Number {

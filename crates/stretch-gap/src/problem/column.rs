@@ -1,10 +1,10 @@
-//! Columns of a record, and what may have happened to one between the rig and the file.
+//! Columns of a record, and their possible distortion between the rig and the file.
 
 use std::borrow::Cow;
 
 use crate::problem::spec::StageSpec;
 
-/// What a recorder made of a channel: recorded(t) = offset + scale true(t - delay_s).
+/// Distortion of a channel by a recorder: recorded(t) = offset + scale true(t - delay_s).
 ///
 /// ```
 /// use stretch_gap::Distortion;
@@ -30,7 +30,7 @@ impl Default for Distortion {
 }
 
 impl Distortion {
-    /// What the recorder would have written of one trial of a true channel, sampled every `dt_s` seconds.
+    /// The recorded values of one trial of a true channel, sampled every `dt_s` seconds.
     pub fn distorted(&self, channel: &[f64], dt_s: f64) -> Vec<f64> {
         let late = shifted(channel, -self.delay_s / dt_s);
         late.into_iter().map(|x| self.offset + self.scale * x).collect()
@@ -43,7 +43,8 @@ impl Distortion {
     }
 }
 
-/// Values so many samples later, on straight lines between samples, the first and the last held.
+/// Values delayed by so many samples, linearly interpolated, with the first and the last value
+/// held.
 fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
     if samples == 0.0 || values.is_empty() {
         return values.to_vec();
@@ -64,25 +65,28 @@ fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
 pub struct Column<'a> {
     /// Name of the column.
     pub name: Cow<'a, str>,
-    /// Unit, `1` where it has none.
+    /// Unit; `1` without one.
     pub unit: Cow<'a, str>,
-    /// All trials end to end; empty for a group of columns (commands) that is looked at as a whole, and among the
-    /// [facts of a record](crate::RecordFacts) for the output of a stage, whose values the simulator has.
+    /// All trials concatenated. Empty for a group of columns (commands) that is treated as a whole,
+    /// and among the [facts of a record](crate::RecordFacts) for the output of a stage, whose
+    /// values the simulator has.
     pub values: Cow<'a, [f64]>,
     /// The stage whose output it is.
     pub output_of: Option<usize>,
-    /// Stages that are driven by it: [`Driven::corrected`](crate::Driven::corrected) can correct it for them.
+    /// Stages that it drives: [`Driven::corrected`](crate::Driven::corrected) can correct it for
+    /// them.
     pub read_by: Vec<usize>,
-    /// Whether it is a command: the only error that a command may have is a scale.
+    /// Whether it is a command. The only possible error of a command is a scale.
     pub is_command: bool,
-    /// Delays that an effect of the catalogue stands for, s: none of these is an error of the record.
+    /// Delays that an effect of the catalogue describes, s. None of these is an error of the
+    /// record.
     pub skew_s: [f64; 2],
-    /// What to look at when the column is wrong, for the end of a sentence.
+    /// What to check if the column is wrong, for the end of a sentence.
     pub hint: Cow<'a, str>,
 }
 
 impl<'a> Column<'a> {
-    /// The column of a stage's output, where nothing more is known of it; without its values.
+    /// The column of a stage's output if nothing more is known of it; without its values.
     pub fn output(stage: usize, spec: &StageSpec) -> Self {
         Self {
             name: Cow::Owned(spec.channel.clone()),
@@ -96,7 +100,7 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// The same column, its texts and values borrowed.
+    /// The same column with borrowed texts and values.
     pub(crate) fn borrowed(&self) -> Column<'_> {
         Column {
             name: Cow::Borrowed(&self.name),

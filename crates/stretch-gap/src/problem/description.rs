@@ -1,4 +1,4 @@
-//! A simulator's description, checked once: whatever indexes it afterwards cannot miss.
+//! A simulator's description, checked once so that later indexing cannot fail.
 
 use std::{ops::Deref, sync::Arc};
 
@@ -7,12 +7,12 @@ use stretch_effects::EffectParameter;
 
 use crate::problem::{
     checks::{DescriptionError, check_effect, check_parameter, filled, indices, number, unique},
-    record_facts::RecordFacts,
-    rows_used::RowsUsed,
+    record_facts::{RecordFacts, RowsUsed},
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 
-/// What a simulator is made of and what was recorded beside it, as it is written down; [`Description::new`] checks it.
+/// The structure of a simulator and the recordings, as written by a user; [`Description::new`]
+/// checks it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DescriptionSpec {
     /// Stages of the simulator.
@@ -27,10 +27,10 @@ pub struct DescriptionSpec {
     pub dt_s: f64,
 }
 
-/// A [`DescriptionSpec`] that was checked: it reads like one, and cannot be altered.
+/// A checked [`DescriptionSpec`]: it reads like one, and cannot be altered.
 ///
-/// Indices lie in range, numbers are finite, ranges are ordered, and every effect has a start of the right length:
-/// where none was given they are derived as [`EffectSpec::new`] does.
+/// Indices are in range, numbers are finite, ranges are ordered, and every effect has a start of
+/// the right length. Missing starts are derived as in [`EffectSpec::new`].
 ///
 /// ```
 /// use stretch_gap::{Description, DescriptionSpec, ParameterSpec, StageSpec, TrialSpec};
@@ -61,16 +61,17 @@ pub struct Description {
 }
 
 impl Description {
-    /// Checks every entry, and derives the starts of effects that come without.
+    /// Checks every entry, and derives missing starts of effects.
     ///
     /// # Errors
-    /// [`DescriptionError`] names the first entry that does not do, and what to do about it.
+    /// [`DescriptionError`] names the first invalid entry, and what to do about it.
     pub fn new(mut spec: DescriptionSpec) -> Result<Self, DescriptionError> {
         for effect in spec.effects.iter_mut().filter(|e| e.starts.is_empty()) {
             effect.starts = EffectParameter::starts(&effect.parameters);
         }
         let whole = || "description".to_owned();
-        // from 1e-3 to 1e7 Hz: every time that is counted in samples is then a number of them
+        // 1e-3 to 1e7 Hz, so that every time that is counted in samples is a valid number of
+        // samples
         number(&whole, "dt_s", spec.dt_s, "1e-7 .. 1e3", |x| (1e-7..=1e3).contains(&x))?;
         filled(&whole, "stages", &spec.stages)?;
         filled(&whole, "trials", &spec.trials)?;
@@ -93,10 +94,11 @@ impl Description {
         Ok(Self { spec, record: Arc::default() })
     }
 
-    /// The description with what is known of the record.
+    /// The description with facts about the record.
     ///
     /// # Errors
-    /// [`DescriptionError`] where an index or a length does not fit the stages, the parameters or the trials.
+    /// [`DescriptionError`] if an index or a length does not fit the stages, the parameters or the
+    /// trials.
     pub fn with_record(self, record: RecordFacts) -> Result<Self, DescriptionError> {
         let samples = self.trials.iter().map(|t| t.samples).sum();
         record.check(self.stages.len(), self.parameters.len(), samples)?;
@@ -108,21 +110,21 @@ impl Description {
         &self.record
     }
 
-    /// Rows that the trials stand on, of those that were read.
+    /// Number of rows in the trials, and of rows that were read.
     pub fn rows_used(&self) -> RowsUsed {
         let used = self.trials.iter().map(|t| t.samples).sum();
         self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
     }
 
-    /// The description with more effects, which are valid.
+    /// The description with more effects, which have to be valid.
     pub(crate) fn with_effects(&self, more: impl Iterator<Item = EffectSpec>) -> Self {
         let mut out = self.clone();
         out.spec.effects.extend(more);
         out
     }
 
-    /// The description with other stages touched by its effects, of which there are as many: `touches` gives them anew for every
-    /// effect, and a stage that is not there is left out.
+    /// The description with other stages touched by its effects: `touches` returns them for every
+    /// effect, and a stage that does not exist is left out.
     pub fn with_touches(&self, touches: impl Fn(usize, &EffectSpec) -> Vec<usize>) -> Self {
         let mut out = self.clone();
         let stages = out.spec.stages.len();
@@ -136,7 +138,8 @@ impl Description {
         out
     }
 
-    /// The description with other tolerances: `altered` gives every parameter anew, and keeps it valid.
+    /// The description with other tolerances: `altered` returns every parameter anew, and keeps it
+    /// valid.
     pub(crate) fn with_parameters(
         &self,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

@@ -1,4 +1,4 @@
-//! Stages that hang together because a parameter that is fitted acts in both.
+//! Groups of stages that are linked by a fitted parameter that acts in several of them.
 
 use crate::problem::simulator::Simulator;
 

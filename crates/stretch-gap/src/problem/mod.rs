@@ -1,12 +1,12 @@
-//! The problem as its owner poses it: a simulator bound to the measurements that it is held against.
+//! The problem as its owner states it: a simulator and the measurements that it is compared with.
 //!
-//! In: what a user writes, an implementation of [`simulator::Simulator`] with a validated [`description::Description`] of its
-//! stages, parameters, effects and trials ([`spec`]), its noise ([`noise`]), and what is known of
-//! the record ([`record_facts`], [`mod@column`]).
-//! Out: the samples that are fitted, held out and tested ([`roles`]), and every run, counted, stoppable and finite
-//! ([`runs`]). Two simulators stand before another one: one alters parameters ([`altered_parameters`]), one corrects a
-//! column (in `record`). [`thresholds`] are the calibrated numbers of the decisions.
-//! Imports: `numerics` alone.
+//! Input: an implementation of [`simulator::Simulator`] by a user, with a validated
+//! [`description::Description`] of its stages, parameters, effects and trials ([`spec`]), its noise
+//! ([`noise`]), and what is known of the record ([`record_facts`], [`mod@column`]). Output: the
+//! samples that are fitted, held out and tested ([`roles`]), and every run, counted, stoppable and
+//! finite ([`runs`]). Two simulators wrap another one: one alters parameters
+//! ([`altered_parameters`]), one corrects a column (in `record`). [`thresholds`] are the calibrated
+//! numbers of the decisions. Imports: only `numerics`.
 
 pub(crate) mod altered_parameters;
 pub(crate) mod checks;
@@ -18,7 +18,6 @@ pub(crate) mod noise;
 mod pace;
 pub(crate) mod record_facts;
 mod rests;
-pub(crate) mod rows_used;
 pub(crate) mod runs;
 pub(crate) mod sample_roles;
 pub(crate) mod simulator;

@@ -1,14 +1,15 @@
-//! How quick a record is: what half a second is to a slow rig, a tenth is to a quick one.
+//! How quick a record is: half a second of a slow rig corresponds to a tenth of a quick one.
 //!
-//! Residuals are alike for about as long as the motion goes one way. So lengths that a diagnosis needs count in half turns of the motion, never
-//! less than a handful of samples:
+//! Residuals are correlated for about as long as the motion keeps its direction. Therefore lengths
+//! in a diagnosis are counted in half turns of the motion, with a minimum of a few samples:
 //!
 //! ```text
 //! block = min(most, max(half a mean turn of the slowest output, 20 samples))
 //! ```
 //!
-//! A turn ends where an output has crossed its middle upwards by more than a tenth of its span and six times its noise, so that noise makes
-//! no turns; an output that makes fewer than [`FEWEST`] counts as slow.
+//! A turn ends when an output has crossed its middle upwards by more than a tenth of its span and
+//! six times its noise, so that noise makes no turns. An output with fewer than [`FEWEST`] turns
+//! counts as slow.
 
 use stretch_data::ends;
 
@@ -18,10 +19,11 @@ use crate::problem::noise::noise_variance;
 const SAMPLES: f64 = 20.0;
 /// Share of the span, and multiple of the noise, by which the middle is crossed.
 const CROSSED: (f64, f64) = (0.1, 6.0);
-/// Turns of an output that tell how quick it is.
+/// Number of turns from which an output determines the pace.
 const FEWEST: usize = 10;
 
-/// Length of a block of a record, s and at most `most_s`, from the parts of each output that may be looked at.
+/// Length of a block of a record, s, at most `most_s`, from the fitted and held-out parts of each
+/// output.
 pub(super) fn block_s<'a, P>(outputs: impl Iterator<Item = P>, dt_s: f64, most_s: f64) -> f64
 where
     P: Iterator<Item = &'a [f64]> + Clone,
@@ -30,7 +32,7 @@ where
     slowest.max(SAMPLES * dt_s).min(most_s)
 }
 
-/// Half of the mean time from one turn to the next, s; infinite where there are too few turns.
+/// Half of the mean time from one turn to the next, s; infinite if there are too few turns.
 fn half_turn_s<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> f64 {
     let (low, high) = ends(parts.clone().flatten());
     let noise = noise_variance(parts.clone(), dt_s).sqrt();
@@ -78,7 +80,7 @@ mod tests {
         approx::assert_relative_eq!(block(&both[..1], 0.002), 0.1, max_relative = 0.05);
         assert_eq!(block(&both[1..], 0.002), MOST_S);
         assert_eq!(block(&both, 0.002), MOST_S);
-        // Turns of a few samples make no block of a few samples.
+        // Even if turns take few samples, blocks do not.
         assert_eq!(block(&[wave(20.0, 0.01, at)], 0.002), 0.04);
     }
 

@@ -1,16 +1,17 @@
-//! What is known of a record beside stages, parameters, effects and trials.
+//! What is known of a record in addition to stages, parameters, effects and trials.
+
+use serde::{Deserialize, Serialize};
 
 use crate::problem::{
     checks::{DescriptionError, check_parameter, indices, number},
     column::Column,
-    rows_used::RowsUsed,
     spec::ParameterSpec,
 };
 
-/// The measured motion that slices go by.
+/// The measured motion by which slices are made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<'a> {
-    /// All trials end to end.
+    /// All trials concatenated.
     pub values: &'a [f64],
     /// Unit.
     pub unit: &'a str,
@@ -20,16 +21,18 @@ pub struct Motion<'a> {
     pub rising: &'a str,
 }
 
-/// A signal that was recorded beside the outputs, or is fed to a stage: what a missing term may be a function of.
+/// A signal that was recorded in addition to the outputs, or that is fed to a stage. A missing term
+/// may be a function of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     /// Column.
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Values, all trials end to end; a measured one smoothed as far as its noise allows, for terms use its rate.
+    /// Values, all trials concatenated. A measured signal is smoothed as far as its noise allows,
+    /// because terms use its rate.
     pub values: Vec<f64>,
-    /// Whether it is commanded: it may jump, and its zero means that nothing is done.
+    /// Whether it is a command: it may jump, and zero means that nothing is done.
     pub is_command: bool,
 }
 
@@ -40,7 +43,7 @@ impl Recorded {
     }
 }
 
-/// The motion that a record holds, all trials end to end, and what it is called when it falls and when it rises.
+/// The motion of a record, all trials concatenated, and the words for falling and rising.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionSpec {
     /// Values.
@@ -65,10 +68,11 @@ impl MotionSpec {
     }
 }
 
-/// What is known of a record beside what a [`DescriptionSpec`](crate::DescriptionSpec) says; by default nothing more is known.
+/// What is known of a record in addition to a [`DescriptionSpec`](crate::DescriptionSpec); empty by
+/// default.
 ///
-/// [`Description::with_record`](crate::Description::with_record) checks it. All that has a value for each sample counts the samples of
-/// all trials end to end.
+/// [`Description::with_record`](crate::Description::with_record) checks it. All fields with one
+/// value per sample count the samples of all concatenated trials.
 ///
 /// ```
 /// use stretch_gap::{Description, DescriptionSpec, RecordFacts, StageSpec, TrialSpec};
@@ -90,28 +94,33 @@ impl MotionSpec {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordFacts {
-    /// Samples that were not measured, whatever stands in their place: they count for nothing. Empty where all were measured.
+    /// Samples that were not measured, whatever their value. They do not count. Empty if all were
+    /// measured.
     pub is_lost: Vec<bool>,
-    /// Rows that the trials stand on, of those that were read; none where every sample is a row.
+    /// Number of rows in the trials, and of rows that were read; `None` if every sample is a row.
     pub rows_used: Option<RowsUsed>,
-    /// The motion by which the gap is cut into regimes, levels and rates; none where it is the first stage's output.
+    /// The motion by which the gap is divided into regimes, levels and rates; `None` if it is the
+    /// first stage's output.
     pub motion: Option<MotionSpec>,
-    /// Everything that a missing term may be a function of; empty where that is what the stages are fed with, under the name of the
-    /// channel before, or the motion where they are fed with nothing.
+    /// Everything that a missing term may be a function of. If empty, it is the inputs of the
+    /// stages, named after the previous channel, or the motion if the stages have no inputs.
     pub signals: Vec<Recorded>,
-    /// Columns of the record, without values where they are the output of a stage; empty where there are no others than outputs.
+    /// Columns of the record, without values for the outputs of stages; empty if the outputs are
+    /// the only columns.
     pub columns: Vec<Column<'static>>,
-    /// The stage whose output a user turns back into the motion with a calibration; none where there is no such sensor.
+    /// The stage whose output a user converts back into the motion with a calibration; `None`
+    /// without such a sensor.
     pub sensor: Option<usize>,
-    /// Share of a channel's variance that may be left before the names of effects mean nothing.
+    /// Share of a channel's variance that may be left before names of effects are meaningless.
     pub gross_misfit_share: f64,
-    /// Parameters, by index, that are exact while commands switch at rows of the record, and what they are where commands switch
-    /// anywhere between two rows; the diagnosis weighs both. Empty where commands are not held from row to row.
+    /// Parameters, by index, that are exact if commands switch at rows of the record, and their
+    /// specification if commands switch anywhere between two rows. The diagnosis weighs both. Empty
+    /// if commands are not held from row to row.
     ///
-    /// What differs from switch to switch is [per tick](ParameterSpec::per_tick_sd).
+    /// Differences from switch to switch are given [per tick](ParameterSpec::per_tick_sd).
     pub command_timing: Vec<(usize, ParameterSpec)>,
-    /// Parameters, by index, whose slow drift has no way into the outputs at times: the sample, counted from the trial's start, at which
-    /// it last had one.
+    /// Parameters, by index, whose slow drift cannot reach the outputs at times: for every sample
+    /// the last sample, counted from the trial's start, at which it could.
     pub drift_clocks: Vec<(usize, Vec<u32>)>,
 }
 
@@ -132,13 +141,13 @@ impl Default for RecordFacts {
 }
 
 impl RecordFacts {
-    /// The clock of a parameter's slow drift; none where it always has a way into the outputs.
+    /// The clock of a parameter's slow drift; `None` if the drift always affects the outputs.
     pub(crate) fn drift_clock(&self, parameter: usize) -> Option<&[u32]> {
         let own = self.drift_clocks.iter().find(|(p, _)| *p == parameter)?;
         Some(&own.1)
     }
 
-    /// Whether the facts fit so many stages, parameters, and samples of all trials.
+    /// Checks the facts against the numbers of stages, parameters, and samples of all trials.
     pub(crate) fn check(
         &self,
         stages: usize,
@@ -173,5 +182,26 @@ impl RecordFacts {
         indices(&owner, "stage", self.sensor.as_slice(), stages)?;
         let share = self.gross_misfit_share;
         number(&owner, "gross_misfit_share", share, "above 0", |x| x > 0.0)
+    }
+}
+
+/// Number of rows in the trials, which a diagnosis uses, and of all rows that were read.
+///
+/// ```
+/// let rows = stretch_gap::RowsUsed { used: 120, read: 1000 };
+/// assert_eq!(rows.share(), 0.12);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RowsUsed {
+    /// Rows used.
+    pub used: usize,
+    /// Rows read.
+    pub read: usize,
+}
+
+impl RowsUsed {
+    /// Share of the rows that is used; 1 if there are none.
+    pub fn share(&self) -> f64 {
+        if self.read == 0 { 1.0 } else { self.used as f64 / self.read as f64 }
     }
 }

@@ -1,15 +1,17 @@
-//! Noise of an output from its rests: spans in which whatever drives it stands still.
+//! Noise of an output from its rests: spans in which all its inputs are constant.
 //!
-//! What a recorder adds shows where nothing is done. A model's residual cannot tell it, for it holds what the model gets wrong, and
-//! second differences of the whole record hold every quick motion. So noise is taken from rests alone, without their first [`SETTLES`],
-//! and there from differences of sixth order, which pass white noise and hardly anything that still rings slower than a fifth of the sample rate:
+//! What a recorder adds is visible when nothing happens. A model's residual does not show it,
+//! because it includes the model's errors, and second differences of the whole record include every
+//! quick motion. Therefore noise is estimated only from rests, without their first [`SETTLES`], by
+//! differences of sixth order. These pass white noise and almost nothing that rings slower than a
+//! fifth of the sample rate:
 //!
 //! ```text
 //! sigma^2 = mean over parts of mean (D^6 x)^2 / 924,     gain of D^6 at frequency f: (2 - 2 cos(2 pi f dt))^6
 //! ```
 //!
-//! with 924 = 12!/(6! 6!), the squares of its weights summed. Parts in which more than [`MOVES`] times the median of it is left are still
-//! moving and do not count.
+//! with 924 = 12!/(6! 6!), the sum of the squared weights. Parts in which more than [`MOVES`] times
+//! the median power is left are still moving and do not count.
 
 use std::ops::Range;
 
@@ -19,18 +21,20 @@ use crate::problem::noise::{Noise, take_waves_out};
 const SETTLES: f64 = 1.0 / 3.0;
 /// Samples of a part of a rest.
 const PART: usize = 48;
-/// Parts that determine a level: a tenth in a dozen.
+/// Fewest parts for a level: a dozen determine it to a tenth.
 const FEWEST: usize = 6;
-/// Times the median of the power of all parts from which on a part moves.
+/// A part moves if its power exceeds the median of all parts by this factor.
 const MOVES: f64 = 3.0;
 /// Order of the differences, and the sum of their squared weights.
 const ORDER: (usize, f64) = (6, 924.0);
-/// Squared correlations of sixth differences, summed over all lags: 24!/(12! 12!)/924^2. So many of them say as much as one sample.
+/// Squared correlations of sixth differences, summed over all lags: 24!/(12! 12!)/924^2. That many
+/// differences have the information of one sample.
 const TOGETHER: f64 = 2_704_156.0 / (924.0 * 924.0);
 
 impl Noise {
-    /// Noise of an output over the `trials` that may be looked at, from rests of all its `inputs`; `dt_s` is the sample time, s.
-    /// None where the inputs hardly ever stand still, or where nothing at all changes in the rests.
+    /// Noise of an output over the permitted `trials`, from rests of all its `inputs`; `dt_s` is
+    /// the sample time, s. `None` if the inputs are hardly ever constant, or if the output does not
+    /// change at all in the rests.
     ///
     /// ```
     /// use stretch_gap::{Noise, RandomGenerator};
@@ -82,7 +86,7 @@ fn rests(inputs: &[&[f64]], trial: Range<usize>) -> Vec<Range<usize>> {
     out
 }
 
-/// Variance of white noise that a part holds, waves of the mains left out.
+/// Variance of white noise in a part, without mains hum.
 fn power(part: &[f64], dt_s: f64) -> f64 {
     let mut values = part.to_vec();
     for _ in 0..ORDER.0 {
@@ -101,7 +105,8 @@ mod tests {
     const DT_S: f64 = 0.01;
     const TRIALS: [Range<usize>; 2] = [0..3000, 3000..6000];
 
-    /// Steps that are held for 1.5 s, through a lag of second order, y'' = w^2 (x - y) - 2 damping w y'.
+    /// Steps that are held for 1.5 s, through a lag of second order, y'' = w^2 (x - y) - 2 damping
+    /// w y'.
     fn stepped(hertz: f64, damping: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut random = RandomGenerator::new(9, 0);
         let (w, h) = (std::f64::consts::TAU * hertz, DT_S / 50.0);
@@ -121,7 +126,7 @@ mod tests {
         (command, output)
     }
 
-    /// Second differences of the same record tell a third more.
+    /// Second differences of the same record would give a third more.
     #[test]
     fn noise_is_told_beside_what_rings() {
         for (hertz, damping) in [(1.0, 0.05), (3.0, 0.05), (6.0, 0.05), (3.0, 0.5), (10.0, 0.3)] {

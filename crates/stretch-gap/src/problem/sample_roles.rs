@@ -1,14 +1,14 @@
-//! Which samples are fitted, held out and tested.
+//! Decides which samples are fitted, held out and tested.
 //!
-//! Selection by what was fitted is optimistic, and information criteria alone mislead where models are wrong (Schoniger et al.
-//! 2014, doi 10.1002/2014WR016062): so long trials lend their last part to compare fits on, and test trials are read once, when all
-//! else is decided.
+//! Selection by the fitted data is optimistic, and information criteria alone mislead if models are
+//! wrong (Schoniger et al. 2014, doi 10.1002/2014WR016062). Therefore the last part of long trials
+//! is held out to compare fits, and test trials are read once, after all decisions.
 
 use serde::Serialize;
 
 use crate::problem::{error::GapError, pace, simulator::Simulator, spec::TrialSpec};
 
-/// What a stretch of samples is used for.
+/// The use of a stretch of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -20,49 +20,49 @@ pub enum Role {
     Test,
 }
 
-/// A stretch of one trial in one role; sample numbers count over all trials end to end.
+/// A stretch of one trial in one role; sample numbers count over all concatenated trials.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Segment {
     /// Which trial.
     pub trial: usize,
     /// First sample.
     pub from: usize,
-    /// Sample behind the last.
+    /// One past the last sample.
     pub to: usize,
     /// What the stretch is used for.
     pub role: Role,
 }
 
-/// Length of a block: residuals within one are taken as one observation, s. Of a record whose motion turns more quickly than once a second
-/// a block is half a turn.
+/// Length of a block, s. Residuals within a block count as one observation. If the motion of a
+/// record turns more than once a second, a block is half a turn.
 pub const BLOCK_S: f64 = 0.5;
-/// Trials of at least so many blocks lend their last part to be held out.
+/// Trials of at least so many blocks have a held-out last part.
 const LONG: f64 = 60.0;
 /// Share of a long trial that is held out.
 const HELD: f64 = 0.3;
-/// Share of every trial that is tested on where there is no test trial.
+/// Share of every trial that is used for testing if there is no test trial.
 const TESTED: f64 = 0.25;
 
-/// The session cut into segments.
+/// The session divided into segments.
 #[derive(Debug, Clone)]
 pub struct SampleRoles {
     /// Segments in order of time.
     pub segments: Vec<Segment>,
-    /// Samples a block.
+    /// Samples per block.
     pub block: usize,
-    /// Trials that hold samples to fit, from the first.
+    /// Number of trials, from the first, that contain samples to fit.
     pub fit_trials: usize,
     /// Whether the test samples are the last parts of the trials that are fitted.
     pub borrowed_test: bool,
 }
 
-/// Samples from a trial's start that are not tested on.
+/// Number of samples from a trial's start that are not test samples.
 fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
     let share = if borrowed_test { TESTED } else { 0.0 };
     if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
 }
 
-/// By stage: the parts of its measured output that are not tested on.
+/// By stage: the parts of its measured output that are not test samples.
 fn looked_at(
     simulator: &dyn Simulator,
 ) -> impl Iterator<Item = impl Iterator<Item = &[f64]> + Clone> {
@@ -80,7 +80,8 @@ fn looked_at(
 }
 
 impl SampleRoles {
-    /// By trial: samples from its start that are not tested on, which is all that a simulator may look at before the end.
+    /// By trial: the number of samples from its start that are not test samples. A simulator may
+    /// use only these before the end.
     ///
     /// ```
     /// use stretch_gap::{SampleRoles, TrialSpec};
@@ -94,7 +95,7 @@ impl SampleRoles {
         trials.iter().map(|t| may_fit(t, borrowed_test)).collect()
     }
 
-    /// Cuts a session.
+    /// Divides a session.
     ///
     /// # Errors
     /// [`GapError::TooLittle`] without anything to fit.
@@ -136,7 +137,7 @@ impl SampleRoles {
         Ok(Self { segments, block, fit_trials: last + 1, borrowed_test })
     }
 
-    /// How many samples the first `trials` trials have.
+    /// Number of samples of the first `trials` trials.
     pub fn samples(&self, trials: usize) -> usize {
         self.segments.iter().filter(|s| s.trial < trials).map(|s| s.to).max().unwrap_or(0)
     }
@@ -151,7 +152,7 @@ impl SampleRoles {
         self.count(role) as f64 / self.block as f64
     }
 
-    /// Segments that may be looked at before the end: all but those that are tested on.
+    /// Segments that may be used before the end: all but test segments.
     pub(crate) fn looked_at(&self) -> impl Iterator<Item = &Segment> {
         self.segments.iter().filter(|s| s.role != Role::Test)
     }

@@ -1,4 +1,5 @@
-//! The one trait through which any simulator is diagnosed, and what some simulators can do besides.
+//! The trait through which every simulator is diagnosed, and the optional abilities of some
+//! simulators.
 
 use std::borrow::Cow;
 
@@ -35,7 +36,7 @@ impl Model {
         self.effects.iter().find(|(i, _)| *i == index).map(|(_, values)| values.as_slice())
     }
 
-    /// The same model with one effect more.
+    /// The same model with one more effect.
     pub(crate) fn with(&self, effect: usize, values: &[f64]) -> Self {
         let mut model = self.clone();
         model.effects.push((effect, values.to_vec()));
@@ -52,36 +53,39 @@ pub struct Run<'a> {
     pub model: &'a Model,
     /// Number of the session's trials that are run, from the first.
     pub trials: usize,
-    /// Adds another draw of their noise to the measured inputs, from this seed: shows how much of it arrives at
-    /// the output.
+    /// Adds another draw of their noise to the measured inputs, from this seed, to show how much of
+    /// it arrives at the output.
     pub input_noise: Option<u64>,
-    /// Multiple of the usual step of integration: 0.5 for the check of the solver, 2 where that check allows longer steps.
+    /// Multiple of the usual step of integration: 0.5 for the check of the solver, 2 if that check
+    /// allows longer steps.
     pub step: f64,
-    /// Nominal parameters so near that the output may be taken from the run there and the [linearisation](Costly::linearise), where a
-    /// run costs more than that; none where it has to be exact.
+    /// Nominal parameters near enough that the output may be computed from the run there and the
+    /// [linearisation](Costly::linearise), if a run costs more than that; `None` if the output has
+    /// to be exact.
     pub near: Option<&'a [f64]>,
 }
 
 impl<'a> Run<'a> {
-    /// An exact run on the inputs as they were measured, at the usual step.
+    /// An exact run on the measured inputs, at the usual step.
     pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
         Self { stage, model, trials, input_noise: None, step: 1.0, near: None }
     }
 }
 
-/// Runs of a simulator that are counted, because they cost.
+/// Runs of a costly simulator, which are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ModelRuns {
-    /// Number of runs that were made.
+    /// Number of runs so far.
     pub count: usize,
-    /// Number of runs that may be made, where that is limited.
+    /// Largest number of runs, if it is limited.
     pub budget: Option<usize>,
-    /// Whether no more may be made but those that the answer itself needs; in a diagnosis, whether the search was cut short for it.
+    /// Whether only the runs that the answer itself needs are left; in a diagnosis, whether the
+    /// search was therefore cut short.
     pub is_spent: bool,
 }
 
 impl ModelRuns {
-    /// That the search was cut short, where it was.
+    /// A note that the search was cut short, if it was.
     pub(crate) fn note(&self) -> Option<String> {
         let budget = self.budget.filter(|_| self.is_spent)?;
         Some(format!(
@@ -91,52 +95,57 @@ impl ModelRuns {
     }
 }
 
-/// A simulator bound to the measurements that it is held against.
+/// A simulator and the measurements that it is compared with.
 ///
-/// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
-/// spread to the next. Memories are carried from trial to trial in the order of the session.
+/// Every stage is run alone on its measured input (teacher forcing), so that the error of one stage
+/// does not spread to the next. Memories are carried from trial to trial in the order of the
+/// session.
 ///
-/// Three methods do: [`Simulator::description`], [`Simulator::measured`] and [`Simulator::simulate`]. What else a simulator can
-/// do it shows as one of the small traits behind the other methods, by returning itself: `Some(self)`.
+/// Three methods suffice: [`Simulator::description`], [`Simulator::measured`] and
+/// [`Simulator::simulate`]. Further abilities are small traits. The other methods return the
+/// simulator as such a trait: `Some(self)`.
 pub trait Simulator: Sync {
-    /// Stages, parameters, effects, trials, and what is known of the record, in one.
+    /// Stages, parameters, effects, trials, and facts about the record.
     fn description(&self) -> &Description;
-    /// Measured output of a stage, all trials end to end.
+    /// Measured output of a stage, all trials concatenated.
     fn measured(&self, stage: usize) -> &[f64];
-    /// Simulates a stage on its measured input; effects of other stages in the model are passed over.
+    /// Simulates a stage on its measured input; effects of other stages in the model are ignored.
     ///
-    /// `out` takes the samples of the first `run.trials` trials.
+    /// `out` receives the samples of the first `run.trials` trials.
     ///
     /// # Errors
-    /// When the simulation is not possible with these values: the fit then turns back.
+    /// The simulation is not possible with these values; the fit then rejects the step.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
-    /// Runs in batches, where a batch costs little more than a run; without it runs go side by side on the threads there are.
+    /// Runs in batches, if a batch costs little more than a run; without it runs are parallel on
+    /// the available threads.
     fn batch(&self) -> Option<&dyn Batch> {
         None
     }
-    /// How dear runs are, where each costs enough to be counted and spared.
+    /// The cost of runs, if each is costly enough to be counted and saved.
     fn costly(&self) -> Option<&dyn Costly> {
         None
     }
-    /// Runs on inputs that were not measured, where a stage can be driven by such.
+    /// Runs on unmeasured inputs, if a stage can be driven by them.
     fn driven(&self) -> Option<&dyn Driven> {
         None
     }
-    /// Lines of unknown phase, where an effect leaves such.
+    /// Lines of unknown phase, if an effect leaves such lines.
     fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
         None
     }
 }
 
-/// A simulator for which a batch of runs costs little more than one run: that is what makes its diagnosis fast.
+/// A simulator for which a batch of runs costs little more than one run. This makes its diagnosis
+/// fast.
 pub trait Batch {
-    /// Some runs at once, each as [`Simulator::simulate`] answers it.
+    /// Several runs at once, each with the result of [`Simulator::simulate`].
     ///
-    /// `outs` takes the samples of each run, and is as long as `runs`.
+    /// `outs` receives the samples of each run, and is as long as `runs`.
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>>;
 }
 
-/// Some runs at once, each as [`Simulator::simulate`] answers it: in one batch where the simulator takes batches, else side by side.
+/// Several runs at once, each with the result of [`Simulator::simulate`]: in one batch if the
+/// simulator supports batches, otherwise in parallel.
 pub(crate) fn simulate_many(
     simulator: &dyn Simulator,
     runs: &[Run<'_>],
@@ -148,7 +157,7 @@ pub(crate) fn simulate_many(
     }
 }
 
-/// Some runs on the threads there are.
+/// Several runs on the available threads.
 pub(crate) fn side_by_side(
     simulator: &dyn Simulator,
     runs: &[Run<'_>],
@@ -158,40 +167,41 @@ pub(crate) fn side_by_side(
     pairs.map(|(run, out)| simulator.simulate(*run, out)).collect()
 }
 
-/// A simulator whose runs cost: they are counted, and may be limited.
+/// A simulator with costly runs: they are counted, and may be limited.
 pub trait Costly {
-    /// Runs so far of what is simulated. They are fewer than the simulations of stages where a kept run serves again.
+    /// Runs so far. They are fewer than the simulations of stages if a stored run is used again.
     fn model_runs(&self) -> ModelRuns;
-    /// Whether each value of an effect takes a run of its own, so that sensitivities to the effect are renewed as seldom as those to
-    /// the nominal parameters.
+    /// Whether each value of an effect needs a separate run. Sensitivities to the effect are then
+    /// renewed as seldom as those to the nominal parameters.
     fn is_costly(&self, effect: usize) -> bool;
-    /// Takes sensitivities of a stage to its nominal parameters around a model: from here on, runs that say what they are
-    /// [near to](Run::near) may be answered with them. It is called between searches, never during one, so that the answer does not depend on
-    /// the threads. By default every run stays exact.
+    /// Computes sensitivities of a stage to its nominal parameters around a model. From then on,
+    /// runs that state what they are [near to](Run::near) may be answered with them. It is called
+    /// between searches, never during one, so that the answer does not depend on the threads. By
+    /// default every run stays exact.
     ///
     /// # Errors
-    /// When the simulation is not possible with these values.
+    /// The simulation is not possible with these values.
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
         let _ = (stage, model, trials);
         Ok(())
     }
 }
 
-/// A simulator of which stages can be driven by something else than what was measured.
+/// A simulator whose stages can be driven by other inputs than the measured ones.
 pub trait Driven {
-    /// Measured input of a stage as the stage is fed with it, all trials end to end; none where the input is not the output of the
-    /// stage before.
+    /// Measured input of a stage as it is fed to the stage, all trials concatenated; `None` if the
+    /// input is not the output of the previous stage.
     fn input(&self, stage: usize) -> Option<Vec<f64>>;
-    /// As [`Simulator::simulate`] on an input that was not measured; says whether the stage can.
+    /// As [`Simulator::simulate`] on an unmeasured input; returns whether the stage supports this.
     ///
     /// # Errors
-    /// When the simulation is not possible with these values.
+    /// The simulation is not possible with these values.
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError>;
-    /// The same simulator driven by a record of which one column is corrected, its error undone; none where that column drives no
-    /// stage. What was measured of the stages' outputs may stay as it is.
+    /// The same simulator driven by a record in which the error of one column is corrected; `None`
+    /// if that column drives no stage. The measurements of the stages' outputs may stay unchanged.
     ///
     /// # Errors
-    /// When the corrected column cannot drive the simulator.
+    /// The corrected column cannot drive the simulator.
     fn corrected(
         &self,
         column: &str,
@@ -201,11 +211,12 @@ pub trait Driven {
 
 /// A simulator with effects that leave a line of known strength and unknown phase in an output.
 pub trait SpectralLines {
-    /// Lines that a model leaves in the output of a stage where it is not fitted; see [`Line`].
+    /// Lines that a model leaves in the output of a stage on samples that are not fitted; see
+    /// [`Line`].
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line>;
 }
 
-/// Short ways to what the [description](Simulator::description) of any simulator says.
+/// Shortcuts to the [description](Simulator::description) of any simulator.
 impl dyn Simulator + '_ {
     /// Stages of the simulator.
     pub fn stages(&self) -> &[StageSpec] {
@@ -227,12 +238,12 @@ impl dyn Simulator + '_ {
     pub fn dt_s(&self) -> f64 {
         self.description().dt_s
     }
-    /// What is known of the record beside the description's lists.
+    /// What is known of the record in addition to the description's lists.
     pub fn record(&self) -> &RecordFacts {
         self.description().record()
     }
-    /// The motion by which the gap is cut into regimes, levels and rates: the first stage's output unless the
-    /// [record](RecordFacts::motion) has another.
+    /// The motion by which the gap is divided into regimes, levels and rates: the first stage's
+    /// output unless the [record](RecordFacts::motion) has another.
     pub fn motion(&self) -> Motion<'_> {
         match &self.record().motion {
             Some(motion) => motion.as_ref(),

@@ -1,4 +1,5 @@
-//! What a simulator is made of, entry by entry: stages, parameters with tolerances, effects, trials.
+//! The structure of a simulator, entry by entry: stages, parameters with tolerances, effects,
+//! trials.
 //!
 //! Entries are plain data; [`Description::new`](crate::Description::new) checks them together.
 
@@ -12,18 +13,19 @@ use crate::problem::noise::Noise;
 pub struct StageSpec {
     /// Name in reports.
     pub name: String,
-    /// Output channel: the column that it is held against.
+    /// Output channel: the column that it is compared with.
     pub channel: String,
     /// Unit of the output.
     pub unit: String,
     /// Indices of the nominal parameters that act in it.
     pub parameters: Vec<usize>,
-    /// Noise of the output, rounding included; none when it has to be taken from the record's second differences.
+    /// Noise of the output, including rounding; `None` if it has to be estimated from the record's
+    /// second differences.
     pub noise: Option<Noise>,
 }
 
 impl StageSpec {
-    /// A stage whose noise is taken from the record.
+    /// A stage whose noise is estimated from the record.
     pub fn new(name: &str, channel: &str, unit: &str, parameters: &[usize]) -> Self {
         Self {
             name: name.into(),
@@ -35,10 +37,12 @@ impl StageSpec {
     }
 }
 
-/// A slow drift of a parameter around its value that nobody models: it belongs to the noise.
+/// A slow drift of a parameter around its value that the simulator does not model. It belongs to
+/// the noise.
 ///
-/// An Ornstein-Uhlenbeck process of about the standard deviation `sd` and the correlation time `correlation_s`: both are
-/// looked for in the record, around these within factors of some two and three.
+/// An Ornstein-Uhlenbeck process of about the standard deviation `sd` and the correlation time
+/// `correlation_s`. Both are estimated from the record, within factors of about two and three
+/// around these values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SlowDrift {
     /// Standard deviation, in the parameter's unit.
@@ -59,18 +63,19 @@ pub struct ParameterSpec {
     /// Tolerance, one standard deviation in the parameter's unit; 0 when exact. The re-tuned value stays within
     /// three of them.
     pub sd: f64,
-    /// Least value that makes sense.
+    /// Smallest plausible value.
     pub least: f64,
-    /// Greatest value that makes sense.
+    /// Largest plausible value.
     pub greatest: f64,
     /// Slow drift within a trial, when there is one.
     pub drift: Option<SlowDrift>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
     pub per_trial_sd: Option<f64>,
-    /// Standard deviation of an offset of its own for each tick of its [drift clock](crate::RecordFacts::drift_clocks), in the
-    /// parameter's unit: what differs from event to event.
+    /// Standard deviation of an independent offset for each tick of its [drift
+    /// clock](crate::RecordFacts::drift_clocks), in the parameter's unit: what differs from event
+    /// to event.
     pub per_tick_sd: Option<f64>,
-    /// Whether its re-tuned value says anything by itself (not when others can stand in for it).
+    /// Whether its re-tuned value is evidence (it is not if others can compensate for it).
     pub is_evidence: bool,
 }
 
@@ -97,29 +102,31 @@ impl ParameterSpec {
     }
 }
 
-/// Share of its range within which a parameter stands at an end of it.
+/// A parameter is at an end of its range if its distance is at most this share of the range.
 const AT_END: f64 = 1e-3;
 
-/// An effect that the nominal simulator leaves out.
+/// An effect that the nominal simulator lacks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectSpec {
     /// Name in reports.
     pub name: String,
-    /// Stage that it belongs to, in the vocabulary of reports.
+    /// Stage that it belongs to, as named in reports.
     pub stage: String,
     /// Indices of the stages whose output it changes.
     pub touches: Vec<usize>,
     /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
-    /// Values to screen it at, a few per shape and threshold; strengths in between are interpolated.
+    /// Values for screening, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
-    /// Whether its course is found in the record: its size then only says how much is looked for.
+    /// Whether its course is found in the record. Its size then only says how much is searched.
     pub is_found: bool,
-    /// Whether it is a law of session time, so that trials outside the time that was fitted are extrapolated.
+    /// Whether it is a law of session time, so that trials outside the fitted time are
+    /// extrapolated.
     pub drifts: bool,
-    /// Names of effects that are hard to tell from it.
+    /// Names of effects that are hard to distinguish from it.
     pub twins: Vec<String>,
-    /// Another stage whose measured output it reads, errors and all: what it explains by them are errors that two outputs share.
+    /// Another stage whose measured output it reads, including errors. What it explains by these
+    /// errors is the common error of two outputs.
     pub reads: Option<usize>,
 }
 
@@ -150,8 +157,8 @@ impl EffectSpec {
         }
     }
 
-    /// Whether a size stands at an end of its range where the effect is not off: it stands in for something
-    /// else then.
+    /// Whether a size is at an end of its range, and this end is not "off". The effect then
+    /// compensates for something else.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
         let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted());
         fitted.any(|(p, value)| {
@@ -159,13 +166,14 @@ impl EffectSpec {
                 true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
-            // A time beyond its range is still that of a memory; a size beyond it is another cause's.
+            // A time constant beyond its range still belongs to a memory; a size beyond its range
+            // belongs to another cause.
             p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
         }) && !self.is_found
     }
 }
 
-/// What is known of a trial.
+/// Facts about a trial.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrialSpec {
     /// Name in reports.
@@ -179,7 +187,7 @@ pub struct TrialSpec {
 }
 
 impl TrialSpec {
-    /// A trial that began at a session time, s, to be fitted or tested on.
+    /// A trial that began at a session time, s, to be fitted or tested.
     pub fn new(name: &str, samples: usize, start_s: f64, is_test: bool) -> Self {
         Self { name: name.into(), samples, start_s, is_test }
     }

@@ -1,19 +1,20 @@
-//! A line of known strength and unknown phase, where nothing may be fitted: judged by its power.
+//! A line of known strength and unknown phase, for samples where nothing may be fitted: it is
+//! judged by its power.
 //!
-//! A model that holds a hum of amplitude a foretells how strong its line is, not where its waves lie. In each second the residual r, in
-//! multiples of the noise s, then has the covariance
+//! A model that contains a hum of amplitude a predicts how strong its line is, but not its phase.
+//! In each second the residual r, in multiples of the noise s, then has the covariance
 //!
 //! ```text
 //! V = I + C C',     C = (a/sqrt 2) (cos(2 pi f t_i)/s_i, sin(2 pi f t_i)/s_i)
 //! ```
 //!
-//! both quadratures normal of variance a^2/2. The residual is levelled to V^-1/2 r, with the symmetric root: its mean square is 1 where
-//! the line is as strong as was foretold, larger where it is stronger, and nothing of the residual was fitted. Whatever is not in
-//! the line stays as it is.
+//! with both quadratures normal of variance a^2/2. The residual is whitened to V^-1/2 r, with the
+//! symmetric root. Its mean square is 1 if the line is as strong as predicted, larger if it is
+//! stronger, and nothing of the residual was fitted. Components outside the line do not change.
 
 use std::f64::consts::TAU;
 
-/// A sine of known frequency and amplitude whose phase nothing tells.
+/// A sine of known frequency and amplitude and unknown phase.
 ///
 /// ```
 /// use stretch_gap::Line;
@@ -33,12 +34,12 @@ pub struct Line {
     pub amplitude: f64,
 }
 
-/// Time over which the phase is steady, s.
+/// Time over which the phase is constant, s.
 const STEADY_S: f64 = 1.0;
 
 impl Line {
-    /// Levels a residual in multiples of the noise without a break; `noise` is one standard deviation at every sample, in the unit of the
-    /// output, `dt_s` the sample time, s.
+    /// Whitens a residual in multiples of the noise without a break; `noise` is one standard
+    /// deviation at every sample, in the unit of the output, `dt_s` the sample time, s.
     pub fn level(&self, residual: &mut [f64], noise: &[f64], dt_s: f64) {
         let window = ((STEADY_S / dt_s) as usize).max(8);
         for (r, sd) in residual.chunks_mut(window).zip(noise.chunks(window)) {
@@ -65,7 +66,7 @@ impl Line {
     }
 }
 
-/// Axes of C C' and the variance along each: the eigenvectors of the 2 x 2 matrix C'C, carried over by C.
+/// Axes of C C' and the variance along each: the eigenvectors of the 2 x 2 matrix C'C, mapped by C.
 fn principal([c, s]: &[Vec<f64>; 2]) -> Vec<(Vec<f64>, f64)> {
     let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
     let (cc, cs, ss) = (product(c, c), product(c, s), product(s, s));
@@ -75,7 +76,7 @@ fn principal([c, s]: &[Vec<f64>; 2]) -> Vec<(Vec<f64>, f64)> {
         .into_iter()
         .filter_map(|(p, q)| {
             let variance = p * p * cc + 2.0 * p * q * cs + q * q * ss;
-            // At half the sample rate there is one quadrature only.
+            // At half the sample rate there is only one quadrature.
             (variance > 1e-9 * (cc + ss)).then(|| {
                 let axis = c.iter().zip(s).map(|(c, s)| (p * c + q * s) / variance.sqrt());
                 (axis.collect(), variance)
@@ -90,7 +91,7 @@ mod tests {
     use crate::numerics::random::RandomGenerator;
     use testkit::tolerance::MEDIAN_SPREAD;
 
-    fn left(hertz: f64, amplitude: f64, foretold: f64) -> f64 {
+    fn left(hertz: f64, amplitude: f64, predicted: f64) -> f64 {
         let mut random = RandomGenerator::new(3, 0);
         let mut sum = 0.0;
         let seconds = 200;
@@ -98,20 +99,21 @@ mod tests {
             let phase = TAU * f64::from(second) * 0.618;
             let wave = |i: usize| amplitude * libm::sin(TAU * hertz * 0.01 * i as f64 + phase);
             let mut r: Vec<f64> = (0..100).map(|i| wave(i) + random.gauss()).collect();
-            Line { hertz, amplitude: foretold }.level(&mut r, &[1.0; 100], 0.01);
+            Line { hertz, amplitude: predicted }.level(&mut r, &[1.0; 100], 0.01);
             sum += r.iter().map(|r| r * r).sum::<f64>() / 100.0;
         }
         sum / f64::from(seconds)
     }
 
     #[test]
-    fn a_line_as_strong_as_foretold_is_no_gap_and_a_stronger_one_is() {
-        // At 50 Hz of 100 a hum of that power shows once a second, as large as the sine of its phase.
+    fn a_line_as_strong_as_predicted_is_no_gap_and_a_stronger_one_is() {
+        // At 50 of 100 Hz a hum of that power is visible once a second, as large as the sine of its
+        // phase.
         for hertz in [50.0, 60.0] {
             approx::assert_relative_eq!(left(hertz, 5.0, 5.0), 1.0, max_relative = MEDIAN_SPREAD);
         }
         assert!(left(60.0, 50.0, 5.0) > 2.0);
-        // What is foretold and absent takes its own two components of a hundred, no more.
+        // A line that is predicted but absent removes only its own two components of a hundred.
         assert!(left(60.0, 0.0, 50.0) > 0.95);
     }
 

@@ -1,4 +1,4 @@
-//! Stages that hang together, runs that are counted, and tolerances told another way, on toys.
+//! Dependent stages, counted runs, and tolerances in another form, on toys.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,10 +24,10 @@ fn stages_that_share_a_fitted_parameter_are_one_group() {
     toy.shared = vec![(2, 0)];
     assert_eq!(groups(&toy.measured(1)), [vec![0, 2], vec![1]]);
     assert_eq!(linked(&toy.measured(1), &[2]), [0, 2]);
-    // An exact parameter is fitted nowhere, and ties nothing.
+    // An exact parameter is not fitted, and links nothing.
     toy.parameters[0].sd = 0.0;
     assert_eq!(groups(&toy.measured(1)), [vec![0], vec![1], vec![2]]);
-    // Through the second stage all three hang together.
+    // All three are linked through the second stage.
     toy.parameters[0].sd = 0.05;
     toy.shared = vec![(1, 0), (2, 0)];
     assert_eq!(groups(&toy.measured(1)), [vec![0, 1, 2]]);
@@ -52,7 +52,7 @@ fn runs_are_counted_and_none_is_made_once_stopped() {
     assert_eq!(record.runs(), 5);
 }
 
-/// A run over the first trials is the beginning of one over all.
+/// A run over the first trials equals the beginning of a run over all.
 #[test]
 fn a_run_over_fewer_trials_is_the_same_up_to_there() {
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {

@@ -1,20 +1,25 @@
-//! What a look at the columns alone says, before any simulation: copied, dead and stuck channels.
+//! Checks of the columns alone, before any simulation: copied, dead and stuck channels.
 //!
-//! Every test asks whether *noise* can be what was recorded. Noise of standard deviation s is found by differences of second and of
-//! fourth order, which pass white noise alike and what moves slowly not at all:
+//! Every test asks whether *noise* can explain the recording. The standard deviation s of noise is
+//! estimated by differences of second and of fourth order, which pass white noise equally and slow
+//! motion not at all:
 //!
 //! ```text
 //! s2^2 = median(d2^2)/(6 * 0.4549),   s4^2 = median(d4^2)/(70 * 0.4549),   white where s4 is about s2
 //! ```
 //!
-//! * copied: the line of one column over another leaves less than half of what two independent noises would, and the second
-//!   differences of the two go together: a hum in one of them would pass for its noise;
-//! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less); what repeats itself
-//!   within ten samples is no noise but motion of few samples a turn, the hum of the mains aside;
-//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records, while
-//!   another moves. A sensor behind a play or a dead band repeats itself as well where it shows no noise: such a stretch counts only if
-//!   its column has white noise, which no play takes away; or jumps at its end, for what comes out of a play moves on from where it
-//!   stood; or if another column goes through more of its range than any play takes up.
+//! * copied: the residual of one column regressed on another is less than half of what two
+//!   independent noises would leave, and the second differences of the two are correlated. The
+//!   second condition is needed because a hum in one of them would pass for its noise.
+//! * dead: a column stays within its noise while another goes through most of its range (a loose
+//!   sleeve hides less). What repeats within ten samples is not noise but motion with few samples
+//!   per turn, except mains hum.
+//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would
+//!   do so once in a billion records, while another column moves. A sensor behind a play or a dead
+//!   band also repeats values if it shows no noise. Such a stretch counts only if its column has
+//!   white noise, which no play removes; or if it jumps at its end, because the output of a play
+//!   moves on from its last value; or if another column goes through more of its range than any
+//!   play takes up.
 
 use stretch_data::ends;
 
@@ -23,28 +28,29 @@ use crate::{
     record::{fault::DELAY_S, gross::Gross},
 };
 
-/// Share of independent noise's standard deviation that a copy leaves at most.
+/// Largest share of independent noise's standard deviation that a copy leaves.
 const COPY: f64 = 0.5;
-/// Correlation of second differences from which they are of one noise.
+/// Correlation of second differences from which two columns have the same noise.
 const ALIKE: f64 = 0.9;
-/// Ratios of s4 to s2 of what is white.
+/// Ratios of s4 to s2 of white noise.
 const WHITE: (f64, f64) = (0.7, 1.4);
-/// Share of its range that another column goes through while one is dead.
+/// Share of its range that another column covers while one is dead.
 const RANGE: f64 = 0.8;
-/// Standard deviations of a block's mean within which a dead column keeps.
+/// Standard deviations of a block's mean within which a dead column stays.
 const KEEPS: f64 = 4.0;
 /// Samples of such a block.
 const BLOCK: usize = 10;
 /// Autocorrelation, at the lags of a block, that no noise has.
 const REPEATS: f64 = 0.5;
-/// Share of its range that another column moves by, at least, while one is stuck.
+/// Smallest share of its range by which another column moves while one is stuck.
 const MOVES: f64 = 0.3;
-/// Times the greatest step of all but a thousandth by which a column jumps when it is stuck no more.
+/// A column jumps at the end of a stuck stretch if the step exceeds the largest step of all but a
+/// thousandth by this factor.
 const JUMP: f64 = 3.0;
-/// ln of the probability that noise repeats itself like that.
+/// ln of the probability that noise repeats itself in this way.
 const CHANCE: f64 = -20.7;
 
-/// Everything that is wrong with the columns of a session; empty, as a rule.
+/// Everything that is wrong with the columns of a session; usually empty.
 pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
     let own: Vec<&Column<'_>> = columns.iter().filter(|c| !c.values.is_empty()).collect();
     let mut out = Vec::new();
@@ -104,10 +110,11 @@ fn noise(values: &[f64]) -> (f64, f64) {
     (of(&[1.0, -2.0, 1.0]), of(&[1.0, -4.0, 6.0, -4.0, 1.0]))
 }
 
-/// Factor by which column `b` is a copy of column `a`, noise and all; none where it is none.
+/// Factor by which column `b` is a copy of column `a`, including noise; `None` if it is no copy.
 ///
-/// Two channels of independent noise leave sqrt(s_b^2 + factor^2 s_a^2) when one is laid over the other; a copy leaves nothing but
-/// rounding. Where there is no white noise nothing is said: a good sensor would look the same.
+/// The residual of two channels of independent noise is sqrt(s_b^2 + factor^2 s_a^2); a copy leaves
+/// only rounding. Without white noise there is no answer, because a good sensor would look the
+/// same.
 ///
 /// ```
 /// use stretch_gap::{RandomGenerator, copied};
@@ -152,7 +159,7 @@ fn alike(a: &[f64], b: &[f64]) -> f64 {
     ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Whether one of the others moves by a share of its range within a stretch.
+/// Whether another column moves by a share of its range within a stretch.
 fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> bool {
     others.iter().any(|other| {
         let ((low, high), (a, b)) = (ends(*other), ends(&other[from..to]));
@@ -160,7 +167,7 @@ fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> boo
     })
 }
 
-/// Stretches in which a column is noise only while another goes through its range.
+/// Stretches in which a column is only noise while another covers its range.
 fn dead(
     values: &[f64],
     others: &[&[f64]],
@@ -182,7 +189,8 @@ fn dead(
             let next = if i < blocks { mean(i) } else { f64::INFINITY };
             if high.max(next) - low.min(next) > reach {
                 let run = (begin + first * BLOCK, begin + i * BLOCK);
-                // Late is not dead: so far from its ends the others stand still if it is only that.
+                // Late is not dead: with only a delay, the other columns are still this far from
+                // the ends of the run.
                 let inner = (run.0 + late, run.1.saturating_sub(late));
                 let is_seen = inner.1 > inner.0 && others_move(others, inner, RANGE);
                 if is_seen && !repeats_itself(&values[run.0..run.1], dt_s) {
@@ -197,8 +205,8 @@ fn dead(
     out
 }
 
-/// Whether a stretch repeats itself at a lag of a block or less, or turns over, as what moves does: |r_k| above [`REPEATS`] with
-/// r_k = sum x_i x_(i+k) / sum x_i^2 about the mean, the waves of the mains taken out.
+/// Whether a stretch repeats itself at a lag of a block or less, or reverses, as motion does: |r_k|
+/// above [`REPEATS`] with r_k = sum x_i x_(i+k) / sum x_i^2 about the mean, without mains hum.
 fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let mut apart: Vec<f64> = values.iter().map(|x| x - mean).collect();
@@ -223,7 +231,7 @@ fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(u
         }
     }
     runs.sort_by_key(|(from, to)| std::cmp::Reverse(to - from));
-    // What repeats itself elsewhere: the longest runs are those in doubt.
+    // Repetitions elsewhere: the longest runs are the doubtful ones.
     let doubted = |(from, to): &(usize, usize)| to - from > 20;
     let (mut equal, mut all) = (1.0, 2.0);
     for (from, to) in runs.iter().filter(|run| !doubted(run)) {
@@ -254,7 +262,7 @@ fn shows_noise(values: &[f64]) -> bool {
     (WHITE.0 * s2..=WHITE.1 * s2).contains(&s4) && s2 > step
 }
 
-/// The greatest change from one sample to the next, a thousandth of all left out.
+/// The largest change from one sample to the next, without a thousandth of all.
 fn greatest_step(values: &[f64]) -> f64 {
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let at = steps.len() * 999 / 1000;
@@ -284,11 +292,11 @@ mod tests {
         let copy: Vec<f64> = a.iter().map(|x| 3.0 - 2.0 * x).collect();
         assert!(copied(&a, &copy).is_some_and(|factor| (factor + 2.0).abs() < 1e-3));
         assert_eq!(copied(&a, &b), None);
-        // A hum that is larger than what the line leaves is no copy either.
+        // A hum larger than the residual of the line is no copy either.
         let hum = |i: usize| if i.is_multiple_of(2) { 0.2 } else { -0.2 };
         let humming: Vec<f64> = b.iter().enumerate().map(|(i, x)| x + hum(i)).collect();
         assert_eq!(copied(&a, &humming), None);
-        // Without noise nothing tells a copy from a sensor that is as good as that.
+        // Without noise a copy cannot be distinguished from an equally good sensor.
         let smooth: Vec<f64> = (0..N).map(|i| 10.0 * (5e-3 * i as f64).sin()).collect();
         assert_eq!(copied(&smooth, &smooth), None);
     }
@@ -302,13 +310,14 @@ mod tests {
         died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * random.gauss());
         let found = dead(&died, &[&other], &trials, DT_S);
         assert!(matches!(found[..], [(from, to)] if from >= N / 2 - BLOCK && to == N), "{found:?}");
-        // Half of the stroke is not seen.
+        // Half of the stroke is invisible.
         let slack: Vec<f64> =
             wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * random.gauss()).collect();
         assert_eq!(dead(&slack, &[&other], &trials, DT_S), []);
     }
 
-    /// Seven samples a turn look like noise to differences; a broken wire that hums is dead all the same.
+    /// Seven samples per turn look like noise to differences; a broken wire that hums is
+    /// nevertheless dead.
     #[test]
     fn quick_motion_is_not_dead_and_a_humming_wire_is() {
         let other = wave(0.05, 1);
@@ -336,7 +345,8 @@ mod tests {
         );
         let railed: Vec<f64> = wave(0.05, 2).iter().map(|x| x.min(5.0)).collect();
         assert_eq!(stuck(&railed, &[&other], &trials), []);
-        // Behind a play of a third of the way, read by a coarse encoder, it stands at every turn and moves on from there.
+        // Behind a play of a third of the range, read by a coarse encoder, it is constant at every
+        // turn and then moves on from its last value.
         let step = |x: f64| (20.0 * x).round() / 20.0;
         let mut at = 0.0_f64;
         let behind = |x: &f64| {
@@ -345,13 +355,13 @@ mod tests {
         };
         let played: Vec<f64> = wave(0.0, 2).iter().map(behind).collect();
         assert_eq!(stuck(&played, &[&other], &trials), []);
-        // The same encoder, stuck: it jumps to where the rest has gone.
+        // The same encoder, stuck: it jumps to where the others have gone.
         let mut held: Vec<f64> = wave(0.0, 2).iter().map(|x| step(*x)).collect();
         let value = held[1000];
         held[1000..1300].iter_mut().for_each(|x| *x = value);
         let found = stuck(&held, &[&other], &trials);
         assert!(matches!(found[..], [(from, to)] if from <= 1000 && to >= 1300), "{found:?}");
-        // A converter of few bits repeats itself all the time.
+        // A converter of few bits repeats values all the time.
         let coarse: Vec<f64> = wave(0.05, 2).iter().map(|x| (2.0 * x).round() / 2.0).collect();
         assert_eq!(stuck(&coarse, &[&other], &trials), []);
     }

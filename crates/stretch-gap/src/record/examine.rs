@@ -1,4 +1,5 @@
-//! Every error of the record and of the rig file, looked at; those that could explain most of a gap, fitted.
+//! Examines every error of the record and of the rig file, and fits those that could explain most
+//! of a gap.
 
 use std::collections::BTreeMap;
 
@@ -17,38 +18,42 @@ use crate::{
     },
     record::{
         fault::{Kind, span},
+        gross::allowed_gap,
         screen::{Bench, END, Promising, REACH},
         suspect::Suspect,
-        weigh::allowed,
     },
     search::{screen::Ground, selection::Found},
 };
 
-/// Share of the gap of the stages that it touches which an error must promise: it is exact, and a look at it nearly so.
+/// Share of the gap of its stages that an error must promise. An error has an exact form, and its
+/// screen is nearly exact.
 const MOST: f64 = 0.5;
-/// Share of the fall of the most promising that others must promise.
+/// Share of the most promising gain that others must promise.
 const NEAR: f64 = 0.5;
-/// Errors that are fitted at most.
+/// Largest number of errors that are fitted.
 const FITTED: usize = 4;
-/// Errors that are fitted to the end after a coarse fit.
+/// Number of errors that are fitted to the end after a coarse fit.
 const POLISHED: usize = 2;
-/// Least scale and offset (a share of the span) that are reported: an instrument is that good.
+/// Smallest scale and offset (as a share of the span) that are reported, because instruments are
+/// that accurate.
 const LEAST: f64 = 0.03;
-/// Least delay that is reported, in samples: less is when within a sample a channel is read.
+/// Smallest delay that is reported, in samples, because a channel may be read anywhere within a
+/// sample.
 const LEAST_SAMPLES: f64 = 2.0;
 /// Standard deviations by which a size must lie beyond what is allowed.
 const SURE: f64 = 3.0;
 
-/// Errors that were looked at, and those of them that were fitted, each with the nominal parameters.
+/// Errors that were examined, and those that were fitted, each with the nominal parameters.
 #[derive(Debug, Default)]
 pub(crate) struct Doubts {
     looked: Vec<Promising>,
-    /// Larger than what tolerances, instruments and effects stand for; the best first.
+    /// Errors that tolerances, instruments and effects do not cover; the best first.
     pub(crate) errors: Vec<Hypothesis>,
 }
 
 impl Doubts {
-    /// Looks at every error, and fits those that could explain most of a gap; `problem` is one of the suspect.
+    /// Examines every error, and fits those that could explain most of a gap; `problem` is that of
+    /// the suspect.
     pub(crate) fn of(
         problem: &PreparedProblem<'_>,
         suspect: &Suspect<'_>,
@@ -64,7 +69,7 @@ impl Doubts {
         let all: Result<Vec<Option<Promising>>, GapError> =
             (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
         let looked: Vec<Promising> = all?.into_iter().flatten().collect();
-        // A fall counts as a score does: by the samples of an observation.
+        // A gain counts as a score does: by the samples per observation.
         let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
         let counts = |p: &&Promising| p.share > MOST && p.fall > least;
         let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
@@ -77,7 +82,8 @@ impl Doubts {
         Ok(Self { looked, errors })
     }
 
-    /// Looks closer where the best set of effects leaves more than form may, or parameters stand at their ends.
+    /// Searches more closely if the best set of effects leaves more than discrepancy may, or if
+    /// parameters are at their bounds.
     pub(crate) fn closer_if(
         mut self,
         problem: &PreparedProblem<'_>,
@@ -86,14 +92,16 @@ impl Doubts {
         thresholds: &Thresholds,
     ) -> Result<Self, GapError> {
         let best = &found.best;
-        if problem.gap(best) > allowed(problem, thresholds) || is_strained(problem, &best.model) {
+        if problem.gap(best) > allowed_gap(problem, thresholds) || is_strained(problem, &best.model)
+        {
             self.closer(problem, suspect, best)?;
         }
         Ok(self)
     }
 
-    /// A straight line says little of a large error, so those in the stage where most is left are fitted coarsely from the rig as
-    /// shipped, and the best of them to the end.
+    /// A linearisation says little about a large error. Therefore errors in the stage with the
+    /// largest residual are fitted coarsely from the rig as shipped, and the best of them to the
+    /// end.
     fn closer(
         &mut self,
         problem: &PreparedProblem<'_>,
@@ -137,7 +145,8 @@ fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> 
     found
 }
 
-/// Whether a parameter of a model that is evidence stands at an end of its tolerances, or any two of one stage.
+/// Whether a parameter of a model that is evidence is at an end of its tolerances, or any two of
+/// one stage are.
 fn is_strained(problem: &PreparedProblem<'_>, model: &Model) -> bool {
     let specs = problem.simulator().parameters();
     let at_end = |p: &usize| {
@@ -180,7 +189,8 @@ fn fitted(
     Ok(found)
 }
 
-/// Whether the error of a model, known to `sd`, is larger than what tolerances, instruments and effects of the catalogue stand for.
+/// Whether the error of a model, known to `sd`, is larger than tolerances, instruments and effects
+/// of the catalogue cover.
 fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
     let Some((fault, size)) = suspect.error_of(model) else { return false };
     let column = fault.column.map(|c| &suspect.columns()[c]);

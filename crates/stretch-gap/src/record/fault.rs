@@ -1,4 +1,5 @@
-//! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
+//! The hypotheses: one error of the record or of the rig file each, as an effect with one
+//! parameter.
 
 use stretch_data::ends;
 use stretch_effects::{EffectParameter, Role};
@@ -9,15 +10,16 @@ use crate::problem::{
     spec::EffectSpec,
 };
 
-/// Factors that are looked for, as deviations from 1.
+/// Factors that are searched, as deviations from 1.
 const FACTORS: (f64, f64) = (-0.95, 9.0);
-/// Powers of ten around which factors of an output are looked for beside those around 1: a simulator in other units.
+/// Powers of ten around which factors of an output are searched, in addition to 1: a simulator in
+/// other units.
 const DECADES: [i32; 8] = [-4, -3, -2, -1, 1, 2, 3, 4];
-/// Factors that stand nearest to a power of ten: a third to three times it.
+/// Factors nearest to a power of ten: a third to three times it.
 const NEAREST: (f64, f64) = (0.316, 3.163);
-/// Offsets that are looked for, in spans of the column.
+/// Offsets that are searched, in spans of the column.
 const SPANS: f64 = 20.0;
-/// Delays that are looked for, s.
+/// Delays that are searched, s.
 pub(crate) const DELAY_S: f64 = 2.0;
 
 /// What is wrong.
@@ -35,18 +37,18 @@ pub(crate) enum Kind {
     Parameter(usize),
 }
 
-/// One error, its size left open.
+/// One error of unknown size.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub(crate) kind: Kind,
-    /// Which column; none for a parameter.
+    /// Which column; `None` for a parameter.
     pub(crate) column: Option<usize>,
     /// Stages whose simulation it changes.
     pub(crate) touches: Vec<usize>,
     name: String,
     unit: String,
     range: (f64, f64),
-    /// Factor that a size of 0 stands for.
+    /// Scale factor at size 0.
     base: f64,
 }
 
@@ -57,7 +59,7 @@ impl Fault {
             columns.iter().enumerate().flat_map(|(i, column)| Self::of_column(i, column)).collect();
         let stages = simulator.stages();
         for (p, spec) in simulator.parameters().iter().enumerate() {
-            // A factor says nothing of what is 0.
+            // A factor is meaningless for 0.
             if spec.sd > 0.0 && spec.nominal != 0.0 {
                 let acts = |s: &usize| stages[*s].parameters.contains(&p);
                 all.push(Self {
@@ -107,7 +109,7 @@ impl Fault {
         near.chain(decades).filter(|f| f.range.0 < f.range.1).collect()
     }
 
-    /// Size of the scale that a factor stands for; none where another scale stands nearer to it.
+    /// Size on this scale that corresponds to a factor; `None` if another scale is nearer to it.
     pub(crate) fn of_factor(&self, factor: f64) -> Option<f64> {
         let share = factor / self.base;
         let is_own = match self.base == 1.0 {
@@ -120,7 +122,7 @@ impl Fault {
         is_own.then_some(share - 1.0)
     }
 
-    /// Whether it stands for factors that no sensor errs by.
+    /// Whether its factors are larger than any error of a sensor.
     pub(crate) fn is_beyond(&self) -> bool {
         self.base != 1.0
     }
@@ -130,7 +132,7 @@ impl Fault {
         self.base * (1.0 + size)
     }
 
-    /// As the engine fits it.
+    /// The effect that the engine fits.
     pub(crate) fn spec(&self) -> EffectSpec {
         let (least, greatest) = self.range;
         let mut strength = EffectParameter::sized("size", &self.unit, least..=greatest);
@@ -149,7 +151,7 @@ impl Fault {
         size.clamp(self.range.0, self.range.1)
     }
 
-    /// What a size does to its column.
+    /// Effect of a size on its column.
     pub(crate) fn distortion(&self, size: f64) -> Distortion {
         let none = Distortion::default();
         match self.kind {
@@ -162,7 +164,7 @@ impl Fault {
     }
 }
 
-/// Greatest less least.
+/// Largest minus smallest value.
 pub(crate) fn span(values: &[f64]) -> f64 {
     let (low, high) = ends(values);
     (high - low).max(0.0)

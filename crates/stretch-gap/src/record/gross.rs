@@ -1,6 +1,13 @@
-//! What an error of the record or of the rig file says of itself in a diagnosis.
+//! Errors of the record and of the rig file as a diagnosis reports them, and how they are weighed against effects.
 
 use serde::{Deserialize, Serialize};
+
+use crate::{
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
+    problem::thresholds::Thresholds,
+    record::suspect::Suspect,
+    search::selection::Found,
+};
 
 /// What may be wrong with a record or a rig file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -8,7 +15,8 @@ use serde::{Deserialize, Serialize};
 pub enum GrossKind {
     /// A column is too large by a factor.
     Scale,
-    /// Simulator and record differ by a factor that no sensor need err by: other units, or parameters that may not move.
+    /// Simulator and record differ by a factor that no sensor error explains: other units, or fixed
+    /// parameters.
     Factor,
     /// A column has an offset.
     Offset,
@@ -20,7 +28,7 @@ pub enum GrossKind {
     Parameter,
     /// A column is a copy of another.
     Copied,
-    /// A column stands still while others move.
+    /// A column is constant while others move.
     Dead,
 }
 
@@ -33,22 +41,24 @@ pub struct Gross {
     pub column: Option<String>,
     /// Name of the nominal parameter that is wrong.
     pub parameter: Option<String>,
-    /// Factor by which the column, or the rig's parameter, is larger than it is said to be.
+    /// Ratio of the actual value of the column, or of the rig's parameter, to the stated one.
     pub factor: Option<f64>,
-    /// Offset of the column, in `unit`; of one upside down the sum of what is and what should be.
+    /// Offset of the column, in `unit`; if it is upside down, the sum of the actual and the
+    /// expected value.
     pub offset: Option<f64>,
     /// Delay of the column, s.
     pub delay_s: Option<f64>,
-    /// What the rig file says of the parameter.
+    /// Value of the parameter in the rig file.
     pub says: Option<f64>,
-    /// What was found of the parameter.
+    /// Estimated value of the parameter.
     pub found: Option<f64>,
     /// Unit of the column or the parameter.
     pub unit: String,
-    /// The units that a factor of an output stands for, those of the simulator and of the record: `rpm for rad/s`.
+    /// The units that explain a factor of an output, those of the simulator and of the record: `rpm
+    /// for rad/s`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<String>,
-    /// First trial in which it shows, of what shows in stretches.
+    /// First trial in which it shows, for errors in stretches.
     pub trial: Option<String>,
     /// Begin of the stretch in which the error shows, s from the trial's start.
     pub from_s: Option<f64>,
@@ -61,8 +71,47 @@ pub struct Gross {
 }
 
 impl Gross {
-    /// Whether the columns alone say so, whatever the simulator is.
+    /// Whether the columns alone show the error, whatever the simulator is.
     pub fn is_plain(&self) -> bool {
         matches!(self.what, GrossKind::Copied | GrossKind::Dead)
     }
+}
+
+/// No effect of the best set: the alternative replaces the whole set.
+const WHOLE: usize = usize::MAX;
+/// Nats within which two errors are a tie.
+const TIE: f64 = 1.1;
+
+/// Gap that a set of effects, or an error, may leave.
+pub(crate) fn allowed_gap(problem: &PreparedProblem<'_>, thresholds: &Thresholds) -> f64 {
+    thresholds.unknown_excess + thresholds.unknown_share * problem.gap(&problem.nominal)
+}
+
+/// Weighs errors of the record against the best effects. Returns the errors with a higher score, as
+/// they are reported, and the result with the first of them in place of the effects; `None` if the
+/// effects win.
+///
+/// An error has an exact form and one parameter, so it leaves almost only noise. It wins if it
+/// scores higher than the best set of effects and leaves no more than a named set may.
+pub(crate) fn weigh_errors(
+    doubted: &PreparedProblem<'_>,
+    suspect: &Suspect<'_>,
+    errors: Vec<Hypothesis>,
+    found: &Found,
+    thresholds: &Thresholds,
+) -> Option<(Vec<Gross>, Found)> {
+    let most = allowed_gap(doubted, thresholds);
+    let least = found.best.score.max(thresholds.rise);
+    let above = |e: &Hypothesis| e.score > least && doubted.gap(e) <= most;
+    let mut errors = errors.into_iter().filter(above);
+    let first = errors.next()?;
+    let (tied, behind): (Vec<Hypothesis>, Vec<Hypothesis>) =
+        errors.partition(|e| e.score > first.score - TIE);
+    let told = std::iter::once(&first).chain(&tied).filter_map(|e| Gross::found(suspect, e));
+    let mut gross: Vec<Gross> = told.collect();
+    // If these data cannot distinguish several errors, a factor between two units comes first.
+    gross.sort_by_key(|g| g.units.is_none());
+    let rivals = tied.into_iter().chain(behind).chain([found.best.clone()]);
+    let rivals = rivals.map(|rival| (WHOLE, rival)).collect();
+    Some((gross, Found { best: first, rivals }))
 }

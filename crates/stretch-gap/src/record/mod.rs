@@ -1,10 +1,12 @@
-//! Errors of the record and of the rig file: hypotheses like the effects, and commoner than they are.
+//! Errors of the record and of the rig file: hypotheses like the effects, and more frequent than
+//! they are.
 //!
-//! In: the columns of a record, a prepared problem and what the search found. Out: the [`gross::Gross`] errors, with the
-//! sentence of each ([`sentence`], [`units`]), if one stands above every set of effects.
-//! Columns are looked at without any simulation first ([`columns_alone`]); then every kind of error ([`fault`]) is a hypothesis
-//! of one number ([`suspect`]), screened ([`screen`]), fitted ([`examine`]) and weighed against the effects ([`weigh`]).
-//! Imports: `numerics`, `problem`, `fit`, `search`.
+//! Input: the columns of a record, a prepared problem and what the search found. Output: the
+//! [`gross::Gross`] errors, with the sentence of each ([`sentence`], [`units`]), if one is more
+//! probable than every set of effects. Columns are first checked without any simulation
+//! ([`columns_alone`]). Then every kind of error ([`fault`]) is a hypothesis with one parameter
+//! ([`suspect`]), screened ([`screen`]), fitted ([`examine`]) and weighed against the effects
+//! ([`gross`]). Imports: `numerics`, `problem`, `fit`, `search`.
 
 pub(crate) mod columns_alone;
 pub(crate) mod examine;
@@ -14,4 +16,3 @@ pub(crate) mod screen;
 pub(crate) mod sentence;
 pub(crate) mod suspect;
 pub(crate) mod units;
-pub(crate) mod weigh;

@@ -27,9 +27,10 @@ use crate::{
 const STEP: usize = 2;
 /// Scales of the commands that are looked at.
 const COMMANDS: [f64; 4] = [-0.5, -0.2, 0.25, 1.0];
-/// Factors at which a parameter is looked at beside the step of Gauss and Newton, as deviations from 1: smaller, larger.
+/// Factors at which a parameter is tried in addition to the Gauss-Newton step, as deviations from
+/// 1: smaller, larger.
 const FACTORS: [[f64; 2]; 2] = [[-0.4, -0.8], [0.5, 4.0]];
-/// Share of a tolerance within which a parameter stands at its end.
+/// Share of a tolerance beyond which a parameter is at its end.
 pub(crate) const END: f64 = 0.99;
 /// Tolerances within which no parameter is wrong.
 pub(crate) const REACH: f64 = 3.0;
@@ -79,7 +80,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(bench)
     }
 
-    /// Best size of one error, and what it promises; none where it promises nothing.
+    /// Best size of one error and its promise; `None` if it promises nothing.
     pub(crate) fn look(&self, fault: usize) -> Result<Option<Promising>, GapError> {
         let one = &self.suspect.faults()[fault];
         let mut best: Option<Promising> = None;

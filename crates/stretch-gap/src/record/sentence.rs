@@ -41,7 +41,7 @@ impl Gross {
         }
     }
 
-    /// `column` is `factor` times `source`, noise and all.
+    /// `column` is `factor` times `source`, including noise.
     pub(crate) fn copied(column: &Column<'_>, source: &Column<'_>, factor: f64) -> Self {
         Self {
             factor: Some(factor),
@@ -56,7 +56,7 @@ impl Gross {
         }
     }
 
-    /// A column stands still, first in a stretch of a trial, `count` times in all.
+    /// A column is constant, first in a stretch of a trial, `count` times in all.
     pub(crate) fn still(
         column: &Column<'_>,
         (trial, from_s, to_s): &(String, f64, f64),
@@ -78,7 +78,8 @@ impl Gross {
         }
     }
 
-    /// An output that the simulator computes in other units, larger by a factor that no sensor errs by, or without a parameter that may move.
+    /// An output that the simulator computes in other units: it is larger by a factor that no
+    /// sensor error explains, or no parameter may move.
     fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
         let ratio = short(1.0 / factor);
@@ -95,7 +96,7 @@ impl Gross {
         }
     }
 
-    /// The error of a hypothesis with its size; none where it has none.
+    /// The error of a hypothesis with its size; `None` if it has none.
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
         if let Kind::Parameter(p) = fault.kind {
@@ -169,7 +170,7 @@ impl Gross {
     }
 }
 
-/// Four digits, without an exponent where none is needed.
+/// Four digits, without an exponent if none is needed.
 fn short(x: f64) -> String {
     let size = x.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -183,7 +184,7 @@ fn short(x: f64) -> String {
     }
 }
 
-/// What is wrong, in one sentence: the first, what may stand in its place, and what to do.
+/// What is wrong, in one sentence: the first error, its alternatives, and what to do.
 pub(crate) fn sentence(gross: &[Gross]) -> String {
     let Some(first) = gross.first() else { return String::new() };
     let rest: Vec<&str> = gross[1..].iter().map(|g| g.sentence.as_str()).collect();

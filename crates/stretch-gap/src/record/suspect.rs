@@ -1,8 +1,9 @@
-//! A simulator beside a record, or a rig file, that may be wrong.
+//! A simulator with a record or a rig file that may be wrong.
 //!
-//! An error is an effect like any other, so that one fit moves it and the nominal parameters together. What was recorded stays what it
-//! is: an output is distorted as the column would be, and a stage that a column drives is driven by the corrected column. So every
-//! hypothesis is held against the same numbers.
+//! An error is an effect like any other, so that one fit moves it together with the nominal
+//! parameters. The recorded values do not change. A simulated output is distorted as the column
+//! would be, and a stage that a column drives is driven by the corrected column. Therefore every
+//! hypothesis is compared with the same numbers.
 
 use std::{collections::VecDeque, sync::Mutex};
 
@@ -20,15 +21,17 @@ use crate::{
     record::fault::{Fault, Kind},
 };
 
-/// Simulators with a corrected column that are kept: those of the probes and steps of the fits under way.
+/// Number of stored simulators with a corrected column: those of the probes and steps of the
+/// current fits.
 const KEPT: usize = 8;
 
 type Corrected<'a> = std::sync::Arc<dyn Simulator + Send + 'a>;
 
-/// Which error, how large (bits), and the simulator driven by the corrected column; none where that column drives nothing.
+/// Which error, how large (bits), and the simulator driven by the corrected column; `None` if that
+/// column drives nothing.
 type Entry<'a> = (usize, u64, Option<Corrected<'a>>);
 
-/// The simulator with its possible errors in the place of the effects.
+/// The simulator with its possible errors in place of the effects.
 pub(crate) struct Suspect<'a> {
     simulator: &'a dyn Simulator,
     about: Description,
@@ -86,7 +89,7 @@ impl<'a> Suspect<'a> {
         let found = |kept: &VecDeque<Entry<'a>>| {
             kept.iter().find(|(f, s, _)| (*f, *s) == key).map(|(_, _, driven)| driven.clone())
         };
-        // A poisoned list is only a list of what can be made again.
+        // A poisoned list can be used, because its entries can be made again.
         let lock = || self.corrected.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(driven) = found(&lock()) {
             return Ok(driven);
@@ -183,7 +186,7 @@ impl Costly for Suspect<'_> {
     }
 
     fn is_costly(&self, effect: usize) -> bool {
-        // An error of the record costs what the simulator costs.
+        // An error of the record costs as much as the simulator.
         effect >= self.first || self.simulator.costly().is_some_and(|c| c.is_costly(effect))
     }
 

@@ -1,8 +1,9 @@
-//! Which units a factor stands for: a simulator that computes in other units than the record was written in.
+//! The units that explain a factor: a simulator that computes in other units than those of the
+//! record.
 
 use std::f64::consts::{PI, TAU};
 
-/// Share within which a factor is that of two units.
+/// Largest relative deviation of a factor from that of two units.
 const WITHIN: f64 = 0.01;
 
 /// Pairs of units of one quantity, and how many of the first make one of the second.
@@ -44,9 +45,10 @@ const NAMES: [(&str, &str); 7] = [
     ("", "1"),
 ];
 
-/// The units of a simulator whose output is `ratio` times a record in `unit`: "rpm for rad/s". None where no pair of units stands within 1 %
-/// of the ratio, or the record's unit is none of the pair. `sd` is how surely the ratio is known, as a share of it: within two of them the only
-/// pair of the record's unit is taken as well.
+/// The units of a simulator whose output is `ratio` times a record in `unit`: "rpm for rad/s".
+/// `None` if no pair of units is within 1 % of the ratio, or if the record's unit belongs to no
+/// such pair. `sd` is the relative standard deviation of the ratio. The only pair of the record's
+/// unit within two of them is also accepted.
 pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
     let unit = NAMES.iter().find(|(name, _)| *name == unit).map_or(unit, |(_, own)| own);
     let all = PAIRS.iter().flat_map(|&(a, b, factor)| [(a, b, factor), (b, a, 1.0 / factor)]);

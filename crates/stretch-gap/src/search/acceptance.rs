@@ -1,12 +1,17 @@
-//! What an effect must bring to be taken: more than chance, more than what counts, more than model discrepancy.
+//! Criteria for accepting an effect: more than chance, more than a gap that counts, more than model
+//! discrepancy.
 //!
-//! Three acceptance criteria, all of them in [`Thresholds`]. At least `share` of the gap that is left in the effect's stages closes. What is closed is
-//! more than chance makes of noise of this colour: `rise` nats by the [octaves](crate::fit::octaves), and by the score. And it is more than *model
-//! discrepancy*: the rig's backlash is not the textbook's; an effect in the right place leaves a share `model_discrepancy` of what it closes, with the shape of
-//! a further effect, and evidence grows with the samples while that share does not. What closes no more than that share, or would not count as a gap, so that it may be
-//! discrepancy within the noise, has to raise the score by `faint_rise`. Within the share it has to leave noise alone as well, and to be more than the share of
-//! what was closed in the octaves in which it acts: a discrepancy has no reason to have the very form of one further effect.
-//! Both sets stand beside each other with the [deviations](crate::fit::deviations) of their own effects' forms as well.
+//! There are three acceptance criteria, all of them in [`Thresholds`]. First, at least `share` of
+//! the gap that is left in the effect's stages closes. Second, the closed part is more than chance
+//! makes of noise of this colour: `rise` nats by the [octaves](crate::fit::octaves), and by the
+//! score. Third, it is more than *model discrepancy*: the rig's backlash is not the textbook's. An
+//! effect in the right place leaves a share `model_discrepancy` of what it closes, with the shape
+//! of a further effect, and evidence grows with the samples while that share does not. An effect
+//! that closes no more than that share, or that would not count as a gap, may be discrepancy within
+//! the noise; it has to raise the score by `faint_rise`. Within the share it also has to leave only
+//! noise, and to be more than the share of what was closed in the octaves in which it acts, because
+//! a discrepancy has no reason to have the exact form of one further effect. Both sets are also
+//! compared with the [deviations](crate::fit::deviations) of their own effects' forms added.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -14,7 +19,8 @@ use crate::{
     search::screen::Screened,
 };
 
-/// Share of all that is left that a screen must promise of an effect which is to leave noise alone: where the change bends it promises too little.
+/// Share of the remaining gap that a screen must promise for an effect that is to leave only noise.
+/// It is below 1 because a screen promises too little if the change is non-linear.
 const ALONE: f64 = 0.5;
 
 /// The acceptance criteria of a problem.
@@ -25,8 +31,9 @@ pub(crate) struct Acceptance<'a> {
 }
 
 impl Acceptance<'_> {
-    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion: as both are, and with the deviations of their own
-    /// effects' forms, for what a deviation of the first explains is no further effect's.
+    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion:
+    /// with both unchanged, and with the deviations of their own effects' forms, because what such
+    /// a deviation explains is not evidence for a further effect.
     pub(crate) fn is_accepted(
         &self,
         base: &Hypothesis,
@@ -56,14 +63,15 @@ impl Acceptance<'_> {
             && (is_beyond || self.left(next, new) <= unknown_excess)
     }
 
-    /// Whether an effect on top of `base` can be more than what model discrepancy left.
+    /// Whether an effect on top of `base` can explain more than the remaining model discrepancy.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();
         touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))
     }
 
-    /// The same of an effect of which a screen promises a gain, or whether it may leave noise alone: it promises [`ALONE`] of all that is left there, and that is
-    /// more than discrepancy in the octaves.
+    /// The same for an effect with a screened gain. It is also promising if it may leave only
+    /// noise: if it promises [`ALONE`] of the remaining gap, and that is more than discrepancy in
+    /// the octaves.
     pub(crate) fn is_promising(&self, base: &Hypothesis, screened: &Screened) -> bool {
         let Thresholds { model_discrepancy, rise, .. } = *self.thresholds;
         let touched = self.touched(screened.effect).iter();
@@ -73,13 +81,13 @@ impl Acceptance<'_> {
             || (screened.gain() >= ALONE * all && rises.any(|most| most > rise))
     }
 
-    /// Rise of the score that one effect more has to bring, if it closes that much.
+    /// Rise of the score that one more effect has to achieve if it closes that much.
     pub(crate) fn least_rise(&self, closed: f64) -> f64 {
         let is_faint = closed < self.thresholds.null_excess;
         if is_faint { self.thresholds.faint_rise } else { self.thresholds.rise }
     }
 
-    /// Gap that is left in the stages that an effect touches.
+    /// Remaining gap in the stages that an effect touches.
     pub(crate) fn left(&self, base: &Hypothesis, effect: usize) -> f64 {
         self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
     }

@@ -1,4 +1,4 @@
-//! What simpler methods say of the same data: what is gained by the longer way shows beside them.
+//! What simpler methods say of the same data, to show what the full search gains.
 //!
 //! | method | leaves out |
 //! | --- | --- |
@@ -28,7 +28,7 @@ use crate::{
     search::screen::Ground,
 };
 
-/// What simpler methods would have said of the same data.
+/// Answers of simpler methods to the same data.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Baselines {
     /// Effect with the largest drop of the error, nominal parameters left as shipped.
@@ -39,14 +39,15 @@ pub struct Baselines {
     pub bic: Option<String>,
 }
 
-/// Single effects that an information criterion is asked about: the best of the screen.
+/// Number of single effects that the information criterion compares: the best of the screen.
 const KEPT: usize = 8;
-/// A correlation that noise alone hardly ever reaches, in its standard deviations, samples counted as independent.
+/// A correlation that noise alone almost never reaches, in its standard deviations, samples counted
+/// as independent.
 const FAR: f64 = 4.0;
-/// Starts that are fitted.
+/// Number of starts that are fitted.
 const STARTS: usize = 2;
 
-/// Three methods that leave out one step each.
+/// Three methods, each of which omits one step.
 pub(crate) fn baselines(
     problem: &PreparedProblem<'_>,
     tried: &BTreeMap<Vec<usize>, Hypothesis>,
@@ -62,13 +63,14 @@ pub(crate) fn baselines(
     })
 }
 
-/// The effect whose own parameters, fitted alone, take most from the mean square error in multiples of the noise, all parameters of the
-/// simulator left as shipped; none where that is less than what counts as a gap.
+/// The effect whose parameters, fitted alone, reduce the mean square error in multiples of the
+/// noise most, with all parameters of the simulator as shipped; `None` if the reduction is less
+/// than a gap that counts.
 fn largest_drop(
     problem: &PreparedProblem<'_>,
     null_excess: f64,
 ) -> Result<Option<usize>, GapError> {
-    // Nothing is re-tuned, nothing drifts.
+    // No parameter is re-tuned or drifts.
     let compare = &problem.compare;
     let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
         sd: 0.0,
@@ -97,8 +99,9 @@ fn largest_drop(
     Ok(best(drops).filter(|(_, drop)| *drop > null_excess).map(|(effect, _)| effect))
 }
 
-/// The effect whose change, taken once, correlates best with what the re-tuned simulator leaves, all that its
-/// parameters can do taken out of both; none where noise could do as well.
+/// The effect whose change, simulated once, correlates best with the residual of the re-tuned
+/// simulator, after the contribution of the parameters is projected out of both; `None` if noise
+/// could do as well.
 fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
     let likeness = each_effect(compare, |effect| {
         let spec = &compare.simulator().effects()[effect];
@@ -113,13 +116,15 @@ fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>,
         let own = compare.product(s, residual, residual);
         (squares + own, count + compare.roles.count(Role::Fit) as f64)
     });
-    // Correlation r = product / sqrt(own squares); its standard deviation without a likeness is 1 / sqrt(count).
+    // Correlation r = product / sqrt(own squares); without correlation its standard deviation is 1
+    // / sqrt(count).
     let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
     Ok(best(likeness).filter(|(_, product)| *product > least).map(|(effect, _)| effect))
 }
 
-/// The single effect, fitted together with all parameters, with the lowest BIC = n ln(mean square) + k ln(n), every
-/// sample counted as independent; none where no effect has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
+/// The single effect, fitted together with all parameters, with the lowest
+/// BIC = n ln(mean square) + k ln(n), every sample counted as independent; `None` if the model
+/// without effects has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
 fn criterion(
     problem: &PreparedProblem<'_>,
     ground: &Ground,
@@ -161,13 +166,14 @@ fn each_effect(
     (0..compare.simulator().effects().len()).into_par_iter().map(of).collect()
 }
 
-/// The effect with the greatest number above 0.
+/// The effect with the largest number above 0.
 fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
     let above = numbers.into_iter().enumerate().filter(|(_, x)| *x > 0.0);
     above.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
+/// The residual in the stages that an effect touches when it is fitted on top of a ground, from its
+/// best starts.
 fn fits(
     compare: &Comparison<'_>,
     ground: &Ground,

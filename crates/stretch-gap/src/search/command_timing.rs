@@ -1,9 +1,12 @@
-//! Whether commands switch at rows of the record or anywhere between two: two hypotheses, weighed by what each explains in the end.
+//! Whether commands switch at rows of the record or anywhere between two: two hypotheses, weighed
+//! by what each explains in the end.
 //!
-//! A record of which every second row was dropped shows a switch up to a row late. The [parameter](crate::RecordFacts::command_timing) that says
-//! how far ahead of its row a switch acts in the mean is then re-tuned, and that each switch has its own is a nuisance, marginalised. A
-//! true effect (a late valve) gains by such freedom as well, as long as it is not in the model: so both ways are searched to the end and
-//! the better likelihood of the records decides.
+//! If every second row of a record was dropped, a switch is visible up to a row late. Then the
+//! [parameter](crate::RecordFacts::command_timing) that says how far ahead of its row a switch acts
+//! on average is re-tuned, and the variation between switches is a marginalised nuisance. A true
+//! effect (a late valve) gains from this freedom as well, as long as it is not in the model.
+//! Therefore both hypotheses are searched to the end, and the better likelihood of the records
+//! decides.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -14,7 +17,7 @@ use crate::{
     search::selection::Search,
 };
 
-/// A simulator whose commands switch between rows; none where it has no such commands.
+/// A simulator whose commands switch between rows; `None` if it has no such commands.
 pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     let timing = &simulator.record().command_timing;
     let altered = |i: usize, p: &ParameterSpec| {
@@ -24,8 +27,9 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     (!timing.is_empty()).then(|| Altered::of(simulator, altered))
 }
 
-/// The problem in which the records are likelier, and the set to go on from; that of commands between rows is prepared where there are
-/// such commands and a gap that they could explain.
+/// The problem with the larger likelihood of the records, and the set to continue from. The problem
+/// with commands between rows is prepared only if there are such commands and a gap that they could
+/// explain.
 pub(crate) fn likelier<'a>(
     at_rows: PreparedProblem<'a>,
     between_rows: Option<&'a Altered<'a>>,
@@ -47,7 +51,7 @@ pub(crate) fn likelier<'a>(
     }
     progress("when commands switch");
     let between = PreparedProblem::prepare(between_rows, at_rows.stop(), seed, progress)?;
-    let between = between.begun_anew(thresholds.least_gap, seed)?;
+    let between = between.retuned_from_starts(thresholds.least_gap, seed)?;
     if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {
         return Ok((at_rows, unaltered));
     }

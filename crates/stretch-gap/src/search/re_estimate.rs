@@ -1,8 +1,8 @@
-//! The nuisances of a record beside what was found in it.
+//! Re-estimates the nuisances of a record, given what was found in it.
 //!
-//! What an effect explains, a larger nuisance of the same stage may explain as well, so that the one is sized beside the other: the
-//! nuisances beside the best set, and those beside what is left of it without the effects of their stage, are two hypotheses, weighed by their
-//! likelihoods.
+//! A larger nuisance of a stage may explain the same as an effect of that stage, so the two are
+//! sized together. The nuisances given the best set, and those given this set without the effects
+//! of their stage, are two hypotheses, weighed by their likelihoods.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -10,7 +10,8 @@ use crate::{
     search::sets::Sets,
 };
 
-/// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
+/// The problem with the re-estimated nuisances, and the set to continue from; `None` if they are as
+/// described.
 pub(crate) fn re_estimated<'a>(
     problem: &PreparedProblem<'a>,
     sets: &mut Sets<'_>,

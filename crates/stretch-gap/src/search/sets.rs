@@ -18,10 +18,7 @@ use crate::{
         prepared::PreparedProblem,
     },
     problem::{error::GapError, linked_stages::linked, simulator::Model},
-    search::{
-        screen::{Ground, Screened},
-        unstrained::unstrained,
-    },
+    search::screen::{Ground, Screened},
 };
 
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
@@ -230,7 +227,7 @@ impl<'a> Sets<'a> {
             let promising = screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
             let mut models: Vec<Model> =
                 promising.take(STARTS).map(|s| base.model.with(screen.effect, &s.0)).collect();
-            models.extend(unstrained(self.problem, &base.model, screen.effect)?);
+            models.extend(start_at_shipped(self.problem, &base.model, screen.effect)?);
             Ok((screen.effect, models))
         };
         screened.par_iter().map(of_one).collect()
@@ -336,4 +333,40 @@ fn key(effects: &[usize], more: Option<usize>) -> Vec<usize> {
     let mut key: Vec<usize> = effects.iter().copied().chain(more).collect();
     key.sort_unstable();
     key
+}
+
+/// Tolerances from which a re-tuned parameter is far from its shipped value; one in seven is by chance.
+const FAR: f64 = 1.5;
+
+/// A model with one more effect, in which parameters that re-tuning took far are as shipped; none if re-tuning took none far.
+///
+/// Re-tuning takes up what it can of an effect, for example a valve's dead band by a smaller least opening. The effect then has nothing left
+/// to do, and no small step of both leads back. So the effect begins once with these parameters as shipped, at whichever of its own starts
+/// costs least there.
+pub(crate) fn start_at_shipped(
+    problem: &PreparedProblem<'_>,
+    base: &Model,
+    effect: usize,
+) -> Result<Option<Model>, GapError> {
+    let simulator = problem.simulator();
+    let spec = &simulator.effects()[effect];
+    let mut model = base.clone();
+    for &p in spec.touches.iter().flat_map(|s| &simulator.stages()[*s].parameters) {
+        let (shipped, sd) = (problem.shipped.parameters[p], simulator.parameters()[p].sd);
+        if (model.parameters[p] - shipped).abs() > FAR * sd {
+            model.parameters[p] = shipped;
+        }
+    }
+    if model.parameters == base.parameters {
+        return Ok(None);
+    }
+    let mut models: Vec<Model> = spec.starts.iter().map(|v| model.with(effect, v)).collect();
+    let there = problem.compare.possible_residuals(&spec.touches, &models)?;
+    let mut best: Option<(f64, usize)> = None;
+    for (i, residuals) in there.iter().enumerate() {
+        let Some(residuals) = residuals else { continue };
+        let cost = problem.compare.cost(&spec.touches, &models[i], residuals);
+        best = best.filter(|b| b.0 <= cost).or(Some((cost, i)));
+    }
+    Ok(best.map(|(_, i)| models.swap_remove(i)))
 }

@@ -1,23 +1,67 @@
-//! How much of what was recorded a diagnosis stands on, and whether that can carry a name.
+//! How much of the recorded data a diagnosis uses, and whether that suffices to name an effect.
 //!
-//! A name is a statement about the rig, not about the rows that happened to be even enough. It needs at least the share [`LEAST_SHARE`] of
-//! them: with less, most of what was recorded is not in the answer. It needs [`LEAST_TEST`] blocks to test on: a bootstrap of
-//! fewer has no 95 % interval; and twice as many to fit. On less than [`SHORT`] blocks to fit, a handful of motions, one lag
-//! is as good as another: whatever closes as much of the held-out gap, within the interval of the first, is then a
-//! tie with it, however the fitted samples weigh the two.
+//! A name is a statement about the rig, not about the rows that happened to be even enough. It
+//! needs at least the share [`LEAST_SHARE`] of the rows, because otherwise most of the recording is
+//! not in the answer. It needs [`LEAST_TEST`] blocks for testing, because a bootstrap of fewer has
+//! no 95 % interval, and twice as many for fitting. With less than [`SHORT`] blocks for fitting, a
+//! few motions, lags cannot be distinguished. Then every set that closes as much of the held-out
+//! gap, within the interval of the first, is a tie with it, however the fitted samples weigh the
+//! two.
 
-use crate::{
-    problem::{
-        rows_used::RowsUsed,
-        sample_roles::{Role, SampleRoles},
-    },
-    verdict::too_little::{LEAST_FIT, LEAST_SHARE, LEAST_TEST, TooLittle},
+use crate::problem::{
+    record_facts::RowsUsed,
+    sample_roles::{Role, SampleRoles},
 };
 
-/// Fitted records of fewer blocks part no lags.
+/// Smallest share of the rows.
+const LEAST_SHARE: f64 = 0.5;
+/// Fewest blocks for testing.
+const LEAST_TEST: f64 = 10.0;
+/// Fewest blocks for fitting.
+const LEAST_FIT: f64 = 20.0;
+
+/// Why a record cannot support a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum TooLittle {
+    /// Most rows were left out.
+    Rows(RowsUsed),
+    /// Too short, s: for fitting and for testing, and the length of a
+    /// [block](crate::SampleRoles::block).
+    Short { fit_s: f64, test_s: f64, block_s: f64 },
+}
+
+impl TooLittle {
+    /// A sentence that says what is missing from the record, and what to record.
+    pub(crate) fn words(&self) -> String {
+        match self {
+            Self::Rows(rows) => format!(
+                "No cause can be named on {:.0} % of the rows ({} of {}): record without gaps, so that at least {:.0} % can be used.",
+                100.0 * rows.share(),
+                rows.used,
+                rows.read,
+                100.0 * LEAST_SHARE
+            ),
+            Self::Short { fit_s, test_s, block_s } => {
+                let (least_fit_s, least_test_s) =
+                    (seconds(LEAST_FIT * block_s), seconds(LEAST_TEST * block_s));
+                format!(
+                    "The record is too short to carry a name: {fit_s:.1} s to fit and {test_s:.1} s to test on. Record at least \
+                     {least_fit_s} s to fit and {least_test_s} s to test on; without test trials four times {least_test_s} s in all."
+                )
+            }
+        }
+    }
+}
+
+/// Seconds for a text, with a decimal for small values.
+fn seconds(s: f64) -> String {
+    if s < 4.95 { format!("{s:.1}") } else { format!("{s:.0}") }
+}
+
+/// With fewer fitted blocks, lags cannot be distinguished.
 const SHORT: f64 = 120.0;
 
-/// Why the record carries no name, if it does not.
+/// Why the record cannot support a name, if it cannot.
 pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Option<TooLittle> {
     if rows.share() < LEAST_SHARE {
         return Some(TooLittle::Rows(rows));
@@ -31,7 +75,7 @@ pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Opti
     })
 }
 
-/// Whether so little was fitted that what closes as much is a tie.
+/// Whether so little was fitted that sets that close as much are ties.
 pub(crate) fn is_short(roles: &SampleRoles) -> bool {
     fitted(roles) < SHORT
 }
@@ -65,7 +109,7 @@ mod tests {
         let short = too_little(&roles(375, 125), RowsUsed { used: 500, read: 500 }, 0.01);
         assert_eq!(short, Some(TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 }));
         assert!(short.is_some_and(|why| why.words().contains("Record at least 10 s")));
-        // The same at 500 Hz, of a motion that turns five times a second.
+        // The same at 500 Hz, for a motion that turns five times a second.
         let quick = SampleRoles { block: 50, ..roles(3000, 1000) };
         assert_eq!(too_little(&quick, all, 0.002), None);
         assert!(is_short(&quick));

@@ -6,7 +6,7 @@ use crate::{
     evidence::{
         candidates::{Candidate, ParameterShift},
         detection_limit::DetectionLimit,
-        excess::Excess,
+        gathered::Excess,
         localise::location::Where,
         probability::{Function, Gap, Standing, probabilities},
         shares::EffectShare,
@@ -14,7 +14,7 @@ use crate::{
     },
     fit::{identifiability::Identified, starts::Starts},
     missing::Proposed,
-    problem::{rows_used::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
+    problem::{record_facts::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
     search::baselines::Baselines,
 };
@@ -168,6 +168,23 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether simulator and rig agree, although more is left than 19 of 20 records of the stated noise would leave: the noise is larger than
+    /// stated, or something is missing that is too small to name.
+    ///
+    /// ```
+    /// use stretch_gap::{Diagnosis, VerdictKind};
+    /// fn check(diagnosis: &Diagnosis) {
+    ///     let quieter = Diagnosis { null_band: f64::INFINITY, ..diagnosis.clone() };
+    ///     assert!(!quieter.is_faint());
+    ///     let unknown = Diagnosis { verdict: VerdictKind::Unknown, ..diagnosis.clone() };
+    ///     assert!(!unknown.is_faint());
+    /// }
+    /// ```
+    pub fn is_faint(&self) -> bool {
+        let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+        agrees && self.gap.retuned > self.null_band
+    }
+
     /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The
     /// last candidate is what the catalogue lacks; all sum to 1.
     ///

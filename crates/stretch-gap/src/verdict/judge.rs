@@ -2,45 +2,47 @@
 //!
 //! | holds when | verdict |
 //! | --- | --- |
-//! | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
-//! | what the catalogue lacks is the most probable | `unknown` |
+//! | a column alone says so, or an error of record or rig file is more probable than every set of effects | `record` |
+//! | a cause outside the catalogue is the most probable | `unknown` |
 //! | effects are the most probable, and the gap counts; what is left is noise and model discrepancy | `effect` |
-//! | the same, and more is left, or the strongest effect stands at an end of its range | `partial` |
+//! | the same, and more is left, or the strongest effect is at an end of its range | `partial` |
 //! | nothing is the most probable, or the gap is too small to matter; as shipped there is one | `parameters` |
 //! | the same, and there is none as shipped | `no_gap` |
 //!
-//! A gap counts from `least_gap` on; more is left than noise and discrepancy where [`allowed`] is exceeded. Two findings stand beside the sum, for
-//! no probability is known of them: parameters that stand at the ends of their tolerances and, set loose, explain as much as the effects do
-//! (`unknown`); and a record that is too short, or too full of gaps, to carry a name (`unknown`).
+//! A gap counts from `least_gap` on. More is left than noise and discrepancy if [`allowed`] is
+//! exceeded. Two checks can override the posterior because we have no likelihood for them. First,
+//! parameters are at the ends of their tolerances and, without tolerances, explain as much as the
+//! effects do (`unknown`). Second, the record is too short, or has too many gaps, to support a name
+//! (`unknown`).
 
 use crate::{
     evidence::{
         candidates::Candidate,
-        excess::Excess,
+        gathered::Excess,
         probability::{Posterior, Standing, allowed, names},
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
     missing::Proposed,
     problem::{error::GapError, thresholds::Thresholds},
-    verdict::{diagnosis::VerdictKind, naming::Naming, too_little::TooLittle},
+    verdict::{coverage::TooLittle, diagnosis::VerdictKind, naming::Naming},
 };
 
-/// What the verdict is a function of.
+/// The input of the verdict.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
     pub(crate) posterior: &'a Posterior,
-    /// The most probable first, behind the sets of effects the one without.
+    /// The most probable first; the set without effects comes after the sets with effects.
     pub(crate) candidates: &'a [Candidate],
-    /// What each effect of the best set does, the strongest first.
+    /// Share of each effect of the best set, the strongest first.
     pub(crate) shares: &'a [EffectShare],
     pub(crate) sanity: &'a Sanity,
-    /// Whether an error of the record or of the rig file stands above all effects.
+    /// Whether an error of the record or of the rig file is more probable than all sets of effects.
     pub(crate) is_record: bool,
-    /// Why the record carries no name, if it does not.
+    /// Why the record cannot support a name, if it cannot.
     pub(crate) too_little: Option<TooLittle>,
-    /// Whether so little was fitted that what closes as much is a tie.
+    /// Whether so little was fitted that sets that close as much are ties.
     pub(crate) is_short: bool,
 }
 
@@ -48,18 +50,18 @@ pub(crate) struct Case<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Judged {
     pub(crate) kind: VerdictKind,
-    /// What the verdict would be if nothing overruled it.
+    /// The verdict if nothing overrode it.
     pub(crate) seen: VerdictKind,
-    /// Why the evidence carries no other verdict.
+    /// Why the evidence supports no other verdict.
     pub(crate) overruled: Option<Overruled>,
-    /// The names that would stand if nothing overruled the verdict.
+    /// The names that would be reported if nothing overrode the verdict.
     pub(crate) seen_naming: Naming,
-    /// What the catalogue lacks, where a gap is left.
+    /// The cause outside the catalogue, if a gap is left.
     pub(crate) proposed: Option<Proposed>,
 }
 
 impl Judged {
-    /// The names of the verdict: none where it is overruled.
+    /// The names of the verdict: empty if it is overridden.
     pub(crate) fn naming(&self) -> Naming {
         match self.overruled {
             Some(_) => Naming::default(),
@@ -68,16 +70,17 @@ impl Judged {
     }
 }
 
-/// Why the data cannot come from the simulator, or cannot say so.
+/// Why the data cannot come from the simulator, or do not suffice to decide it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Overruled {
     /// The parameters of a stage do not fit within their tolerances.
     AtBounds(AtBounds),
-    /// The record carries no name.
+    /// The record cannot support a name.
     TooLittle(TooLittle),
 }
 
-/// Judges. `lacking` looks for what the catalogue lacks: instead of names, and, asked with `true`, beside them.
+/// Judges. `lacking` searches for what the catalogue lacks: instead of names or, if called with
+/// `true`, in addition to them.
 pub(crate) fn judge(
     case: &Case<'_>,
     thresholds: &Thresholds,
@@ -109,7 +112,7 @@ fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming
     let all = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
     match seen {
         VerdictKind::Effect | VerdictKind::Partial => all,
-        // What is certain and small is told below the headline.
+        // What is certain and small is reported below the headline.
         VerdictKind::Parameters | VerdictKind::NoGap
             if case.posterior.effects() > case.posterior.nothing() =>
         {
@@ -119,7 +122,7 @@ fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming
     }
 }
 
-/// The verdict that the posterior and the sizes make.
+/// The verdict of the posterior and the sizes.
 fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
     let Excess { raw, retuned, .. } = case.gap;
@@ -144,7 +147,7 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
 
 fn at_bounds(case: &Case<'_>) -> Option<Overruled> {
     let found = case.sanity.at_bounds.as_ref()?;
-    // The effects stand where they explain more than loose parameters would.
+    // The effects are kept if they explain more than free parameters would.
     let is_effect = found.rivals.is_some_and(|(effects, loose)| loose > effects);
     (!is_effect).then(|| Overruled::AtBounds(found.clone()))
 }
@@ -177,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Probabilities of play, of nothing, and of what the catalogue lacks; what play leaves.
+    /// Probabilities of play, of nothing, and of a cause outside the catalogue; what play leaves.
     fn posterior(play: f64, nothing: f64, unknown: f64, left: f64) -> Posterior {
         let set = |effects: &[usize], left: f64, probability: f64| Weighed {
             hypothesis: Hypothesis {
@@ -235,7 +238,8 @@ mod tests {
         }
     }
 
-    /// Whatever the probabilities and the sizes: the verdict is that of the greatest of the three, and a name needs a gap that counts.
+    /// For all probabilities and sizes the verdict is that of the largest of the three, and a name
+    /// needs a gap that counts.
     #[test]
     fn no_verdict_contradicts_its_own_probability() {
         let mut random = crate::numerics::random::RandomGenerator::new(11, 0);
@@ -294,7 +298,7 @@ mod tests {
             judge(&case, &Thresholds::frozen(), |_| Ok(None)).unwrap().kind
         };
         assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
-        // Loose parameters leave more than the effects do: the effects stand.
+        // Free parameters leave more than the effects do: the effects are kept.
         assert_eq!(ended(Some((0.1, 4.0))), Effect);
         let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 };
         let verdict = judged(gap, p, |case| case.too_little = Some(short));
@@ -303,9 +307,9 @@ mod tests {
             (Unknown, Effect, 0)
         );
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
-        // The note below the verdict says what was seen, by its name.
+        // The note below the verdict names what was seen.
         assert_eq!(verdict.seen_naming.named, ["play"]);
-        // Without a name there is nothing that a short record could not carry.
+        // Without a name there is nothing that a short record could not support.
         let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
         assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
     }

@@ -1,8 +1,11 @@
-//! Which names stand in the headline, which beside it, and which below.
+//! Decides which names are in the headline, which are its alternatives, and which are reported
+//! below.
 //!
-//! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So what a
-//! name closes in one of its stages, on trials that were not fitted, is itself a gap that counts, or the name is reported as faint. And a name stands
-//! alone where its probability suffices: of the smallest sets that hold 95 % of the probability, those that differ from the first in one effect are a
+//! Evidence is not importance: with 50 000 samples, sixty nats may correspond to a
+//! hundred-thousandth of the gap. Therefore what a name closes in one of its stages, on trials that
+//! were not fitted, must itself be a gap that counts; otherwise the name is reported as faint. A
+//! name is reported alone if its probability suffices. Otherwise, among the smallest collection of
+//! sets that holds 95 % of the probability, those that differ from the first in one effect are a
 //! declared tie with it.
 
 use crate::{
@@ -10,19 +13,20 @@ use crate::{
     problem::thresholds::Thresholds,
 };
 
-/// Effects of the first candidate by what may be said of them.
+/// Effects of the first candidate by how they are reported.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Naming {
     /// For the headline, the strongest first.
     pub(crate) named: Vec<String>,
-    /// Pairs of a name and another effect that may stand in its place.
+    /// Pairs of a name and an alternative effect.
     pub(crate) ties: Vec<(String, String)>,
     /// Effects that were found but close less than a name must.
     pub(crate) faint: Vec<String>,
 }
 
 impl Naming {
-    /// Names the effects of the most probable candidate beside its rivals; shares are of the held-out gap.
+    /// Names the effects of the most probable candidate and their alternatives; shares are of the
+    /// held-out gap.
     pub(crate) fn of(
         candidates: &[Candidate],
         shares: &[EffectShare],
@@ -31,14 +35,15 @@ impl Naming {
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let size = |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_excess);
-        // A rival that came out first was not taken apart: it stands where an effect that was stood.
+        // If an alternative ranks first, we have no per-effect shares for it, so we reuse those of
+        // the effect it replaces.
         let counts = |name: &&String| size(name).is_none_or(|s| s >= thresholds.least_gap);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
-        // On a short record probabilities part what the held-out gap does not.
+        // On a short record probabilities distinguish sets that the held-out gap does not.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
         let rivals = candidates.iter().enumerate().skip(1);
@@ -58,7 +63,7 @@ impl Naming {
         Self { named, ties, faint }
     }
 
-    /// Every name that may stand in the place of another, once.
+    /// Every name that is an alternative to another, once.
     pub(crate) fn tied(&self) -> Vec<String> {
         let mut tied: Vec<String> = Vec::new();
         for (_, other) in &self.ties {
@@ -69,7 +74,7 @@ impl Naming {
         tied
     }
 
-    /// The headline's names, each with what may stand in its place.
+    /// The headline's names, each with its alternatives.
     pub(crate) fn alternatives(&self) -> Vec<String> {
         let one = |name: &String| {
             let others = self.ties.iter().filter(|(own, _)| own == name).map(|(_, other)| other);
@@ -119,7 +124,7 @@ mod tests {
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
         );
         assert_eq!(naming.alternatives(), ["slack or saturation"]);
-        // On a short record what closes as much is a tie, whatever its probability.
+        // On a short record a set that closes as much is a tie, whatever its probability.
         let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
         assert_eq!(short.ties.len(), 1);
         let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
@@ -131,7 +136,7 @@ mod tests {
             (alike(false), alike(true)),
             (vec!["slip".into()], vec!["slip or lowpass".into()])
         );
-        // Something is named where an effect is, however little it closes.
+        // If there is an effect it is named, however little it closes.
         let weak = Naming::of(
             &candidates,
             &[share("slack", 0.0), share("sag", 0.0)],

@@ -1,14 +1,15 @@
-//! The experiment that tells rivals apart.
+//! The experiment that distinguishes two hypotheses.
 //!
-//! Discrimination between models after Atkinson and Fedorov (1975, doi 10.1093/biomet/62.1.57), T-optimality: the best experiment is that
-//! in which the rival, its parameters free within what is already known, comes least near to the truth. With tangents A of the rival's
-//! predictions and differences d between the two, over what was measured (index 0) and the experiment (1),
+//! Discrimination between models after Atkinson and Fedorov (1975, doi 10.1093/biomet/62.1.57),
+//! T-optimality: in the best experiment the alternative, with its parameters free within what is
+//! already known, stays furthest from the truth. With tangents A of the alternative's predictions
+//! and differences d between the two, over what was measured (index 0) and the experiment (1),
 //!
 //! ```text
 //! x = argmin of 0.5/b (|d_0 + A_0 x|^2 + |d_1 + A_1 x|^2) + 0.5 |x|^2 in its box,     D^2 = |d_1 + A_1 x|^2/samples
 //! ```
 //!
-//! Which of the two is true nobody knows: both are tried, and the smaller D counts.
+//! It is unknown which of the two is true. Both are assumed in turn, and the smaller D counts.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -25,9 +26,9 @@ use crate::{
     verdict::diagnosis::{Diagnosis, NextExperiment},
 };
 
-/// Evidence that tells two rivals apart with 95 % probability, nats.
+/// Evidence that distinguishes two hypotheses with 95 % probability, nats.
 const ENOUGH: f64 = 3.0;
-/// Share of an effect parameter's range that a sensitivity is taken over.
+/// Share of an effect parameter's range over which a sensitivity is computed.
 const SMALL: f64 = 0.02;
 
 /// An experiment in words, and the trial that does it.
@@ -39,12 +40,12 @@ pub struct Plan {
     pub how: String,
     /// Time to prepare it, minutes.
     pub prepare_min: f64,
-    /// What is commanded or set from outside, evenly sampled.
+    /// What is commanded or imposed from outside, evenly sampled.
     pub trial: Trial,
 }
 
 impl Plan {
-    /// Minutes with the preparation.
+    /// Minutes including the preparation.
     pub fn minutes(&self) -> f64 {
         self.prepare_min + self.runs_min()
     }
@@ -58,18 +59,18 @@ impl Plan {
     }
 }
 
-/// A simulator that can tell what it would show in experiments that nobody has done yet.
+/// A simulator that can predict the outcome of experiments that have not been done yet.
 pub trait Laboratory: Simulator {
-    /// What it takes to simulate an experiment.
+    /// The data needed to simulate an experiment.
     type Setting: Sync;
     /// Experiments to choose from, all with the same sample time.
     fn experiments(&self) -> Vec<(Plan, Self::Setting)>;
-    /// An experiment that stands for what has been measured.
+    /// An experiment that represents what has been measured.
     fn done(&self) -> Self::Setting;
-    /// What a model predicts of an experiment: every recorded channel in units of its noise.
+    /// Prediction of a model for an experiment: every recorded channel in units of its noise.
     ///
     /// # Errors
-    /// When the simulation is not possible with these values.
+    /// The simulation is not possible with these values.
     fn predict(&self, model: &Model, setting: &Self::Setting) -> Result<Vec<Vec<f64>>, GapError>;
 }
 
@@ -78,22 +79,23 @@ pub trait Laboratory: Simulator {
 pub struct Proposal {
     /// The recommendation.
     pub next: NextExperiment,
-    /// Openings by time, and what is to be set from outside.
+    /// Openings by time, and what is to be imposed from outside.
     pub trial: Trial,
     /// Every candidate experiment: name, difference in multiples of the noise, minutes; the best first.
     pub experiments: Vec<(String, f64, f64)>,
 }
 
-/// Recommends an experiment when the 95 % set of a diagnosis holds more than one effect.
+/// Recommends an experiment if the 95 % set of a diagnosis holds more than one effect.
 ///
-/// D(x) is the root mean square difference between the predictions of the two leading rivals for the experiment x, in
-/// multiples of the noise, that is left when one rival's nominal and effect parameters are moved, within their tolerances and at the
-/// price of what has been measured already, to come as near to the other as they can (linearised); both ways, the
-/// smaller. The experiment with the largest D^2 times blocks a minute wins: evidence adds up in squares. The
-/// preparation counts into the minutes.
+/// D(x) is the root mean square difference between the predictions of the two leading hypotheses
+/// for the experiment x, in multiples of the noise. It is the difference that is left when the
+/// nominal and effect parameters of one hypothesis are moved as close to the other as possible
+/// (linearised), within their tolerances and at the cost of fitting what was already measured. Both
+/// directions are tried, and the smaller counts. The experiment with the largest D^2 times blocks
+/// per minute wins, because evidence adds up in squares. The minutes include the preparation.
 ///
 /// # Errors
-/// What the simulator says.
+/// Errors of the simulator.
 pub fn next_experiment<L: Laboratory>(
     simulator: &L,
     diagnosis: &Diagnosis,
@@ -128,7 +130,7 @@ pub fn next_experiment<L: Laboratory>(
 /// D of every candidate experiment for two models, in multiples of the noise: see [`next_experiment`].
 ///
 /// # Errors
-/// What the simulator says.
+/// Errors of the simulator.
 pub fn differences<L: Laboratory>(
     simulator: &L,
     one: &Model,
@@ -162,7 +164,7 @@ fn rate<L: Laboratory>(
         .collect()
 }
 
-/// How often the experiment has to be repeated until rivals part, where once is not enough.
+/// How often the experiment has to be repeated until the hypotheses differ, if once is not enough.
 fn repeats(d: f64, minutes: f64) -> String {
     let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / nats).ceil() {
@@ -174,8 +176,8 @@ fn repeats(d: f64, minutes: f64) -> String {
     }
 }
 
-/// The first candidate, the most probable one with an effect of the 95 % set that the first lacks, and the effects in
-/// which they differ.
+/// The first candidate, the most probable other one with an effect of the 95 % set that the first
+/// lacks, and the effects in which they differ.
 fn rivals<'a>(
     simulator: &dyn Simulator,
     diagnosis: &Diagnosis,
@@ -195,11 +197,11 @@ fn rivals<'a>(
     (holds(one) && holds(two)).then_some((one, two, separates))
 }
 
-/// What a model predicts of an experiment, and how that moves with each of its parameters.
+/// Prediction of a model for an experiment, and its derivative with respect to each parameter.
 struct Tangent {
     values: Vec<f64>,
     slopes: Vec<Vec<f64>>,
-    /// How far each parameter may go down and up, in its own units of one.
+    /// How far each parameter may move down and up, on its scale.
     bounds: Vec<[f64; 2]>,
     channels: usize,
 }
@@ -239,7 +241,7 @@ impl Tangent {
                 let range = p.max - p.min;
                 let x = effect_values[k];
                 let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
-                // Small beside the value where the range is wide.
+                // Small relative to the value if the range is wide.
                 let step = if p.is_log() && x > 0.0 {
                     step.signum() * (0.1 * x / range).min(SMALL)
                 } else {
@@ -259,8 +261,8 @@ impl Tangent {
     }
 }
 
-/// Root mean square difference, summed over channels, that stays when `rival` comes as near to `truth` as it can;
-/// residuals are correlated, and `block` samples count as one observation.
+/// Root mean square difference, summed over channels, that remains when `rival` comes as near to
+/// `truth` as it can. Residuals are correlated, and `block` samples count as one observation.
 fn left(
     block: f64,
     truth_known: &Tangent,
@@ -302,7 +304,7 @@ mod tests {
     use approx::assert_relative_eq;
     use testkit::tolerance::F64_ROUNDING;
 
-    /// One channel, with parameters that may go three tolerances either way.
+    /// One channel, with parameters that may move three tolerances in both directions.
     fn tangent(values: &[f64], slopes: &[&[f64]]) -> Tangent {
         Tangent {
             values: values.into(),
@@ -317,12 +319,12 @@ mod tests {
     }
 
     #[test]
-    fn rivals_that_foretell_the_same_are_not_parted() {
+    fn rivals_that_predict_the_same_are_not_distinguished() {
         let (one, two) = (tangent(&wave(0.1), &[]), tangent(&wave(0.1), &[&wave(0.1)]));
         assert_eq!(left(50.0, &one, &two, &one, &two), 0.0);
     }
 
-    /// Nothing can be re-tuned: what is left is the root mean square of the difference.
+    /// Nothing can be re-tuned: the result is the root mean square of the difference.
     #[test]
     fn without_parameters_the_difference_stays() {
         let (one, two) = (tangent(&[0.0; 100], &[]), tangent(&[0.3; 100], &[]));
@@ -348,15 +350,17 @@ mod tests {
         assert_relative_eq!(d, s / (scale + 1.0), epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Data that were measured forbid what would explain the experiment away: the rival may not move where it was pinned.
+    /// Measured data exclude a re-tuning that would explain the experiment away: the alternative
+    /// may not move if it was determined.
     #[test]
     fn what_is_known_pins_the_rival() {
         let [none, one, much, half] = [0.0, 1.0, 100.0, 0.5].map(|value| vec![value; 200]);
         let (truth, rival) = (tangent(&none, &[]), tangent(&half, &[&one]));
         let d = |slope: &[f64]| left(50.0, &truth, &tangent(&none, &[slope]), &truth, &rival);
-        // Not pinned, the four blocks of the experiment pull against the prior: 1/(4 + 1) of 0.5 stays.
+        // Undetermined, the four blocks of the experiment pull against the prior: 1/(4 + 1) of 0.5
+        // stays.
         assert_relative_eq!(d(&none), 0.1, epsilon = 0.0, max_relative = 1e-9);
-        // Pinned by 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5) of it stays.
+        // Determined by 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5) of it stays.
         let kept = 1.0 - 4.0 / 40_005.0;
         assert_relative_eq!(d(&much), 0.5 * kept, epsilon = 0.0, max_relative = 1e-9);
     }
@@ -371,7 +375,7 @@ mod tests {
         assert_relative_eq!(d, 7.0, epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Evidence is half the squared difference by blocks: 3 nats are enough.
+    /// Evidence is half the squared difference by blocks; 3 nats are enough.
     #[test]
     fn runs_are_planned_where_one_will_hardly_do() {
         // A minute holds 120 blocks: d^2 of 0.05 gives 3 nats.

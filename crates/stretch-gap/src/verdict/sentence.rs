@@ -2,7 +2,9 @@
 
 use crate::{
     evidence::{
-        candidates::Candidate, excess::Excess, gathered::Evidence, sanity::Sanity,
+        candidates::Candidate,
+        gathered::{Evidence, Excess},
+        sanity::Sanity,
         shares::EffectShare,
     },
     problem::simulator::Simulator,
@@ -83,7 +85,7 @@ pub(crate) fn cut_short(not_looked_at: &[&str]) -> String {
     };
     match not_looked_at.is_empty() {
         true => "The budget of runs was spent before the search was over. ".to_owned(),
-        false => format!("The budget of runs was spent: {names}{others} were not looked at. "),
+        false => format!("The budget of runs was spent; not looked at: {names}{others}. "),
     }
 }
 

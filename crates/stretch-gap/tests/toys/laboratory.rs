@@ -1,4 +1,4 @@
-//! Experiments that nobody has done yet, with a toy of one stage.
+//! Experiments that have not been done yet, with a toy of one stage.
 
 use super::{
     Effect, Measured,

@@ -3,7 +3,6 @@
 pub(crate) mod acting;
 pub(crate) mod courses;
 pub(crate) mod isolated_outliers;
-pub(crate) mod kept;
-pub(crate) mod lost;
 pub(crate) mod rig_file;
 pub(crate) mod specs;
+pub(crate) mod undetermined;

@@ -1,9 +1,10 @@
 //! The catalogue of a user's own problem: effects that are looked for, and effects that act in every run.
 
+use stretch_data::EffectEntry;
 use stretch_effects::{EffectParameter, Role, Side};
 use stretch_gap::EffectSpec;
 
-use super::spec::{OwnEffect, ProblemSpec, StageEntry, Wrapped};
+use super::spec::{OwnEffect, ProblemSpec, StageEntry};
 use crate::{
     error::ProblemError,
     wrap::{Among, Placed, Site, placed},
@@ -133,15 +134,15 @@ fn outputs_of(name: &str) -> String {
 }
 
 /// Values of a wrapper that acts in every run, in the order of its parameters.
-fn values_of(wrapper: &Placed, known: &Wrapped) -> Result<Vec<f64>, ProblemError> {
+fn values_of(wrapper: &Placed, known: &EffectEntry) -> Result<Vec<f64>, ProblemError> {
     let owner = || format!("[[wrapped]] {}", known.name);
     let parameters = wrapper.parameters();
     let names = || parameters.iter().map(|p| &*p.name);
-    if let Some(name) = known.values.keys().find(|name| names().all(|n| n != name.as_str())) {
+    if let Some(name) = known.parameters.keys().find(|name| names().all(|n| n != name.as_str())) {
         return Err(ProblemError::unknown(owner(), "parameter", name, names()));
     }
     let value = |p: &EffectParameter| {
-        known.values.get(&*p.name).copied().or(p.usual_form()).ok_or_else(|| {
+        known.parameters.get(&*p.name).copied().or(p.usual_form()).ok_or_else(|| {
             let found = format!("it has no {}", p.name);
             ProblemError::value(owner(), found, format!("write {} = VALUE", p.name))
         })
@@ -197,19 +198,20 @@ pub(crate) fn own_effects(
         let mut parameters = Vec::new();
         for a in &effect.arguments {
             let name = if a.name.is_empty() { &effect.name } else { &a.name };
+            let [min, max] = a.range;
             // what is searched in equal ratios never reaches the 0 at which it does nothing
-            let is_off = |off: f64| (a.min..=a.max).contains(&off) || a.is_log && off == 0.0;
+            let is_off = |off: f64| (min..=max).contains(&off) || a.is_log && off == 0.0;
             // an empty range is told as one by whoever fits it
-            if let Some(off) = a.off.filter(|off| a.min < a.max && !is_off(*off)) {
+            if let Some(off) = a.off.filter(|off| min < max && !is_off(*off)) {
                 return Err(ProblemError::value(
                     format!("effect {name}"),
-                    format!("off = {off} is outside of its range, {} to {}", a.min, a.max),
+                    format!("off = {off} is outside of its range, {min} to {max}"),
                     "give a range that holds the value at which it does nothing",
                 ));
             }
-            let middle = if a.is_log { (a.min * a.max).sqrt() } else { 0.5 * (a.min + a.max) };
+            let middle = if a.is_log { (min * max).sqrt() } else { 0.5 * (min + max) };
             off.push(a.value.or(a.off).unwrap_or(middle));
-            let strength = EffectParameter::sized(name, &a.unit, a.min..=a.max);
+            let strength = EffectParameter::sized(name, &a.unit, min..=max);
             parameters.push(match a.off {
                 Some(off) if a.is_log => strength.off_at(off).log(),
                 Some(off) => strength.off_at(off),

@@ -13,7 +13,7 @@ use super::{
     columns::Columns,
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
-    spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry},
+    spec::{Input, OwnEffect, Parameter, ProblemSpec, StageEntry},
     velocity::{integral_of, of_position},
 };
 use crate::{
@@ -63,7 +63,8 @@ impl Checked {
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
         let by = apart.and_then(|_| columns.take_last());
         check_stated(stages, inputs, &columns)?;
-        let sensor = spec.sensor.as_ref().map(|s| sensor_of(s, stages)).transpose()?;
+        let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());
+        let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;
         let mut notes = columns.notes.clone();
         let grid = Grid::samples(columns.dt_s)
             .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time"))?;
@@ -247,7 +248,7 @@ fn used(spec: &ProblemSpec) -> Vec<String> {
     let all = spec.stages.iter().flat_map(of_stage);
     let all = all.chain(spec.inputs.iter().map(|i| i.column.clone()));
     let all = all.chain(spec.beside.iter().cloned());
-    let all = all.chain(spec.sensor.iter().map(|s| s.reference.clone()));
+    let all = all.chain(spec.reference.clone());
     let mut out: Vec<String> = Vec::new();
     for name in all {
         if !out.contains(&name) {
@@ -258,12 +259,14 @@ fn used(spec: &ProblemSpec) -> Vec<String> {
 }
 
 /// The stage of a sensor, and the column that the sensor measures.
-fn sensor_of(sensor: &Sensor, stages: &[StageEntry]) -> Result<(usize, String), ProblemError> {
-    let at = stages.iter().position(|s| s.output == sensor.signal);
+fn sensor_of(
+    (reference, signal): (&String, &String),
+    stages: &[StageEntry],
+) -> Result<(usize, String), ProblemError> {
+    let at = stages.iter().position(|s| s.output == *signal);
     let outputs = stages.iter().map(|s| s.output.as_str());
-    let at =
-        at.ok_or_else(|| ProblemError::unknown("signal", "output", &sensor.signal, outputs))?;
-    Ok((at, sensor.reference.clone()))
+    let at = at.ok_or_else(|| ProblemError::unknown("signal", "output", signal, outputs))?;
+    Ok((at, reference.clone()))
 }
 
 fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {

@@ -1,11 +1,12 @@
 //! A user's own problem with what a diagnosis found.
 
-use stretch_data::Remarks;
+use std::num::NonZeroUsize;
+
+use stretch_data::{EffectEntry, Remarks};
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
 
-use super::{Agreed, BlackBox, agreed, catalogue::Acting, spec::Wrapped};
+use super::{Agreed, BlackBox, agreed, catalogue::Acting, spec::ProblemSpec};
 use crate::{
-    file::{ProblemFile, SimulatorEntry},
     fix::{Chosen, Fix, Fixed, Meaning, NoFix},
     implement::Implementation,
     problem::Diagnosable,
@@ -24,38 +25,20 @@ impl BlackBox {
         }
     }
 
-    /// The problem as a file: the file that it was read from, or a new file for a problem in memory.
-    fn as_file(&self) -> ProblemFile {
-        let spec = self.problem.spec.clone();
-        match &self.file {
-            Some(file) => ProblemFile { spec, ..file.clone() },
-            None => ProblemFile {
-                name: "problem".into(),
-                folder: ".".into(),
-                simulator: SimulatorEntry::Caller,
-                spec,
-                trials: Vec::new(),
-                time: "time_s".into(),
-                time_unit: None,
-                budget: self.runs.budget(),
-            },
-        }
-    }
-
     /// Writes the values of an effect that was found into the file, so that the effect acts in every run.
-    fn add(&self, file: &mut ProblemFile, effect: usize, values: &[f64]) {
+    fn add(&self, file: &mut ProblemSpec, effect: usize, values: &[f64]) {
         let spec = &self.description().effects[effect];
         let named =
             || spec.parameters.iter().map(|p| p.name.to_string()).zip(values.iter().copied());
         match self.problem.acting[effect] {
             Acting::Own(_) => {
-                let own = file.spec.effects.iter_mut().find(|own| own.name == spec.name);
+                let own = file.effects.iter_mut().find(|own| own.name == spec.name);
                 let arguments = own.into_iter().flat_map(|own| &mut own.arguments);
                 arguments.zip(values).for_each(|(a, value)| a.value = Some(*value));
             }
             Acting::Wrapper(_) | Acting::Recorder(_) => {
-                let (name, values) = (spec.name.clone(), named().collect());
-                file.spec.wrapped.push(Wrapped { name, values });
+                let (name, parameters) = (spec.name.clone(), named().collect());
+                file.wrapped.push(EffectEntry { name, parameters });
             }
         }
     }
@@ -122,9 +105,10 @@ impl Diagnosable for BlackBox {
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
-        let mut file = self.as_file();
+        let mut file = self.problem.spec.clone();
+        file.budget = file.budget.or(self.runs.budget().and_then(NonZeroUsize::new));
         let is_bare = chosen.effects(&self.description().effects).next().is_none();
-        let tuned = file.spec.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
+        let tuned = file.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
         for (index, (parameter, value)) in tuned {
             if self.description().parameters[index].sd == 0.0 {
                 continue;

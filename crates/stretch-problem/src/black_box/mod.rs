@@ -8,8 +8,8 @@ mod experiments;
 mod facts;
 mod families;
 mod fixed;
+mod inner_run;
 mod linear;
-mod needed;
 mod repeated;
 mod runs;
 pub(crate) mod source;
@@ -26,7 +26,7 @@ use stretch_gap::{
 
 use stretch_effects::{Find, Kind, Measured, Side};
 
-use crate::{file::ProblemFile, wrap::Trials};
+use crate::wrap::Trials;
 use catalogue::Acting;
 use coupled::{Coupled, probes};
 use linear::Linear;
@@ -40,7 +40,7 @@ pub use source::{
     SourceError, closure,
 };
 
-pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
+pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, StageEntry, TrialFile};
 pub use states::State;
 
 /// A checked problem and a source, bound together: a [`Simulator`].
@@ -96,7 +96,6 @@ pub use states::State;
 #[derive(Debug)]
 pub struct BlackBox {
     problem: Checked,
-    file: Option<ProblemFile>,
     runs: Runs,
     /// By stage, the last linearisation.
     lines: RwLock<Vec<Option<Arc<Linear>>>>,
@@ -121,7 +120,7 @@ impl BlackBox {
         let runs = Runs::new(source, budget, stages * samples);
         let lines = RwLock::new(vec![None; problem.stages.len()]);
         let (coupled, undeclared) = (OnceLock::new(), Undeclared::default());
-        Self { problem, file: None, runs, lines, probes, coupled, undeclared }
+        Self { problem, runs, lines, probes, coupled, undeclared }
     }
 
     /// The problem.
@@ -159,11 +158,6 @@ impl BlackBox {
     /// Whether what alters the input of one stage acts on the outputs of others.
     fn is_coupled(&self) -> bool {
         self.coupled().about.is_some()
-    }
-
-    /// Notes the file that the problem was read from: a [fix](crate::Fix) is that file with what was found.
-    pub fn from_file(self, file: ProblemFile) -> Self {
-        Self { file: Some(file), ..self }
     }
 
     /// The run that a run is predicted from, and the difference of the parameters; the run itself where it has to be exact.

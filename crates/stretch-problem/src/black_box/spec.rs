@@ -1,56 +1,112 @@
-//! The entries of a problem as a user writes them down; [`Checked::new`](crate::Checked::new) checks the entries.
+//! A problem as a user writes it down, in a `problem.toml` or in memory; [`Checked::new`](crate::Checked::new) checks the entries.
 //!
-//! Python hands these entries over by serde: the fields have the names that the Python package gives them.
+//! Comments on fields are the descriptions of the keys in the reference of `problem.toml` and in its JSON Schema.
 
-use std::collections::BTreeMap;
+use std::{
+    fmt,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
 
-use serde::{Deserialize, Deserializer, de::Error};
-use stretch_data::SessionTrial;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{
+    Deserialize, Deserializer, Serialize, Serializer,
+    de::{Error, Unexpected, Visitor},
+};
+use stretch_data::{EffectEntry, SessionTrial, Split, from_zero};
 use stretch_effects::Kind;
+use stretch_recording::TimeUnit;
 use stretch_sim::Tolerance;
 
-/// A problem with its recordings in memory.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+use crate::file::{SimulatorEntry, simulator, simulator_schema};
+
+/// A problem: what a `problem.toml` holds, and the recordings in memory.
+///
+/// ```
+/// use stretch_problem::ProblemSpec;
+/// let text = r#"
+/// simulator = ["python3", "servo.py"]
+/// wrap = ["input.delay", "output.backlash"]
+/// [[stage]]
+/// name = "servo"
+/// output = "angle_deg"
+/// inputs = ["command_V"]
+/// [[parameter]]
+/// name = "gain"
+/// value = 10
+/// tolerance = "10 %"
+/// [[trial]]
+/// file = "monday.csv"
+/// "#;
+/// let problem = ProblemSpec::parse("problem.toml", text)?;
+/// assert_eq!(problem.parameters[0].name, "gain");
+/// let error = ProblemSpec::parse("problem.toml", &text.replace("tolerance", "tolerence")).unwrap_err();
+/// assert!(error.to_string().starts_with(
+///     "problem.toml, row 11, key parameter[0].tolerence: nothing reads it (did you mean tolerance?)"
+/// ));
+/// # Ok::<(), stretch_problem::ProblemError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "problem.toml of stretch", description = "The file itself.", extend("required" = ["simulator"]))]
 pub struct ProblemSpec {
-    /// Stages, at least one.
+    /// Name of the problem in reports.
+    pub name: Option<String>,
+    /// Folder that its files are relative to, where it is not its own.
+    #[serde(default, skip_serializing_if = "is_own")]
+    pub folder: PathBuf,
+    /// The simulator: a command as a list, or the table `[simulator]`.
+    #[serde(default, deserialize_with = "simulator")]
+    #[schemars(schema_with = "simulator_schema")]
+    pub simulator: Option<SimulatorEntry>,
+    /// What is looked for around the stages: `all`, or names such as `input.delay`, `output.all`, `state.all`, `gear.output.backlash`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wrap: Vec<String>,
+    /// Effects that are not looked for, by name, kind (`backlash`) or place (`output.all`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
+    /// Further columns that a wrapper may look at: channels that may talk across to another channel, loads of a contact.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<String>,
+    /// Column that a sensor measures, where the output `signal` is that of a sensor: the diagnosis then reports what a calibration of the
+    /// sensor loses by the gap, and slices go by this column.
+    pub reference: Option<String>,
+    /// Output of a stage that is a sensor; with `reference`.
+    pub signal: Option<String>,
+    /// Column of the time; `time_s` without it.
+    pub time: Option<String>,
+    /// What the time counts, where the name of its column does not say.
+    pub time_unit: Option<TimeUnit>,
+    /// Greatest number of runs of the simulator.
+    pub budget: Option<NonZeroUsize>,
+    /// The stages; needed unless the simulator is built in.
+    #[serde(rename = "stage", default, skip_serializing_if = "Vec::is_empty")]
     pub stages: Vec<StageEntry>,
     /// Unit and noise of columns that drive stages, where they are known.
+    #[serde(rename = "input", default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<Input>,
     /// Nominal parameters.
+    #[serde(rename = "parameter", default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter>,
-    /// Effects that the user's simulator has itself.
+    /// Effects that the simulator has itself.
+    #[serde(rename = "effect", default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<OwnEffect>,
-    /// Wrappers to look for, as `input.delay`, `output.backlash`, `stage.output.lag`, or `all`.
-    pub wrap: Vec<String>,
+    /// Wrappers that act in every run, by place and kind (`output.backlash`), with their values; a form that is left out has its usual value.
+    /// These wrappers are not looked for. `--fix` writes them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wrapped: Vec<EffectEntry>,
+    /// The recordings; needed unless the simulator is built in.
+    #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<TrialFile>,
     /// Kinds of effects of the user's own, which `wrap` may name beside the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,
-    /// Wrappers that were found before and act in every run, with their values. These wrappers are not looked for.
-    pub wrapped: Vec<Wrapped>,
-    /// Effects that are not looked for, by name; a wrapper is also named by its kind or its place.
-    pub without: Vec<String>,
-    /// Further columns that a wrapper may take: channels that may talk across to another channel.
-    pub beside: Vec<String>,
     /// A column by which runs are told apart, which no effect looks at.
     #[serde(skip)]
     pub by: Option<String>,
-    /// The stage that is a sensor, where there is one, by the column of its output and the column that it measures: the diagnosis then
-    /// reports what a calibration of the sensor loses by the gap, and slices go by the measured column.
-    pub sensor: Option<Sensor>,
-    /// Recordings.
+    /// Recordings in memory; [`ProblemSpec::load`] reads these.
     #[serde(skip)]
     pub trials: Vec<SessionTrial>,
-}
-
-impl ProblemSpec {
-    /// Takes columns as those of a sensor, where columns are given.
-    pub(crate) fn set_sensor(&mut self, columns: Option<(&str, &str)>) {
-        if let Some((reference, signal)) = columns {
-            let (reference, signal) = (reference.to_owned(), signal.to_owned());
-            self.sensor = Some(Sensor { reference, signal });
-        }
-    }
 }
 
 /// Says that the catalogue was narrowed for a simulator that takes no altered inputs.
@@ -59,7 +115,7 @@ pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side
 impl ProblemSpec {
     /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` stands for what can be behind the
     /// simulator, and noise of its inputs is not drawn. `None` where the problem asks for nothing else anyway.
-    pub(crate) fn only_behind(&self) -> Option<Self> {
+    pub fn only_behind(&self) -> Option<Self> {
         let is_noisy = |input: &Input| input.noise > 0.0;
         if !self.wrap.iter().any(|name| name == "all") && !self.inputs.iter().any(is_noisy) {
             return None;
@@ -73,83 +129,74 @@ impl ProblemSpec {
     }
 }
 
-/// A stage that is a sensor.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-pub struct Sensor {
-    /// Column that the sensor measures.
-    pub reference: String,
-    /// Column of its output: the output of a stage.
-    pub signal: String,
-}
-
-/// A wrapper that acts in every run.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Wrapped {
-    /// Place and kind, as `output.backlash`.
-    pub name: String,
-    /// Its values by name; a form that is left out has its usual value.
-    pub values: BTreeMap<String, f64>,
-}
-
-/// A stage, which turns measured input columns into one measured output column.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// A stage turns measured input columns into one measured output column.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct StageEntry {
-    /// Name in reports.
+    /// Name in reports; the output without it.
+    #[serde(default)]
     pub name: String,
     /// Column that the simulated output is compared with.
     pub output: String,
-    /// Unit of the output; the last part of the column's name where it is empty.
+    /// Unit of the output; the last part of the column's name without it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
     /// Columns that drive the stage.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<String>,
-    /// Noise of the output, one standard deviation; estimated from the recordings where it is not given.
+    /// Noise of the output, one standard deviation; estimated from the recordings without it.
+    #[serde(default, deserialize_with = "from_zero")]
     pub noise: Option<f64>,
-    /// Column of the velocity of the rubbing parts, for friction.
+    /// Column of the velocity of the rubbing parts; friction needs it, or the position.
     pub velocity: Option<String>,
     /// Column of the position whose change is that velocity.
     pub position: Option<String>,
 }
 
-/// Unit and noise of a column that drives a stage.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// What is known of a column that drives a stage.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Input {
     /// The column.
     pub column: String,
-    /// Its unit; the last part of the column's name where it is empty.
+    /// Its unit; the last part of the column's name without it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Its noise, one standard deviation; 0 for a command.
+    /// Its noise, one standard deviation; 0 for a command, and without it.
+    #[serde(default, deserialize_with = "from_zero")]
     pub noise: f64,
 }
 
-/// A nominal parameter.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// A nominal parameter, which may be re-tuned within three tolerances.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Parameter {
-    /// Name in reports.
+    /// Name, as the simulator knows it.
     pub name: String,
-    /// Unit.
+    /// Unit; empty where there is none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
     /// Value that the simulator is shipped with.
     pub value: f64,
-    /// Tolerance, one standard deviation; for serde a number in the unit, or a text such as `"10 %"`.
-    #[serde(deserialize_with = "tolerance")]
+    /// One standard deviation, a number in the unit or a share such as `"10 %"`; exact without it.
+    #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
+    #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
     /// Least value that makes sense.
     pub least: Option<f64>,
     /// Greatest value that makes sense.
     pub greatest: Option<f64>,
-    /// Stages that the parameter acts in; all stages where none is named.
+    /// Names of the stages in which it acts; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stages: Vec<String>,
-    /// Value re-tuned without the effects that were found, beside which a [foretelling](crate::foretell) is judged; a fix writes it.
+    /// Value re-tuned without the effects of the file, with which `stretch predict` compares; `--fix` writes it.
     pub alone: Option<f64>,
 }
 
-/// An effect that the user's simulator has itself: arguments, with the values at which the effect does nothing.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// An effect that the simulator has itself. The keys of its one argument stand here; an effect of several arguments has a table
+/// `[[effect.argument]]` with these keys for each.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "WrittenEffect", into = "WrittenEffect")]
 pub struct OwnEffect {
     /// Name in reports.
     pub name: String,
@@ -159,6 +206,74 @@ pub struct OwnEffect {
     pub stages: Vec<String>,
     /// Names of effects that are hard to tell from it.
     pub twins: Vec<String>,
+}
+
+/// An [`OwnEffect`] as it is written.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct WrittenEffect {
+    /// Name, as the simulator knows it.
+    name: String,
+    /// Names of the stages in which it acts; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    stages: Vec<String>,
+    /// Effects that are hard to tell from it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    twins: Vec<String>,
+    /// Unit; empty where there is none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    unit: String,
+    /// Least and greatest plausible value; needed without `[[effect.argument]]`.
+    #[serde(default, deserialize_with = "range")]
+    range: Option<[f64; 2]>,
+    /// Value at which it does nothing; none for a shape.
+    off: Option<f64>,
+    /// Whether it is searched in equal ratios.
+    #[serde(default, skip_serializing_if = "is_false")]
+    log: bool,
+    /// Value in every run, where it was found before; `--fix` writes it.
+    value: Option<f64>,
+    /// Its arguments, where it has several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    argument: Vec<Argument>,
+}
+
+impl TryFrom<WrittenEffect> for OwnEffect {
+    type Error = String;
+
+    fn try_from(written: WrittenEffect) -> Result<Self, String> {
+        let WrittenEffect { name, stages, twins, unit, range, off, log: is_log, value, argument } =
+            written;
+        let has_own = range.is_some() || off.is_some() || value.is_some() || is_log;
+        let arguments = match (argument.is_empty(), range) {
+            (false, _) if has_own => {
+                return Err("range, off, log and value stand in its [[effect.argument]]".into());
+            }
+            (false, _) => argument,
+            (true, Some(range)) => {
+                vec![Argument { name: String::new(), unit, range, off, is_log, value }]
+            }
+            (true, None) => return Err("it has no range; write range = [least, greatest]".into()),
+        };
+        match arguments.iter().find(|a| a.is_log && a.range[0] <= 0.0) {
+            Some(a) => Err(format!(
+                "its range begins at {}; what is searched in equal ratios (log) is above 0",
+                a.range[0]
+            )),
+            None => Ok(Self { name, arguments, stages, twins }),
+        }
+    }
+}
+
+impl From<OwnEffect> for WrittenEffect {
+    fn from(effect: OwnEffect) -> Self {
+        let OwnEffect { name, mut arguments, stages, twins } = effect;
+        let is_one = matches!(&arguments[..], [one] if one.name.is_empty());
+        let one = if is_one { arguments.pop() } else { None };
+        let range = one.as_ref().map(|one| one.range);
+        let Argument { unit, off, is_log: log, value, .. } = one.unwrap_or_default();
+        Self { name, stages, twins, unit, range, off, log, value, argument: arguments }
+    }
 }
 
 impl OwnEffect {
@@ -176,51 +291,135 @@ impl OwnEffect {
     }
 }
 
-/// An argument of an own effect.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// An argument of an effect that has several; the simulator knows it as `effect.argument`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Argument {
-    /// Name; the name of the effect where this one is empty.
+    /// Name of the argument.
     pub name: String,
-    /// Unit.
+    /// Unit; empty where there is none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Least plausible value.
-    pub min: f64,
-    /// Greatest plausible value.
-    pub max: f64,
-    /// Value at which the effect does nothing; none for a shape, which has the middle of its range where the effect is off.
+    /// Least and greatest plausible value.
+    #[serde(deserialize_with = "range")]
+    pub range: [f64; 2],
+    /// Value at which it does nothing; none for a shape, which has the middle of its range where the effect is off.
     pub off: Option<f64>,
-    /// Whether the value is searched in equal ratios.
-    #[serde(rename = "log")]
+    /// Whether it is searched in equal ratios.
+    #[serde(rename = "log", default, skip_serializing_if = "is_false")]
     pub is_log: bool,
-    /// Value in every run, where the value was found before; the effect is then not looked for.
+    /// Value in every run, where it was found before; `--fix` writes it.
     pub value: Option<f64>,
 }
 
-/// A tolerance as it is written.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum WrittenTolerance {
-    Absolute(f64),
-    Share(String),
+/// A recording.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrialFile {
+    /// File, relative to the problem's folder.
+    pub file: String,
+    /// Session time of its first sample, s; without it the trial follows the one before.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub start_s: f64,
+    /// Whether it may be fitted, as without it, or is tested on once.
+    #[serde(default, skip_serializing_if = "is_fit")]
+    pub split: Split,
 }
 
-fn tolerance<'de, D: Deserializer<'de>>(from: D) -> Result<Tolerance, D::Error> {
-    match Option::<WrittenTolerance>::deserialize(from)? {
-        None => Ok(Tolerance::Exact),
-        Some(WrittenTolerance::Absolute(sd)) => Ok(Tolerance::Absolute(sd)),
-        Some(WrittenTolerance::Share(text)) => {
-            share(&text).map(Tolerance::Relative).ok_or_else(|| {
-                D::Error::custom(format!(
-                    "{text:?} is no share; write \"10 %\", or a number in its unit"
-                ))
-            })
-        }
+fn is_own(folder: &Path) -> bool {
+    folder.as_os_str().is_empty()
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+fn is_fit(split: &Split) -> bool {
+    *split == Split::Fit
+}
+
+/// Reads a least and a greatest value.
+fn range<'de, D, T>(from: D) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: From<[f64; 2]>,
+{
+    match Vec::<f64>::deserialize(from)?[..] {
+        [least, greatest] if least < greatest => Ok(T::from([least, greatest])),
+        [least, greatest] => Err(D::Error::custom(format!(
+            "the range {least} to {greatest} is empty; give the least value first"
+        ))),
+        _ => Err(D::Error::custom("this is not a range; write [least, greatest]")),
     }
 }
 
-/// The share that a text with a per cent sign gives.
-pub(crate) fn share(text: &str) -> Option<f64> {
-    let percent = text.strip_suffix('%')?.trim().parse::<f64>().ok()?;
-    percent.is_finite().then_some(percent / 100.0)
+/// A tolerance as it is written: a number in the unit of the value, or a text such as `"10 %"`.
+mod tolerance {
+    use super::*;
+
+    struct Written;
+
+    impl Visitor<'_> for Written {
+        type Value = Tolerance;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a tolerance; write \"10 %\", or a number in its unit")
+        }
+
+        fn visit_f64<E: Error>(self, sd: f64) -> Result<Tolerance, E> {
+            Ok(Tolerance::Absolute(sd))
+        }
+
+        fn visit_i64<E: Error>(self, sd: i64) -> Result<Tolerance, E> {
+            Ok(Tolerance::Absolute(sd as f64))
+        }
+
+        fn visit_u64<E: Error>(self, sd: u64) -> Result<Tolerance, E> {
+            Ok(Tolerance::Absolute(sd as f64))
+        }
+
+        fn visit_str<E: Error>(self, text: &str) -> Result<Tolerance, E> {
+            let percent = text.strip_suffix('%').and_then(|number| number.trim().parse().ok());
+            match percent.filter(|percent: &f64| percent.is_finite()) {
+                Some(percent) => Ok(Tolerance::Relative(percent / 100.0)),
+                None => Err(E::invalid_value(Unexpected::Str(text), &self)),
+            }
+        }
+
+        fn visit_unit<E: Error>(self) -> Result<Tolerance, E> {
+            Ok(Tolerance::Exact)
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Tolerance, D::Error> {
+        match from.deserialize_any(Written)? {
+            Tolerance::Absolute(x) | Tolerance::Relative(x) if x < 0.0 => {
+                Err(D::Error::custom("it is below 0; give one standard deviation"))
+            }
+            tolerance => Ok(tolerance),
+        }
+    }
+
+    pub(super) fn serialize<S: Serializer>(
+        tolerance: &Tolerance,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        match tolerance {
+            Tolerance::Exact => to.serialize_none(),
+            Tolerance::Absolute(sd) => to.serialize_f64(*sd),
+            Tolerance::Relative(share) => to.collect_str(&format_args!("{} %", 100.0 * share)),
+        }
+    }
+
+    pub(super) fn is_exact(tolerance: &Tolerance) -> bool {
+        *tolerance == Tolerance::Exact
+    }
+
+    pub(super) fn schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "oneOf": [{ "type": "number", "minimum": 0 }, { "type": "string", "pattern": "%$" }] })
+    }
 }

@@ -76,15 +76,13 @@ impl ProblemSpec {
 fn arguments(state: &State, session_s: f64, rate_hz: f64) -> [(&'static str, Argument); 3] {
     let level = |off: f64| Argument {
         unit: state.unit.clone(),
-        min: state.least,
-        max: state.greatest,
+        range: [state.least, state.greatest],
         off: Some(off),
         ..Argument::default()
     };
     let leak = Argument {
         unit: "1/s".into(),
-        min: 1.0 / (LEAKS[1] * session_s.max(1.0 / rate_hz)),
-        max: rate_hz / LEAKS[0],
+        range: [1.0 / (LEAKS[1] * session_s.max(1.0 / rate_hz)), rate_hz / LEAKS[0]],
         off: Some(0.0),
         is_log: true,
         ..Argument::default()

@@ -2,15 +2,13 @@
 
 use std::ops::Range;
 
-use stretch_gap::{Simulator, TrialSpec};
+use stretch_gap::TrialSpec;
 
 /// Samples that are fitted together, by the index of each in all trials end to end.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
     pub(super) name: String,
     pub(super) samples: Vec<usize>,
-    /// How many trials are to be simulated, from the first on.
-    pub(super) trials: usize,
 }
 
 /// Most values of a column that is set; one with more is measured.
@@ -24,22 +22,11 @@ const PARTS: usize = 4;
 /// Least samples of a group.
 const FEWEST: usize = 20;
 
-/// All samples.
-pub(super) fn whole(simulator: &dyn Simulator) -> Group {
-    let trials = simulator.trials();
-    let samples = (0..trials.iter().map(|t| t.samples).sum()).collect();
-    Group { name: "all".to_owned(), samples, trials: trials.len() }
-}
-
 /// A group a trial.
 pub(super) fn by_trial(trials: &[TrialSpec]) -> Vec<Group> {
-    let each = ranges(trials).into_iter().zip(trials).enumerate();
-    each.map(|(i, (samples, trial))| Group {
-        name: trial.name.clone(),
-        samples: samples.collect(),
-        trials: i + 1,
-    })
-    .collect()
+    let each = ranges(trials).into_iter().zip(trials);
+    each.map(|(samples, trial)| Group { name: trial.name.clone(), samples: samples.collect() })
+        .collect()
 }
 
 /// A group a value of a column.
@@ -53,22 +40,16 @@ pub(super) fn by_column(name: &str, values: &[f64], trials: &[TrialSpec]) -> Vec
     for (i, value) in values.iter().enumerate() {
         samples[bounds.partition_point(|bound| bound <= value)].push(i);
     }
-    let ranges = ranges(trials);
     let group = |samples: Vec<usize>| {
-        let last = samples.last().copied().unwrap_or(0);
         let of = samples.iter().map(|i| values[*i]);
         let [low, high] =
             of.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-        Group {
-            name: said(name, low, high),
-            trials: ranges.iter().position(|r| r.contains(&last)).map_or(trials.len(), |t| t + 1),
-            samples,
-        }
+        Group { name: group_name(name, low, high), samples }
     };
     samples.into_iter().filter(|samples| samples.len() >= FEWEST).map(group).collect()
 }
 
-fn said(name: &str, low: f64, high: f64) -> String {
+fn group_name(name: &str, low: f64, high: f64) -> String {
     let [low, high] = [low, high]
         .map(|x| format!("{:.4}", x).trim_end_matches('0').trim_end_matches('.').to_owned());
     if low == high { format!("{name} {low}") } else { format!("{name} {low} to {high}") }
@@ -133,8 +114,8 @@ mod tests {
         (0..count).map(|i| TrialSpec::new(&format!("t{i}"), samples, 0.0, false)).collect()
     }
 
-    fn told(groups: &[Group]) -> Vec<(&str, usize, usize)> {
-        groups.iter().map(|g| (g.name.as_str(), g.samples.len(), g.trials)).collect()
+    fn sizes(groups: &[Group]) -> Vec<(&str, usize)> {
+        groups.iter().map(|g| (g.name.as_str(), g.samples.len())).collect()
     }
 
     #[test]
@@ -142,7 +123,7 @@ mod tests {
         // Two values a trial, and one between them where a recording was brought to an even grid.
         let one = [vec![0.5; 50], vec![1.0], vec![2.0; 49]].concat();
         let groups = by_column("voltage_v", &[one.clone(), one].concat(), &trials(2, 100));
-        assert_eq!(told(&groups), [("voltage_v 0.5 to 1", 102, 2), ("voltage_v 2", 98, 2)]);
+        assert_eq!(sizes(&groups), [("voltage_v 0.5 to 1", 102), ("voltage_v 2", 98)]);
     }
 
     #[test]
@@ -150,7 +131,7 @@ mod tests {
         let noisy = |level: f64| (0..100).map(move |i| level + 0.01 * f64::from(i * 37 % 10));
         let values: Vec<f64> = [3.0, 8.0, 3.1].into_iter().flat_map(noisy).collect();
         let groups = by_column("pull_n", &values, &trials(3, 100));
-        assert_eq!(told(&groups), [("pull_n 3 to 3.19", 200, 3), ("pull_n 8 to 8.09", 100, 2)]);
+        assert_eq!(sizes(&groups), [("pull_n 3 to 3.19", 200), ("pull_n 8 to 8.09", 100)]);
     }
 
     #[test]
@@ -158,7 +139,7 @@ mod tests {
         let values: Vec<f64> = (0..400).map(|i| f64::from(i * 7 % 400)).collect();
         let groups = by_column("angle_deg", &values, &trials(2, 200));
         assert_eq!(groups.len(), 4);
-        assert!(groups.iter().all(|g| g.samples.len() == 100), "{:?}", told(&groups));
+        assert!(groups.iter().all(|g| g.samples.len() == 100), "{:?}", sizes(&groups));
         assert_eq!(groups[3].name, "angle_deg 300 to 399");
     }
 

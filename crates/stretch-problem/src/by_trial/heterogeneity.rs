@@ -11,8 +11,7 @@
 
 use serde::Serialize;
 use statrs::function::{erf::erfc, gamma::checked_gamma_ur};
-
-use super::{fit::Fit, unknowns::Unknowns};
+use stretch_gap::{SampleFit, SampleValue};
 
 /// False discovery rate.
 const RATE: f64 = 0.05;
@@ -81,20 +80,27 @@ impl Apart {
     }
 }
 
-/// What the data of a run say of a value: index of the run, number, variance.
-type Said = (usize, f64, f64);
+/// A run that was fitted by itself, with its name.
+type Run = (String, SampleFit);
 
-fn said(runs: &[(String, Fit, f64)], value: usize) -> Vec<Said> {
-    let one =
-        |(i, (_, fit, _)): (usize, &(String, Fit, f64))| fit.data(value).map(|(x, v)| (i, x, v));
+/// What the data of a run say of a value: index of the run, place on the scale of the fit, variance.
+type Estimate = (usize, f64, f64);
+
+fn estimates(runs: &[Run], value: usize) -> Vec<Estimate> {
+    let one = |(i, (_, fit)): (usize, &Run)| fit.values[value].estimate.map(|(x, v)| (i, x, v));
     runs.iter().enumerate().filter_map(one).collect()
 }
 
+/// The values that were fitted, which are the same in all runs.
+fn fitted(runs: &[Run]) -> &[SampleValue] {
+    runs.first().map_or(&[], |(_, fit)| &fit.values)
+}
+
 /// Weighted mean, its variance, and Q.
-fn pooled(said: &[Said]) -> (f64, f64, f64) {
-    let weight: f64 = said.iter().map(|(_, _, v)| 1.0 / v).sum();
-    let mean = said.iter().map(|(_, x, v)| x / v).sum::<f64>() / weight;
-    let q = said.iter().map(|(_, x, v)| (x - mean) * (x - mean) / v).sum();
+fn pooled(estimates: &[Estimate]) -> (f64, f64, f64) {
+    let weight: f64 = estimates.iter().map(|(_, _, v)| 1.0 / v).sum();
+    let mean = estimates.iter().map(|(_, x, v)| x / v).sum::<f64>() / weight;
+    let q = estimates.iter().map(|(_, x, v)| (x - mean) * (x - mean) / v).sum();
     (mean, 1.0 / weight, q)
 }
 
@@ -104,24 +110,23 @@ fn beyond(q: f64, degrees: usize) -> f64 {
 }
 
 /// By value: whether the runs agree.
-pub(super) fn values(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<Heterogeneity> {
+pub(super) fn values(runs: &[Run]) -> Vec<Heterogeneity> {
     let mut out = Vec::new();
-    for value in 0..unknowns.len() {
-        let said = said(runs, value);
-        if said.len() < 2 {
+    for (i, value) in fitted(runs).iter().enumerate() {
+        let estimates = estimates(runs, i);
+        if estimates.len() < 2 {
             continue;
         }
-        let (mean, _, q) = pooled(&said);
-        let of = |x: f64| unknowns.at(value, x, 0.0).0;
-        let ends = said.iter().map(|(_, x, _)| of(*x));
+        let (mean, _, q) = pooled(&estimates);
+        let ends = estimates.iter().map(|(_, x, _)| value.at(*x));
         let range = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-        let degrees = said.len() - 1;
+        let degrees = estimates.len() - 1;
         out.push(Heterogeneity {
-            name: unknowns.name(value).to_owned(),
-            unit: unknowns.unit(value).to_owned(),
-            mean: of(mean),
+            name: value.identified.name.clone(),
+            unit: value.identified.unit.clone(),
+            mean: value.at(mean),
             range,
-            runs: said.len(),
+            runs: estimates.len(),
             q,
             i_squared: (1.0 - degrees as f64 / q).max(0.0),
             p: beyond(q, degrees),
@@ -137,16 +142,17 @@ pub(super) fn values(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<He
 }
 
 /// Runs that stand apart from the mean of the others.
-pub(super) fn apart(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<Apart> {
+pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     let mut asked: Vec<(usize, usize, f64, bool)> = Vec::new();
-    for value in 0..unknowns.len() {
-        let said = said(runs, value);
-        // Of two that differ nobody knows which is the other one.
-        if said.len() < 3 {
+    for value in 0..fitted(runs).len() {
+        let estimates = estimates(runs, value);
+        // If two runs differ, either may be the odd one.
+        if estimates.len() < 3 {
             continue;
         }
-        for (run, x, v) in &said {
-            let rest: Vec<Said> = said.iter().copied().filter(|(r, ..)| r != run).collect();
+        for (run, x, v) in &estimates {
+            let rest: Vec<Estimate> =
+                estimates.iter().copied().filter(|(r, ..)| r != run).collect();
             let (mean, variance, q) = pooled(&rest);
             let agree = beyond(q, rest.len() - 1) > RATE;
             asked.push((*run, value, (x - mean) / (v + variance).sqrt(), agree));
@@ -162,7 +168,7 @@ pub(super) fn apart(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<Apa
         let is_set_up = own.iter().any(|(.., agree)| *agree);
         (is_set_up).then(|| Apart {
             run: runs[run].0.clone(),
-            values: own.iter().map(|(_, v, ..)| unknowns.name(*v).to_owned()).collect(),
+            values: own.iter().map(|(_, v, ..)| fitted(runs)[*v].identified.name.clone()).collect(),
             deviations: own.iter().map(|(_, _, z, _)| *z).collect(),
             is_set_up,
         })

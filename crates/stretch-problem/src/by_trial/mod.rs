@@ -1,24 +1,18 @@
 //! Do the runs agree: every run fitted by itself, a trial or all samples in which a column has one value, and what differs from run to run.
 
-mod fit;
 mod groups;
 mod heterogeneity;
-mod told;
-mod unknowns;
 
 use serde::Serialize;
-use stretch_gap::{GapError, Simulator};
+use stretch_gap::{GapError, SampleFit, SampleValue, Simulator, fit_samples};
 
 use crate::{error::ProblemError, examine::Examined, problem::Problem};
-use fit::{Fit, Target};
 use groups::Group;
-use unknowns::Unknowns;
 
 pub use heterogeneity::{Apart, Heterogeneity};
-pub use told::{FittedValue, Standing};
 
 /// What some runs say when they are fitted without the others.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct RunFit {
     /// Name of the run; of all runs together `all`.
     pub run: String,
@@ -26,12 +20,12 @@ pub struct RunFit {
     pub times_noise: f64,
     /// The same with the values of all runs together.
     pub times_noise_of_all: f64,
-    /// The values, in the order of the problem's parameters, the effects' behind them.
-    pub values: Vec<FittedValue>,
+    /// The values: parameters stage by stage, then the numbers of the effects.
+    pub values: Vec<SampleValue>,
 }
 
 /// Whether runs agree, by value and by run. Its serde form is the key `by_trial` of a diagnosis' JSON.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct ByTrial {
     /// What a run is: `trial`, or the column of which each run has another value.
     pub by: String,
@@ -57,13 +51,7 @@ impl ByTrial {
                 self.runs.len()
             ));
         }
-        let untold = self.all.values.iter().filter(|v| v.standing != Standing::Identified);
-        out.extend(untold.map(|v| match v.standing {
-            Standing::Absorbed => {
-                format!("{} is absorbed by {}", v.name, v.absorbed_by.join(" and "))
-            }
-            _ => format!("{} is free: these runs say little more of it than its tolerance", v.name),
-        }));
+        out.extend(self.all.values.iter().filter_map(|v| v.identified.sentence()));
         out
     }
 }
@@ -78,8 +66,8 @@ impl Problem {
     /// max(1, X tau),     X = mean (r/noise)^2,     tau = 1 + 2 sum of the residual's autocorrelations while they are positive
     /// ```
     ///
-    /// so that an error that lasts counts as the fewer observations that it is. Effects are those that the diagnosis names; their forms stay
-    /// as they were found. Test trials are fitted, too: the verdict stands when this is asked.
+    /// so that an error that lasts counts as fewer observations. The effects are those that the diagnosis names; their forms stay as they were
+    /// found. Test trials are fitted as well, because the verdict is already given.
     ///
     /// # Errors
     /// A simulator whose nuisances cannot be fitted by run (the built-in rig), a single run, and what the simulator says.
@@ -141,32 +129,33 @@ fn compared(
     if simulator.parameters().iter().any(is_nuisance) {
         return refused("its nuisances are of all runs together");
     }
-    let unknowns = Unknowns::of(simulator, &examined.diagnosis, &examined.evidence);
-    let noise: Vec<f64> = examined.evidence.stages.iter().map(|s| s.noise).collect();
-    let target = |group| Target { simulator, unknowns: &unknowns, noise: &noise, group, stop };
+    let Examined { diagnosis, evidence, .. } = examined;
+    let found = evidence.candidates.first().filter(|_| !diagnosis.named.is_empty());
+    let mut start = found.unwrap_or(&evidence.retuned).clone();
+    start.effects.retain(|(e, _)| diagnosis.named.contains(&simulator.effects()[*e].name));
+    let noise: Vec<f64> = evidence.stages.iter().map(|s| s.noise).collect();
     progress("all runs together");
-    let whole = groups::whole(simulator);
-    let all = Fit::of(&target(&whole), &unknowns.start())?;
+    let samples: usize = simulator.trials().iter().map(|t| t.samples).sum();
+    let whole: Vec<usize> = (0..samples).collect();
+    let all = fit_samples(simulator, &noise, &whole, &start, stop)?;
     let mut runs = Vec::new();
     for (i, group) in groups.iter().enumerate() {
         progress(&format!("run {} of {}", i + 1, groups.len()));
-        let own = target(group);
-        let fit = Fit::of(&own, &all.at)?;
-        let of_all = own.times_noise(&all.at)?;
-        runs.push((group.name.clone(), fit, of_all));
+        let fit = fit_samples(simulator, &noise, &group.samples, &all.model, stop)?;
+        runs.push((group.name.clone(), fit));
     }
-    let values = heterogeneity::values(&unknowns, &runs);
-    let apart = heterogeneity::apart(&unknowns, &runs);
-    let one = |(name, fit, of_all): &(String, Fit, f64)| RunFit {
-        run: name.clone(),
+    let values = heterogeneity::values(&runs);
+    let apart = heterogeneity::apart(&runs);
+    let run_fit = |(run, fit): (String, SampleFit)| RunFit {
+        run,
         times_noise: fit.times_noise,
-        times_noise_of_all: *of_all,
-        values: told::values(&unknowns, fit),
+        times_noise_of_all: fit.times_noise_of_start,
+        values: fit.values,
     };
-    let together = ("all".to_owned(), all.clone(), all.times_noise);
-    let runs = runs.iter().map(one).collect();
-    Ok(ByTrial { by: by.to_owned(), all: one(&together), runs, values, apart })
+    let all = RunFit { times_noise_of_all: all.times_noise, ..run_fit(("all".to_owned(), all)) };
+    let runs = runs.into_iter().map(run_fit).collect();
+    Ok(ByTrial { by: by.to_owned(), all, runs, values, apart })
 }
 
-/// What to do where runs cannot be told apart.
+/// What to do if runs cannot be compared.
 const HINT: &str = "runs are compared of a simulator of your own, or of a gauge alone, with two recordings or more, or by a column that was recorded and changes";

@@ -1,102 +1,46 @@
 //! A problem as a file: `problem.toml`.
 
-mod entries;
-mod keys;
 mod schema;
 mod simulator;
-mod write;
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{DataError, SessionTrial, TomlFile, TomlView};
-use stretch_recording::{ReadOptions, Recording, TimeUnit};
+use stretch_data::{DataError, Remarks, SessionTrial, TomlFile};
+use stretch_recording::{ReadOptions, Recording};
 
-use crate::{
-    black_box::spec::{ProblemSpec, Sensor},
-    error::ProblemError,
-    worker::WorkersSpec,
-};
-use entries::{effect, input, parameter, stage, trial, wrapped};
-use keys::TOP;
+use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
 
-pub use entries::TrialFile;
 pub use schema::{problem_reference, problem_schema};
-pub use simulator::{SimulatorEntry, WorkersEntry};
-
-/// The contents of a `problem.toml`.
-///
-/// ```
-/// use stretch_problem::{ProblemFile, SimulatorEntry};
-/// let text = r#"
-/// simulator = ["python3", "servo.py"]
-/// wrap = ["input.delay", "output.backlash"]
-/// [[stage]]
-/// name = "servo"
-/// output = "angle_deg"
-/// inputs = ["command_V"]
-/// [[parameter]]
-/// name = "gain"
-/// value = 10
-/// tolerance = "10 %"
-/// [[trial]]
-/// file = "monday.csv"
-/// "#;
-/// let file = ProblemFile::parse("problem.toml", text)?;
-/// assert_eq!(file.spec.parameters[0].name, "gain");
-/// assert!(matches!(file.simulator, SimulatorEntry::Command { .. }));
-/// let error = ProblemFile::parse("problem.toml", &text.replace("tolerance", "tolerence")).unwrap_err();
-/// assert!(error.to_string().starts_with(
-///     "problem.toml, [[parameter]] gain, key tolerence: nothing reads it (did you mean tolerance?)"
-/// ));
-/// # Ok::<(), stretch_problem::ProblemError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct ProblemFile {
-    /// Name of the problem.
-    pub name: String,
-    /// Folder that its files are relative to.
-    pub folder: PathBuf,
-    /// The simulator.
-    pub simulator: SimulatorEntry,
-    /// All other entries, without the recordings.
-    pub spec: ProblemSpec,
-    /// The recordings.
-    pub trials: Vec<TrialFile>,
-    /// Column of the time.
-    pub time: String,
-    /// What the time counts, where the name of its column does not say.
-    pub time_unit: Option<TimeUnit>,
-    /// Greatest number of runs of the simulator.
-    pub budget: Option<usize>,
-}
+pub use simulator::{BuiltIn, SimulatorEntry};
+pub(crate) use simulator::{simulator, simulator_schema};
 
 /// Name of a problem's file in a folder.
 pub(crate) const IN_FOLDER: &str = "problem.toml";
 /// The current folder.
 const HERE: &str = ".";
 
-impl ProblemFile {
-    /// Reads a problem's file.
+impl ProblemSpec {
+    /// Reads a problem's file, without its recordings.
     ///
     /// # Errors
-    /// Files that cannot be read, text that is no TOML, and [`DataError::Key`] with table and key.
+    /// Files that cannot be read, text that is no TOML, and [`DataError::Key`] with the key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ProblemError> {
         let path = path.as_ref();
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         let beside = folder.unwrap_or_else(|| Path::new(HERE));
-        let file = Self::from_file(&TomlFile::read(path)?)?;
-        let folder = match file.folder == Path::new(HERE) {
+        let spec = Self::from_file(&TomlFile::read(path)?)?;
+        let folder = match spec.folder == Path::new(HERE) {
             true => beside.to_owned(),
-            false => beside.join(&file.folder),
+            false => beside.join(&spec.folder),
         };
-        Ok(Self { folder, ..file })
+        Ok(Self { folder, ..spec })
     }
 
     /// Reads the problem's file that a path stands for: the path itself where it ends in `.toml`, or the `problem.toml` of a folder that is
     /// no data set. None where the path stands for no problem's file.
     ///
     /// # Errors
-    /// As [`ProblemFile::read`].
+    /// As [`ProblemSpec::read`].
     pub fn at(path: &Path) -> Result<Option<Self>, ProblemError> {
         let inside = path.join(IN_FOLDER);
         match path {
@@ -111,54 +55,70 @@ impl ProblemFile {
     /// Parses the text of a problem's file; `file` is its name in messages.
     ///
     /// # Errors
-    /// As [`ProblemFile::read`].
+    /// As [`ProblemSpec::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, ProblemError> {
-        Ok(Self::from_file(&TomlFile::parse(file, text)?)?)
+        Ok(Self::from_file(&TomlFile::new(file, text))?)
     }
 
     fn from_file(file: &TomlFile) -> Result<Self, DataError> {
-        let top = file.top();
-        top.only(&TOP.names())?;
-        let simulator = SimulatorEntry::of(&top)?;
-        let spec = ProblemSpec {
-            stages: named(&top, "stage", stage)?,
-            inputs: named(&top, "input", input)?,
-            parameters: named(&top, "parameter", parameter)?,
-            effects: named(&top, "effect", effect)?,
-            kinds: Vec::new(),
-            wrap: top.texts("wrap")?,
-            wrapped: named(&top, "wrapped", wrapped)?,
-            without: top.texts("without")?,
-            beside: top.texts("beside")?,
-            by: None,
-            sensor: sensor(&top)?,
-            trials: Vec::new(),
+        let mut spec: Self = file.parse()?;
+        let fail = |key: &str, problem: &str| Err(file.error(key, problem));
+        let Some(simulator) = &spec.simulator else {
+            return fail(
+                "simulator",
+                "it is missing; write simulator = [\"python3\", \"sim.py\"], or a table [simulator]",
+            );
         };
-        let trials = named(&top, "trial", trial)?;
-        let is_builtin =
-            matches!(simulator, SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. });
-        if !is_builtin {
-            if spec.stages.is_empty() {
-                return top
-                    .fail("stage", "there is no [[stage]]; write one with output and inputs");
-            }
-            if trials.is_empty() {
-                return top.fail(
-                    "trial",
-                    "there is no [[trial]]; write one with file for each recording",
-                );
-            }
+        simulator.check().map_err(|(key, problem)| file.error(&key, problem))?;
+        if spec.reference.is_some() != spec.signal.is_some() {
+            return fail("reference", "reference and signal go together; give both");
         }
-        Ok(Self {
-            name: top.optional_text("name")?.unwrap_or("problem").to_owned(),
-            folder: PathBuf::from(top.optional_text("folder")?.unwrap_or(HERE)),
-            simulator,
-            spec,
-            trials,
-            time: top.optional_text("time")?.unwrap_or("time_s").to_owned(),
-            time_unit: time_unit(&top)?,
-            budget: top.optional_count("budget")?,
-        })
+        if simulator.builtin.is_none() && spec.stages.is_empty() {
+            return fail("stage", "there is no [[stage]]; write one with output and inputs");
+        }
+        if simulator.builtin.is_none() && spec.files.is_empty() {
+            return fail("trial", "there is no [[trial]]; write one with file for each recording");
+        }
+        for stage in spec.stages.iter_mut().filter(|stage| stage.name.is_empty()) {
+            stage.name.clone_from(&stage.output);
+        }
+        if spec.folder.as_os_str().is_empty() {
+            spec.folder = HERE.into();
+        }
+        Ok(spec)
+    }
+
+    /// The text of the file in its own folder; the text reads back to the same problem.
+    pub fn to_toml(&self) -> String {
+        self.to_toml_with(&self.folder.join(IN_FOLDER), &Remarks::default())
+    }
+
+    /// The text of the file at `path`, with comments on its entries; the text reads back to the same problem. Where its files are relative
+    /// to another folder than that of `path`, the text names that folder.
+    ///
+    /// Comments on parameters stand under the table `parameter`.
+    pub fn to_toml_with(&self, path: &Path, remarks: &Remarks) -> String {
+        let mut remarks = remarks.clone();
+        if self.simulator.is_none() {
+            remarks.head.push("simulator = the one that was diagnosed from memory".into());
+        }
+        remarks.write(&Self { folder: self.folder_from(path).unwrap_or_default(), ..self.clone() })
+    }
+
+    /// The folder that the files of the problem are relative to, where it is another one than that of `path`.
+    fn folder_from(&self, path: &Path) -> Option<PathBuf> {
+        let real = |folder: &Path| match folder.as_os_str().is_empty() {
+            true => Path::new(HERE).canonicalize(),
+            false => folder.canonicalize(),
+        };
+        let beside = real(path.parent().unwrap_or(Path::new(HERE)));
+        let own = real(&self.folder).unwrap_or_else(|_| self.folder.clone());
+        (beside.ok().as_ref() != Some(&own)).then_some(own)
+    }
+
+    /// Name in reports.
+    pub fn shown_name(&self) -> &str {
+        self.name.as_deref().unwrap_or("problem")
     }
 
     /// The workers of the problem's simulator, `jobs` at once where the file gives no number; none for a simulator that is built in.
@@ -166,29 +126,12 @@ impl ProblemFile {
     /// # Errors
     /// There is no program that runs FMUs, and the simulator is one.
     pub fn workers(&self, jobs: usize) -> Result<Option<WorkersSpec>, ProblemError> {
-        let (spec, how) = match &self.simulator {
-            SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. } | SimulatorEntry::Caller => {
-                return Ok(None);
-            }
-            SimulatorEntry::Command { command, workers } => {
-                let command: Vec<&str> = command.iter().map(String::as_str).collect();
-                (WorkersSpec::new(&command, &self.folder), workers)
-            }
-            SimulatorEntry::Python { object, workers } => {
-                (WorkersSpec::python(object, &self.folder), workers)
-            }
-            SimulatorEntry::Fmu { file, variables, workers } => {
-                let units = units(&self.spec);
-                (WorkersSpec::fmu(file, variables, &units, &self.folder)?, workers)
-            }
-        };
-        let jobs = how.jobs.unwrap_or(jobs).max(1);
-        Ok(Some(WorkersSpec { jobs, deadline_s: how.deadline_s, start_s: how.start_s, ..spec }))
+        self.simulator.as_ref().map_or(Ok(None), |own| own.workers(jobs, self))
     }
 
     /// How recordings of the problem are read.
     pub(crate) fn reading(&self) -> ReadOptions {
-        let options = ReadOptions::new().time(&self.time);
+        let options = ReadOptions::new().time(self.time.as_deref().unwrap_or("time_s"));
         match self.time_unit {
             Some(unit) => options.time_unit(unit),
             None => options,
@@ -199,11 +142,15 @@ impl ProblemFile {
     ///
     /// # Errors
     /// Recordings that cannot be read.
-    pub fn load(&self) -> Result<ProblemSpec, ProblemError> {
-        let mut spec = self.spec.clone();
-        let options = self.reading();
-        for entry in &self.trials {
-            let recording = Recording::read(self.folder.join(&entry.file), &options)?;
+    pub fn load(&self) -> Result<Self, ProblemError> {
+        self.load_as(&self.reading())
+    }
+
+    /// The same, the recordings read in another way.
+    pub(crate) fn load_as(&self, options: &ReadOptions) -> Result<Self, ProblemError> {
+        let mut spec = self.clone();
+        for entry in &self.files {
+            let recording = Recording::read(self.folder.join(&entry.file), options)?;
             let mut trial = SessionTrial::from(recording);
             trial.trial.name.clone_from(&entry.file);
             (trial.start_s, trial.split) = (entry.start_s, entry.split);
@@ -211,57 +158,4 @@ impl ProblemFile {
         }
         Ok(spec)
     }
-}
-
-/// Units of the time, as they are written.
-pub(crate) const TIME_UNITS: [(&str, TimeUnit); 4] = [
-    ("s", TimeUnit::Seconds),
-    ("ms", TimeUnit::Milliseconds),
-    ("us", TimeUnit::Microseconds),
-    ("ns", TimeUnit::Nanoseconds),
-];
-
-fn time_unit(top: &TomlView<'_>) -> Result<Option<TimeUnit>, DataError> {
-    const KEY: &str = "time_unit";
-    let Some(text) = top.optional_text(KEY)? else { return Ok(None) };
-    match TIME_UNITS.iter().find(|(name, _)| *name == text) {
-        Some((_, unit)) => Ok(Some(*unit)),
-        None => top.fail(KEY, format!("{text:?} is none of s, ms, us, ns")),
-    }
-}
-
-/// The columns of reference and signal, where both are named.
-fn sensor(top: &TomlView<'_>) -> Result<Option<Sensor>, DataError> {
-    match (top.optional_text("reference")?, top.optional_text("signal")?) {
-        (Some(reference), Some(signal)) => {
-            Ok(Some(Sensor { reference: reference.to_owned(), signal: signal.to_owned() }))
-        }
-        (None, None) => Ok(None),
-        _ => top.fail("reference", "reference and signal go together; give both"),
-    }
-}
-
-/// Units of parameters and of the values of own effects, by their names for workers.
-fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
-    let parameters = spec.parameters.iter().map(|p| (p.name.clone(), p.unit.as_str()));
-    let effects = spec.effects.iter().flat_map(|effect| {
-        effect.arguments.iter().map(|a| (effect.value_name(a), a.unit.as_str()))
-    });
-    parameters.chain(effects).filter(|(_, unit)| !unit.is_empty()).collect()
-}
-
-/// Every table of one kind; messages call a table by its name where it has one.
-fn named<T>(
-    top: &TomlView<'_>,
-    kind: &str,
-    read: fn(&TomlView<'_>) -> Result<T, DataError>,
-) -> Result<Vec<T>, DataError> {
-    let one = |view: TomlView<'_>| {
-        let own = ["name", "file", "column"].iter().find_map(|key| view.text(key).ok());
-        match own {
-            Some(own) => read(&view.called(format!("[[{kind}]] {own}"))),
-            None => read(&view),
-        }
-    };
-    top.tables(kind)?.into_iter().map(one).collect()
 }

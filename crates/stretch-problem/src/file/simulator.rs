@@ -1,179 +1,237 @@
 //! The simulator of a problem's file.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt, num::NonZeroUsize};
 
-use stretch_data::{DataError, TomlView};
-
-use super::sensor;
-
-/// The simulator of a problem.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum SimulatorEntry {
-    /// The built-in rig, on a data set.
-    Rig {
-        /// Folder of the data set, relative to the problem's folder.
-        data_set: String,
-        /// Rig file; the data set's own where none is given.
-        rig: Option<String>,
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{
+        Error, MapAccess, SeqAccess, Visitor,
+        value::{MapAccessDeserializer, SeqAccessDeserializer},
     },
+};
+
+use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
+
+/// One of command, python, fmu and builtin; the others say how it is run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatorEntry {
+    /// Program and arguments of a worker, started in the problem's folder.
+    pub command: Option<Vec<String>>,
+    /// `module:object` of a Python simulator.
+    pub python: Option<String>,
+    /// A functional mock-up unit, relative to the problem's folder.
+    pub fmu: Option<String>,
+    /// Of an FMU: its names for parameters, effects and columns, where they differ.
+    pub variables: Option<BTreeMap<String, String>>,
+    /// Number of workers at once; one without it.
+    pub jobs: Option<NonZeroUsize>,
+    /// Longest time that one model may take, s; 60 without it.
+    #[serde(default, deserialize_with = "above_zero")]
+    pub deadline_s: Option<f64>,
+    /// Longest time that a worker may take to begin, s; 120 without it.
+    #[serde(default, deserialize_with = "above_zero")]
+    pub start_s: Option<f64>,
+    /// The built-in rig, or a gauge alone.
+    pub builtin: Option<BuiltIn>,
+    /// Of a built-in one: folder of its data set, or a trial; the problem's folder without it.
+    pub data_set: Option<String>,
+    /// Of a built-in one: its rig file; that of the data set without it.
+    pub rig: Option<String>,
+    /// Of a gauge: column of its reference, where that is not the usual one; with `signal`.
+    pub reference: Option<String>,
+    /// Of a gauge: column of its signal.
+    pub signal: Option<String>,
+}
+
+/// A simulator that is built in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum BuiltIn {
+    /// The rig, on a data set.
+    Rig,
     /// A gauge alone, on a data set or a trial.
-    Gauge {
-        /// Folder or file, relative to the problem's folder.
-        data_set: String,
-        /// Rig file.
-        rig: Option<String>,
-        /// Columns of reference and signal, where these are not the usual ones.
-        columns: Option<(String, String)>,
-    },
-    /// Another program, as workers.
-    Command {
-        /// Program and arguments, started in the problem's folder.
-        command: Vec<String>,
-        /// How the workers are run.
-        workers: WorkersEntry,
-    },
-    /// An object of a Python module, behind a worker that comes with the program.
-    Python {
-        /// `module:object`.
-        object: String,
-        /// How the workers are run.
-        workers: WorkersEntry,
-    },
-    /// A functional mock-up unit.
-    Fmu {
-        /// The file, relative to the problem's folder.
-        file: String,
-        /// Variables of the FMU for parameters, effects and columns, where the names differ.
-        variables: BTreeMap<String, String>,
-        /// How the workers are run.
-        workers: WorkersEntry,
-    },
-    /// A simulator in the memory of the caller, which no file can name.
-    Caller,
+    Gauge,
 }
 
-/// How workers are run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WorkersEntry {
-    /// Number of workers at once; the program's `--jobs` where none is given.
-    pub jobs: Option<usize>,
-    /// Longest time that one model may take, s.
-    pub deadline_s: f64,
-    /// Longest time that a worker may take to begin, s.
-    pub start_s: f64,
-}
+/// Keys of every simulator that runs as workers.
+const WORKERS: [&str; 3] = ["jobs", "deadline_s", "start_s"];
 
 impl SimulatorEntry {
-    pub(super) fn of(top: &TomlView<'_>) -> Result<Self, DataError> {
-        const KEY: &str = "simulator";
-        if top.is_list(KEY) {
-            let workers = WorkersEntry { jobs: None, deadline_s: 60.0, start_s: 120.0 };
-            return Ok(Self::Command { command: command(top, KEY)?, workers });
-        }
-        let Some(view) = top.table(KEY)? else {
-            return top.fail(KEY, "it is missing; write simulator = [\"python3\", \"sim.py\"], or a table [simulator]");
+    /// Checks that it is one simulator, and that every key is one of that simulator's.
+    ///
+    /// # Errors
+    /// The key, and what is wrong with it.
+    pub(super) fn check(&self) -> Result<(), (String, String)> {
+        let fail = |key: &str, problem: String| Err((format!("simulator.{key}"), problem));
+        let given = serde_json::to_value(self).unwrap_or_default();
+        let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
+        let given: Vec<&str> = given.map(|(key, _)| key.as_str()).collect();
+        let kinds =
+            ["builtin", "command", "python", "fmu"].map(|kind| (kind, given.contains(&kind)));
+        let kinds: Vec<&str> =
+            kinds.into_iter().filter_map(|(kind, is)| is.then_some(kind)).collect();
+        let [kind] = kinds[..] else {
+            return match kinds[..] {
+                [_, second, ..] => {
+                    fail(second, format!("{} are given; keep one", kinds.join(" and ")))
+                }
+                _ => fail(
+                    "command",
+                    "there is no simulator; write one of builtin, command, python, fmu".into(),
+                ),
+            };
         };
-        let kinds = ["builtin", "command", "python", "fmu"];
-        let given: Vec<&str> = kinds.into_iter().filter(|kind| view.has(kind)).collect();
-        match given.as_slice() {
-            ["builtin"] => Self::builtin(&view),
-            [kind] => {
-                let own: &[&str] = if *kind == "fmu" { &["variables"] } else { &[] };
-                view.only(&[&[kind, "jobs", "deadline_s", "start_s"], own].concat())?;
-                let workers = WorkersEntry {
-                    jobs: view.optional_count("jobs")?,
-                    deadline_s: view.above_zero("deadline_s")?.unwrap_or(60.0),
-                    start_s: view.above_zero("start_s")?.unwrap_or(120.0),
-                };
-                Ok(match *kind {
-                    "command" => Self::Command { command: command(&view, kind)?, workers },
-                    "python" => {
-                        let object = view.text(kind)?.to_owned();
-                        if object.split(':').count() != 2 || object.split(':').any(str::is_empty) {
-                            return view.fail(
-                                kind,
-                                format!("{object:?} is no object; write \"module:object\""),
-                            );
-                        }
-                        Self::Python { object, workers }
-                    }
-                    _ => {
-                        let (file, variables) = (view.text(kind)?.to_owned(), variables(&view)?);
-                        Self::Fmu { file, variables, workers }
-                    }
-                })
+        let own: &[&str] = match (kind, self.builtin) {
+            (_, Some(BuiltIn::Rig)) => &["data_set", "rig"],
+            (_, Some(BuiltIn::Gauge)) => &["data_set", "rig", "reference", "signal"],
+            ("fmu", _) => &["variables"],
+            _ => &[],
+        };
+        let more = if self.builtin.is_some() { &[][..] } else { &WORKERS };
+        let known = [&[kind], own, more].concat();
+        if let Some(key) = given.iter().find(|key| !known.contains(key)) {
+            return fail(
+                key,
+                format!("nothing reads it with {kind}; known are {}", known.join(", ")),
+            );
+        }
+        if self.reference.is_some() != self.signal.is_some() {
+            return fail("reference", "reference and signal go together; give both".into());
+        }
+        if self.command.as_ref().is_some_and(|all| all.first().is_none_or(String::is_empty)) {
+            return fail("command", "it is empty; write the program and its arguments".into());
+        }
+        match &self.python {
+            Some(object) if object.split(':').filter(|part| !part.is_empty()).count() != 2 => {
+                fail("python", format!("{object:?} is no object; write \"module:object\""))
             }
-            [] => view.fail(
-                "command",
-                "there is no simulator; write one of builtin, command, python, fmu",
-            ),
-            [_, second, ..] => {
-                view.fail(second, format!("{} are given; keep one", given.join(" and ")))
-            }
+            _ => Ok(()),
         }
     }
 
-    fn builtin(view: &TomlView<'_>) -> Result<Self, DataError> {
-        let kind = view.text("builtin")?;
-        let data_set = view.optional_text("data_set")?.unwrap_or(".").to_owned();
-        let rig = view.optional_text("rig")?.map(str::to_owned);
-        match kind {
-            "rig" => {
-                view.only(&["builtin", "data_set", "rig"])?;
-                Ok(Self::Rig { data_set, rig })
-            }
-            "gauge" => {
-                view.only(&["builtin", "data_set", "rig", "reference", "signal"])?;
-                let columns = sensor(view)?.map(|s| (s.reference, s.signal));
-                Ok(Self::Gauge { data_set, rig, columns })
-            }
-            other => view.fail("builtin", format!("{other:?} is none of rig, gauge")),
+    /// Its workers, as [`ProblemSpec::workers`].
+    pub(super) fn workers(
+        &self,
+        jobs: usize,
+        problem: &ProblemSpec,
+    ) -> Result<Option<WorkersSpec>, ProblemError> {
+        let folder = &problem.folder;
+        let mut spec = if let Some(command) = &self.command {
+            let command: Vec<&str> = command.iter().map(String::as_str).collect();
+            WorkersSpec::new(&command, folder)
+        } else if let Some(object) = &self.python {
+            WorkersSpec::python(object, folder)
+        } else if let Some(file) = &self.fmu {
+            let variables = self.variables.clone().unwrap_or_default();
+            WorkersSpec::fmu(file, &variables, &units(problem), folder)?
+        } else {
+            return Ok(None);
+        };
+        spec.jobs = self.jobs.map_or(jobs.max(1), NonZeroUsize::get);
+        spec.deadline_s = self.deadline_s.unwrap_or(spec.deadline_s);
+        spec.start_s = self.start_s.unwrap_or(spec.start_s);
+        Ok(Some(spec))
+    }
+}
+
+/// Units of parameters and of the values of own effects, by their names for workers.
+fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
+    let parameters = spec.parameters.iter().map(|p| (p.name.clone(), p.unit.as_str()));
+    let effects = spec.effects.iter().flat_map(|effect| {
+        effect.arguments.iter().map(|a| (effect.value_name(a), a.unit.as_str()))
+    });
+    parameters.chain(effects).filter(|(_, unit)| !unit.is_empty()).collect()
+}
+
+fn above_zero<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    match Option::<f64>::deserialize(from)? {
+        Some(x) if x <= 0.0 => Err(D::Error::custom(format!("{x} is not above 0"))),
+        other => Ok(other),
+    }
+}
+
+/// Reads a simulator: a command as a list, or a table.
+pub(crate) fn simulator<'de, D>(from: D) -> Result<Option<SimulatorEntry>, D::Error>
+where
+    D: Deserializer<'de>,
+{
+    struct Written;
+
+    impl<'de> Visitor<'de> for Written {
+        type Value = Option<SimulatorEntry>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a simulator; write [\"python3\", \"sim.py\"], or a table [simulator]")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+            let command = Some(Vec::deserialize(SeqAccessDeserializer::new(seq))?);
+            Ok(Some(SimulatorEntry { command, ..SimulatorEntry::default() }))
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            SimulatorEntry::deserialize(MapAccessDeserializer::new(map)).map(Some)
         }
     }
+    from.deserialize_any(Written)
 }
 
-/// The table `[simulator.variables]`: names of the problem, and the FMU's names for them.
-fn variables(view: &TomlView<'_>) -> Result<BTreeMap<String, String>, DataError> {
-    let Some(own) = view.table("variables")? else { return Ok(BTreeMap::new()) };
-    let own = own.called("[simulator.variables]");
-    own.keys().map(|name| Ok((name.to_owned(), own.text(name)?.to_owned()))).collect()
-}
-
-fn command(view: &TomlView<'_>, key: &str) -> Result<Vec<String>, DataError> {
-    let command = view.texts(key)?;
-    match command.first().is_some_and(|program| !program.is_empty()) {
-        true => Ok(command),
-        false => view.fail(key, "it is empty; write the program and its arguments"),
-    }
+pub(crate) fn simulator_schema(generator: &mut SchemaGenerator) -> Schema {
+    let command = json_schema!({ "type": "array", "items": { "type": "string" }, "minItems": 1 });
+    json_schema!({ "oneOf": [command, generator.subschema_for::<SimulatorEntry>()] })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::ProblemFile;
 
     fn parsed(simulator: &str) -> Result<SimulatorEntry, String> {
         let rest = "[[stage]]\noutput = \"y\"\n[[trial]]\nfile = \"a.csv\"\n";
-        let file = ProblemFile::parse("p.toml", &format!("[simulator]\n{simulator}\n{rest}"));
-        file.map(|file| file.simulator).map_err(|e| e.to_string())
+        let file = ProblemSpec::parse("p.toml", &format!("[simulator]\n{simulator}\n{rest}"));
+        file.map(|file| file.simulator.expect("a simulator")).map_err(|e| e.to_string())
     }
 
     #[test]
     fn an_fmu_may_call_things_otherwise_and_nothing_else_may() {
         let entry = parsed("fmu = \"a.fmu\"\nvariables = { tau = \"motor.tau\" }").unwrap();
-        let SimulatorEntry::Fmu { file, variables, workers } = entry else { panic!("{entry:?}") };
-        assert_eq!((file.as_str(), workers.deadline_s), ("a.fmu", 60.0));
-        assert_eq!(variables, BTreeMap::from([("tau".into(), "motor.tau".into())]));
-        let error = parsed("fmu = \"a.fmu\"\nvariables = { tau = 1 }").unwrap_err();
-        assert!(
-            error.starts_with("p.toml, [simulator.variables], key tau: 1 is not a text"),
-            "{error}"
-        );
-        let error = parsed("python = \"a:b\"\nvariables = {}").unwrap_err();
-        assert!(
-            error.starts_with("p.toml, [simulator], key variables: nothing reads it"),
-            "{error}"
-        );
+        assert_eq!((entry.fmu.as_deref(), entry.deadline_s), (Some("a.fmu"), None));
+        assert_eq!(entry.variables, Some(BTreeMap::from([("tau".into(), "motor.tau".into())])));
+        for (simulator, sentence) in [
+            (
+                "fmu = \"a.fmu\"\nvariables = { tau = 1 }",
+                "row 3, key simulator.variables.tau: 1 is not a text",
+            ),
+            (
+                "python = \"a:b\"\nvariables = {}",
+                "row 3, key simulator.variables: nothing reads it with python",
+            ),
+            (
+                "python = \"a\"",
+                "row 2, key simulator.python: \"a\" is no object; write \"module:object\"",
+            ),
+            (
+                "python = \"a:b\"\ncommand = \"c\"",
+                "row 2, key simulator.python: command and python are given; keep one",
+            ),
+            ("jobs = 2", "row 1, key simulator.command: there is no simulator; write one of"),
+            ("command = []", "row 2, key simulator.command: it is empty"),
+            (
+                "command = \"a\"\njobs = 0",
+                "row 3, key simulator.jobs: 0 is not a whole number from 1 on",
+            ),
+            (
+                "builtin = \"rig\"\nsignal = \"u\"",
+                "row 3, key simulator.signal: nothing reads it with builtin",
+            ),
+            (
+                "builtin = \"gauge\"\nsignal = \"u\"",
+                "row 1, key simulator.reference: reference and signal go",
+            ),
+        ] {
+            let error = parsed(simulator).unwrap_err();
+            assert!(error.starts_with(&format!("p.toml, {sentence}")), "{error}");
+        }
     }
 }

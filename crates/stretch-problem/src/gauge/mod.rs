@@ -3,7 +3,6 @@
 mod experiments;
 mod facts;
 mod fixed;
-mod lag;
 mod session;
 mod source;
 
@@ -17,7 +16,6 @@ use stretch_sim::{
 };
 
 use facts::{facts, unit_of};
-use lag::lag;
 use session::GaugeSession;
 
 use crate::{
@@ -281,7 +279,7 @@ fn alone(session: &GaugeSession) -> Alone {
     let longest = session.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
     Alone {
         session_s: session.trials.last().map_or(0.0, end_s) - begun_s,
-        lag_s: lag(&session.reference[longest.clone()], &session.signal[longest], session.dt_s),
+        lag_s: lag_s(&session.reference[longest.clone()], &session.signal[longest], session.dt_s),
     }
 }
 
@@ -299,4 +297,28 @@ fn line(session: &GaugeSession, spec: &GaugeSpec) -> (f64, f64) {
         .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
     let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
     (y - gain * e, gain)
+}
+
+/// Longest lag that is looked for, s.
+const REACH_S: f64 = 1.0;
+
+/// Time by which `y` trails `x`, s: the lag within [`REACH_S`] at which `x` and `y` correlate best.
+fn lag_s(x: &[f64], y: &[f64], dt_s: f64) -> f64 {
+    let reach = ((REACH_S / dt_s) as usize).min(x.len() / 4);
+    if reach == 0 {
+        return 0.0;
+    }
+    let centre = |v: &[f64]| {
+        let mean = v.iter().sum::<f64>() / v.len() as f64;
+        v.iter().map(|v| v - mean).collect::<Vec<f64>>()
+    };
+    let middle = centre(&y[reach..y.len() - reach]);
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let size = |shift: usize| {
+        let there = centre(&x[shift..shift + middle.len()]);
+        let power = dot(&there, &there).max(f64::MIN_POSITIVE);
+        dot(&there, &middle).powi(2) / power
+    };
+    let best = (0..=2 * reach).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(reach);
+    (reach as f64 - best as f64) * dt_s
 }

@@ -6,7 +6,7 @@ use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, ends, unit};
 use stretch_gap::{Noise, SampleRoles, TrialSpec};
 
 use crate::{
-    bench::lost::open,
+    bench::undetermined::undetermined,
     error::{ProblemError, check_rate},
 };
 
@@ -67,7 +67,7 @@ impl GaugeSession {
             reference: all(0),
             signal: all(1),
             pressure: all(2),
-            is_lost: session.trials().iter().flat_map(|t| open(t.is_lost())).collect(),
+            is_lost: session.trials().iter().flat_map(|t| undetermined(t.is_lost())).collect(),
             dt_s: session.dt_s(),
             rows: session.rows(),
             notes: session.notes().to_vec(),

@@ -26,6 +26,7 @@ impl GaugeSimulator {
         columns: Option<(&str, &str)>,
         rig: Option<&Path>,
         catalogue: &Catalogue,
+        recorded: &ReadOptions,
     ) -> Result<Option<Self>, ProblemError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
@@ -34,7 +35,7 @@ impl GaugeSimulator {
             (None, Some(own)) if rig_file::is_gauge(own)? => (Some(own.as_path()), true),
             _ => (None, false),
         };
-        let mut options = ReadOptions::new();
+        let mut options = recorded.clone();
         if let Some((reference, signal)) = columns {
             options = options.require(reference).require(signal);
         }
@@ -51,7 +52,7 @@ impl GaugeSimulator {
             // The recording is read once, for it may be standard input.
             None => vec![SessionTrial::from(first)],
             Some(set) => {
-                let options = ReadOptions::new().require(reference).require(signal);
+                let options = recorded.clone().require(reference).require(signal);
                 Recording::session(set, path, &options)?
             }
         };

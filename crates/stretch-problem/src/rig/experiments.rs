@@ -7,7 +7,7 @@ use stretch_sim::{
     RigStage, Sensing, Start, TrialPlan,
 };
 
-use super::{RigSimulator, tuned::Tuned};
+use super::{RigSimulator, nominal::TunedRig};
 use crate::{bench::acting::unrecorded, error::ProblemError};
 
 /// Sample time of an experiment, s.
@@ -246,7 +246,7 @@ impl Experiment {
 impl RigSimulator {
     /// Rig and effects of a model.
     fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
-        let params = Tuned::of(&self.base, &self.tuned, model).params;
+        let params = TunedRig::of(&self.base, &self.tuned, model).params;
         Ok((params, unrecorded(&self.effects, &self.rows, model)?))
     }
 

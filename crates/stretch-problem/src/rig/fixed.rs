@@ -4,7 +4,10 @@ use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
 use stretch_sim::{EffectParameter, Grid, Rig};
 
-use super::{RigSimulator, nominal::TunedParameter, tuned::Tuned};
+use super::{
+    RigSimulator,
+    nominal::{TunedParameter, TunedRig},
+};
 use crate::{
     fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
     implement::{Implementation, implementations},
@@ -33,7 +36,7 @@ impl Diagnosable for RigSimulator {
         // A sample time with which a diagnosis ran makes a grid.
         let Ok(grid) = Grid::samples(self.about.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
-        let around = Tuned::of(&self.base, &self.tuned, model).params.surroundings(&grid);
+        let around = TunedRig::of(&self.base, &self.tuned, model).params.surroundings(&grid);
         let place = (self.about.record().sensor.unwrap_or(0), 1.0);
         let answer = (diagnosis, evidence);
         implementations(answer, &self.about.effects, &self.rows, &around, |effect, values| {

@@ -1,35 +1,34 @@
 //! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
-mod corrected;
+mod cache;
 mod directions;
 mod experiments;
-mod extent;
 mod facts;
 mod fixed;
-mod found;
-mod initial_state;
 mod noises;
 mod nominal;
 mod rails;
 mod record_columns;
+mod reference_sensor;
 mod run;
 mod session;
-mod shown;
 mod simulator;
 pub(crate) mod smooth;
 mod stand_ins;
 mod timing;
-mod tuned;
 
 use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
-use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, RigStage, Search, Tolerance};
+use stretch_recording::ReadOptions;
+use stretch_sim::{
+    Bridge, Catalogue, Effect, EffectSet, Extent, Key, Place as EffectPlace, Rig, RigParams,
+    RigStage, Search, Tolerance,
+};
 
-use extent::Extents;
+use cache::RigCache;
 use facts::facts;
-use found::Found;
 use noises::Noises;
 use nominal::{TunedParameter, parameters, stages};
 use session::Inputs;
@@ -73,7 +72,7 @@ pub struct RigSimulator {
     measured: Vec<Vec<f64>>,
     /// The samples of the bridge voltage in which effects may be found.
     bridge: FitRecord,
-    found: Found,
+    found: RigCache,
     notes: Vec<String>,
 }
 
@@ -86,11 +85,12 @@ impl RigSimulator {
         folder: &Path,
         rig: Option<&Path>,
         catalogue: &Catalogue,
+        recorded: ReadOptions,
     ) -> Result<Self, ProblemError> {
         let set = DataSet::read(folder)?;
         let own = set.rig.as_ref().map(|file| folder.join(file));
         let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
-        let session = RigSession::read(folder, &set)?;
+        let session = RigSession::read(folder, &set, recorded)?;
         Self::new(RigSetup { session, rig, catalogue })
     }
 
@@ -141,7 +141,7 @@ impl RigSimulator {
             rows,
             measured,
             bridge,
-            found: Found::new(),
+            found: RigCache::new(),
             notes,
         })
     }
@@ -190,4 +190,34 @@ fn measured(session: &RigSession, stage: RigStage) -> Vec<f64> {
         _ => trial.length_mm.clone(),
     };
     session.trials.iter().flat_map(channel).collect()
+}
+
+/// Share of the samples at either end of the voltage that are left out as noise.
+const OUTERMOST: f64 = 0.002;
+
+/// Ranges of voltage and strain over the trials that are fitted.
+struct Extents {
+    volts: Extent,
+    strain: Extent,
+}
+
+impl Extents {
+    fn of(params: &RigParams, inputs: &Inputs, bridge: &FitRecord) -> Self {
+        let mut volts: Vec<f64> = bridge.samples().collect();
+        volts.sort_by(f64::total_cmp);
+        let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
+        let strain = Bridge::new(params).strain(inputs.stroke.0);
+        Self {
+            volts: Extent::between(at(OUTERMOST), at(1.0 - OUTERMOST)),
+            strain: Extent::between(strain, params[Key::E0]),
+        }
+    }
+
+    /// The range of the channel that an effect acts on.
+    fn at(&self, effect: &Effect) -> &Extent {
+        match effect.at() {
+            Some((_, EffectPlace::Volts)) => &self.volts,
+            _ => &self.strain,
+        }
+    }
 }

@@ -1,9 +1,12 @@
 //! What may be re-tuned of a rig, and the stages that the parameters act in.
 
-use stretch_gap::{ParameterSpec, SlowDrift, StageSpec};
-use stretch_sim::{Key, PARAMETERS, Rig, RigStage};
+use stretch_gap::{Model, ParameterSpec, SlowDrift, StageSpec};
+use stretch_sim::{Key, PARAMETERS, Rig, RigParams, RigStage};
 
-use super::{noises::Noises, timing};
+use super::{
+    noises::Noises,
+    timing::{self, Leads},
+};
 
 /// Slow drift of the supply (Ornstein-Uhlenbeck) as laboratories have it, a share of the supply (1 sd): regulators hold a tenth of a per cent
 /// to half of one.
@@ -109,4 +112,40 @@ pub(super) fn stages(
         }
     };
     kinds.iter().map(stage).collect()
+}
+
+/// The parameters of a model, sorted by what they set.
+pub(super) struct TunedRig {
+    pub(super) params: RigParams,
+    /// Offset of the pressure at a trial's start, standard deviations.
+    pub(super) offset: f64,
+    /// How far ahead of their rows commands act, samples.
+    pub(super) leads: Leads,
+    /// Share of the settled state in the initial state of the muscle, 0 to 1.
+    pub(super) initial_muscle: f64,
+    /// Share of the settled state in the initial state of the gauge, 0 to 1.
+    pub(super) initial_gauge: f64,
+}
+
+impl TunedRig {
+    pub(super) fn of(base: &RigParams, parameters: &[TunedParameter], model: &Model) -> Self {
+        let mut out = Self {
+            params: *base,
+            offset: 0.0,
+            leads: [0.0; 2],
+            initial_muscle: 0.0,
+            initial_gauge: 0.0,
+        };
+        for (parameter, value) in parameters.iter().zip(&model.parameters) {
+            let share = value.clamp(0.0, 1.0);
+            match parameter {
+                TunedParameter::Rig(key) => out.params[*key] = *value,
+                TunedParameter::StartPressure => out.offset = *value,
+                TunedParameter::CommandLead(which) => out.leads[*which] = *value,
+                TunedParameter::InitialState(RigStage::Sensing) => out.initial_gauge = share,
+                TunedParameter::InitialState(_) => out.initial_muscle = share,
+            }
+        }
+        out
+    }
 }

@@ -9,8 +9,8 @@ use stretch_sim::{
 };
 
 use super::{
-    RigSimulator, initial_state::set_initial_state, session::Begin, shown::Shown, smooth::cubic,
-    timing, timing::Leads, tuned::Tuned,
+    RigSimulator, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin,
+    smooth::cubic, timing, timing::Leads,
 };
 use crate::{bench::acting::Acting, error::ProblemError};
 
@@ -56,8 +56,8 @@ pub(super) fn simulate(
     out: &mut [f64],
 ) -> Result<(), ProblemError> {
     let kind = rig.stage_kinds[run.stage];
-    let tuned = Tuned::of(&rig.base, &rig.tuned, run.model);
-    let Tuned { params, offset, leads, initial_muscle, initial_gauge } = tuned;
+    let tuned = TunedRig::of(&rig.base, &rig.tuned, run.model);
+    let TunedRig { params, offset, leads, initial_muscle, initial_gauge } = tuned;
     let initial_share = if kind == RigStage::Sensing { initial_gauge } else { initial_muscle };
     let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let step_s = run.step * STEP_S;
@@ -134,7 +134,7 @@ impl Setting<'_> {
     /// Sets the initial state of the reference, which follows the muscle.
     pub(super) fn set_reference_state(
         &self,
-        shown: &mut Shown,
+        shown: &mut ReferenceSensor,
         length: &[f64],
     ) -> Result<(), ProblemError> {
         shown.set_initial_state(self.initial_muscle, self.after_pause(0), length)
@@ -397,7 +397,34 @@ impl Setting<'_> {
             .collect()
     }
 
-    pub(super) fn shown(&self, effects: &EffectSet) -> Result<Shown, ProblemError> {
-        Shown::new(&self.params, effects, self.rig.about.dt_s)
+    pub(super) fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
+        ReferenceSensor::new(&self.params, effects, self.rig.about.dt_s)
     }
+}
+
+/// Sets what a stage remembers of the motion before the session.
+///
+/// As a rule a muscle that is vented at the session's start was filled before, so play and creep begin from the filled side. A rig that had
+/// settled (just switched on, or simulated) remembers no such motion. The initial state lies between the two, where the share is a parameter
+/// of the recording:
+///
+/// ```text
+/// cells = moved + share (settled - moved)
+/// ```
+///
+/// Moves a memory that was left at the other end of the stroke towards the memory of a stage that settled where the session begins.
+/// `begin` begins a trial with a memory at the session's first sample; the trial then follows without a pause.
+pub(super) fn set_initial_state(
+    share: f64,
+    after_pause: Start,
+    memory: &mut Memory,
+    mut settled: Memory,
+    mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
+) -> Result<(), ProblemError> {
+    if share > 0.0 {
+        begin(memory, after_pause)?;
+        begin(&mut settled, Start::Settled)?;
+        memory.move_towards(&settled, share);
+    }
+    Ok(())
 }

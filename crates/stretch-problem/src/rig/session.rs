@@ -12,7 +12,7 @@ use super::timing::{is_slow, switched};
 use crate::{
     bench::{
         isolated_outliers::without_isolated_outliers,
-        lost::{open, open_behind},
+        undetermined::{undetermined, undetermined_behind_gap},
     },
     error::{ProblemError, check_rate},
 };
@@ -64,8 +64,8 @@ impl RigTrial {
             bridge_v: needed(3),
             pressure_kpa: column(4),
             is_lost: match goes_on {
-                true => open_behind(trial.is_lost(), dt_s),
-                false => open(trial.is_lost()),
+                true => undetermined_behind_gap(trial.is_lost(), dt_s),
+                false => undetermined(trial.is_lost()),
             },
             goes_on,
             excitation,
@@ -102,9 +102,8 @@ impl RigSession {
     ///
     /// # Errors
     /// Files that cannot be read, and as [`RigSession::new`].
-    pub fn read(folder: &Path, set: &DataSet) -> Result<Self, ProblemError> {
-        let options =
-            NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
+    pub fn read(folder: &Path, set: &DataSet, recorded: ReadOptions) -> Result<Self, ProblemError> {
+        let options = NEEDED.iter().fold(recorded, |options, name| options.require(*name));
         Self::new(&Recording::session(set, folder, &options)?)
     }
 

@@ -4,7 +4,7 @@ use std::{convert::Infallible, num::NonZeroUsize};
 
 use stretch_gap::{Noise, RandomGenerator};
 
-use crate::bench::kept::Kept;
+use super::cache::LastResults;
 
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
@@ -188,11 +188,11 @@ const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
 
 /// Draws of the noise of a measured input; every model gets the same draws.
 #[derive(Debug, Clone)]
-pub(crate) struct Draws(Kept<u64, Vec<Vec<f64>>>);
+pub(crate) struct Draws(LastResults<u64, Vec<Vec<f64>>>);
 
 impl Draws {
     pub(crate) fn new() -> Self {
-        Self(Kept::new(DRAWS))
+        Self(LastResults::new(DRAWS))
     }
 
     /// A trial of an input with the draw of its noise that belongs to a seed.

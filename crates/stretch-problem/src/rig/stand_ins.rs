@@ -5,7 +5,7 @@ use std::sync::Arc;
 use stretch_sim::{Actuation, Grid, Openings, RigStage, Start};
 
 use super::{
-    found::{Pressures, causes},
+    cache::{Pressures, causes},
     run::Setting,
 };
 use crate::error::ProblemError;

@@ -2,7 +2,6 @@
 //!
 //! The protocol is written down byte by byte in `book/src/reference/worker.md`.
 
-mod bound;
 mod fmu;
 mod frame;
 mod group;

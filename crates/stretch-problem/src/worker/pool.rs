@@ -12,11 +12,13 @@ use std::{
 
 use super::{
     message::{self, Hello},
-    process::{Lost, NO_BODY, Process},
+    process::{NO_BODY, Process},
 };
 use crate::{
     black_box::{
+        Checked,
         source::{Ask, RecordedSession, Source, SourceError},
+        spec::{ONLY_BEHIND, ProblemSpec},
         states::State,
     },
     error::ProblemError,
@@ -98,6 +100,32 @@ struct Crew {
 }
 
 impl Workers {
+    /// Checks a problem, starts the workers of its simulator, and fits the problem to what they say of themselves: effects on the states
+    /// that they declare are looked for, and nothing in front of a stage where they take no altered inputs.
+    ///
+    /// # Errors
+    /// A problem that does not do, workers that cannot be started, effects on states that are not declared.
+    pub fn bound(spec: ProblemSpec, workers: WorkersSpec) -> Result<(Checked, Self), ProblemError> {
+        let mut bare = spec.clone();
+        bare.wrap.retain(|name| !name.starts_with("state."));
+        let mut checked = Checked::new(bare)?;
+        let mut source = Self::start(workers.clone(), checked.session())?;
+        let mut spec = spec.with_states(source.states())?;
+        if spec.effects.len() > checked.session().effects.len() {
+            // the session of the first worker knows nothing of its states' effects
+            drop(source);
+            checked = Checked::new(spec.clone())?;
+            source = Self::start(workers, checked.session())?;
+        }
+        if !source.takes_inputs()
+            && let Some(behind) = spec.only_behind()
+        {
+            spec = behind;
+            checked = Checked::new(spec)?.noting(ONLY_BEHIND);
+        }
+        Ok((checked, source))
+    }
+
     /// Starts the first worker and hands it the session.
     ///
     /// # Errors
@@ -106,10 +134,7 @@ impl Workers {
         let named =
             |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
         let begun = begin(&spec, session);
-        let (process, hello, session_notes) = begun.map_err(|lost| match lost {
-            Lost::Failed(why) => named(why),
-            Lost::Interrupted => named("interrupted".into()),
-        })?;
+        let (process, hello, session_notes) = begun.map_err(named)?;
         let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });
         let session = session.clone();
         let (free, restarts) = (Condvar::new(), AtomicUsize::new(0));
@@ -122,7 +147,7 @@ impl Workers {
     }
 
     /// An idle worker, or a new worker where there may be more.
-    fn take(&self) -> Result<Process, Lost> {
+    fn take(&self) -> Result<Process, String> {
         let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(process) = crew.idle.pop() {
@@ -150,7 +175,7 @@ impl Workers {
         self.free.notify_one();
     }
 
-    fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Lost> {
+    fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
         let mut process = self.take()?;
         let most = seconds(self.spec.deadline_s * asks.len() as f64);
         // a worker that answers all stages gives each of them
@@ -166,17 +191,14 @@ impl Workers {
 
     fn answer(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
         let all = |error: SourceError| asks.iter().map(|_| Err(error.clone())).collect();
-        let stopped = || SourceError::Refused("stopped".into());
         let lost = match self.try_once(asks) {
             Ok(answers) => return answers,
-            Err(Lost::Interrupted) => return all(stopped()),
-            Err(Lost::Failed(why)) => why,
+            Err(why) => why,
         };
         self.restarts.fetch_add(1, Ordering::Relaxed);
         match self.try_once(asks) {
             Ok(answers) => answers,
-            Err(Lost::Interrupted) => all(stopped()),
-            Err(Lost::Failed(why)) => {
+            Err(why) => {
                 let again =
                     if why == lost { String::new() } else { format!("\nbefore that: {lost}") };
                 all(SourceError::Gone(format!(
@@ -198,8 +220,8 @@ fn seconds(seconds: f64) -> Duration {
 fn begin(
     spec: &WorkersSpec,
     session: &RecordedSession,
-) -> Result<(Process, Hello, Vec<String>), Lost> {
-    let mut process = Process::start(&spec.command, &spec.folder).map_err(Lost::Failed)?;
+) -> Result<(Process, Hello, Vec<String>), String> {
+    let mut process = Process::start(&spec.command, &spec.folder)?;
     let most = seconds(spec.start_s);
     let frame = process.exchange(message::hello(), most, NO_BODY)?;
     let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;

@@ -23,21 +23,10 @@ use super::{
 const LINES: usize = 12;
 /// Number of bytes that are kept of each line.
 const LINE_BYTES: usize = 400;
-/// Time between two checks for an interrupt while a worker is waited for.
-const GLANCE: Duration = Duration::from_millis(50);
 /// Longest body of an answer that needs none, bytes.
 pub(super) const NO_BODY: u64 = 1 << 16;
 /// Longest time that a worker may take to end.
 const LEAVES: Duration = Duration::from_millis(500);
-
-/// Why a worker gave no answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Lost {
-    /// The worker died, hung, or did not keep to the protocol; the text says what happened.
-    Failed(String),
-    /// Somebody asked to stop.
-    Interrupted,
-}
 
 type Last = Arc<Mutex<VecDeque<String>>>;
 
@@ -94,40 +83,33 @@ impl Process {
         Ok(Self { group, to: Some(to), from, last, most_bytes })
     }
 
-    /// Sends a frame and waits for the answer, whose body has at most so many bytes.
+    /// Sends a frame and waits for the answer, whose body has at most so many bytes. The error says how the worker died, hung, or did
+    /// not keep to the protocol.
     pub(super) fn exchange(
         &mut self,
         bytes: Vec<u8>,
         most: Duration,
         most_bytes: u64,
-    ) -> Result<WorkerFrame, Lost> {
+    ) -> Result<WorkerFrame, String> {
         self.most_bytes.store(most_bytes, SeqCst);
         let sent = self.to.as_ref().is_some_and(|to| to.send(bytes).is_ok());
         if !sent {
             return Err(self.failed("it takes no more requests"));
         }
-        let until = Instant::now() + most;
-        loop {
-            let left = until.saturating_duration_since(Instant::now());
-            match self.from.recv_timeout(left.min(GLANCE)) {
-                Ok(Ok(frame)) => return Ok(frame),
-                Ok(Err(why)) => return Err(self.failed(&why)),
-                Err(RecvTimeoutError::Disconnected) => return Err(self.failed("it is gone")),
-                Err(RecvTimeoutError::Timeout) if stretch_files::interrupted() => {
-                    return Err(Lost::Interrupted);
-                }
-                Err(RecvTimeoutError::Timeout) if left.is_zero() => {
-                    self.group.kill();
-                    let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
-                    return Err(self.failed(&why));
-                }
-                Err(RecvTimeoutError::Timeout) => {}
+        match self.from.recv_timeout(most) {
+            Ok(Ok(frame)) => Ok(frame),
+            Ok(Err(why)) => Err(self.failed(&why)),
+            Err(RecvTimeoutError::Disconnected) => Err(self.failed("it is gone")),
+            Err(RecvTimeoutError::Timeout) => {
+                self.group.kill();
+                let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
+                Err(self.failed(&why))
             }
         }
     }
 
     /// The error of a worker: what happened, the exit status, and the last lines that the worker printed.
-    pub(super) fn failed(&mut self, why: &str) -> Lost {
+    pub(super) fn failed(&mut self, why: &str) -> String {
         // Lines that the worker printed as it died may still be under way.
         let until = Instant::now() + LEAVES;
         let mut ended = None;
@@ -150,7 +132,7 @@ impl Process {
                 last.iter().for_each(|line| text += &format!("\n  {line}"));
             }
         }
-        Lost::Failed(text)
+        text
     }
 }
 

@@ -98,8 +98,7 @@ fn problem(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
             name: "brake".into(),
             arguments: vec![Argument {
                 unit: "deg".into(),
-                min: 0.0,
-                max: 20.0,
+                range: [0.0, 20.0],
                 off: Some(0.0),
                 ..Argument::default()
             }],

@@ -2,6 +2,8 @@
 
 use stretch_core::DesignError;
 
+use crate::ReceptorError;
+
 /// One conversion, right-aligned as in data registers.
 ///
 /// A number outside `0 .. 2^bits` is a missing sample; firmware uses [`AdcCode::MISSING`].
@@ -16,13 +18,16 @@ impl AdcCode {
 /// The meaning of a converter's codes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdcSpec {
-    /// Bits of a code, 1 to 16.
+    /// Bits of a code, 1 to 24; integer arithmetic takes up to 16.
     pub bits: u8,
     /// Volts at code 0 (below zero for a bipolar converter).
     pub zero_v: f64,
     /// Volts at the largest code, `2^bits - 1`.
     pub full_scale_v: f64,
 }
+
+/// Most bits of a code that arithmetic in integers of 32 bits takes.
+pub const FIXED_BITS: u8 = 16;
 
 /// A checked [`AdcSpec`].
 ///
@@ -32,7 +37,7 @@ pub struct AdcSpec {
 /// assert_eq!(adc.volts(AdcCode(4095)), Some(3.3));
 /// assert_eq!(adc.volts(AdcCode(4096)), None);
 /// assert_eq!(adc.code(1.65), AdcCode(2048));
-/// # Ok::<(), stretch_core::DesignError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adc(AdcSpec);
@@ -41,16 +46,17 @@ impl Adc {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] for bits outside 1 ..= 16,
-    /// [`DesignError::EmptyRange`] unless `zero_v < full_scale_v`, both finite.
-    pub fn new(spec: AdcSpec) -> Result<Self, DesignError> {
+    /// [`ReceptorError`] for bits outside 1 ..= 24,
+    /// and unless `zero_v < full_scale_v`, both finite.
+    pub fn new(spec: AdcSpec) -> Result<Self, ReceptorError> {
         let AdcSpec { bits, zero_v, full_scale_v } = spec;
-        DesignError::check("adc.bits", bits.into(), (1..=16).contains(&bits))?;
+        DesignError::check("adc.bits", bits.into(), (1..=24).contains(&bits))?;
         DesignError::check("adc.zero_v", zero_v, true)?;
         DesignError::check("adc.full_scale_v", full_scale_v, true)?;
         let span = full_scale_v - zero_v;
         if !(span > 0.0 && span.is_finite() && span.recip().is_finite()) {
-            return Err(DesignError::EmptyRange { field: "adc", min: zero_v, max: full_scale_v });
+            let (min, max) = (zero_v, full_scale_v);
+            return Err(DesignError::EmptyRange { field: "adc", min, max }.into());
         }
         Ok(Self(spec))
     }
@@ -63,6 +69,16 @@ impl Adc {
     /// The largest code, `2^bits - 1`.
     pub fn largest(&self) -> i32 {
         (1 << self.0.bits) - 1
+    }
+
+    /// The factor that moves a code to the upper end of 16 bits.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] for a converter of more than 16 bits, which arithmetic in 32 bits does not hold.
+    pub(super) fn align(&self) -> Result<u16, DesignError> {
+        let bits = self.0.bits;
+        DesignError::check("adc.bits", bits.into(), bits <= FIXED_BITS)?;
+        Ok(1 << (FIXED_BITS - bits))
     }
 
     /// Volts from one code to the next.

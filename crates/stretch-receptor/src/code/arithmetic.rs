@@ -3,8 +3,8 @@
 use stretch_core::DesignError;
 
 use super::{
+    code_map::{CodeMap, Span},
     fold::Folded,
-    ranged_surface::{RangedSurfaces, Span},
 };
 
 pub(super) mod sealed {
@@ -16,11 +16,10 @@ pub(super) mod sealed {
         type Surface: Copy + core::fmt::Debug + PartialEq;
         type Estimate: Copy + core::fmt::Debug + PartialEq;
 
-        fn round(folded: &Folded)
-        -> Result<RangedSurfaces<Self::Line, Self::Surface>, DesignError>;
+        fn round(folded: &Folded) -> Result<CodeMap<Self::Line, Self::Surface>, DesignError>;
         /// The largest error in thousandths; `None` for the rounding of a float.
         fn worst_case(
-            surfaces: &RangedSurfaces<Self::Line, Self::Surface>,
+            surfaces: &CodeMap<Self::Line, Self::Surface>,
             rate_rounding: f64,
         ) -> Option<f64>;
         /// The line that the step evaluates: a float takes the factor of the span into its coefficients.

@@ -9,11 +9,11 @@ use stretch_filter::{FixedSgIntegers, FixedSgRate};
 use super::{
     adc::Adc,
     arithmetic::CodeArithmetic,
+    code_map::CodeMap,
     fixed_arithmetic::{Fixed, Scaled, worst_case},
     fold::{Units, fold},
-    ranged_surface::RangedSurfaces,
 };
-use crate::fold::output;
+use crate::{ReceptorError, fold::output};
 
 /// The schema of the records that this release writes, and the newest it reads.
 pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
@@ -32,7 +32,7 @@ pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 /// let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 })?;
 /// let fixed = FixedCalibration::<11, 2>::new(&calibration, &adc)?;
 /// assert!(fixed.worst_case_error_um() < 0.6); // of which 0.5 is the last rounding
-/// # Ok::<(), stretch_core::DesignError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeCalibration<
@@ -47,7 +47,7 @@ pub struct CodeCalibration<
     pub(super) falling: bool,
     /// The largest rate that keeps the branch.
     pub(super) dead_band: i32,
-    pub(super) surfaces: RangedSurfaces<A::Line, A::Surface>,
+    pub(super) surfaces: CodeMap<A::Line, A::Surface>,
 }
 
 /// A calibration in fixed point: [`CodeCalibration`] in [`Fixed`].
@@ -64,7 +64,7 @@ pub struct FixedNumbers {
     /// The largest integer rate that keeps the branch.
     pub dead_band: i32,
     /// A line, or a surface a branch.
-    pub surfaces: RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    pub surfaces: CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>,
     /// The rate.
     pub rate: FixedSgIntegers,
 }
@@ -75,21 +75,21 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     /// Converts a calibration for the codes of `adc`.
     ///
     /// # Errors
-    /// [`DesignError`], naming the field: a rate estimator other than the
+    /// [`ReceptorError`], naming the field: a rate estimator other than the
     /// Savitzky-Golay of this type (`rate.*`), a surface with terms beyond
     /// poly13 (`model.surface.terms`), a number that the arithmetic cannot hold
     /// (`fixed.*`, `surface`), or, in fixed point, a [worst-case
     /// error](FixedCalibration::worst_case_error_um) above 0.01 % of the
     /// target's span (`fixed.error`).
-    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
-        Self::check_estimator(calibration.rate_estimator)?;
+    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, ReceptorError> {
+        Self::check_estimator(calibration.spec().rate_estimator)?;
         let units = Units::new(
             adc,
-            calibration.sample_rate_hz.hz(),
+            calibration.spec().sample_rate_hz.hz(),
             FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::PER_SAMPLE,
             FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::LARGEST,
-        );
-        let dead_band = libm::floor(calibration.dead_band / units.rate_v_per_s);
+        )?;
+        let dead_band = libm::floor(calibration.spec().dead_band / units.rate_v_per_s);
         let surfaces = A::round(&fold(calibration, &units)?)?;
         let (gain, _) = output(calibration);
         if let Some(error) = A::worst_case(&surfaces, Self::rate_rounding()) {
@@ -97,8 +97,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         }
         Ok(Self {
             bits: adc.spec().bits,
-            sample_rate: calibration.sample_rate_hz,
-            falling: calibration.polarity == Polarity::Falling,
+            sample_rate: calibration.spec().sample_rate_hz,
+            falling: calibration.spec().polarity == Polarity::Falling,
             // the cast saturates: no rate is beyond 32 bits
             dead_band: dead_band as i32,
             surfaces,

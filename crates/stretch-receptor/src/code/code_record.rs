@@ -6,7 +6,7 @@ use stretch_core::{DesignError, SampleRate};
 use super::{
     arithmetic::CodeArithmetic,
     calibration::{CODE_SCHEMA, CodeCalibration},
-    ranged_surface::{RangedSurface, RangedSurfaces},
+    code_map::{CodeMap, CodeSurface},
 };
 
 #[derive(Serialize, Deserialize)]
@@ -20,7 +20,7 @@ struct CodeRecord<L, P> {
     falling: bool,
     dead_band: i32,
     #[serde(rename = "sheets")]
-    surfaces: RangedSurfaces<L, P>,
+    surfaces: CodeMap<L, P>,
 }
 
 impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Serialize
@@ -68,13 +68,13 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         DesignError::check("adc.bits", adc_bits.into(), (1..=16).contains(&adc_bits))?;
         DesignError::check("dead_band", dead_band.into(), dead_band >= 0)?;
         let spans = match &surfaces {
-            RangedSurfaces::Line(ranged) => {
+            CodeMap::Line(ranged) => {
                 A::valid_line(&ranged.surface)?;
                 ranged.holds()
             }
-            RangedSurfaces::Poly13(both) => {
+            CodeMap::Poly13(both) => {
                 both.iter().try_for_each(|ranged| A::valid_surface(&ranged.surface))?;
-                both.iter().all(RangedSurface::holds)
+                both.iter().all(CodeSurface::holds)
             }
         };
         DesignError::check("domain", 0.0, spans)?;

@@ -7,8 +7,8 @@ use stretch_core::{
 
 use super::{
     arithmetic::{CodeArithmetic, sealed},
+    code_map::{COARSE_BITS, CodeMap, Span},
     fold::Folded,
-    ranged_surface::{COARSE_BITS, RangedSurfaces, Span},
 };
 
 /// 32-bit fixed point; estimates are thousandths of the reference's unit.
@@ -49,7 +49,7 @@ impl sealed::Arithmetic for Fixed {
     type Estimate = i32;
 
     /// The surfaces with the most bits behind the thousandths that fit.
-    fn round(folded: &Folded) -> Result<RangedSurfaces<Self::Line, Self::Surface>, DesignError> {
+    fn round(folded: &Folded) -> Result<CodeMap<Self::Line, Self::Surface>, DesignError> {
         let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
         for bits in BITS.rev() {
             match fixed_with(folded, bits) {
@@ -61,7 +61,7 @@ impl sealed::Arithmetic for Fixed {
     }
 
     fn worst_case(
-        surfaces: &RangedSurfaces<Self::Line, Self::Surface>,
+        surfaces: &CodeMap<Self::Line, Self::Surface>,
         rate_rounding: f64,
     ) -> Option<f64> {
         Some(worst_case(surfaces, rate_rounding))
@@ -96,7 +96,7 @@ impl sealed::Arithmetic for Fixed {
 fn fixed_with(
     folded: &Folded,
     bits: u8,
-) -> Result<RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
+) -> Result<CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
     let scale = 1000.0 * f64::from(1u32 << bits);
     let half = 0.5 * f64::from(1u32 << bits);
     let thousandths = 1 << (32 - bits);
@@ -123,7 +123,7 @@ fn fixed_with(
 /// The largest error of surfaces in thousandths: see
 /// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
 pub(super) fn worst_case(
-    surfaces: &RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    surfaces: &CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>,
     rate_rounding: f64,
 ) -> f64 {
     // an end of a domain is rounded to a whole number, which adds up to one to the rate's own rounding
@@ -132,12 +132,12 @@ pub(super) fn worst_case(
     let bits =
         |error: f64, thousandths: i32| 0.5 + libm::ldexp(error * f64::from(thousandths), -32);
     match surfaces {
-        RangedSurfaces::Line(ranged) => {
+        CodeMap::Line(ranged) => {
             let (_, slope) = <(i32, i32)>::from(ranged.surface.of);
             let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(ranged.signal.factor);
             bits(error, ranged.surface.thousandths)
         }
-        RangedSurfaces::Poly13(both) => {
+        CodeMap::Poly13(both) => {
             let each = both.map(|ranged| {
                 let p = ranged.surface.of.coefficients();
                 // the steepest slope of the surface for inputs within a half

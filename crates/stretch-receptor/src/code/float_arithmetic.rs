@@ -4,8 +4,8 @@ use stretch_core::{DesignError, Poly13, Real};
 
 use super::{
     arithmetic::{CodeArithmetic, sealed},
+    code_map::{CodeMap, Span},
     fold::Folded,
-    ranged_surface::{RangedSurfaces, Span},
 };
 
 macro_rules! float {
@@ -16,11 +16,11 @@ macro_rules! float {
             type Surface = Poly13<$float>;
             type Estimate = $float;
 
-            fn round(folded: &Folded) -> Result<RangedSurfaces<[$float; 2], Poly13<$float>>, DesignError> {
+            fn round(folded: &Folded) -> Result<CodeMap<[$float; 2], Poly13<$float>>, DesignError> {
                 float(folded)
             }
 
-            fn worst_case(_: &RangedSurfaces<Self::Line, Self::Surface>, _: f64) -> Option<f64> {
+            fn worst_case(_: &CodeMap<Self::Line, Self::Surface>, _: f64) -> Option<f64> {
                 None
             }
 
@@ -71,7 +71,7 @@ fn finite<T: Real>(coefficients: &[T]) -> Result<(), DesignError> {
 }
 
 /// The coefficients over integers instead of halves, rounded.
-fn float<T: Real>(folded: &Folded) -> Result<RangedSurfaces<[T; 2], Poly13<T>>, DesignError> {
+fn float<T: Real>(folded: &Folded) -> Result<CodeMap<[T; 2], Poly13<T>>, DesignError> {
     let round = |c: f64, powers: i32| T::from_f64(libm::ldexp(c, -32 * powers));
     folded.try_map(
         |&[intercept, slope]| Ok([round(intercept, 0), round(slope, 1)]),

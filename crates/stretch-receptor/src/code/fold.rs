@@ -4,12 +4,12 @@ use stretch_core::{BranchSurface, Calibration, DesignError, Interval, LinearMap,
 
 use super::{
     adc::Adc,
-    ranged_surface::{COARSE_BITS, RangedSurface, RangedSurfaces, Span},
+    code_map::{COARSE_BITS, CodeMap, CodeSurface, Span},
 };
 use crate::fold::output;
 
 /// Surfaces in reference units over inputs in -1/2..1/2, before an arithmetic rounds them.
-pub(super) type Folded = RangedSurfaces<[f64; 2], Poly13>;
+pub(super) type Folded = CodeMap<[f64; 2], Poly13>;
 
 /// Units of the integers.
 pub(super) struct Units {
@@ -22,10 +22,15 @@ pub(super) struct Units {
 }
 
 impl Units {
-    pub(super) fn new(adc: &Adc, samples_per_s: f64, per_sample: f64, largest_rate: i32) -> Self {
-        let step_v = adc.volts_per_code() / f64::from(1u32 << (16 - adc.spec().bits));
+    pub(super) fn new(
+        adc: &Adc,
+        samples_per_s: f64,
+        per_sample: f64,
+        largest_rate: i32,
+    ) -> Result<Self, DesignError> {
+        let step_v = adc.volts_per_code() / f64::from(adc.align()?);
         let rate_v_per_s = step_v * samples_per_s * per_sample;
-        Self { zero_v: adc.spec().zero_v, step_v, rate_v_per_s, largest_rate }
+        Ok(Self { zero_v: adc.spec().zero_v, step_v, rate_v_per_s, largest_rate })
     }
 }
 
@@ -41,11 +46,11 @@ fn span(min: f64, max: f64, most: i32) -> Span {
 }
 
 pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, DesignError> {
-    match &calibration.model {
-        Model::Linear(line) => Ok(RangedSurfaces::Line(fold_line(calibration, line, units))),
+    match &calibration.spec().model {
+        Model::Linear(line) => Ok(CodeMap::Line(fold_line(calibration, line, units))),
         Model::Surfaces { inflation, deflation } => {
             let ranged = |branch| fold_surface(calibration, branch, units);
-            Ok(RangedSurfaces::Poly13([ranged(inflation)?, ranged(deflation)?]))
+            Ok(CodeMap::Poly13([ranged(inflation)?, ranged(deflation)?]))
         }
         other => Err(other.instead_of("linear or surfaces")),
     }
@@ -65,35 +70,31 @@ fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
 
 /// Normalised signal at the centre, and its change over the spread signal's 1.
 fn normalised(calibration: &Calibration, centre: u16, volts: f64, units: &Units) -> (f64, f64) {
-    let range = calibration.signal_range;
+    let range = calibration.spec().signal_range;
     let centre_v = units.zero_v + f64::from(centre) * units.step_v;
     (range.normalise(centre_v), volts / range.span())
 }
 
-fn fold_line(
-    calibration: &Calibration,
-    line: &LinearMap,
-    units: &Units,
-) -> RangedSurface<[f64; 2]> {
+fn fold_line(calibration: &Calibration, line: &LinearMap, units: &Units) -> CodeSurface<[f64; 2]> {
     let (gain, zero) = output(calibration);
     let (centre, span, volts) = signal(line.signal_domain, units);
     let (at, per) = normalised(calibration, centre, volts, units);
     let surface = [zero + gain * (line.intercept + line.slope * at), gain * line.slope * per];
-    RangedSurface { centre, signal: span, rate: Span::new(0, 0), surface }
+    CodeSurface { centre, signal: span, rate: Span::new(0, 0), surface }
 }
 
 fn fold_surface(
     calibration: &Calibration,
     branch: &BranchSurface,
     units: &Units,
-) -> Result<RangedSurface<Poly13>, DesignError> {
+) -> Result<CodeSurface<Poly13>, DesignError> {
     let degree = branch.surface.degree();
     let Some(p) = branch.surface.as_poly13() else {
         let (field, asked) = ("model.surface.terms", degree.terms());
         return Err(DesignError::TooLarge { field, asked, most: 7 });
     };
     let (gain, zero) = output(calibration);
-    let sign = calibration.polarity.sign();
+    let sign = calibration.spec().polarity.sign();
     let (centre, signal, volts) = signal(branch.signal_domain, units);
     let ends =
         [branch.rate_domain.min, branch.rate_domain.max].map(|r| sign * r / units.rate_v_per_s);
@@ -117,7 +118,7 @@ fn fold_surface(
         p11: rise(1),
         p12: rise(2),
     };
-    Ok(RangedSurface { centre, signal, rate, surface })
+    Ok(CodeSurface { centre, signal, rate, surface })
 }
 
 /// The cubic `c` in `at + per x`, as a cubic in x.

@@ -20,6 +20,7 @@
 mod adc;
 mod arithmetic;
 mod calibration;
+mod code_map;
 #[cfg(feature = "serde")]
 mod code_record;
 mod fixed_arithmetic;
@@ -27,16 +28,15 @@ mod float_arithmetic;
 mod fold;
 mod observer;
 mod observer_numbers;
-mod ranged_surface;
 mod reading;
 mod receptor;
 
-pub use adc::{Adc, AdcCode, AdcSpec};
+pub use adc::{Adc, AdcCode, AdcSpec, FIXED_BITS};
 pub use arithmetic::CodeArithmetic;
 pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration, FixedNumbers};
+pub use code_map::{CodeMap, CodeSurface, Span};
 pub use fixed_arithmetic::{Fixed, Scaled};
-pub use observer::{FixedObserver, IntegerObserver};
-pub use observer_numbers::{Numbers, Rest};
-pub use ranged_surface::{RangedSurface, RangedSurfaces, Span};
+pub use observer::{FixedObserver, IntegerMemory, IntegerObserver};
+pub use observer_numbers::{ObserverNumbers, RestNumbers};
 pub use reading::CodeReading;
-pub use receptor::{CodeReceptor, FixedReceptor};
+pub use receptor::{CodeMemory, CodeReceptor, CodeSurfaces, FixedReceptor, SideBit};

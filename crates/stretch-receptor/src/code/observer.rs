@@ -1,16 +1,16 @@
 //! The observer over converter codes, in integers.
 
 use stretch_core::{
-    Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS,
-    fixed::saturate, play,
+    Branch, Calibration, Design, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, arithmetic::play,
+    fixed::saturate,
 };
 
 use super::{
     adc::{Adc, AdcCode},
-    observer_numbers::{KNOTS, Numbers, PLACE_BITS, SHARE_BITS, TARGET_BITS, WEIGHT_BITS},
+    observer_numbers::{KNOTS, ObserverNumbers, PLACE_BITS, SHARE_BITS, TARGET_BITS, WEIGHT_BITS},
     reading::CodeReading,
 };
-use crate::{Domain, Front, front::Live, gains::SLOPES};
+use crate::{Domain, Front, ReceptorError, front::Live, gains::SLOPES};
 
 /// The fastest rate: a whole range in a sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
@@ -40,7 +40,7 @@ const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 /// let mut receptor = Runner::new(FixedObserver::new(&calibration, &adc)?);
 /// let reading = receptor.step(AdcCode(1861)).expect("an observer needs no warm-up");
 /// assert!((150_000..=180_000).contains(&reading.estimate)); // micrometres
-/// # Ok::<(), stretch_core::DesignError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 pub type FixedObserver = Front<IntegerObserver>;
 
@@ -48,7 +48,7 @@ pub type FixedObserver = Front<IntegerObserver>;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerObserver {
     /// The numbers of the record.
-    pub numbers: Numbers,
+    pub numbers: ObserverNumbers,
     /// Places per signal inside each segment, times `2^recip_bits`.
     pub recips: [i32; KNOTS],
     /// Bits behind the point of `recips`.
@@ -83,10 +83,10 @@ impl FixedObserver {
     /// The observer of a calibration over the codes of `adc`.
     ///
     /// # Errors
-    /// [`DesignError`] when the calibration is of another model or a number does
+    /// [`ReceptorError`] when the calibration is of another model or a number does
     /// not fit its format.
-    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
-        Ok(Self { model: Numbers::new(calibration, adc).map(IntegerObserver::of)? })
+    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, ReceptorError> {
+        Ok(Self { model: ObserverNumbers::new(calibration, adc).map(IntegerObserver::of)? })
     }
 
     /// Bits of the converter.
@@ -96,7 +96,7 @@ impl FixedObserver {
 }
 
 impl IntegerObserver {
-    fn of(n: Numbers) -> Self {
+    fn of(n: ObserverNumbers) -> Self {
         let knots = usize::from(n.knots);
         let rise = |k: usize| n.curve[k + 1] - n.curve[k];
         let flattest = (0..knots - 1).map(rise).min().unwrap_or(1).max(1);
@@ -331,7 +331,7 @@ fn part(x: i32, share: i32) -> i32 {
 mod record {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-    use super::{FixedObserver, IntegerObserver, Numbers};
+    use super::{FixedObserver, IntegerObserver, ObserverNumbers};
 
     impl Serialize for FixedObserver {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -341,7 +341,7 @@ mod record {
 
     impl<'de> Deserialize<'de> for FixedObserver {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            let numbers = Numbers::deserialize(deserializer)?;
+            let numbers = ObserverNumbers::deserialize(deserializer)?;
             let model = numbers.check().map(IntegerObserver::of).map_err(D::Error::custom)?;
             Ok(Self { model })
         }

@@ -2,7 +2,7 @@
 
 use stretch_core::{
     Calibration, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Model, RestTracker,
-    fixed, lag_share,
+    arithmetic::lag_share, fixed,
 };
 
 use super::adc::{Adc, AdcCode};
@@ -34,7 +34,7 @@ const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 /// bits behind the point, weights 20, places between knots 16, shares 31.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Numbers {
+pub struct ObserverNumbers {
     /// Schema of the record. The field stands first, so that a newer record is refused before the rest is read.
     pub schema: u32,
     /// Bits of the converter.
@@ -82,13 +82,13 @@ pub struct Numbers {
     /// Bits behind the point of `zero` and `gain`.
     pub output_bits: u8,
     /// The baseline, which is followed only where `pull` is above zero.
-    pub rest: Rest,
+    pub rest: RestNumbers,
 }
 
 /// The baseline's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Rest {
+pub struct RestNumbers {
     /// The resting signal.
     pub level: i32,
     /// Share of a negative mean excess (signal above baseline and resting level) by which the baseline falls in a
@@ -107,15 +107,15 @@ pub struct Rest {
 /// The schema of the records that this release writes, and the newest it reads.
 pub(super) const SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
-impl Numbers {
+impl ObserverNumbers {
     pub(super) fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
-        let Model::Observer(map) = &calibration.model else {
-            return Err(calibration.model.instead_of("observer"));
+        let Model::Observer(map) = &calibration.spec().model else {
+            return Err(calibration.spec().model.instead_of("observer"));
         };
-        let sign = calibration.polarity.sign();
-        let period_s = calibration.sample_rate_hz.period_s();
+        let sign = calibration.spec().polarity.sign();
+        let period_s = calibration.spec().sample_rate_hz.period_s();
         let spec = adc.spec();
-        let step_v = adc.volts_per_code() / f64::from(1u32 << (16 - spec.bits));
+        let step_v = adc.volts_per_code() / f64::from(adc.align()?);
         let per_volt = f64::from(1 << SIGNAL_BITS) / step_v;
         let span = |volts: f64| round("fixed.signal", volts * per_volt);
         let at = |volts: f64| round("fixed.signal", sign * (volts - spec.zero_v) * per_volt);
@@ -159,14 +159,14 @@ impl Numbers {
         let weight = |x: f64| fixed::from_f64("fixed.weight", x, WEIGHT_BITS);
         let place_bits = 32 + PLACE_BITS - TARGET_BITS;
         let rest = match map.rest {
-            None => Rest { level: 0, pull: 0, leak: 0, average: 0, most: 0, furthest: 0 },
-            Some(rest) => Rest {
+            None => RestNumbers { level: 0, pull: 0, leak: 0, average: 0, most: 0, furthest: 0 },
+            Some(rest) => RestNumbers {
                 level: at(rest.level)?,
                 pull: share(period_s / rest.catch_up_s)?,
                 leak: span(rest.leak * period_s)?,
                 average: share(lag_share(period_s, RestTracker::AVERAGE_S))?,
-                most: span(RestTracker::MOST_EXCESS * calibration.signal_range.span())?,
-                furthest: span(RestTracker::FURTHEST * calibration.signal_range.span())?,
+                most: span(RestTracker::MOST_EXCESS * calibration.spec().signal_range.span())?,
+                furthest: span(RestTracker::FURTHEST * calibration.spec().signal_range.span())?,
             },
         };
         let half = 0.5;
@@ -247,7 +247,7 @@ impl Numbers {
         for &end in &self.ends {
             holds("fixed.ends", end.into(), (0..=MOST_SIGNAL).contains(&end))?;
         }
-        let Rest { level, leak, most, furthest, .. } = self.rest;
+        let RestNumbers { level, leak, most, furthest, .. } = self.rest;
         within("fixed.level", level, 4 * MOST_SIGNAL / 2)?;
         for size in [leak, most, furthest] {
             holds("fixed.rest", size.into(), (0..=MOST_SIGNAL).contains(&size))?;

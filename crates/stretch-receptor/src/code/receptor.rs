@@ -7,8 +7,8 @@ use super::{
     adc::AdcCode,
     arithmetic::CodeArithmetic,
     calibration::CodeCalibration,
+    code_map::{CodeMap, CodeSurface},
     fixed_arithmetic::Fixed,
-    ranged_surface::{RangedSurface, RangedSurfaces},
     reading::CodeReading,
 };
 use crate::{
@@ -43,7 +43,7 @@ use crate::{
 /// let reading = receptor.step(AdcCode(1861)).unwrap(); // 1.4997 V
 /// assert_eq!((reading.estimate, reading.domain), (168_876, Domain::Inside)); // micrometres
 /// assert_eq!(receptor.step(AdcCode::MISSING), Err(Withheld::Missing));
-/// # Ok::<(), stretch_core::DesignError>(())
+/// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 pub type CodeReceptor<A, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     Front<CodeSurfaces<A, WINDOW, DEGREE, DELAY>>;
@@ -63,7 +63,7 @@ pub struct CodeSurfaces<
     dead_band: i32,
     /// All ones where a rising signal means a falling target, else zero.
     mirror: i32,
-    surfaces: RangedSurfaces<A::Line, A::Surface>,
+    surfaces: CodeMap<A::Line, A::Surface>,
 }
 
 /// The receptor in fixed point: [`CodeReceptor`] in [`Fixed`].
@@ -109,11 +109,10 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let mirror = -i32::from(falling);
         let (codes, align) = (1 << bits, 1 << (16 - bits));
         let surfaces = match surfaces {
-            RangedSurfaces::Line(s) => RangedSurfaces::Line(RangedSurface {
-                surface: A::line_over(s.surface, &s.signal),
-                ..s
-            }),
-            RangedSurfaces::Poly13(both) => RangedSurfaces::Poly13(both.map(|s| RangedSurface {
+            CodeMap::Line(s) => {
+                CodeMap::Line(CodeSurface { surface: A::line_over(s.surface, &s.signal), ..s })
+            }
+            CodeMap::Poly13(both) => CodeMap::Poly13(both.map(|s| CodeSurface {
                 surface: A::surface_over(s.surface, &s.signal, &s.rate),
                 ..s
             })),
@@ -177,11 +176,11 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         *side = now;
         let branch = now.branch();
         let (estimate, domain) = match &self.surfaces {
-            RangedSurfaces::Line(ranged) => {
+            CodeMap::Line(ranged) => {
                 let (volts, domain) = ranged.input(sample);
                 (A::line(&ranged.surface, &ranged.signal, volts), domain)
             }
-            RangedSurfaces::Poly13(surfaces) => {
+            CodeMap::Poly13(surfaces) => {
                 let ranged = &surfaces[usize::from(now.0 & 1)];
                 let (volts, rate, domain) = ranged.inputs(sample, rate);
                 let (volts, rate) = ((&ranged.signal, volts), (&ranged.rate, rate));

@@ -1,20 +1,17 @@
-//! Named arrays, as NPZ, MAT and HDF5 hold them: which of them are clocks, and whose.
+//! Named arrays, as NPZ holds them and the Python package makes them of other formats: which of them are clocks, and whose.
 
-#[cfg(feature = "hdf5")]
-pub(crate) mod hdf5;
-#[cfg(feature = "mat")]
-pub(crate) mod mat;
-#[cfg(feature = "npz")]
 pub(crate) mod npy;
 
 use stretch_data::Channel;
 
 use crate::{
-    ReadOptions, RecordingError, TimeUnit,
-    grid::{Track, listed, note},
+    ReadOptions, Recording, RecordingError,
+    clock::{self, Rows, Stamps, note_on_rate},
+    grid::{Track, listed, merged, note},
     names::{clock_of, time_rank},
     options::TIME,
     room::Room,
+    text::bad_rows::BadRows,
 };
 
 /// Blocks in which a matrix is taken apart.
@@ -23,14 +20,85 @@ const BLOCKS: usize = 32;
 /// Columns of one array that are taken.
 const MOST_COLUMNS: usize = 64;
 
+/// Longest array that is a date or a time of day rather than a clock, where there is a clock many times as long.
+const DATE: usize = 3;
+/// How many times as long that clock is.
+const MUCH_LONGER: usize = 10;
+
 /// One array of numbers, the last index running fastest.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Array {
-    /// Path within the file.
-    pub(crate) name: String,
+pub struct Array {
+    /// Path within the file, with `/` or `.` between its parts.
+    pub name: String,
     /// Lengths, the slowest index first.
-    pub(crate) shape: Vec<usize>,
-    pub(crate) values: Vec<f64>,
+    pub shape: Vec<usize>,
+    /// As many as the lengths say.
+    pub values: Vec<f64>,
+}
+
+/// Channels that were recorded at the same instants.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Clock {
+    /// What the array of the instants is called.
+    pub name: String,
+    /// The instants, s.
+    pub time_s: Vec<f64>,
+    /// NaN where an instant has no value.
+    pub channels: Vec<Channel>,
+}
+
+impl Recording {
+    /// Reads named arrays as those of an NPZ file: the channels on one clock, and the clocks as they were recorded.
+    ///
+    /// # Errors
+    /// As [`Recording::read`] of such a file; an array whose lengths do not fit its values.
+    ///
+    /// ```
+    /// use stretch_recording::{Array, ReadOptions, Recording};
+    /// let array = |name: &str, values: &[f64]| Array {
+    ///     name: name.into(),
+    ///     shape: vec![values.len()],
+    ///     values: values.into(),
+    /// };
+    /// let arrays = vec![
+    ///     array("gauge.time_s", &[0.0, 0.1, 0.2]),
+    ///     array("gauge.bridge_v", &[1.5, 1.6, 1.7]),
+    ///     array("valve.time_s", &[0.0, 0.2]),
+    ///     array("valve.pressure_kpa", &[100.0, 120.0]),
+    /// ];
+    /// let (recording, clocks) =
+    ///     Recording::from_arrays("run.mcap", arrays, Vec::new(), &ReadOptions::new())?;
+    /// assert_eq!(clocks.len(), 2);
+    /// assert_eq!(recording.trial.require("pressure_kpa")?, [100.0, 110.0, 120.0]);
+    /// # Ok::<(), stretch_recording::RecordingError>(())
+    /// ```
+    pub fn from_arrays(
+        name: &str,
+        arrays: Vec<Array>,
+        notes: Vec<String>,
+        options: &ReadOptions,
+    ) -> Result<(Self, Vec<Clock>), RecordingError> {
+        let unfit = |a: &&Array| a.shape.iter().product::<usize>() != a.values.len();
+        if let Some(Array { name: array, shape, .. }) = arrays.iter().find(unfit) {
+            let problem = format!("array {array} has other values than its shape {shape:?} says");
+            return Err(RecordingError::Format { file: name.to_owned(), format: "array", problem });
+        }
+        let (tracks, notes) = tracks(name, arrays, notes, options)?;
+        let clocks = tracks.iter().map(|track| {
+            let mut read = track.clone();
+            // A clock that nothing asked for is on stays as it was recorded if it cannot be read.
+            if clock::read(name, &mut read, options, &mut Vec::new()).is_err() {
+                read = track.clone();
+            }
+            let Stamps { name, counts, per_second, .. } = read.stamps;
+            let per_second = per_second.unwrap_or_else(|| options.divisor(&name));
+            let time_s = counts.iter().map(|count| count / per_second).collect();
+            Clock { name, time_s, channels: read.channels }
+        });
+        let clocks = clocks.collect();
+        let recording = merged(name, tracks, notes, options)?;
+        Ok((recording, clocks))
+    }
 }
 
 impl Array {
@@ -103,10 +171,19 @@ pub(crate) fn beside(arrays: &[Array], room: &mut Room) -> Result<(), String> {
     room.take_time(lengths.max().unwrap_or(0))
 }
 
+/// An array that may be a clock.
+#[derive(Debug, Clone)]
+struct Candidate {
+    /// The group that it is the clock of.
+    of: String,
+    /// How likely its name is that of a clock, 0 first.
+    rank: usize,
+    rises: bool,
+}
+
 /// A clock among the arrays.
 struct ClockArray {
     array: Array,
-    /// The group that it is the clock of.
     of: String,
 }
 
@@ -117,13 +194,12 @@ pub(crate) fn tracks(
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-    let found: Vec<_> = arrays.iter().map(|array| clock(array, options)).collect();
-    // One that does not rise is a clock only by its name, and told as one where there is no other.
-    let one_rises = found.iter().flatten().any(|(_, rises)| *rises);
+    let found: Vec<_> = arrays.iter().map(|array| candidate(array, options)).collect();
+    let are_clocks = choose(&arrays, &found);
     let (mut clocks, mut others) = (Vec::new(), Vec::new());
-    for (array, found) in arrays.into_iter().zip(found) {
-        match found.filter(|(_, rises)| *rises || !one_rises) {
-            Some((of, _)) => clocks.push(ClockArray { array, of }),
+    for ((array, found), is_clock) in arrays.into_iter().zip(found).zip(are_clocks) {
+        match found.filter(|_| is_clock) {
+            Some(Candidate { of, .. }) => clocks.push(ClockArray { array, of }),
             None => others.push(array),
         }
     }
@@ -140,30 +216,75 @@ pub(crate) fn tracks(
         channels[i].extend(array.into_columns(clocks[i].array.values.len()).into_iter().flatten());
     }
     note(&mut notes, "left out, no clock has their length or two clocks have", &left_out);
-    let track = |(clock, channels): (ClockArray, _)| Track {
-        per_second: options.divisor(&clock.array.name),
-        clock: clock.array.name,
-        counts: clock.array.values,
-        channels,
+    if let Some(rate_hz) = options.sample_rate_hz {
+        let [ClockArray { array, .. }] = &clocks[..] else {
+            let names: Vec<&str> = clocks.iter().map(|clock| clock.array.name.as_str()).collect();
+            let problem = format!(
+                "one rate is said for several clocks ({}); name the clock with --time, or leave --sample-rate out",
+                listed(&names)
+            );
+            return Err(RecordingError::Format { file: file.to_owned(), format: "array", problem });
+        };
+        notes.push(note_on_rate(Some(&array.name), rate_hz, "was said"));
+        let stamps = Stamps::at_rate(array.values.len(), rate_hz);
+        return Ok((vec![Track::new(stamps, channels.remove(0))], notes));
+    }
+    let track = |(clock, channels): (ClockArray, _)| {
+        let Array { name, values: counts, .. } = clock.array;
+        let rows = Rows::counted(counts.len());
+        Track::new(Stamps { name, counts, origin: 0.0, per_second: None, rows }, channels)
     };
     Ok((clocks.into_iter().zip(channels).map(track).collect(), notes))
 }
 
-/// What the array is the clock of and whether it rises, if it can be a clock: named so, of one dimension, and rising.
-fn clock(array: &Array, options: &ReadOptions) -> Option<(String, bool)> {
+/// What the array is the clock of, if it can be one: named so, of one dimension, and rising.
+fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
     let (samples, 1) = array.matrix()? else { return None };
-    let last = array.name.rsplit(['/', '.']).next().unwrap_or_default();
+    let (group, last) = parts(&array.name);
     let wanted = options.time.as_str();
-    let of = if array.name == wanted || last == wanted {
-        array.name.rsplit_once(['/', '.']).map_or(String::new(), |(group, _)| group.to_owned())
-    } else if wanted == TIME {
-        clock_of(&array.name)?
-    } else {
-        return None;
+    let is_wanted = array.name == wanted || last == wanted;
+    let of = match is_wanted {
+        true => group.to_owned(),
+        false if wanted == TIME => clock_of(&array.name)?,
+        false => return None,
     };
-    let rises = array.values.windows(2).all(|t| t[1] > t[0]);
-    let is_named = array.name == wanted || last == wanted || time_rank(last).is_some();
-    (samples > 1 && (rises || is_named)).then_some((of, rises))
+    let rank = if is_wanted { Some(0) } else { time_rank(last).map(|rank| rank + 1) };
+    // A clock may roll over, repeat its stamps, and begin with a stale one.
+    let back = array.values.windows(2).filter(|t| t[1] < t[0]).count();
+    let rises =
+        BadRows::are_few(back, samples) && array.values.iter().any(|t| *t != array.values[0]);
+    (samples > 1 && (rises || rank.is_some())).then_some(Candidate {
+        of,
+        rank: rank.unwrap_or(usize::MAX),
+        rises,
+    })
+}
+
+/// Which of the candidates are clocks.
+fn choose(arrays: &[Array], found: &[Option<Candidate>]) -> Vec<bool> {
+    let all = || arrays.iter().zip(found).filter_map(|(a, found)| Some((a, found.as_ref()?)));
+    // One that does not rise is a clock only by its name, and reported as one where there is no other.
+    let one_rises = all().any(|(_, found)| found.rises);
+    let longest = all().filter(|(_, c)| c.rises).map(|(a, _)| a.values.len()).max().unwrap_or(0);
+    let is_clock = |array: &Array, own: &Candidate| {
+        let samples = array.values.len();
+        let is_date = samples <= DATE && longest >= MUCH_LONGER * samples;
+        let (group, _) = parts(&array.name);
+        // In a group with a `time_s`, as in one with a likelier name, another array of times is a channel.
+        let has_better = all().any(|(other, better)| {
+            let is_same = better.of == own.of || (!group.is_empty() && group == better.of);
+            let is_likelier = better.rank < own.rank && (better.rises || !own.rises);
+            is_same && is_likelier && other.values.len() == samples
+        });
+        (own.rises || !one_rises) && !is_date && !has_better
+    };
+    let pairs = arrays.iter().zip(found);
+    pairs.map(|(array, own)| own.as_ref().is_some_and(|own| is_clock(array, own))).collect()
+}
+
+/// The group that a path leads to, and the last part.
+fn parts(path: &str) -> (&str, &str) {
+    path.rsplit_once(['/', '.']).unwrap_or(("", path))
 }
 
 /// The clock of an array: of its length, and by its name the nearest; none where two are as near.
@@ -218,18 +339,16 @@ fn counted(
     let (Some(rate_hz), Some(samples)) = (options.sample_rate_hz.or(own), samples) else {
         let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
         let hint = format!(
-            "save it as an array {} beside the others ({}), or say --sample-rate",
+            "save it as an array {} beside the others ({}), or give its rate with --time 100hz",
             &options.time,
             listed(&names)
         );
         return Err(RecordingError::NoTime { file: file.to_owned(), hint });
     };
     let said = if options.sample_rate_hz.is_some() { "was said" } else { "the file says" };
-    notes.push(format!("there is no time: {rate_hz} samples a second, as {said}"));
-    let per_second = options.time_unit.unwrap_or(TimeUnit::Seconds).per_second();
+    notes.push(note_on_rate(None, rate_hz, said));
     let channels = others.into_iter().filter(|a| a.values.len() > 1);
     let channels = channels.filter_map(|a| a.into_columns(samples));
     let channels = channels.flatten().collect();
-    let counts = (0..samples).map(|i| i as f64 / rate_hz * per_second).collect();
-    Ok((vec![Track { clock: TIME.to_owned(), counts, per_second, channels }], notes))
+    Ok((vec![Track::new(Stamps::at_rate(samples, rate_hz), channels)], notes))
 }

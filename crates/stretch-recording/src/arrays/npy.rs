@@ -1,4 +1,7 @@
 //! NumPy's arrays: one in an NPY file, several in an NPZ archive.
+//!
+//! The header is read here because the crate `npyz` brings 70 others, among them an old `zip` and a build from assembly, and
+//! allocates what a header asks for.
 
 use std::io::Cursor;
 
@@ -8,7 +11,7 @@ use crate::{
     grid::{Track, listed, note},
     names::time_rank,
     room::Room,
-    whole::{signed, word},
+    sniff::EXCEL,
 };
 
 type Tracks = (Vec<Track>, Vec<String>);
@@ -59,7 +62,8 @@ pub(crate) fn read_archive(
         let mut member = archive.by_index(i).map_err(broken)?;
         let path = member.name().map_err(broken)?.into_owned();
         if path.starts_with("xl/") {
-            return Err(fail("it is an Excel workbook; save the sheet as CSV".to_owned()));
+            let problem = format!("recordings of this kind are not read; {EXCEL}");
+            return Err(RecordingError::Format { file: file.to_owned(), format: "Excel", problem });
         }
         let Some(name) = path.strip_suffix(".npy") else { continue };
         let read = room.unpack(&mut member);
@@ -281,4 +285,16 @@ fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
         at += bytes;
     }
     Ok((places, at))
+}
+
+/// The number of at most eight bytes.
+fn word(bytes: &[u8], is_big: bool) -> u64 {
+    let push = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
+    if is_big { bytes.iter().fold(0, push) } else { bytes.iter().rev().fold(0, push) }
+}
+
+/// The value of a word of so many bytes whose first bit is the sign.
+fn signed(word: u64, bytes: usize) -> f64 {
+    let unused = 64 - 8 * bytes as u32;
+    (((word << unused) as i64) >> unused) as f64
 }

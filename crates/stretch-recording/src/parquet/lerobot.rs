@@ -71,12 +71,7 @@ pub(crate) fn episode(
             "it holds the episodes {low} to {high}, and {wanted} is read; FILE#{high} reads another"
         ));
     }
-    let kept = |values: &[f64]| -> Vec<f64> {
-        values.iter().zip(&of).filter(|(_, e)| **e == wanted).map(|(x, _)| *x).collect()
-    };
-    track.counts = kept(&track.counts);
-    for channel in &mut track.channels {
-        channel.values = kept(&channel.values);
-    }
+    let others: Vec<usize> = (0..of.len()).filter(|i| of[*i] != wanted).collect();
+    track.remove(&others);
     Ok(track)
 }

@@ -15,9 +15,8 @@ use stretch_data::Channel;
 
 use crate::{
     ReadOptions, RecordingError,
-    clock::time_among,
+    clock::{Rows, Stamps, note_on_rate, time_among},
     grid::{Track, note},
-    options::TIME,
     parquet::column::{Refused, stamp_counts},
     room::Room,
 };
@@ -56,7 +55,7 @@ pub(crate) fn read(
     note(&mut notes, "left out", &other);
     lerobot::name(Path::new(file), &mut channels);
     let track = on_its_clock(file, channels, &stamps, options, &mut notes)?;
-    if track.counts.is_empty() {
+    if track.stamps.counts.is_empty() {
         return Err(RecordingError::HeaderOnly { file: file.to_owned() });
     }
     let track = lerobot::episode(track, options.episode, &mut notes).map_err(fail)?;
@@ -72,24 +71,20 @@ fn on_its_clock(
     notes: &mut Vec<String>,
 ) -> Result<Track, RecordingError> {
     let names: Vec<String> = channels.iter().map(|c| c.name.clone()).collect();
-    match (time_among(&names, options), options.sample_rate_hz) {
-        (Some(time), _) => {
-            let Channel { name: clock, values: counts } = channels.remove(time);
-            if clock != options.time {
-                notes.push(format!("the time is column {clock}"));
-            }
-            let per_second = stamps[time].unwrap_or_else(|| options.divisor(&clock));
-            Ok(Track { clock, counts, per_second, channels })
-        }
-        (None, Some(rate_hz)) => {
-            notes.push(format!("there is no time: {rate_hz} samples a second, as was said"));
-            let rows = channels.first().map_or(0, |c| c.values.len());
-            let counts = (0..rows).map(|i| i as f64 / rate_hz).collect();
-            Ok(Track { clock: TIME.to_owned(), counts, per_second: 1.0, channels })
-        }
-        (None, None) => {
-            let names = names.iter().map(String::as_str);
-            Err(RecordingError::missing_column(file, &options.time, names))
-        }
+    let time = time_among(&names, options);
+    if let Some(rate_hz) = options.sample_rate_hz {
+        notes.push(note_on_rate(time.map(|i| &*names[i]), rate_hz, "was said"));
+        let time = time.map(|i| channels.remove(i));
+        let rows = channels.first().or(time.as_ref()).map_or(0, |c| c.values.len());
+        return Ok(Track::new(Stamps::at_rate(rows, rate_hz), channels));
     }
+    let Some(time) = time else {
+        return Err(RecordingError::missing_time(file, &options.time, &names));
+    };
+    let Channel { name, values: counts } = channels.remove(time);
+    if name != options.time {
+        notes.push(format!("the time is column {name}"));
+    }
+    let (per_second, rows) = (stamps[time], Rows::counted(counts.len()));
+    Ok(Track::new(Stamps { name, counts, origin: 0.0, per_second, rows }, channels))
 }

@@ -1,129 +1,157 @@
 //! Columns of numbers that grow by a row.
 
-use stretch_data::{Channel, DataError, Place, Trial};
+use stretch_data::{Channel, DataError, Place};
 
 use crate::{
     ReadOptions, RecordingError,
+    clock::{Rows, Stamps},
+    grid::{Track, is_needed, sparse},
+    text::bad_rows::BadRows,
     text::header::Header,
     text::row::{Fault, Role, RowFault},
 };
 
 /// The channels that every trial file of the format knows by name.
 pub(crate) const KNOWN: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
+/// Fields that are no numbers after which a column may be taken for text.
+const MOST_HOLES: usize = 16;
 
 /// Columns that grow by a row at a time.
 pub(crate) struct Columns {
     pub(crate) roles: Vec<Role>,
-    time: usize,
-    time_column: String,
-    divisor: f64,
-    /// What the time column counts from.
-    origin: f64,
-    /// The last time of what was cut off.
-    previous_s: Option<f64>,
-    time_s: Vec<f64>,
-    kept: Vec<(usize, Vec<f64>)>,
+    /// What the time column counts, or how many samples came before.
+    counts: Vec<f64>,
+    rows: Rows,
+    kept: Vec<Kept>,
+    /// Whether columns are kept that nobody asks for.
+    keeps_all: bool,
+    /// Samples with a field that is no number.
+    holes: Vec<usize>,
+}
+
+/// A column that is kept as long as nearly all of its fields are numbers or blank.
+struct Kept {
+    column: usize,
+    values: Vec<f64>,
+    holes: usize,
+    /// Of the holes those that are neither blank nor a number that is not finite.
+    words: usize,
+    /// The first field that is no number.
+    first: Option<RecordingError>,
 }
 
 impl Columns {
+    /// The columns of a header; `time` is that of the time, `is_counted` says that it is not read.
     pub(crate) fn new(
         file: &str,
         header: &Header,
+        time: Option<usize>,
+        is_counted: bool,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let time = header.position(file, &options.time)?;
         for name in options.required() {
             header.position(file, name)?;
         }
         let role = |(i, name): (usize, &String)| match name.as_str() {
+            _ if Some(i) == time && is_counted => Role::Skipped,
+            name if Some(i) == time || options.required().iter().any(|r| r == name) => Role::Needed,
             "" => Role::Skipped,
-            name if i == time || KNOWN.contains(&name) => Role::Needed,
-            _ if options.required().contains(name) => Role::Needed,
+            _ if i >= header.recorded => Role::Skipped,
+            name if is_needed(name, options) => Role::Needed,
             _ => Role::Welcome,
         };
         let roles: Vec<Role> = header.names.iter().enumerate().map(role).collect();
         let kept = (0..roles.len())
-            .filter(|&i| i != time && roles[i] != Role::Skipped)
-            .map(|i| (i, Vec::new()))
+            .filter(|&i| Some(i) != time && roles[i] != Role::Skipped)
+            .map(|column| Kept { column, values: Vec::new(), holes: 0, words: 0, first: None })
             .collect();
-        Ok(Self {
-            roles,
-            time,
-            time_column: options.time.clone(),
-            divisor: options.time_divisor(),
-            origin: 0.0,
-            previous_s: None,
-            time_s: Vec::new(),
-            kept,
-        })
-    }
-
-    /// Counts the time from `origin`, in the column's own unit, and so many counts make a second.
-    pub(crate) fn count_from(&mut self, origin: f64, divisor: f64) {
-        (self.origin, self.divisor) = (origin, divisor);
+        let keeps_all = options.required().is_empty();
+        let (counts, rows, holes) = (Vec::new(), Rows::default(), Vec::new());
+        Ok(Self { roles, counts, rows, kept, keeps_all, holes })
     }
 
     /// How many rows there are.
     pub(crate) fn len(&self) -> usize {
-        self.time_s.len()
+        self.counts.len()
     }
 
     #[inline]
-    pub(crate) fn push(
-        &mut self,
-        file: &str,
-        row: u64,
-        values: &[f64],
-    ) -> Result<(), RecordingError> {
-        let time_s = (values[self.time] - self.origin) / self.divisor;
-        if let Some(previous_s) = self.time_s.last().copied().or(self.previous_s)
-            && time_s <= previous_s
-        {
-            let at = Place { file: file.to_owned(), row, column: self.time_column.clone() };
-            return Err(DataError::TimeNotRising { at, time_s, previous_s }.into());
+    pub(crate) fn push(&mut self, row: u64, count: f64, values: &[f64]) {
+        self.counts.push(count);
+        self.rows.push(row);
+        for kept in &mut self.kept {
+            kept.values.push(values[kept.column]);
         }
-        self.time_s.push(time_s);
-        let mut spoilt = false;
-        for (i, column) in &mut self.kept {
-            let value = values[*i];
-            spoilt |= value.is_nan();
-            column.push(value);
-        }
-        if spoilt {
-            self.drop_spoilt(values);
-        }
-        Ok(())
     }
 
-    /// Leaves out the columns whose newest field was no number.
+    /// Notes which fields of the newest row are no numbers. A column of text is given up.
     #[cold]
-    fn drop_spoilt(&mut self, values: &[f64]) {
-        self.kept.retain(|&(i, _)| !values[i].is_nan());
-        for (role, value) in self.roles.iter_mut().zip(values) {
-            if value.is_nan() {
-                *role = Role::Skipped;
+    pub(crate) fn spoil(&mut self, fields: impl IntoIterator<Item = (usize, RecordingError)>) {
+        let count = self.len();
+        self.holes.push(count - 1);
+        for (column, error) in fields {
+            let Some(at) = self.kept.iter().position(|kept| kept.column == column) else {
+                continue;
+            };
+            let kept = &mut self.kept[at];
+            kept.holes += 1;
+            kept.words += usize::from(!error.is_blank());
+            kept.first.get_or_insert(error);
+            if kept.words > MOST_HOLES && !BadRows::are_few(kept.words, count) {
+                self.roles[column] = Role::Skipped;
+                self.kept.remove(at);
             }
         }
     }
 
-    /// What there is so far; rows go on behind it.
-    pub(crate) fn cut(&mut self, file: &str, header: &Header) -> Trial {
-        self.previous_s = self.time_s.last().copied().or(self.previous_s);
-        let kept = self.kept.iter_mut().map(|(i, values)| (*i, std::mem::take(values)));
-        let channel = |(i, values): (usize, _)| Channel { name: header.names[i].clone(), values };
-        let channels = kept.map(channel).collect();
-        Trial { name: file.to_owned(), time_s: std::mem::take(&mut self.time_s), channels }
-    }
-
-    pub(crate) fn into_trial(
+    /// The tracks of the columns: one, and in a sparse table those of columns that have the clock of their own rows. Leaves out rows with
+    /// holes if they are few, or else the columns that have them; too many holes in a column that is needed are bad rows.
+    pub(crate) fn into_tracks(
         mut self,
-        file: &str,
         header: &Header,
-    ) -> Result<Trial, RecordingError> {
-        if self.time_s.is_empty() {
-            return Err(RecordingError::HeaderOnly { file: file.to_owned() });
+        stamps: Stamps,
+        options: &ReadOptions,
+        bad: &mut BadRows,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Track>, RecordingError> {
+        let count = self.len();
+        self.kept.retain(|kept| kept.words == 0 || BadRows::are_few(kept.words, count));
+        let name = |kept: &Kept| header.names[kept.column].clone();
+        let mut first: Vec<(String, RecordingError)> = Vec::new();
+        for kept in &mut self.kept {
+            first.extend(kept.first.take().map(|error| (name(kept), error)));
         }
-        Ok(self.cut(file, header))
+        let channel = |kept: Kept| Channel { name: name(&kept), values: kept.values };
+        let channels = self.kept.into_iter().map(channel).collect();
+        let track = Track::new(Stamps { counts: self.counts, rows: self.rows, ..stamps }, channels);
+        let mut tracks = match self.holes.is_empty() {
+            true => vec![track],
+            false => sparse(track, options, notes),
+        };
+        let Some(table) = tracks.first_mut().filter(|t| t.stamps.counts.len() == count) else {
+            return Ok(tracks);
+        };
+        let is_needed = |c: &Channel| is_needed(&c.name, options);
+        let holes_of = |c: &Channel| self.holes.iter().filter(|i| c.values[**i].is_nan()).count();
+        // No row is left out for a column that others are asked for instead of.
+        let most = if self.keeps_all { count } else { 0 };
+        table.channels.retain(|c| is_needed(c) || BadRows::are_few(holes_of(c), most));
+        let rows_with_holes = |channels: &[Channel]| -> Vec<usize> {
+            let is_hole = |i: &&usize| channels.iter().any(|c| c.values[**i].is_nan());
+            self.holes.iter().filter(is_hole).copied().collect()
+        };
+        let mut holes = rows_with_holes(&table.channels);
+        if !BadRows::are_few(holes.len() + bad.len(), count + bad.len()) {
+            table.channels.retain(|c| is_needed(c) || holes_of(c) == 0);
+            holes = rows_with_holes(&table.channels);
+        }
+        first.retain(|(name, _)| table.channels.iter().any(|c| c.name == *name));
+        let first = first.into_iter().map(|(_, error)| error).min_by_key(RecordingError::row);
+        if let Some(first) = first {
+            bad.leave_out(holes.iter().map(|i| table.stamps.rows.row(*i)), first)?;
+            table.remove(&holes);
+        }
+        Ok(tracks)
     }
 }
 
@@ -142,10 +170,10 @@ pub(crate) fn located(file: &str, row: u64, header: &Header, fault: RowFault) ->
                 Fault::Empty => RecordingError::EmptyField { at },
                 Fault::DecimalComma(value) => RecordingError::DecimalComma { at, value },
                 Fault::NotFinite(value) => DataError::NotFinite { at, value }.into(),
-                Fault::NotUtf8(value) => RecordingError::NotUtf8 { at, value },
                 Fault::Quote => RecordingError::Quote { at },
                 Fault::DecimalPoint(value) => RecordingError::DecimalPoint { at, value },
                 Fault::Stamp(value) => RecordingError::TimeStamp { at, value },
+                Fault::DayOrMonth(value) => RecordingError::DayOrMonth { at, value },
             }
         }
     }

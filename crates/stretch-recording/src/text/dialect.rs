@@ -5,7 +5,9 @@ use std::borrow::Cow;
 use stretch_data::shown;
 
 use crate::{
-    stamps::{looks_like_stamp, nanoseconds},
+    DateOrder,
+    stamps::{StampFault, looks_like_stamp, nanoseconds, order_of},
+    text::header::Header,
     text::row::{Fault, Field, Role, RowFault, field, number, numbers},
 };
 
@@ -39,23 +41,39 @@ enum Clock {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Dialect {
     pub(crate) delimiter: u8,
+    /// How many columns each row has.
+    recorded: usize,
     time: Option<usize>,
+    date_order: Option<DateOrder>,
     mark: Mark,
     clock: Clock,
     is_plain: bool,
+    /// What is wrong with welcome fields of the newest row.
+    spoilt: Vec<(usize, Fault)>,
 }
 
 impl Dialect {
-    /// Rows between `delimiter`s, the time in column `time`.
-    pub(crate) fn new(delimiter: u8, time: Option<usize>) -> Self {
+    /// Rows below a header, the time in column `time`; the first of them may show the order of dates.
+    pub(crate) fn new(
+        header: &Header,
+        time: Option<usize>,
+        date_order: Option<DateOrder>,
+        rows: &[(u64, Vec<u8>)],
+    ) -> Self {
+        let (delimiter, recorded) = (header.delimiter, header.recorded);
         // A comma between columns cannot stand in numbers, too.
         let mark = if delimiter == b',' { Mark::Point } else { Mark::Open };
-        Self { delimiter, time, mark, clock: Clock::Open, is_plain: false }
+        let shown =
+            |(_, line): &(u64, Vec<u8>)| order_of(&text(cells(line, delimiter)?.get(time?)?));
+        let date_order = date_order.or_else(|| rows.iter().find_map(shown));
+        let (clock, spoilt) = (Clock::Open, Vec::new());
+        Self { delimiter, recorded, time, date_order, mark, clock, is_plain: false, spoilt }
     }
 
-    /// Whether the time comes in stamps; it then counts seconds from the first.
-    pub(crate) fn has_stamps(&self) -> bool {
-        matches!(self.clock, Clock::Stamps(_))
+    /// What was wrong with welcome fields of the newest row.
+    #[inline]
+    pub(crate) fn take_spoilt(&mut self) -> Option<Vec<(usize, Fault)>> {
+        (!self.spoilt.is_empty()).then(|| std::mem::take(&mut self.spoilt))
     }
 
     /// The first stamp, ns.
@@ -84,12 +102,16 @@ impl Dialect {
         if is_comment(line) {
             return Ok(false);
         }
-        if self.is_plain {
-            return numbers(line, self.delimiter, roles, out).map(|()| true);
+        let recorded = self.recorded;
+        if self.is_plain && numbers(line, self.delimiter, &roles[..recorded], &mut out[..recorded])
+        {
+            return Ok(true);
         }
-        self.learn(line);
-        self.is_plain =
-            self.delimiter != BLANKS && self.mark == Mark::Point && self.clock == Clock::Number;
+        if !self.is_plain {
+            self.learn(line);
+            self.is_plain =
+                self.delimiter != BLANKS && self.mark == Mark::Point && self.clock == Clock::Number;
+        }
         self.parse_loosely(line, roles, out).map(|()| true)
     }
 
@@ -105,6 +127,7 @@ impl Dialect {
                 Some(cell) if cell.len() > EXACT_DIGITS && whole(cell).is_some() => {
                     Clock::Counts(None)
                 }
+                Some(cell) if !is_number(cell) => Clock::Open,
                 _ => Clock::Number,
             };
         }
@@ -125,9 +148,13 @@ impl Dialect {
         out: &mut [f64],
     ) -> Result<(), RowFault> {
         let cells = cells(line, self.delimiter).ok_or_else(|| broken(line, self.delimiter))?;
-        if cells.len() != roles.len() {
+        // A separator may stand behind the last field.
+        let is_trailed = cells.last().is_some_and(|cell| cell.is_empty());
+        let most = roles.len() + usize::from(is_trailed);
+        if !(self.recorded..=most).contains(&cells.len()) {
             return Err(RowFault::Ragged { found: cells.len(), expected: roles.len() });
         }
+        self.spoilt.clear();
         for (column, (cell, &role)) in cells.iter().zip(roles).enumerate() {
             let value = match (role, self.clock) {
                 (Role::Skipped, _) => Ok(f64::NAN),
@@ -141,15 +168,26 @@ impl Dialect {
                 Err(fault @ Fault::DecimalPoint(_)) => {
                     return Err(RowFault::Field { column, fault });
                 }
-                Err(_) if role == Role::Welcome => f64::NAN,
+                Err(fault) if role == Role::Welcome || self.may_be_blank(&fault, column) => {
+                    self.spoilt.push((column, fault));
+                    f64::NAN
+                }
                 Err(fault) => return Err(RowFault::Field { column, fault }),
             };
         }
         Ok(())
     }
 
+    /// Whether a column that is needed may lack a value: it may have a clock of its own.
+    fn may_be_blank(&self, fault: &Fault, column: usize) -> bool {
+        matches!(fault, Fault::Empty | Fault::NotFinite(_)) && Some(column) != self.time
+    }
+
     fn stamp(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
-        let ns = nanoseconds(&text(cell)).ok_or_else(|| Fault::Stamp(shown(cell)))?;
+        let ns = nanoseconds(&text(cell), self.date_order).map_err(|fault| match fault {
+            StampFault::Unknown => Fault::Stamp(shown(cell)),
+            StampFault::DayOrMonth => Fault::DayOrMonth(shown(cell)),
+        })?;
         let first = first.unwrap_or(ns);
         self.clock = Clock::Stamps(Some(first));
         Ok((ns - first) as f64 / 1e9)
@@ -185,6 +223,12 @@ pub(crate) fn is_comment(line: &[u8]) -> bool {
             line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")
         }
     }
+}
+
+/// A comment without its mark.
+pub(crate) fn uncommented(line: &[u8]) -> &[u8] {
+    let is_mark = |b: &u8| matches!(b, b'#' | b'%' | b'/' | b' ' | b'\t');
+    &line[line.iter().take_while(|b| is_mark(b)).count()..]
 }
 
 /// The cells of a line; none where its quotation marks do not pair up.

@@ -1,12 +1,13 @@
-//! The header line: its delimiter and the names of the columns.
-
-use std::collections::HashSet;
+//! The names of a table's columns.
 
 use stretch_data::{Place, shown};
 
 use crate::{
-    RecordingError,
-    text::row::{Field, field, number},
+    ReadOptions, RecordingError,
+    clock::{note_on_rate, time_among},
+    grid::note,
+    options::TIME,
+    stamps::looks_like_stamp,
 };
 
 /// Names of columns in the file's order; an empty name is a column without one.
@@ -14,69 +15,77 @@ use crate::{
 pub(crate) struct Header {
     pub(crate) names: Vec<String>,
     pub(crate) delimiter: u8,
+    /// How many columns each row has; what is named beyond them is a remark, or not recorded.
+    pub(crate) recorded: usize,
 }
 
 impl Header {
-    /// Reads a header line that is not blank.
-    pub(crate) fn parse(file: &str, row: u64, line: &[u8]) -> Result<Self, RecordingError> {
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-        let place = |column: String| Place { file: file.to_owned(), row, column };
-        if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
-            return Err(RecordingError::NotUtf8 { at: place("1".into()), value: shown(line) });
-        }
-        let delimiter = delimiter(line);
-        let (mut cells, mut at) = (Vec::new(), 0);
-        loop {
-            let (content, end) = match field(line, at, delimiter) {
-                Field::Plain(content, end) => (content.to_vec(), end),
-                Field::Quoted(content, end) => (content, end),
-                Field::Broken => {
-                    return Err(RecordingError::Quote { at: place((cells.len() + 1).to_string()) });
-                }
-            };
-            cells.push(content);
-            if end >= line.len() {
-                break;
-            }
-            at = end + 1;
-        }
-        let names = Self::named(file, row, cells)?;
-        if names.iter().all(|name| number(name.as_bytes()).is_ok()) {
-            return Err(RecordingError::NoHeader { file: file.to_owned(), first: shown(line) });
-        }
-        Ok(Self { names, delimiter })
-    }
-
-    /// Names from the cells of a header line.
+    /// Names from the cells of a header line. The second column called `X` becomes `X.1`, with a note; the first is `X.0` if the
+    /// options ask for that.
+    ///
+    /// # Errors
+    /// A control character in a name; two columns of a name that is asked for.
     pub(crate) fn named(
         file: &str,
         row: u64,
-        cells: Vec<Vec<u8>>,
+        cells: &[String],
+        options: &ReadOptions,
+        notes: &mut Vec<String>,
     ) -> Result<Vec<String>, RecordingError> {
-        let place =
-            |column: usize| Place { file: file.to_owned(), row, column: (column + 1).to_string() };
-        let (mut names, mut seen): (Vec<String>, _) = (Vec::new(), HashSet::new());
-        for (column, content) in cells.into_iter().enumerate() {
-            let name = String::from_utf8(content).map_err(|e| RecordingError::NotUtf8 {
-                at: place(column),
-                value: shown(e.as_bytes()),
-            })?;
-            if name.contains(char::is_control) {
-                let value = shown(name.as_bytes());
-                return Err(RecordingError::ControlCharacter { at: place(column), value });
+        let mut names: Vec<String> = cells.to_vec();
+        let (mut renamed, asked) = (Vec::new(), options.asked());
+        for (column, cell) in cells.iter().enumerate() {
+            if cell.contains(char::is_control) {
+                let column = (column + 1).to_string();
+                let at = Place { file: file.to_owned(), row, column };
+                return Err(RecordingError::ControlCharacter { at, value: shown(cell.as_bytes()) });
             }
-            if !name.is_empty() && !seen.insert(name.clone()) {
+            // A serial monitor puts the time of day before the names as well.
+            if looks_like_stamp(cell) {
+                names[column] = "stamp".to_owned();
+            }
+            let before = cells[..column].iter().filter(|name| *name == cell).count();
+            let first_asked = || asked.iter().any(|name| **name == format!("{cell}.0"));
+            let is_twice = before > 0 || (cells[column + 1..].contains(cell) && first_asked());
+            if cell.is_empty() || !is_twice {
+                continue;
+            }
+            // Of several columns of the usual name of the time the first is it.
+            if asked.contains(&cell) && cell != TIME {
                 return Err(RecordingError::DuplicateColumn {
                     file: file.to_owned(),
-                    column: name,
+                    column: cell.clone(),
                 });
             }
-            names.push(name);
+            names[column] = format!("{cell}.{before}");
+            renamed.push(format!("{cell} (column {}) -> {cell}.{before}", column + 1));
         }
+        note(notes, "columns of one name are numbered", &renamed);
         Ok(names)
     }
 
-    /// Where column `name` stands.
+    /// The column of the time, and the samples a second, with a note, if samples are counted instead of read.
+    pub(crate) fn time(
+        &self,
+        file: &str,
+        stated: Option<(f64, String)>,
+        options: &ReadOptions,
+        notes: &mut Vec<String>,
+    ) -> Result<(Option<usize>, Option<f64>), RecordingError> {
+        // A name without numbers below it, such as a remark behind the last column, is no time.
+        let time = time_among(&self.names[..self.recorded], options);
+        let counted = options.counted(time.is_some(), stated);
+        if time.is_none() && counted.is_none() {
+            return Err(RecordingError::missing_time(file, &options.time, &self.names));
+        }
+        let rate_hz = counted.map(|(rate_hz, by)| {
+            notes.push(note_on_rate(time.map(|i| &*self.names[i]), rate_hz, &by));
+            rate_hz
+        });
+        Ok((time, rate_hz))
+    }
+
+    /// Where column `name` is.
     pub(crate) fn position(&self, file: &str, name: &str) -> Result<usize, RecordingError> {
         self.names.iter().position(|n| n == name).ok_or_else(|| {
             RecordingError::missing_column(file, name, self.names.iter().map(String::as_str))
@@ -90,19 +99,4 @@ impl Header {
             _ => (position + 1).to_string(),
         }
     }
-}
-
-/// `;` or a tab where the header has one and no comma outside quotation marks; else `,`.
-fn delimiter(line: &[u8]) -> u8 {
-    let mut quoted = false;
-    let mut found = b',';
-    for &byte in line {
-        match byte {
-            b'"' => quoted = !quoted,
-            b',' if !quoted => return b',',
-            b';' | b'\t' if !quoted && found == b',' => found = byte,
-            _ => {}
-        }
-    }
-    found
 }

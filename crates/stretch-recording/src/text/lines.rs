@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, Read};
 
-use crate::RecordingError;
+use crate::{RecordingError, stamps::looks_like_stamp};
 
 const BUFFER_BYTES: usize = 256 * 1024;
 
@@ -41,6 +41,9 @@ impl<R: Read> Lines<R> {
             if self.row == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
                 self.line.drain(..3);
             }
+            if self.line.get(2) == Some(&b':') {
+                part_arrow(&mut self.line);
+            }
             if !self.line.trim_ascii().is_empty() {
                 return Ok(Some((self.row, &self.line)));
             }
@@ -58,6 +61,27 @@ impl<R: Read> Lines<R> {
         let taken = self.reader.by_ref().take(most).read_until(b'\n', &mut self.line);
         Ok(taken.map_err(failed)? > 0)
     }
+}
+
+/// Puts a separator for the arrow behind the time of day that a serial monitor writes: `10:00:00.020 -> 101.3,1.02`.
+fn part_arrow(line: &mut Vec<u8>) {
+    const ARROW: &[u8] = b" -> ";
+    let Some(at) = memchr::memmem::find(line, ARROW) else { return };
+    if str::from_utf8(&line[..at]).is_ok_and(looks_like_stamp) {
+        let separator = [b';', b'\t', b','].into_iter().find(|byte| line[at..].contains(byte));
+        line.splice(at..at + ARROW.len(), [separator.unwrap_or(b' ')]);
+    }
+}
+
+/// Text in the encoding of Windows in western Europe.
+pub(crate) fn windows_1252(bytes: &[u8]) -> String {
+    /// Characters from 0x80 on; five bytes have none.
+    const FROM_0X80: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8d}Ž\u{8f}\u{90}‘’“”•–—˜™š›œ\u{9d}žŸ";
+    let character = |byte: &u8| match byte {
+        0x80..=0x9f => FROM_0X80.chars().nth(usize::from(byte - 0x80)).unwrap_or_default(),
+        byte => char::from(*byte),
+    };
+    bytes.iter().map(character).collect()
 }
 
 #[cfg(test)]

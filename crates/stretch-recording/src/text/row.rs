@@ -1,6 +1,9 @@
-//! Fields of one line: numbers by the fast way, anything unusual by the careful one.
+//! Fields of one line, and the fast way to read rows of numbers.
 
 use stretch_data::shown;
+
+/// What tables write where there is no number.
+const MISSING: [&str; 5] = ["na", "n/a", "#n/a", "null", "none"];
 
 /// What is wrong with one field or one row, before it is known where it stands.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,13 +12,13 @@ pub(crate) enum Fault {
     Empty,
     DecimalComma(String),
     NotFinite(String),
-    NotUtf8(String),
     Quote,
     DecimalPoint(String),
     Stamp(String),
+    DayOrMonth(String),
 }
 
-/// What a row is at fault for.
+/// What is wrong with a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum RowFault {
     Field { column: usize, fault: Fault },
@@ -72,60 +75,34 @@ pub(crate) fn field(line: &[u8], at: usize, delimiter: u8) -> Field<'_> {
     }
 }
 
-/// Reads a row of numbers into `out`, one for each role.
+/// Reads a row into `out`, one number for each role, if all fields are finite numbers and written plainly; a separator may follow the
+/// last.
 #[inline]
-pub(crate) fn numbers(
-    line: &[u8],
-    delimiter: u8,
-    roles: &[Role],
-    out: &mut [f64],
-) -> Result<(), RowFault> {
+pub(crate) fn numbers(line: &[u8], delimiter: u8, roles: &[Role], out: &mut [f64]) -> bool {
     let mut at = 0;
-    let last = roles.len() - 1;
-    for (column, (&role, slot)) in roles.iter().zip(out.iter_mut()).enumerate() {
-        let fast = if role == Role::Skipped { None } else { fast_number(line, at, delimiter) };
-        let (value, end) = match fast {
-            Some(found) => found,
-            None => careful_number(line, at, delimiter, role)
-                .map_err(|fault| row_fault(line, delimiter, roles.len(), column, fault))?,
-        };
-        *slot = value;
-        if (end == line.len()) != (column == last) {
-            return Err(ragged(line, delimiter, roles.len()));
+    for (&role, slot) in roles.iter().zip(out.iter_mut()) {
+        if at > line.len() {
+            return false;
         }
+        let end = if role == Role::Skipped {
+            *slot = f64::NAN;
+            match field(line, at, delimiter) {
+                Field::Plain(_, end) | Field::Quoted(_, end) => end,
+                Field::Broken => return false,
+            }
+        } else {
+            let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(&line[at..]) else {
+                return false;
+            };
+            if !value.is_finite() || line.get(at + length).is_some_and(|&byte| byte != delimiter) {
+                return false;
+            }
+            *slot = value;
+            at + length
+        };
         at = end + 1;
     }
-    Ok(())
-}
-
-#[inline]
-fn fast_number(line: &[u8], at: usize, delimiter: u8) -> Option<(f64, usize)> {
-    let (value, length) = fast_float2::parse_partial::<f64, _>(&line[at..]).ok()?;
-    let end = at + length;
-    let closed = line.get(end).is_none_or(|&byte| byte == delimiter);
-    (closed && value.is_finite()).then_some((value, end))
-}
-
-#[cold]
-fn careful_number(
-    line: &[u8],
-    at: usize,
-    delimiter: u8,
-    role: Role,
-) -> Result<(f64, usize), Fault> {
-    let (result, end) = match field(line, at, delimiter) {
-        Field::Broken => return Err(Fault::Quote),
-        Field::Plain(_, end) | Field::Quoted(_, end) if role == Role::Skipped => {
-            return Ok((f64::NAN, end));
-        }
-        Field::Plain(content, end) => (number(content), end),
-        Field::Quoted(content, end) => (number(content.trim_ascii()), end),
-    };
-    match result {
-        Ok(value) => Ok((value, end)),
-        Err(_) if role == Role::Welcome => Ok((f64::NAN, end)),
-        Err(fault) => Err(fault),
-    }
+    at >= line.len()
 }
 
 /// The finite number that a whole field spells.
@@ -134,7 +111,9 @@ pub(crate) fn number(content: &[u8]) -> Result<f64, Fault> {
         Ok(value) if value.is_finite() => Ok(value),
         Ok(_) => Err(Fault::NotFinite(shown(content))),
         Err(_) if content.is_empty() => Err(Fault::Empty),
-        Err(_) if core::str::from_utf8(content).is_err() => Err(Fault::NotUtf8(shown(content))),
+        Err(_) if MISSING.iter().any(|word| content.eq_ignore_ascii_case(word.as_bytes())) => {
+            Err(Fault::NotFinite(shown(content)))
+        }
         Err(_) => {
             let pointed: Vec<u8> =
                 content.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
@@ -143,28 +122,5 @@ pub(crate) fn number(content: &[u8]) -> Result<f64, Fault> {
             }
             Err(Fault::NotANumber(shown(content)))
         }
-    }
-}
-
-/// A row of another length is ragged before any of its fields is at fault.
-#[cold]
-fn row_fault(line: &[u8], delimiter: u8, expected: usize, column: usize, fault: Fault) -> RowFault {
-    match ragged(line, delimiter, expected) {
-        RowFault::Ragged { found, .. } if found == expected || fault == Fault::Quote => {
-            RowFault::Field { column, fault }
-        }
-        ragged => ragged,
-    }
-}
-
-#[cold]
-fn ragged(line: &[u8], delimiter: u8, expected: usize) -> RowFault {
-    let (mut found, mut at) = (0, 0);
-    loop {
-        found += 1;
-        at = match field(line, at, delimiter) {
-            Field::Plain(_, end) | Field::Quoted(_, end) if end < line.len() => end + 1,
-            _ => return RowFault::Ragged { found, expected },
-        };
     }
 }

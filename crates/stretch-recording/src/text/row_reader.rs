@@ -1,25 +1,28 @@
 //! Rows of a live stream, each as soon as its line is there.
 
-use std::io::Read;
+use std::{io::Read, vec};
 
 use stretch_data::{DataError, Place};
 
 use crate::{
     ReadOptions, RecordingError,
+    clock::live::{LiveClock, NotRising},
     text::columns::located,
     text::dialect::Dialect,
     text::header::Header,
     text::lines::Lines,
-    text::live::{header, is_units, separator_of},
-    text::row::Role,
+    text::row::{Role, RowFault},
+    text::top::Top,
 };
 
 /// Reads a stream a row at a time, and goes on after a malformed row.
 ///
-/// The header comes first, as in a file; then each line is answered as soon as it is
-/// complete, however slowly the stream comes. Only the time and the required columns are
+/// The header is found as in a file, by the first row of numbers below it; then each line is
+/// answered as soon as it is complete, however slowly the stream comes. Only the time and the required columns are
 /// looked at: whatever else stands in a row cannot spoil it. Memory is bounded: a line that
 /// is too long is an error for that line and is skipped.
+///
+/// The samples of a stream without a time are counted where the options say how many come a second; malformed rows count.
 ///
 /// A row whose time stands still or goes back is an error, too, but the clock goes on from
 /// there: a logger that was restarted is lost for one row, not for good. Whoever keeps a
@@ -48,11 +51,13 @@ pub struct RowReader<R> {
     header: Header,
     roles: Vec<Role>,
     fields: Vec<f64>,
-    dialect: Option<Dialect>,
-    is_begun: bool,
-    time: usize,
-    divisor: f64,
-    previous_s: Option<f64>,
+    dialect: Dialect,
+    ahead: vec::IntoIter<(u64, Vec<u8>)>,
+    notes: Vec<String>,
+    is_strict: bool,
+    /// The column of the time, unless samples are counted.
+    time: Option<usize>,
+    clock: LiveClock,
     wanted: Vec<usize>,
     values: Vec<f64>,
     failed: bool,
@@ -70,33 +75,34 @@ pub struct Row<'a> {
 }
 
 impl<R: Read> RowReader<R> {
-    /// Waits for the header line and finds the time and the required columns in it.
+    /// Waits for the first row of numbers, and finds the time and the required columns in the header above it.
     ///
     /// # Errors
     /// [`RecordingError`] when there is no header or a column is missing.
     pub fn new(reader: R, name: &str, options: &ReadOptions) -> Result<Self, RecordingError> {
         let mut lines = Lines::new(reader, name, options.max_line_bytes);
-        let (header, time) = header(&mut lines, name, options)?;
-        // The separator of a stream without a header line is told by its first row.
-        let known = options.columns.is_none();
-        let dialect = known.then(|| Dialect::new(header.delimiter, Some(time)));
+        let Top { header, ahead, mut notes, stated_hz } =
+            Top::read(&mut lines, name, options, true)?;
+        let (time, rate_hz) = header.time(name, stated_hz, options, &mut notes)?;
+        let time = time.filter(|_| rate_hz.is_none());
         let wanted = options
             .required()
             .iter()
             .map(|column| header.position(name, column))
             .collect::<Result<Vec<_>, _>>()?;
-        let needed = |i| i == time || wanted.contains(&i);
+        let needed = |i| Some(i) == time || wanted.contains(&i);
         let role = |i| if needed(i) { Role::Needed } else { Role::Skipped };
         Ok(Self {
             lines,
             name: name.to_owned(),
             roles: (0..header.names.len()).map(role).collect(),
             fields: vec![f64::NAN; header.names.len()],
-            dialect,
-            is_begun: false,
+            dialect: Dialect::new(&header, time, options.date_order, &ahead),
+            ahead: ahead.into_iter(),
+            notes,
+            is_strict: options.strict,
             time,
-            divisor: options.divisor(&header.names[time]),
-            previous_s: None,
+            clock: LiveClock::new(time.map(|i| &*header.names[i]), rate_hz, options),
             values: vec![f64::NAN; wanted.len()],
             wanted,
             header,
@@ -107,6 +113,13 @@ impl<R: Read> RowReader<R> {
     /// Names of all columns, in the order of the stream.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.header.names.iter().map(String::as_str)
+    }
+
+    /// What was guessed, renamed or repaired since this was asked before.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        let mut notes = std::mem::take(&mut self.notes);
+        notes.append(&mut self.clock.notes);
+        notes
     }
 
     /// The next row; `None` at the end of the stream. Blank lines are passed over.
@@ -121,20 +134,31 @@ impl<R: Read> RowReader<R> {
             Ok(Some(row)) => row,
             Ok(None) => return None,
             Err(error) => {
-                self.failed = !error.is_row();
-                return Some(Err(error));
+                self.clock.skip();
+                self.failed = self.is_strict || !error.is_row();
+                let reason = || "--strict leaves no row out".to_owned();
+                return Some(Err(if self.is_strict { error.refused(reason()) } else { error }));
             }
         };
-        let has_stamps = self.dialect.as_ref().is_some_and(Dialect::has_stamps);
-        let divisor = if has_stamps { 1.0 } else { self.divisor };
-        let time_s = self.fields[self.time] / divisor;
-        if let Some(previous_s) = self.previous_s.replace(time_s)
-            && time_s <= previous_s
-        {
-            let column = self.header.label(self.time);
-            let at = Place { file: self.name.clone(), row, column };
-            return Some(Err(DataError::TimeNotRising { at, time_s, previous_s }.into()));
+        let count = self.time.map_or(0.0, |i| self.fields[i]);
+        let origin = self.dialect.first_count().map_or(0.0, |count| count as f64);
+        if self.dialect.first_stamp().is_some() {
+            self.clock.count_seconds();
         }
+        let at = || {
+            let column = self.header.label(self.time.unwrap_or_default());
+            Place { file: self.name.clone(), row, column }
+        };
+        let time_s = match self.clock.take(row, count, origin) {
+            Ok(time_s) if time_s.is_finite() => time_s,
+            Ok(time_s) => {
+                let value = time_s.to_string();
+                return Some(Err(DataError::NotFinite { at: at(), value }.into()));
+            }
+            Err(NotRising { time_s, previous_s }) => {
+                return Some(Err(DataError::TimeNotRising { at: at(), time_s, previous_s }.into()));
+            }
+        };
         for (value, &i) in self.values.iter_mut().zip(&self.wanted) {
             *value = self.fields[i];
         }
@@ -143,24 +167,27 @@ impl<R: Read> RowReader<R> {
 
     /// Fills `fields` from the next line that is not blank; its row.
     fn read_row(&mut self) -> Result<Option<u64>, RecordingError> {
-        while let Some((row, line)) = self.lines.next()? {
-            let is_first = !std::mem::replace(&mut self.is_begun, true);
-            if self.dialect.is_none() {
-                let found = separator_of(line, self.roles.len());
-                self.dialect = found.map(|d| Dialect::new(d, Some(self.time)));
-            }
-            // What comes before the first whole row of a stream without a header is the end of another.
-            let Some(dialect) = &mut self.dialect else { continue };
-            if is_first && is_units(line, dialect.delimiter) {
-                continue;
-            }
-            match dialect.parse(line, &self.roles, &mut self.fields) {
-                Ok(true) => return Ok(Some(row)),
+        loop {
+            let ahead = self.ahead.next();
+            let (row, line) = match &ahead {
+                Some((row, line)) => (*row, &line[..]),
+                None => match self.lines.next()? {
+                    Some(read) => read,
+                    None => return Ok(None),
+                },
+            };
+            match self.dialect.parse(line, &self.roles, &mut self.fields) {
+                Ok(true) => match self.dialect.take_spoilt().and_then(|mut all| all.pop()) {
+                    None => return Ok(Some(row)),
+                    Some((column, fault)) => {
+                        let fault = RowFault::Field { column, fault };
+                        return Err(located(&self.name, row, &self.header, fault));
+                    }
+                },
                 Ok(false) => {}
                 Err(fault) => return Err(located(&self.name, row, &self.header, fault)),
             }
         }
-        Ok(None)
     }
 }
 

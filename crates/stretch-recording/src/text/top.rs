@@ -1,20 +1,31 @@
-//! The top of a table: what stands above the first row of numbers, and what it says of the columns.
+//! The header finder: where the table begins in a text, and what its columns are called.
 
-use std::io::Read;
+use std::{borrow::Cow, cmp::Reverse, io::Read};
 
 use stretch_data::shown;
 
 use crate::{
     ReadOptions, RecordingError,
-    names::{are_units, tidy, time_rank},
+    clock::time_among,
+    names::{are_units, tidy},
     options::TIME,
-    text::dialect::{BLANKS, cells, is_comment, is_value},
+    text::columns::KNOWN,
+    text::dialect::{BLANKS, cells, is_comment, is_value, uncommented},
     text::header::Header,
-    text::lines::Lines,
+    text::lines::{Lines, windows_1252},
+    text::rate::stated_rate_hz,
 };
 
-/// Lines that are looked at for the first row of numbers.
-const MOST_AHEAD: usize = 64;
+/// Lines that are searched for the table.
+const MOST_AHEAD: usize = 256;
+/// Rows below names with a time after which no other table is searched for.
+const SURE: usize = 64;
+/// Rows of a live stream after which names with a time are no longer expected.
+const LIVE_ROWS: usize = 8;
+/// Rows of other tables above a block, beyond which a line of names is not the block's.
+const ROWS_BETWEEN: usize = 3;
+/// Names without a column that a header line may end with.
+const MOST_OPTIONAL: usize = 4;
 /// Separators, the surest first.
 const SEPARATORS: [u8; 4] = [b';', b'\t', b',', BLANKS];
 
@@ -22,228 +33,465 @@ const SEPARATORS: [u8; 4] = [b';', b'\t', b',', BLANKS];
 pub(crate) struct Top {
     /// Names and separator.
     pub(crate) header: Header,
-    /// What a row of units says of each column; empty where there is none.
-    units: Vec<String>,
-    /// Rows that were read already, with their numbers.
+    /// Lines that were read already, from the table's first row on.
     pub(crate) ahead: Vec<(u64, Vec<u8>)>,
+    /// Samples a second that a field above the table states, and its name.
+    pub(crate) stated_hz: Option<(f64, String)>,
     pub(crate) notes: Vec<String>,
 }
 
-type Row = (u64, Vec<u8>);
-
 impl Top {
-    /// Reads as far as the first row of numbers.
+    /// Reads as far as the table's first row, and further while a better table may follow; a live stream is not read further than it
+    /// must.
     pub(crate) fn read<R: Read>(
         lines: &mut Lines<R>,
         file: &str,
         options: &ReadOptions,
+        is_live: bool,
     ) -> Result<Self, RecordingError> {
-        let (mut rows, mut comment): (Vec<Row>, Option<Row>) = (Vec::new(), None);
-        let mut first = None;
-        while first.is_none() && rows.len() < MOST_AHEAD {
-            let Some((row, line)) = lines.next()? else { break };
-            if is_comment(line) {
-                comment = Some((row, line.to_vec()));
+        let mut finder = Finder { options, lines: Vec::new(), blocks: Vec::new() };
+        let mut is_whole = false;
+        while !is_whole && finder.lines.len() < MOST_AHEAD && !finder.is_done(is_live) {
+            match lines.next()? {
+                Some((row, line)) => finder.take(file, row, line)?,
+                None => is_whole = true,
+            }
+        }
+        finder.top(file, is_whole)
+    }
+}
+
+/// Gives columns names with units in this project's way, and says which; names that are asked for stay.
+fn tidy_names(
+    names: &[String],
+    units: &[String],
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Vec<String> {
+    let mut renamed = Vec::new();
+    let tidied = names.iter().enumerate().map(|(i, name)| {
+        let is_other = |tidied: &String| tidied == name || names.contains(tidied);
+        let tidied = tidy(name, units.get(i).map(String::as_str)).filter(|t| !is_other(t));
+        let Some(tidied) = tidied.filter(|_| !options.asked().contains(&name)) else {
+            return name.clone();
+        };
+        renamed.push(format!("{} -> {tidied}", shown(name.as_bytes())));
+        tidied
+    });
+    let tidied = tidied.collect();
+    if !renamed.is_empty() {
+        notes.push(format!("columns named with their units: {}", renamed.join(", ")));
+    }
+    tidied
+}
+
+/// A line of a text's beginning.
+struct Line {
+    row: u64,
+    text: Vec<u8>,
+    is_comment: bool,
+    /// Whether it was no UTF-8.
+    is_decoded: bool,
+    is_row: bool,
+}
+
+/// Rows of numbers that are written in the same way.
+struct Block {
+    delimiter: u8,
+    /// Cells of a row.
+    cells: usize,
+    /// Cells of its first row up to the last one that is not empty.
+    filled: usize,
+    /// The line of the first row.
+    start: usize,
+    rows: usize,
+    /// Whether a number begins the first row, as none begins a line such as `X0,0,0`.
+    is_begun: bool,
+    names: Option<Names>,
+    /// Whether another line of names has begun another table.
+    is_closed: bool,
+}
+
+/// A line of names above a block.
+struct Names {
+    line: usize,
+    cells: Vec<String>,
+    units: Option<usize>,
+    has_time: bool,
+}
+
+/// The lines so far, and the blocks of rows in them.
+struct Finder<'a> {
+    options: &'a ReadOptions,
+    lines: Vec<Line>,
+    blocks: Vec<Block>,
+}
+
+impl Finder<'_> {
+    fn is_done(&self, is_live: bool) -> bool {
+        let enough = if is_live { 1 } else { SURE };
+        let options = self.options;
+        // of a stream without a time, what is asked for is enough
+        let is_counted = is_live && options.counted(false, None).is_some();
+        let is_asked = |names: &Names| {
+            is_counted && options.required().iter().all(|name| names.cells.contains(name))
+        };
+        let is_timed = |block: &Block| {
+            options.columns.is_some()
+                || (is_live && options.sample_rate_hz.is_some())
+                || block.names.as_ref().is_some_and(|names| names.has_time || is_asked(names))
+        };
+        self.blocks.iter().any(|block| {
+            (is_timed(block) && block.is_begun && block.rows >= enough)
+                || (is_live && block.rows >= LIVE_ROWS)
+        })
+    }
+
+    fn take(&mut self, file: &str, row: u64, line: &[u8]) -> Result<(), RecordingError> {
+        if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
+            return Err(RecordingError::Utf16 { file: file.to_owned() });
+        }
+        let is_decoded = std::str::from_utf8(line).is_err();
+        let text = if is_decoded { windows_1252(line).into_bytes() } else { line.to_vec() };
+        let is_comment = is_comment(line);
+        let shape = if is_comment { None } else { self.shape(&text) };
+        let is_row = shape.is_some();
+        self.lines.push(Line { row, text, is_comment, is_decoded, is_row });
+        match shape {
+            Some(shape) => self.add_row(shape),
+            None if !is_comment => self.close(),
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// The separator and the cells of a line that is a row of numbers.
+    fn shape(&self, line: &[u8]) -> Option<(u8, usize)> {
+        let Some(names) = &self.options.columns else {
+            let found = self.separator(line, |_| true)?;
+            // Columns may be called by numbers, the time is not.
+            let is_header = cells(line, found.0)?.iter().any(|cell| self.is_time(cell));
+            return (!is_header).then_some(found);
+        };
+        let (time, asked) = (time_among(names, self.options), self.options.asked());
+        let fits = |cells: &[Cow<'_, [u8]>]| {
+            let count = cells.len() - usize::from(cells.last().is_some_and(|c| c.is_empty()));
+            let is_field = |(i, cell): (usize, &Cow<'_, [u8]>)| {
+                let is_needed = time == Some(i) || asked.contains(&&names[i]);
+                let is_text = |cell: &[u8]| !is_needed && cell.iter().any(u8::is_ascii_alphabetic);
+                is_number(cell) || is_text(cell) || (cell.is_empty() && time != Some(i))
+            };
+            (cells.len() == names.len() || count == names.len())
+                && cells[..names.len()].iter().enumerate().all(is_field)
+        };
+        self.separator(line, fits)
+    }
+
+    /// Whether a cell is the name that the time is asked for by, or that it has in this project's own form.
+    fn is_time(&self, cell: &[u8]) -> bool {
+        cell == self.options.time.as_bytes() || cell == TIME.as_bytes()
+    }
+
+    /// The separator of a row of numbers and how many cells it then has; none if most cells are no numbers.
+    fn separator(
+        &self,
+        line: &[u8],
+        fits: impl Fn(&[Cow<'_, [u8]>]) -> bool,
+    ) -> Option<(u8, usize)> {
+        let share = |delimiter: u8| {
+            let cells = cells(line, delimiter).filter(|cells| fits(cells))?;
+            let is_number = |cell: &[u8]| {
+                is_value(cell, delimiter) || fast_float2::parse::<f64, _>(cell).is_ok()
+            };
+            let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
+            let values = cells.iter().filter(|cell| is_number(cell)).count();
+            // `Sample rate,100` above a table is no row of it.
+            let begins = cells.first().is_some_and(|cell| is_number(cell));
+            let is_row =
+                cells.len() > 1 && (2 * values > filled || (begins && 2 * values >= filled));
+            is_row.then_some((delimiter, cells.len(), values as f64 / filled as f64))
+        };
+        let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {
+            // No number has one of these in it.
+            let is_sure = matches!(best.0, b';' | b'\t');
+            if next.2 > best.2 && !is_sure { next } else { best }
+        };
+        let found = SEPARATORS.into_iter().filter_map(share).reduce(better);
+        // Bare readings, whose samples are counted, are one column.
+        let is_bare = || {
+            let cell = line.trim_ascii();
+            let is_counted = self.options.counted(false, None).is_some();
+            is_counted && fits(&[Cow::Borrowed(cell)]) && is_number(cell)
+        };
+        found.map(|found| (found.0, found.1)).or_else(|| is_bare().then_some((b';', 1)))
+    }
+
+    fn add_row(&mut self, (delimiter, count): (u8, usize)) {
+        let open = self.blocks.iter_mut().rfind(|block| {
+            !block.is_closed && (block.delimiter, block.cells) == (delimiter, count)
+        });
+        if let Some(block) = open {
+            block.rows += 1;
+            return;
+        }
+        let start = self.lines.len() - 1;
+        let row = cells(&self.lines[start].text, delimiter).unwrap_or_default();
+        let is_begun =
+            self.options.columns.is_some() || row.first().is_some_and(|cell| is_number(cell));
+        let filled = row.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        let mut block = Block {
+            delimiter,
+            cells: count,
+            filled,
+            start,
+            rows: 1,
+            is_begun,
+            names: None,
+            is_closed: false,
+        };
+        block.names = self.names_above(&block);
+        self.blocks.push(block);
+    }
+
+    /// Ends the tables of which the newest line cannot be a bad row: it has other names.
+    fn close(&mut self) {
+        let Some((line, above)) = self.lines.split_last() else { return };
+        for block in self.blocks.iter_mut().filter(|block| !block.is_closed) {
+            let is_again = above[..block.start].iter().any(|other| other.text == line.text);
+            let names = name_cells(&line.text, block).filter(|_| !is_again);
+            block.is_closed = names.is_some_and(|n| !n.iter().any(|c| is_number(c.as_bytes())));
+        }
+    }
+
+    /// The nearest line of names above a block that has the time, or else the nearest; with a line of units below it.
+    fn names_above(&self, block: &Block) -> Option<Names> {
+        let (mut nearest, mut units, mut rows) = (None, None, 0);
+        for (at, line) in self.lines[..block.start].iter().enumerate().rev() {
+            rows += usize::from(line.is_row);
+            if rows > ROWS_BETWEEN {
+                break;
+            }
+            let text = if line.is_comment { uncommented(&line.text) } else { &line.text };
+            let Some(mut cells) = name_cells(text, block).filter(|_| !line.is_row) else {
+                continue;
+            };
+            // What is asked for is recorded.
+            let is_asked = |cell: &String| {
+                self.options.asked().contains(&cell) || KNOWN.contains(&cell.as_str())
+            };
+            if cells.len() > block.cells && cells[block.filled..].iter().any(is_asked) {
                 continue;
             }
-            rows.push((row, line.to_vec()));
-            first = separator(line).filter(|&(_, count)| {
-                options.columns.as_ref().is_none_or(|names| names.len() == count)
-            });
-            // Columns may be called by numbers; the time of this project's own form is not.
-            first = first.filter(|_| !line.starts_with(TIME.as_bytes()));
-            // What comes before the first whole row of a stream is the end of another.
-            first = first.filter(|&(delimiter, count)| {
-                options.columns.is_none() || is_whole(line, delimiter, count)
-            });
-        }
-        match (&options.columns, first) {
-            (Some(names), first) => Self::given(file, rows, names, first),
-            (None, _) if rows.is_empty() => Err(RecordingError::Empty { file: file.to_owned() }),
-            (None, None) => Self::from_line(file, rows, 0),
-            (None, Some(first)) => Self::found(file, rows, comment, first, options),
-        }
-    }
-
-    /// A table without a header line, whose columns somebody named.
-    fn given(
-        file: &str,
-        mut rows: Vec<Row>,
-        names: &[String],
-        first: Option<(u8, usize)>,
-    ) -> Result<Self, RecordingError> {
-        let Some((delimiter, _)) = first else {
-            let counted = rows.iter().find_map(|(row, line)| Some((*row, separator(line)?.1)));
-            return match counted {
-                None => Err(RecordingError::Empty { file: file.to_owned() }),
-                Some((row, found)) => Err(RecordingError::Named {
-                    file: file.to_owned(),
-                    row,
-                    found,
-                    given: names.len(),
-                }),
-            };
-        };
-        let data = rows.len() - 1;
-        let ahead = rows.split_off(data);
-        let cells = names.iter().map(|name| name.clone().into_bytes()).collect();
-        let header = Header { names: Header::named(file, 0, cells)?, delimiter };
-        Ok(Self { header, units: Vec::new(), ahead, notes: passed_over(data) })
-    }
-
-    /// The header is line `at`, read as this project writes it.
-    fn from_line(file: &str, mut rows: Vec<Row>, at: usize) -> Result<Self, RecordingError> {
-        let ahead = rows.split_off(at + 1);
-        let header = Header::parse(file, rows[at].0, &rows[at].1)?;
-        Ok(Self { header, units: Vec::new(), ahead, notes: passed_over(at) })
-    }
-
-    /// The last of `rows` is the first row of numbers.
-    fn found(
-        file: &str,
-        mut rows: Vec<Row>,
-        comment: Option<Row>,
-        (delimiter, count): (u8, usize),
-        options: &ReadOptions,
-    ) -> Result<Self, RecordingError> {
-        let data = rows.len() - 1;
-        let is_trailed = rows[data].1.trim_ascii_end().ends_with(&[delimiter]);
-        let split = |line: &[u8]| name_cells(line, delimiter, count, is_trailed);
-        if data == 0 {
-            let named = comment.and_then(|(row, line)| Some((row, split(uncommented(&line))?)));
-            let Some((row, names)) = named else {
-                let first = shown(&rows[0].1);
-                return Err(RecordingError::NoHeader { file: file.to_owned(), first });
-            };
-            let header = Header { names: Header::named(file, row, names)?, delimiter };
-            let notes = vec![format!("the names of the columns stand in a comment, row {row}")];
-            return Ok(Self { header, units: Vec::new(), ahead: rows, notes });
-        }
-        let names: Vec<Option<Vec<Vec<u8>>>> =
-            rows[..data].iter().map(|(_, line)| split(line)).collect();
-        let units_at = |row: usize| {
-            names[row]
-                .as_ref()
-                .map(|cells| texts(cells))
-                .filter(|cells| are_units(cells.iter().map(String::as_str)))
-        };
-        let has_time = |row: &usize| {
-            names[*row]
-                .as_ref()
-                .is_some_and(|cells| texts(cells).iter().any(|name| is_time(name, &options.time)))
-        };
-        let at = match (0..data).find(has_time) {
-            Some(at) => at,
-            None if data >= 2 && units_at(data - 1).is_some() && names[data - 2].is_some() => {
-                data - 2
+            let numbers = cells.iter().filter(|cell| is_number(cell.as_bytes())).count();
+            let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
+            if 2 * numbers >= filled && !cells.iter().any(|cell| self.is_time(cell.as_bytes())) {
+                continue;
             }
-            None => data - 1,
-        };
-        let Some(cells) = names[at].clone() else { return Self::from_line(file, rows, 0) };
-        let units = if at + 2 == data { units_at(at + 1) } else { None };
-        let header = Header { names: Header::named(file, rows[at].0, cells)?, delimiter };
-        let ahead = rows.split_off(if units.is_some() { data } else { at + 1 });
-        Ok(Self { header, units: units.unwrap_or_default(), ahead, notes: passed_over(at) })
-    }
-
-    /// Gives columns names with units in this project's way, and says which; names that are asked for stay.
-    pub(crate) fn tidy(&mut self, options: &ReadOptions) {
-        let raw = self.header.names.clone();
-        let is_asked = |name: &String| options.required().contains(name) || *name == options.time;
-        let mut told = Vec::new();
-        for (i, name) in raw.iter().enumerate() {
-            let unit = self.units.get(i).map(String::as_str);
-            let Some(tidied) = tidy(name, unit).filter(|_| !is_asked(name)) else { continue };
-            if tidied != *name && !self.header.names.contains(&tidied) {
-                told.push(format!("{} -> {tidied}", shown(name.as_bytes())));
-                self.header.names[i] = tidied;
+            match label(&cells[0]).filter(|_| nearest.is_none()) {
+                Some("unit") => units = Some(at),
+                Some("title" | "name") => cells[0] = TIME.to_owned(),
+                Some(_) => continue,
+                None => {}
+            }
+            let shown = cells.iter().take(block.filled).map(String::as_str);
+            if units.is_none() && nearest.is_none() && are_units(shown) {
+                units = Some(at);
+            }
+            if units == Some(at) {
+                continue;
+            }
+            let tidied = |name: &String| tidy(name, None).unwrap_or_else(|| name.clone());
+            let tidied: Vec<String> = cells.iter().map(tidied).collect();
+            let has_time = time_among(&tidied, self.options).is_some()
+                || time_among(&cells, self.options).is_some();
+            let names = Names { line: at, cells, units, has_time };
+            if has_time {
+                return Some(names);
+            }
+            // A comment is the header where it names the time.
+            if nearest.is_none() && (!line.is_comment || self.options.sample_rate_hz.is_some()) {
+                nearest = Some(names);
             }
         }
-        if !told.is_empty() {
-            self.notes.push(format!("columns named with their units: {}", told.join(", ")));
+        // Columns may be called by units.
+        let by_units = || {
+            let line = units?;
+            let cells = name_cells(&self.lines[line].text, block)?;
+            let has_time = time_among(&cells, self.options).is_some();
+            Some(Names { line, cells, units: None, has_time })
+        };
+        nearest.or_else(by_units)
+    }
+
+    /// The table: with a time rather than without one, and then the longest.
+    fn top(mut self, file: &str, is_whole: bool) -> Result<Top, RecordingError> {
+        let rank = |(i, block): &(usize, &Block)| {
+            let has_time = block.names.as_ref().is_some_and(|names| names.has_time);
+            (has_time, block.is_begun, block.rows, Reverse(*i))
+        };
+        let best = self.blocks.iter().enumerate().max_by_key(rank).map(|(i, _)| i);
+        let mut block = match best {
+            Some(best) => self.blocks.swap_remove(best),
+            None => self.without_rows().ok_or_else(|| self.no_table(file))?,
+        };
+        let mut notes = Vec::new();
+        let names = block.names.take();
+        let lines = &self.lines;
+        let (row, cells, units) = match (&self.options.columns, &names) {
+            (Some(given), _) => (0, given.clone(), None),
+            (None, Some(names)) => {
+                (lines[names.line].row, names.cells.clone(), names.units.map(|at| &lines[at]))
+            }
+            (None, None) => match self.options.required() {
+                // Bare readings are the column that is asked for.
+                [only] if block.cells == 1 => (0, vec![only.clone()], None),
+                _ => return Err(self.no_header(file, &block, is_whole)),
+            },
+        };
+        // The first rows may be bad ones.
+        if let Some(names) = names.as_ref().filter(|_| self.options.columns.is_none()) {
+            let below = names.units.map_or(names.line, |units| units.max(names.line)) + 1;
+            let first = lines[below..block.start].iter().position(|line| line.is_row);
+            block.start = first.map_or(block.start, |first| below + first);
+        }
+        let header_line = names.filter(|_| self.options.columns.is_none()).map(|n| &lines[n.line]);
+        let is_part = |line: &&Line| {
+            line.is_comment || [header_line, units].iter().flatten().any(|l| l.row == line.row)
+        };
+        notes.extend(passed_over(lines[..block.start].iter().filter(|l| !is_part(l)).count()));
+        if let Some(line) = header_line.filter(|line| line.is_comment) {
+            notes.push(format!("the names of the columns stand in a comment, row {}", line.row));
+        }
+        if [header_line, units].iter().flatten().any(|line| line.is_decoded) {
+            notes.push("the names are no UTF-8 and are read as Windows-1252".to_owned());
+        }
+        let units = units.and_then(|line| name_cells(&line.text, &block)).unwrap_or_default();
+        let cells = tidy_names(&cells, &units, self.options, &mut notes);
+        let mut names = Header::named(file, row, &cells, self.options, &mut notes)?;
+        // More names than cells, or more separators behind the last number than one.
+        let named = names.len();
+        let recorded = if named > block.cells { block.filled } else { named };
+        names.resize(named.max(block.cells.saturating_sub(1)), String::new());
+        let header = Header { names, delimiter: block.delimiter, recorded };
+        let above: Vec<&[u8]> = lines[..block.start].iter().map(|line| &line.text[..]).collect();
+        let stated_hz = stated_rate_hz(&above, block.delimiter);
+        let ahead = self.lines.split_off(block.start);
+        let ahead = ahead.into_iter().map(|line| (line.row, line.text)).collect();
+        Ok(Top { header, ahead, stated_hz, notes })
+    }
+
+    /// A table of which no row can be read: below names with a time.
+    fn without_rows(&self) -> Option<Block> {
+        let named = |(start, line): (usize, &Line)| {
+            let by = |delimiter| {
+                let cells: Vec<String> =
+                    cells(&line.text, delimiter)?.iter().map(|cell| text(cell)).collect();
+                time_among(&cells, self.options)?;
+                Some((delimiter, cells))
+            };
+            let (delimiter, cells) =
+                SEPARATORS.into_iter().filter_map(by).max_by_key(|(_, cells)| cells.len())?;
+            let (count, units) = (cells.len(), None);
+            Some(Block {
+                delimiter,
+                cells: count,
+                filled: count,
+                start: start + 1,
+                rows: 0,
+                is_begun: false,
+                names: Some(Names { line: start, cells, units, has_time: true }),
+                is_closed: false,
+            })
+        };
+        let is_text = |(_, line): &(usize, &Line)| !line.is_comment;
+        let own_names = self.options.columns.is_none();
+        self.lines.iter().enumerate().filter(is_text).find_map(named).filter(|_| own_names)
+    }
+
+    /// The error for lines without a table.
+    fn no_table(&self, file: &str) -> RecordingError {
+        let file = file.to_owned();
+        let Some(first) = self.lines.first() else { return RecordingError::Empty { file } };
+        let counted = self.lines.iter().find_map(|line| {
+            let (delimiter, _) =
+                self.separator(&line.text, |_| true).filter(|_| !line.is_comment)?;
+            let mut cells = cells(&line.text, delimiter)?;
+            cells.pop_if(|last| last.is_empty());
+            Some((line.row, cells.len()))
+        });
+        match (&self.options.columns, counted) {
+            (Some(names), Some((row, found))) if found != names.len() => {
+                RecordingError::Named { file, row, found, given: names.len() }
+            }
+            _ => RecordingError::NoNumbers {
+                file,
+                lines: self.lines.len(),
+                first: shown(&first.text),
+            },
+        }
+    }
+
+    /// The error for rows of numbers without names.
+    fn no_header(&self, file: &str, block: &Block, is_whole: bool) -> RecordingError {
+        let above = self.lines[..block.start].iter().rfind(|l| !l.is_comment && !l.is_row);
+        let above = above.map_or("no names above them".to_owned(), |line| {
+            let shown = shown(&line.text);
+            let commas =
+                if block.delimiter == b',' { ", unless they have decimal commas" } else { "" };
+            format!("no names for them in the line above (\"{shown}\"){commas}")
+        });
+        RecordingError::NoHeader {
+            file: file.to_owned(),
+            rows: format!("{}{}", if is_whole { "" } else { "at least " }, block.rows),
+            numbers: block.filled,
+            row: self.lines[block.start].row,
+            above,
         }
     }
 }
 
-/// Whether a column may be the time that is asked for.
-fn is_time(name: &str, wanted: &str) -> bool {
-    let tidied = tidy(name, None);
-    let name = tidied.as_deref().unwrap_or(name);
-    name == wanted || (wanted == TIME && time_rank(name).is_some())
-}
-
-fn passed_over(count: usize) -> Vec<String> {
+fn passed_over(count: usize) -> Option<String> {
     match count {
-        0 => Vec::new(),
-        1 => vec!["the first line is no part of the table and is passed over".to_owned()],
-        _ => vec![format!("the first {count} lines are no part of the table and are passed over")],
+        0 => None,
+        1 => Some("the first line is no part of the table and is passed over".to_owned()),
+        _ => Some(format!("the first {count} lines are no part of the table and are passed over")),
     }
 }
 
-pub(crate) fn uncommented(line: &[u8]) -> &[u8] {
-    let is_mark = |b: &u8| matches!(b, b'#' | b'%' | b'/' | b' ' | b'\t');
-    &line[line.iter().take_while(|b| is_mark(b)).count()..]
+fn text(cell: &[u8]) -> String {
+    String::from_utf8_lossy(cell).into_owned()
 }
 
-fn texts(cells: &[Vec<u8>]) -> Vec<String> {
-    cells.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect()
+/// What a line says of each channel if its first cell is a label, as in `ChannelTitle=` and `Unit:`.
+fn label(cell: &str) -> Option<&'static str> {
+    let label = cell.trim_end().strip_suffix(['=', ':'])?.to_lowercase();
+    let known = ["unit", "title", "name"].into_iter().find(|what| label.contains(what));
+    known.or(cell.contains('=').then_some(""))
 }
 
-/// Whether each of so many cells has a number or a stamp in it.
-pub(crate) fn is_whole(line: &[u8], delimiter: u8, count: usize) -> bool {
-    let cells = cells(line, delimiter).unwrap_or_default();
-    cells.len() == count && cells.iter().all(|cell| is_value(cell, delimiter))
+/// Whether a cell of a row has a number in it, or none that is finite.
+fn is_number(cell: &[u8]) -> bool {
+    is_value(cell, BLANKS) || fast_float2::parse::<f64, _>(cell).is_ok()
 }
 
-/// The separator of a row of numbers and how many cells it then has; none where most cells are no numbers.
-pub(crate) fn separator(line: &[u8]) -> Option<(u8, usize)> {
-    let share = |delimiter: u8| {
-        let cells = cells(line, delimiter)?;
-        let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
-        let values = cells.iter().filter(|cell| is_value(cell, delimiter)).count();
-        // `Sample rate,100` above a table is no row of it.
-        let begins = cells.first().is_some_and(|cell| is_value(cell, delimiter));
-        let is_row = cells.len() > 1 && (2 * values > filled || (begins && 2 * values >= filled));
-        is_row.then_some((delimiter, cells.len(), values as f64 / filled as f64))
-    };
-    let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {
-        if next.2 > best.2 { next } else { best }
-    };
-    let found = SEPARATORS.into_iter().filter_map(share).reduce(better)?;
-    Some((found.0, found.1))
-}
-
-/// The cells of a line of names above `count` columns of numbers, the last one empty where their rows are trailed by a
-/// separator; none where it has others.
-pub(crate) fn name_cells(
-    line: &[u8],
-    delimiter: u8,
-    count: usize,
-    is_trailed: bool,
-) -> Option<Vec<Vec<u8>>> {
-    let owned = |cells: Vec<std::borrow::Cow<'_, [u8]>>| -> Vec<Vec<u8>> {
-        cells.into_iter().map(std::borrow::Cow::into_owned).collect()
-    };
-    let mut found = owned(cells(line, delimiter)?);
-    if delimiter == BLANKS && found.len() > count {
-        // `Pos (mm)` is one name.
-        let mut joined: Vec<Vec<u8>> = Vec::new();
-        for cell in found {
-            match joined.last_mut() {
-                Some(last) if cell.starts_with(b"(") || cell.starts_with(b"[") => {
-                    last.push(b' ');
-                    last.extend(cell);
-                }
-                _ => joined.push(cell),
+/// The cells of a line of names for a block: one for each cell of its rows, or up to their last one that is filled; and more of
+/// them where rows may end early. None where the line has others.
+fn name_cells(line: &[u8], block: &Block) -> Option<Vec<String>> {
+    let split = cells(line, block.delimiter)?;
+    let mut names: Vec<String> = Vec::new();
+    let is_split = block.delimiter == BLANKS && split.len() > block.cells;
+    for cell in split.iter().map(|cell| text(cell)) {
+        match names.last_mut() {
+            // `Pos (mm)` is one name.
+            Some(last) if is_split && cell.starts_with(['(', '[']) => {
+                last.push(' ');
+                last.push_str(&cell);
             }
+            _ => names.push(cell),
         }
-        found = joined;
     }
-    // A separator behind the last name, or behind the last number.
-    if found.len() == count + 1 && found.last().is_some_and(Vec::is_empty) {
-        found.pop();
-    } else if is_trailed && found.len() + 1 == count {
-        found.push(Vec::new());
-    }
-    (found.len() == count).then_some(found)
+    while names.pop_if(|name| name.is_empty()).is_some() {}
+    let optional = if block.delimiter == BLANKS { 0 } else { MOST_OPTIONAL };
+    let fits = (block.filled..=block.cells + optional).contains(&names.len());
+    fits.then_some(names)
 }

@@ -1,4 +1,4 @@
-//! A catalogue: effects to be diagnosed, the built-in ones and a user's own.
+//! A catalogue: effects to be diagnosed, the built-in ones and a user's additions.
 
 use stretch_effects::Effect;
 
@@ -20,17 +20,17 @@ pub struct Catalogue {
 }
 
 impl Default for Catalogue {
-    /// The built-in one.
+    /// The built-in catalogue.
     fn default() -> Self {
         Self { effects: CATALOGUE.to_vec() }
     }
 }
 
 impl Catalogue {
-    /// With an effect more, behind the others.
+    /// With one more effect, after the others.
     ///
     /// # Errors
-    /// An effect of that name is already in.
+    /// An effect with that name exists.
     pub fn with(mut self, effect: &'static Effect) -> Result<Self, SimError> {
         if self.named(effect.name).is_some() {
             return Err(SimError::RepeatedEffect { name: effect.name.to_owned() });
@@ -42,7 +42,7 @@ impl Catalogue {
     /// Without effects of these names.
     ///
     /// # Errors
-    /// A name that nobody knows.
+    /// An unknown name.
     pub fn without(mut self, names: &[impl AsRef<str>]) -> Result<Self, SimError> {
         for name in names.iter().map(AsRef::as_ref) {
             let known = |e: &&&'static Effect| e.name == name;

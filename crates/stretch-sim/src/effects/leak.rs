@@ -23,13 +23,13 @@ pub(super) static LEAK: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Pressure at which a leak of any power flows what a linear one would, Pa.
+/// Pressure at which a leak of any power has the flow of a linear one, Pa.
 const AT_PA: f64 = 620e3;
 
 #[derive(Debug)]
 struct Leak {
     c: f64,
-    /// Power less one.
+    /// Power minus one.
     excess: f64,
 }
 
@@ -39,7 +39,8 @@ impl Law for Leak {
         if p <= 0.0 {
             return self.c * p;
         }
-        // A power without a transcendental: two terms that agree at no and at full pressure.
+        // A power without a transcendental function: two terms that agree at zero and at full
+        // pressure.
         let x = p / AT_PA;
         let shape = if self.excess >= 0.0 {
             1.0 + self.excess * (x - 1.0)

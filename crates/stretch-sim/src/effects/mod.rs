@@ -1,4 +1,5 @@
-//! The catalogue of the rig's effects: those inside its differential equation are its own, the others are kinds at its places.
+//! The catalogue of the rig's effects: those inside its differential equation are defined here, the
+//! others are kinds at its places.
 
 use stretch_effects::{Effect, GAUGE};
 

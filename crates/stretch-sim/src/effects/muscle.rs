@@ -1,4 +1,4 @@
-//! What the muscle and the crossbeam that it lifts do: kinds at the places of the muscle.
+//! Effects of the muscle and the crossbeam that it lifts: kinds at the places of the muscle.
 
 use stretch_effects::{
     Acts, Effect, EffectParameter, Form, Place, RigStage, each,

@@ -24,22 +24,22 @@ impl ActiveEffect {
         self.effect.name
     }
 
-    /// Values, one a parameter.
+    /// Values, one per parameter.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Values, to be changed; whoever changes them keeps them finite.
+    /// Mutable values; the caller keeps them finite.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
-    /// How it acts with its values.
+    /// Its action with its values.
     pub fn action(&self, around: &Surroundings<'_>) -> Action {
         self.effect.action(&self.values, around)
     }
 
-    /// Whether these values do nothing.
+    /// Whether these values have no effect.
     pub fn is_off(&self) -> bool {
         self.effect.is_off(&self.values)
     }
@@ -74,10 +74,12 @@ impl EffectSet {
         Self::default()
     }
 
-    /// Adds an effect of the catalogue by name; shapes that are not given take their typical value, forms their neutral one.
+    /// Adds an effect of the catalogue by name. Missing shapes take their typical value, missing
+    /// forms their neutral one.
     ///
     /// # Errors
-    /// An unknown name or parameter, a strength that is not given, a value outside its range, an effect that is already in.
+    /// An unknown name or parameter, a missing strength, a value outside its range, an effect that
+    /// is already in.
     pub fn insert(&mut self, name: &str, given: &[(&str, f64)]) -> Result<(), SimError> {
         let effect = known(name)?;
         let values = resolve(effect, given, |_| 1.0)?;
@@ -89,8 +91,8 @@ impl EffectSet {
         self.push(effect, &values)
     }
 
-    /// As [`insert`](Self::insert) in other units, `unit` of each parameter's own; ranges, which are the rig's, are not
-    /// enforced.
+    /// As [`insert`](Self::insert) in other units, where `unit` gives the unit of each parameter.
+    /// Ranges belong to the rig and are not enforced.
     pub(crate) fn insert_in(
         &mut self,
         entry: &EffectEntry,
@@ -128,11 +130,12 @@ impl EffectSet {
         self.iter().map(entry).collect()
     }
 
-    /// Adds any effect, the catalogue's or a user's own, with the values of its parameters; forms at their end may be left
-    /// out. Ranges are plausible ones, not limits: they are not enforced here.
+    /// Adds any effect, of the catalogue or of a user, with the values of its parameters; forms at
+    /// their end may be left out. Ranges are plausible values, not limits: they are not enforced
+    /// here.
     ///
     /// # Errors
-    /// An effect of that name is already in, too few or too many values, or one that is not finite.
+    /// An effect with that name exists, there are too few or too many values, or one is not finite.
     pub fn push(&mut self, effect: &'static Effect, values: &[f64]) -> Result<(), SimError> {
         let name = effect.name;
         if self.find(name).is_some() {
@@ -165,13 +168,13 @@ impl EffectSet {
         self.entries.iter().find(|e| e.name() == name)
     }
 
-    /// Takes the effect called `name` out.
+    /// Removes the effect called `name`.
     pub fn remove(&mut self, name: &str) -> Option<ActiveEffect> {
         let at = self.entries.iter().position(|e| e.name() == name)?;
         Some(self.entries.remove(at))
     }
 
-    /// Those of them that are wanted.
+    /// The effects that meet a condition.
     pub fn only(&self, is_wanted: impl Fn(&Effect) -> bool) -> Self {
         let wanted = self.entries.iter().filter(|e| is_wanted(e.effect));
         Self { entries: wanted.cloned().collect() }
@@ -182,12 +185,13 @@ impl EffectSet {
         self.entries.iter()
     }
 
-    /// Those that do something in the stage.
+    /// The effects that are not off in the stage.
     pub fn acting_in(&self, stage: RigStage) -> impl Iterator<Item = &ActiveEffect> {
         self.entries.iter().filter(move |e| stage.holds(e.effect.stage) && !e.is_off())
     }
 
-    /// Steps of time for trials sampled every `dt_s`: none longer than `max_step_s`, split where a delayed switch falls.
+    /// Time steps for trials sampled every `dt_s`: none longer than `max_step_s`, split where a
+    /// delayed switch falls.
     ///
     /// # Errors
     /// Times that are not positive.
@@ -203,7 +207,7 @@ impl EffectSet {
         Ok(Grid::new(dt_s, max_step_s, delay_s)?)
     }
 
-    /// How many there are.
+    /// Number of effects.
     pub fn len(&self) -> usize {
         self.entries.len()
     }
@@ -239,7 +243,8 @@ fn given(entry: &EffectEntry) -> Vec<(&str, f64)> {
     entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect()
 }
 
-/// Values in the effect's order from names and values; what is not given is in the catalogue's unit times `unit`.
+/// Values in the effect's order from names and values; a missing value is the default in the
+/// catalogue's unit times `unit`.
 fn resolve(
     effect: &Effect,
     given: &[(&str, f64)],
@@ -252,7 +257,7 @@ fn resolve(
         let nearest = nearest(name, parameters.iter().map(|p| &*p.name));
         return Err(SimError::unknown_parameter(effect.name, name, nearest));
     }
-    // One strength is enough where there are several (the rails of an amplifier): the others stay off.
+    // One strength is enough if there are several (the rails of an amplifier): the others stay off.
     let strengths = |p: &&EffectParameter| p.off().is_some();
     let any =
         parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));

@@ -1,10 +1,10 @@
-//! The supply gives way to the flow that is drawn from it.
+//! The supply pressure falls with the flow that is drawn from it.
 
 use stretch_effects::{
     Action, Acts, Droop, Effect, EffectParameter, Form, Quantity, RigStage, Sketch, each,
 };
 
-/// The supply gives way to the flow that is drawn from it.
+/// The supply pressure falls with the flow that is drawn from it.
 pub(super) static SUPPLY_SAG: Effect = Effect {
     name: "supply_sag",
     title: "the supply's sag",

@@ -1,10 +1,10 @@
-//! The valves stay shut up to a least command.
+//! The valves stay shut below a smallest command.
 
 use stretch_effects::{
     Action, Acts, DeadBand, Effect, EffectParameter, Form, Quantity, RigStage, Sketch, each,
 };
 
-/// The valves stay shut up to a least command.
+/// The valves stay shut below a smallest command.
 pub(super) static VALVE_DEADBAND: Effect = Effect {
     name: "valve_deadband",
     title: "the valves' dead band",
@@ -28,7 +28,8 @@ pub(super) static VALVE_DEADBAND: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Hard and gradual bands, valves that differ, and a gate that lets the slowest ramp through as pulses.
+/// Hard and gradual bands, different valves, and a gate that lets the slowest ramp through as
+/// pulses.
 fn starts() -> Vec<Vec<f64>> {
     let mut all = each([0.001, 0.01, 0.04]);
     all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));

@@ -5,7 +5,8 @@ use stretch_effects::{Grid, Start};
 use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
 use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
-/// Valves, chamber and muscle, prepared: one after the other, or hand in hand where the chamber's volume follows the muscle.
+/// Valves, chamber and muscle, prepared: in sequence, or coupled if the chamber's volume follows
+/// the muscle.
 #[derive(Debug)]
 pub struct Actuation {
     pneumatics: Pneumatics,
@@ -16,7 +17,7 @@ impl Actuation {
     /// Prepares the stage for trials on `grid`, which must come from [`EffectSet::grid`] with the same effects.
     ///
     /// # Errors
-    /// As the two stages.
+    /// Those of the two stages.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
         let pneumatics = Pneumatics::new(params, effects, grid)?;
         let muscle = Muscle::at_cells(params, effects, grid, pneumatics.end())?;
@@ -41,7 +42,8 @@ impl Actuation {
     /// Gauge pressure in kPa and length in mm at every sample, from `initial_kpa` at the first.
     ///
     /// # Errors
-    /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not finite.
+    /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not
+    /// finite.
     pub fn run(
         &self,
         memory: &mut Memory,
@@ -68,8 +70,9 @@ impl Actuation {
         done
     }
 
-    /// Gauge pressure in kPa at every node of the grid, from `initial_kpa` at the first, where it does not depend on the contraction:
-    /// the first half of [`run`](Self::run), for callers that run the second one often.
+    /// Gauge pressure in kPa at every node of the grid, from `initial_kpa` at the first, if it does
+    /// not depend on the contraction. This is the first half of [`run`](Self::run), for callers
+    /// that run the second half often.
     ///
     /// # Errors
     /// As [`run`](Self::run), and a chamber whose volume depends on the contraction.
@@ -94,8 +97,8 @@ impl Actuation {
         done
     }
 
-    /// Length in mm at every sample, from the gauge pressure in kPa at every node: the second half of [`run`](Self::run), in a memory
-    /// of its own.
+    /// Length in mm at every sample, from the gauge pressure in kPa at every node. This is the
+    /// second half of [`run`](Self::run) and has a separate memory.
     ///
     /// # Errors
     /// Slices of lengths that do not belong together.
@@ -138,7 +141,7 @@ impl Actuation {
         Ok(())
     }
 
-    /// As [`run`](Self::run), at every node of the grid; openings are taken as checked.
+    /// As [`run`](Self::run), at every node of the grid; openings must have been checked.
     pub(crate) fn run_nodes(
         &self,
         memory: &mut Memory,
@@ -205,7 +208,8 @@ impl Actuation {
         Ok(())
     }
 
-    /// Each step twice: the volume's change is first guessed, then taken from the muscle's answer to that guess.
+    /// Each step twice: the volume's change is first predicted, then computed from the muscle's
+    /// response to that prediction.
     fn run_coupled(
         &self,
         cells: &mut [f64],

@@ -1,11 +1,11 @@
-//! The whole rig: every stage on the outputs of the one before.
+//! The whole rig: every stage on the outputs of the previous one.
 
 use stretch_effects::{Grid, Start};
 
 use super::{Actuation, Openings, Reference, Sensing, check_length};
 use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
-/// Caller's buffers for what the rig shows, one value a sample.
+/// Caller's buffers for the recorded channels, one value per sample.
 #[derive(Debug)]
 pub struct Recorded<'a> {
     /// Gauge pressure, kPa.

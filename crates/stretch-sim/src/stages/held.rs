@@ -1,12 +1,13 @@
-//! The rig at a length that is set from outside.
+//! The rig at an imposed length.
 
 use stretch_effects::{Grid, Start};
 
 use super::{ChainMemory, Openings, Pneumatics, Recorded, Reference, Sensing, check_length};
 use crate::{SimError, effects::EffectSet, params::RigParams};
 
-/// The rig with its crossbeam clamped, or held by gauge blocks, prepared: the chamber follows its valves, the gauge and the
-/// reference the length that is set. The muscle's own memory stands still.
+/// The prepared rig with its crossbeam clamped or held by gauge blocks. The chamber follows its
+/// valves; the gauge and the reference follow the imposed length. The muscle's memory does not
+/// change.
 #[derive(Debug)]
 pub struct Held {
     pneumatics: Pneumatics,
@@ -14,7 +15,7 @@ pub struct Held {
     reference: Reference,
 }
 
-/// What is set from outside, one value a sample.
+/// What is imposed from outside, one value per sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting<'a> {
     /// Length, mm.

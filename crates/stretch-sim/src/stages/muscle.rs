@@ -11,7 +11,8 @@ use crate::{
     static_law::StaticLaw,
 };
 
-/// The muscle, prepared: static contraction, effects on it, first-order lag, effects behind it, L = L0 (1 - k).
+/// The muscle, prepared: static contraction, effects on it, first-order lag, effects after it, L =
+/// L0 (1 - k).
 #[derive(Debug)]
 pub struct Muscle {
     grid: Grid,
@@ -34,7 +35,7 @@ impl Muscle {
         Self::at_cells(params, effects, grid, 0)
     }
 
-    /// As [`new`](Self::new), its memory beginning behind another stage's.
+    /// As [`new`](Self::new), with its memory after that of another stage.
     pub(crate) fn at_cells(
         params: &RigParams,
         effects: &EffectSet,
@@ -118,14 +119,14 @@ impl Muscle {
     pub(crate) fn begin(&self, cells: &mut [f64], start: Start, pressure_kpa: f64) -> f64 {
         let span = self.span(0);
         let still = self.before.begin(&span, start, self.law.contraction(pressure_kpa), cells);
-        // The lag has no hysteresis state: it settles within a fifth of a second.
+        // The lag has no hysteresis state and settles within a fifth of a second.
         let lag_start = if matches!(start, Start::Hysteresis(_)) { Start::Settled } else { start };
         self.lag.begin(lag_start, still, &mut cells[self.offset..]);
         let moving = cells[self.offset];
         self.behind.begin(&span, start, moving, cells)
     }
 
-    /// Contraction one node further on.
+    /// Contraction at the next node.
     #[inline]
     pub(crate) fn step(&self, cells: &mut [f64], node: usize, pressure_kpa: f64) -> f64 {
         let mut x = [self.law.contraction(pressure_kpa)];
@@ -133,7 +134,7 @@ impl Muscle {
         x[0]
     }
 
-    /// Static contraction replaced by the moving one.
+    /// Replaces the static contraction by the dynamic one.
     fn move_on(&self, cells: &mut [f64], first_node: usize, signal: &mut [f64]) {
         let span = self.span(first_node);
         self.before.run(&span, cells, signal);

@@ -13,14 +13,14 @@ pub struct Openings<'a> {
 }
 
 impl<'a> Openings<'a> {
-    /// What the valves take of the commands, where that differs.
+    /// The openings as the valves receive them, if they differ from the commands.
     pub(crate) fn of(taken: Option<&'a [Vec<f64>; 2]>, commanded: Self) -> Self {
         taken.map_or(commanded, |[inlet, outlet]| Self { inlet, outlet })
     }
 }
 
 impl Openings<'_> {
-    /// How many samples there are.
+    /// Number of samples.
     ///
     /// # Errors
     /// The valves have different numbers of samples, or an opening is not within 0..1.

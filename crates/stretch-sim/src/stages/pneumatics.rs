@@ -10,16 +10,18 @@ use crate::{
     params::{Key, RigParams},
 };
 
-/// Steps longer than this many times the time constant of the pressure are too long for the Runge-Kutta rule.
+/// A step longer than this many time constants of the pressure is too long for the Runge-Kutta
+/// rule.
 const STIFF: f64 = 2.0;
-/// Most effects that may draw on the supply at once.
+/// Largest number of effects that may draw on the supply at once.
 const MOST_DROOPS: usize = 2;
 
 /// Valves and chamber, prepared: ISO 6358 flow into and out of an isothermal chamber.
 ///
-/// The mass in the chamber is stepped by the classical Runge-Kutta rule; a step that would pass its equilibrium
-/// (where a valve's flow ends like a square root, and nothing passes in truth) ends on it. With `chamber_volume` on,
-/// the pressure depends on the contraction: run [`Actuation`](crate::Actuation), or hand the measured length to
+/// The mass in the chamber is stepped by the classical Runge-Kutta rule. A step that would
+/// overshoot its equilibrium (where a valve's flow ends like a square root, so that the real state
+/// never overshoots) ends on it. With `chamber_volume` on, the pressure depends on the contraction:
+/// run [`Actuation`](crate::Actuation), or pass the measured length to
 /// [`run_with_length`](Self::run_with_length).
 #[derive(Debug)]
 pub struct Pneumatics {
@@ -33,7 +35,7 @@ pub struct Pneumatics {
     critical: f64,
     per_subsonic: f64,
     least: f64,
-    /// What inlet and outlet make of their commands.
+    /// Effects of inlet and outlet on their commands.
     commands: [Row; 2],
     leaks: Vec<Box<dyn Law>>,
     volumes: Vec<Box<dyn Law>>,
@@ -123,7 +125,7 @@ impl Pneumatics {
         Memory::with_cells(self.end())
     }
 
-    /// First cell behind its own.
+    /// First cell after those of this stage.
     pub(crate) fn end(&self) -> usize {
         self.commands[1].end()
     }
@@ -165,7 +167,8 @@ impl Pneumatics {
         }
     }
 
-    /// As [`run`](Self::run), the chamber's volume following a measured length (mm, linear between samples).
+    /// As [`run`](Self::run), with the chamber's volume following a measured length (mm, linear
+    /// between samples).
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -227,7 +230,7 @@ impl Pneumatics {
     /// V/V0 at y = k/k_max.
     #[inline]
     pub(crate) fn volume(&self, y: f64) -> f64 {
-        // A collapsed chamber divides by nothing.
+        // Keeps a collapsed chamber from a division by zero.
         self.volumes.iter().fold(1.0, |v, law| v * law.at(y)).max(0.05)
     }
 
@@ -261,13 +264,14 @@ impl Pneumatics {
         Ok(Chamber { held: absolute * volume, droops })
     }
 
-    /// Remembers how a trial ended.
+    /// Stores the state at the end of a trial.
     pub(crate) fn remember(&self, chamber: &Chamber, cells: &mut [f64]) {
         cells[0] = chamber.held;
         cells[1..=MOST_DROOPS].copy_from_slice(&chamber.droops);
     }
 
-    /// Openings as the valves take them, in buffers of the memory; none where nothing acts on the commands.
+    /// Openings as the valves receive them, in buffers of the memory; `None` if no effect acts on
+    /// the commands.
     pub(crate) fn taken(
         &self,
         memory: &mut Memory,
@@ -325,7 +329,8 @@ impl Pneumatics {
         (inflow, net)
     }
 
-    /// One step of length `h` with constant openings; the volume goes linearly between the two given.
+    /// One step of length `h` with constant openings; the volume is linear between the two given
+    /// values.
     #[inline]
     pub(crate) fn advance(&self, valves: Valves, chamber: &mut Chamber, volume: [f64; 2], h: f64) {
         let still = valves.inlet == 0.0 && valves.outlet == 0.0;
@@ -378,7 +383,7 @@ impl Pneumatics {
         for i in 0..D {
             y[i] += h / 6.0 * (f1[i] + 2.0 * (f2[i] + f3[i]) + f4[i]);
         }
-        // No flow passes the pressure that drives it.
+        // Pressures cannot pass the pressure that drives the flow.
         let (high, low) = (supply(&y) * volume[1], self.atmosphere_pa * volume[1]);
         let full = next > held && next > high;
         let empty = next < held && next < low;
@@ -387,8 +392,8 @@ impl Pneumatics {
         } else if empty {
             next = held.min(low);
         }
-        // Nor does a state pass its equilibrium: a step that was too long for a stiff one, or that had to be cut where
-        // something else still flows, ends on it.
+        // A state cannot pass its equilibrium either: a step that was too long for a stiff state,
+        // or that had to be cut while something else still flows, ends on it.
         if k1 * k4 < 0.0 || full || empty {
             let (end, _) = rate(next, &y, volume[1]);
             let stiff = k1 * end < 0.0 && h * (end - k1).abs() > STIFF * (next - held).abs();
@@ -410,8 +415,8 @@ impl Pneumatics {
         chamber.held = next;
     }
 
-    /// A step in which the chamber follows a supply that recovers: it ends on its equilibrium with the supply, and
-    /// the flow is what the mass gained asks for. Supply and chamber are brought to agree by iteration.
+    /// A step in which the chamber follows a recovering supply ends on its equilibrium with the
+    /// supply, and the flow is the mass gained. Supply and chamber are matched by iteration.
     #[cold]
     fn settle<const D: usize>(
         &self,
@@ -435,7 +440,7 @@ impl Pneumatics {
             let supply = (self.supply_pa - chamber.droops[..D].iter().sum::<f64>()).max(0.0);
             let (low, high) = (self.atmosphere_pa.min(supply) * volume, supply * volume);
             let rate = |m: f64| self.flows(valves, m / volume, supply).1;
-            // Nothing flows back into a supply that has fallen below the chamber.
+            // There is no flow back into a supply that has fallen below the chamber.
             let goal =
                 if rate(high) < 0.0 { balance(low, high, 1.0, rate) } else { high.max(held) };
             let change = goal - next;
@@ -448,7 +453,7 @@ impl Pneumatics {
     }
 }
 
-/// Where `rate` changes its sign between `a` and `b`: bisection, to the last bits that matter.
+/// Zero of `rate` between `a` and `b` by bisection, to the last significant bits.
 fn balance(mut a: f64, mut b: f64, rate_a: f64, rate: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..48 {
         let middle = 0.5 * (a + b);

@@ -71,9 +71,10 @@ impl Reference {
         Ok(())
     }
 
-    /// Replaces a measured (and smoothed) length by a true length that would have been shown like that: what drives
-    /// `sensing` when the reference has effects of its own. Exact for `pot_nonlinearity`; for `pot_backlash` exact
-    /// while the reference moves, led over linearly while it dwells.
+    /// Replaces a measured (and smoothed) length by the true length that would have produced it.
+    /// This length drives `sensing` when the reference has its own effects. The result is exact for
+    /// `pot_nonlinearity`. For `pot_backlash` it is exact while the reference moves and linearly
+    /// interpolated while it dwells.
     pub fn undo(&self, length_mm: &mut [f64]) {
         self.row.undo(length_mm);
     }

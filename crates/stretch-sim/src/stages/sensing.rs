@@ -12,7 +12,7 @@ use crate::{
     params::{Key, RigParams},
 };
 
-/// Values worked on at a time: small enough to stay in the nearest cache.
+/// Values processed at a time: few enough to stay in the nearest cache.
 const BLOCK: usize = 512;
 
 /// Sleeve, gauge, bridge and amplifier of the nominal rig: memoryless.
@@ -113,7 +113,7 @@ impl Sensing {
     /// pressure may be empty unless `pressure_crosstalk` is on. `start_s` is the session time of the first sample.
     ///
     /// # Errors
-    /// Slices of different lengths, a pressure that is needed and absent.
+    /// Slices of different lengths, or a missing pressure that an effect needs.
     pub fn run(
         &self,
         memory: &mut Memory,
@@ -126,8 +126,9 @@ impl Sensing {
         self.run_shunted(memory, start, start_s, (length_mm, &[]), pressure_kpa, bridge_v)
     }
 
-    /// As [`run`](Self::run) with a shunt that lowers the trim of the bridge by a share, one value a node beside the length; empty
-    /// without a shunt. What is behind the bridge sees the step that it makes.
+    /// As [`run`](Self::run), with a shunt that lowers the trim of the bridge by a share, given at
+    /// each node like the length; empty without a shunt. Everything behind the bridge sees this
+    /// step.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -169,7 +170,7 @@ impl Sensing {
         let start = memory.start(start);
         let (bridge, sites) = (&self.bridge, &self.sites);
         if sites.strain.is_empty() && sites.resistance.is_empty() && sites.volts.is_empty() {
-            // The nominal bridge: one pass.
+            // The nominal bridge takes one pass.
             if self.grid.pieces() == 1 && self.skew.is_none() && shunt.is_empty() {
                 for (v, length) in bridge_v.iter_mut().zip(length_mm) {
                     *v = bridge.volts(bridge.resistance(bridge.strain(*length)));
@@ -228,7 +229,7 @@ impl Sensing {
         Ok(())
     }
 
-    /// What acts on recorded samples.
+    /// Effects on recorded samples.
     fn write_down(&self, memory: &mut Memory, start_s: f64, samples: &mut [f64]) {
         if self.sites.record.is_empty() {
             return;
@@ -239,7 +240,7 @@ impl Sensing {
     }
 }
 
-/// Samples from nodes, as a skew shows them.
+/// Samples from nodes, with a skew if there is one.
 pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mut [f64]) {
     match skew {
         Some(skew) => skew.sample(nodes, samples),
@@ -251,7 +252,7 @@ pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mu
     }
 }
 
-/// Row of a sensing chain by where they act, in the catalogue's order.
+/// Rows of a sensing chain by place, in the catalogue's order.
 #[derive(Debug)]
 pub(crate) struct Sites {
     pub(crate) strain: Row,

@@ -40,7 +40,8 @@ fn groups_are_what_each_is_alone() {
     }
 }
 
-/// Ten thousand groups in a pool of 512 MB: nothing is spilled, for there is nowhere to spill to.
+/// Ten thousand groups in a pool of 512 MB: nothing is spilled, because there is no place to spill
+/// to.
 #[test]
 fn ten_thousand_groups_are_held_in_little_memory() {
     let rows = mixed(10_000, 20);
@@ -66,7 +67,7 @@ fn ten_thousand_groups_are_held_in_little_memory() {
     assert!(fits(batch.column(2)).iter().all(|fit| fit.rows == 20));
 }
 
-/// As many groups as rows: states are handed on without being collected.
+/// As many groups as rows: states are passed on without being collected.
 #[test]
 fn a_group_a_row_is_answered_like_any_other() {
     let rows: Vec<Row> = gauge(300_000, 3)
@@ -102,7 +103,7 @@ fn a_filter_is_no_row_left_out() {
     assert_close(&[found.rmse.unwrap()], &[alone.rmse.unwrap()]);
 }
 
-/// Rows of a window that only grows: the answer goes on after it was asked for.
+/// Rows of a window that only grows: the aggregate continues after an answer.
 #[test]
 fn a_growing_window_asks_again_and_again() {
     let rows = gauge(200, 6);

@@ -1,4 +1,4 @@
-//! The aggregates as SQL sees them, against the fits that they are made of.
+//! The aggregates in SQL, compared with the underlying fits.
 
 mod damage;
 mod groups;

@@ -1,4 +1,4 @@
-//! Columns without a fit are rows that say so; queries that cannot mean anything are refused.
+//! Columns without a fit become rows that say so; meaningless queries are refused.
 
 use crate::support::{Row, ask, fit, fits, gauge, session};
 

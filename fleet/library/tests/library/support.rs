@@ -17,7 +17,8 @@ use datafusion::{
 };
 use stretch_fleet::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
 
-/// Relative: triangles merged in another order round otherwise; fits here are well conditioned.
+/// Relative, because triangles merged in another order have other rounding; fits here are well
+/// conditioned.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
 /// A row: sensor, rate, signal, reference.

@@ -1,21 +1,21 @@
-//! The same numbers as the crates that the aggregates stand on.
+//! Compares the aggregates with the crates that they use.
 
 use datafusion::arrow::array::AsArray;
 use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
 use proptest::prelude::*;
 use stretch_calibrate::calibration_from_json;
 use stretch_core::{Degree, Model, Polarity};
-use stretch_fit::{LineAccumulator, SurfaceAccumulator};
+use stretch_fit::{Sample, SurfaceAccumulator};
 use stretch_metrics::Agreement;
 
 use crate::support::{Row, add_states, ask, assert_close, fit, gauge, session};
 
 /// Both branches of a degree, fitted in one pass: rates at or above zero first.
 fn direct(rows: &[Row], degree: Degree) -> (Vec<f64>, f64) {
-    let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, 21, 128>::new(degree).unwrap());
+    let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64>::new(degree).unwrap());
     for (_, rate, signal, reference) in rows {
-        let (Some(r), Some(v), Some(x)) = (rate, signal, reference) else { continue };
-        sides[usize::from(*r < 0.0)].push(*r, *v, *x).unwrap();
+        let (&Some(rate), &Some(volts), &Some(value)) = (rate, signal, reference) else { continue };
+        sides[usize::from(rate < 0.0)].push(Sample { rate, volts, value }).unwrap();
     }
     let fits = sides.map(|side| side.fit().unwrap());
     let sse: f64 = fits.iter().map(|fit| fit.sse()).sum();
@@ -53,16 +53,17 @@ fn any_degree_is_the_fit_of_one_pass() {
 #[test]
 fn a_line_is_the_fit_of_one_pass() {
     let rows = gauge(3000, 9);
-    let mut line = LineAccumulator::new();
+    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE).unwrap();
     for (_, _, signal, reference) in &rows {
-        line.push(signal.unwrap(), reference.unwrap()).unwrap();
+        let (volts, value) = (signal.unwrap(), reference.unwrap());
+        line.push(Sample { rate: 0.0, volts, value }).unwrap();
     }
     let line = line.fit().unwrap();
     let session = session(&rows, 2);
     let found = fit(&session, "select linear_fit(bridge_v, contraction) from trials");
-    assert_close(&found.coefficients.unwrap(), &[line.intercept(), line.slope()]);
+    assert_close(&found.coefficients.unwrap(), line.coefficients());
     let record = calibration_from_json(&found.record.unwrap(), "record").unwrap();
-    assert!(matches!(record.model, Model::Linear(_)));
+    assert!(matches!(record.spec().model, Model::Linear(_)));
 }
 
 #[test]
@@ -75,7 +76,7 @@ fn a_record_gives_what_the_surfaces_give() {
         let found = fit(&session, "select poly13_fit(rate, bridge_v, contraction) from trials");
         let text = found.record.unwrap();
         let record = calibration_from_json(&text, "record").unwrap();
-        let falling = record.polarity == Polarity::Falling;
+        let falling = record.spec().polarity == Polarity::Falling;
         assert_eq!(falling, sign < 0.0);
         let (mut direct, _) = direct(&rows, Degree::POLY13);
         if falling {
@@ -168,7 +169,7 @@ proptest! {
         let merged = fit(&session, "select poly13_merge(state) from states");
         assert_eq!((merged.rows, merged.left_out), (whole.rows, whole.left_out));
         assert_eq!((merged.signal, &merged.refused), (whole.signal, &None));
-        // terms are determined to 1e3 here, and rounding is told in units of that
+        // terms are determined to 1e3 here, and rounding is given in units of that
         let (a, b) = (merged.coefficients.unwrap(), whole.coefficients.unwrap());
         let length = b.iter().map(|x| x * x).sum::<f64>().sqrt();
         let off = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
@@ -176,8 +177,8 @@ proptest! {
         assert_close(&[merged.rmse.unwrap()], &[whole.rmse.unwrap()]);
         let (merged, whole) = (merged.record.unwrap(), whole.record.unwrap());
         prop_assert_eq!(
-            calibration_from_json(&merged, "record").unwrap().signal_range,
-            calibration_from_json(&whole, "record").unwrap().signal_range
+            calibration_from_json(&merged, "record").unwrap().spec().signal_range,
+            calibration_from_json(&whole, "record").unwrap().spec().signal_range
         );
     }
 }

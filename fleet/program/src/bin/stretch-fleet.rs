@@ -1,4 +1,4 @@
-//! Lakes of trials: `stretch fleet`.
+//! Lakes of trials: `stretch-fleet`.
 
 use std::process::ExitCode;
 

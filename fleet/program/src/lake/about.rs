@@ -12,7 +12,8 @@ const FILE: &str = "lake.json";
 /// The layout that this release writes and reads.
 const SCHEMA: u32 = 1;
 
-/// What rates are of, and how they were computed: the same for every file, so that one query may read them all.
+/// The signal of the rates, and how they were computed: the same for every file, so that one query
+/// may read them all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct About {
     schema: u32,
@@ -20,7 +21,7 @@ pub(crate) struct About {
     pub signal: String,
     /// Column of what is to be estimated.
     pub reference: String,
-    /// Whether the reference is a length, and the files have its contraction beside it.
+    /// Whether the reference is a length, and the files also have its contraction.
     pub is_contraction: bool,
     /// What computed the rates.
     pub rate: RateEstimator,
@@ -45,10 +46,10 @@ impl About {
         }
     }
 
-    /// What the lake says of itself; none where the folder is none yet.
+    /// The lake's description of itself; `None` if the folder is no lake yet.
     pub(crate) fn read(lake: &Path) -> anyhow::Result<Option<Self>> {
         let path = lake.join(FILE);
-        let bytes = match stretch_files::read_whole(&path) {
+        let bytes = match stretch_data::files::read_whole(&path) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(e).context(path.display().to_string()),
@@ -67,10 +68,10 @@ impl About {
 
     pub(crate) fn write(&self, lake: &Path) -> anyhow::Result<()> {
         let text = serde_json::to_string_pretty(self)? + "\n";
-        Ok(stretch_files::write_whole(lake.join(FILE), |out| out.write_all(text.as_bytes()))?)
+        Ok(stretch_data::files::write_whole(lake.join(FILE), |out| out.write_all(text.as_bytes()))?)
     }
 
-    /// The column that is fitted: the contraction of a length, else the reference itself.
+    /// The fitted column: the contraction of a length, otherwise the reference itself.
     pub(crate) fn target(&self) -> &str {
         if self.is_contraction { "contraction" } else { &self.reference }
     }
@@ -80,7 +81,7 @@ impl About {
         Ok(SampleRate::new(self.sample_rate_hz)?)
     }
 
-    /// Refuses trials whose rates could not be told from the lake's in a query.
+    /// Refuses trials whose rates could not be distinguished from the lake's in a query.
     pub(crate) fn check(&self, other: &Self) -> Result<(), String> {
         let differs = |what: &str, own: &str, other: &str| {
             format!(

@@ -16,17 +16,20 @@ pub(crate) struct Refused {
     pub why: String,
 }
 
-/// Writes the sentence of a refused file into `refused/`, a file each: whoever looks there sees what is missing.
+/// Writes the error of a refused file into `refused/`, one file each, so that a user finds there
+/// what is missing.
 pub(crate) fn refuse(lake: &Path, file: &Path, why: &str) -> anyhow::Result<Refused> {
     let refused = Refused { file: file.display().to_string(), why: why.to_owned() };
     let folder = lake.join("refused");
     fs::create_dir_all(&folder)?;
     let text = format!("{}: {why}\n", refused.file);
-    stretch_files::write_whole(folder.join(note(file)), |out| out.write_all(text.as_bytes()))?;
+    stretch_data::files::write_whole(folder.join(note(file)), |out| {
+        out.write_all(text.as_bytes())
+    })?;
     Ok(refused)
 }
 
-/// Takes back what was said of a file that is in the lake now.
+/// Removes the refusal of a file that is in the lake now.
 pub(crate) fn accept(lake: &Path, file: &Path) -> std::io::Result<()> {
     match fs::remove_file(lake.join("refused").join(note(file))) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(e),
@@ -34,10 +37,12 @@ pub(crate) fn accept(lake: &Path, file: &Path) -> std::io::Result<()> {
     }
 }
 
-/// Moves the files that no query could read into `refused/`, under names that say where they stood.
+/// Moves the files that no query could read into `refused/`, under names that hold their former
+/// path.
 ///
 /// # Errors
-/// More files that lake.json does not fit than files that it does: it is wrong rather than they, and all stay where they are.
+/// If lake.json does not fit more files than it fits, it is wrong rather than the files, and all
+/// stay where they are.
 pub(crate) fn set_aside(lake: &Lake) -> anyhow::Result<Vec<Refused>> {
     let others: Vec<&Unfit> = lake.unfit.iter().filter(|file| file.is_of_another_lake).collect();
     if let Some(Unfit { path, why, .. }) = others.first() {

@@ -15,7 +15,7 @@ use stretch_data::{Split, TrialKind};
 
 use super::About;
 
-/// The key under which it stands among the file's metadata.
+/// Its key in the file's metadata.
 pub(crate) const KEY: &str = "stretch";
 
 /// The description of a trial, in JSON.
@@ -68,7 +68,7 @@ pub(crate) fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
     hexadecimal(sha)
 }
 
-/// The same of a file, of which a piece at a time is in memory.
+/// The same for a file, one piece at a time in memory.
 ///
 /// # Errors
 /// What the system says.

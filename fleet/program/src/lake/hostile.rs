@@ -1,4 +1,5 @@
-//! Lakes with anything in their files: a sentence for each file that is unfit, no panic, and nothing is written.
+//! Lakes with arbitrary file content: an error for each unfit file, no panic, and nothing is
+//! written.
 
 use std::{fs, path::Path};
 
@@ -82,7 +83,7 @@ fn opens(folder: &Path, [damaged, other]: &[std::path::PathBuf; 2], bytes: &[u8]
     assert!(!folder.join("refused").exists());
 }
 
-/// Where the embedded Arrow schema stands in a file: its value under `ARROW:schema`, in base64.
+/// Position of the embedded Arrow schema in a file: its value under `ARROW:schema`, in base64.
 fn embedded(file: &[u8]) -> std::ops::Range<usize> {
     let key = b"ARROW:schema";
     let from = file.windows(key.len()).position(|part| part == key).unwrap() + key.len();
@@ -92,7 +93,8 @@ fn embedded(file: &[u8]) -> std::ops::Range<usize> {
     from..from + file[from..].iter().take_while(|byte| is_base64(byte)).count()
 }
 
-/// Of an embedded schema every byte is changed: some are those of a type, and its reader panics on one that it does not know.
+/// Changes every byte of an embedded schema: some are those of a type, and its reader panics on an
+/// unknown one.
 #[test]
 fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
     let (folder, paths) = lake();
@@ -111,7 +113,8 @@ fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
     assert!(gave_up > 0);
 }
 
-/// A question of a lake whose rows are damaged has an answer or an error; a panic of the engine is one, as in the program.
+/// A query of a lake with damaged rows has an answer or an error; a panic of the engine is an
+/// error, as in the program.
 fn asks(folder: &Path, bytes: &[u8], damaged: &Path) {
     fs::write(damaged, bytes).unwrap();
     let lake = Lake::open(folder).unwrap();
@@ -136,7 +139,7 @@ proptest! {
         asks(folder.path(), &changed(whole, 4, &(change.0, None)), &paths[0]);
     }
 
-    /// The footer is the last part of the file, and what says what all of it means.
+    /// The footer is the last part of the file and defines the meaning of all of it.
     #[test]
     fn a_damaged_footer_is_one_unfit_file(change in change()) {
         let (folder, paths) = lake();
@@ -168,7 +171,7 @@ proptest! {
         prop_assert!(paths.iter().all(|path| path.exists()) && fs::read(&path).unwrap() == bytes);
     }
 
-    /// What a folder is called is a place that leads to the same folder, or none.
+    /// A folder name is either a place that leads to the same folder, or invalid.
     #[test]
     fn a_place_leads_below_the_lake(names in vec("[a-zA-Z0-9._/\\\\%= -]{0,12}", 3), date in "[0-9-]{0,12}") {
         if let Ok(place) = Place::new([&names[0], &names[1], &names[2], &date]) {

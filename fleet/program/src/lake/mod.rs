@@ -1,4 +1,4 @@
-//! A lake: folders of Parquet files, a file a trial, and what they have in common.
+//! A lake: folders of Parquet files, one per trial, and their common properties.
 //!
 //! ```text
 //! DIR/lake.json                                                    signal, reference, rate estimator, sample rate

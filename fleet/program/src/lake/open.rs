@@ -1,4 +1,4 @@
-//! A lake as it is found: the footers of its files, and what all of them have.
+//! A lake as found on the disk: the footers of its files, and their common columns.
 
 use std::{
     collections::BTreeMap,
@@ -26,7 +26,7 @@ pub(crate) struct Lake {
     pub files: Vec<LakeFile>,
     /// Columns of all files; what a file lacks is null there.
     pub schema: SchemaRef,
-    /// Files below `trials` that no query could read beside the others.
+    /// Files below `trials` that no query could read together with the others.
     pub unfit: Vec<Unfit>,
     /// What was noticed.
     pub notes: Vec<String>,
@@ -38,7 +38,7 @@ pub(crate) struct Unfit {
     pub path: PathBuf,
     /// Why, and what to do.
     pub why: String,
-    /// Whether it could be read, and its rates are not those that lake.json names.
+    /// Whether it could be read, but its rates are not those that lake.json names.
     pub is_of_another_lake: bool,
 }
 
@@ -52,12 +52,12 @@ pub(crate) struct LakeFile {
 }
 
 impl Lake {
-    /// Reads every footer, and writes nothing. A file that cannot be read, or that no query could read beside the others, is
-    /// left out.
+    /// Reads every footer, and writes nothing. A file that cannot be read, or that no query could
+    /// read together with the others, is left out.
     pub(crate) fn open(folder: &Path) -> anyhow::Result<Self> {
         let shown = folder.display();
         let Some(about) = About::read(folder)? else {
-            bail!("{shown} is no lake: it has no lake.json; stretch fleet ingest makes one");
+            bail!("{shown} is no lake: it has no lake.json; stretch-fleet ingest makes one");
         };
         let folder = folder.canonicalize().with_context(|| shown.to_string())?;
         let paths = files(&folder.join("trials"))?;
@@ -110,10 +110,10 @@ impl LakeFile {
     }
 }
 
-/// What the footer of a Parquet file says, with the schema that is embedded in it.
+/// Content of the footer of a Parquet file, with the schema that is embedded in it.
 ///
 /// # Errors
-/// A file that cannot be read, and one that its reader panics on.
+/// A file that cannot be read, or on which its reader panics.
 pub(crate) fn metadata(path: &Path) -> anyhow::Result<ArrowReaderMetadata> {
     let file = File::open(path)?;
     Ok(caught(|| ArrowReaderMetadata::load(&file, Default::default()))??)
@@ -126,7 +126,7 @@ pub(crate) fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Every file at most `depth` folders below a folder, in order; none where there is no folder.
+/// Every file at most `depth` folders below a folder, in order; empty if the folder does not exist.
 pub(crate) fn below(folder: &Path, depth: usize) -> anyhow::Result<Vec<PathBuf>> {
     let (mut found, mut folders) = (Vec::new(), vec![(folder.to_owned(), depth)]);
     while let Some((folder, depth)) = folders.pop() {

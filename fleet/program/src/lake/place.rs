@@ -1,4 +1,4 @@
-//! Where a trial stands: site, rig, sensor and date.
+//! Place of a trial: site, rig, sensor and date.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,11 @@ use chrono::NaiveDate;
 /// Columns of the place, in the order of the folders.
 pub(crate) const COLUMNS: [&str; 4] = ["site", "rig", "sensor", "date"];
 
-/// Longest name of a site, rig or sensor: with its column, and its ending as a record, it is the name of a file everywhere.
+/// Longest name of a site, rig or sensor, such that with its column and its ending as a record it
+/// is a valid file name everywhere.
 const MOST_LETTERS: usize = 100;
 
-/// Refuses a name that could not be that of a folder, or that would lead out of one.
+/// Refuses a name that cannot be a folder, or that would lead out of one.
 pub(crate) fn check_name(what: &str, name: &str) -> anyhow::Result<()> {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     ensure!(

@@ -14,10 +14,11 @@ use datafusion::{
 
 use super::{Lake, place::COLUMNS};
 
-/// Makes the lake's trials the table `trials`, with site, rig, sensor and date from its folders; files that are unfit are left out.
+/// Registers the lake's trials as the table `trials`, with site, rig, sensor and date from its
+/// folders; unfit files are left out.
 ///
 /// # Errors
-/// An unfit file in a folder whose name cannot be told from others in a query.
+/// An unfit file in a folder whose name a query cannot distinguish from others.
 pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<()> {
     let folder = lake.folder.join("trials");
     let urls = vec![folder_url(&folder)?];
@@ -26,7 +27,7 @@ pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<
         session.register_table("trials", whole)?;
         return Ok(());
     }
-    // What stands beside an unfit file is read file by file, all the rest as a folder.
+    // Files in the folder of an unfit file are read one by one, all others as a folder.
     let mut spoilt = BTreeSet::new();
     for file in &lake.unfit {
         spoilt.extend(partition(file.path.strip_prefix(&folder)?)?);
@@ -67,7 +68,8 @@ pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<
     Ok(())
 }
 
-/// The values of the folders that a query would give to a file's rows; none for a file that no query reads.
+/// The folder values that a query would give to a file's rows; `None` for a file that no query
+/// reads.
 fn partition(path: &Path) -> anyhow::Result<Option<[String; 4]>> {
     let mut folders = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned());
     let mut values = [const { String::new() }; 4];

@@ -20,7 +20,7 @@ use datafusion::{
 
 use super::{Footer, footer::KEY};
 
-/// Most rows of a row group: what one core reads at once.
+/// Largest row group: what one core reads at once.
 const GROUP_ROWS: usize = 1 << 20;
 
 /// The rows of a trial.
@@ -29,7 +29,7 @@ pub(crate) struct Samples {
     pub time_s: Vec<f64>,
     /// The trial's channels, with their names.
     pub channels: Vec<(String, Vec<f64>)>,
-    /// Rate of the signal; none while the estimator warms up.
+    /// Rate of the signal; `None` while the estimator warms up.
     pub rate: Vec<Option<f64>>,
     /// Contraction of the reference, where that is a length.
     pub contraction: Option<Vec<f64>>,
@@ -68,7 +68,8 @@ pub(crate) fn write(path: &Path, footer: &Footer, samples: Samples) -> anyhow::R
 
 /// Writes a table, whole or not at all; the folder is made.
 ///
-/// Measured numbers neither repeat nor compress: they stand as they are, which is what is read fastest.
+/// Measured numbers neither repeat nor compress, so they are stored plain, which is the fastest to
+/// read.
 pub(crate) fn write_parquet(
     path: &Path,
     batch: &RecordBatch,
@@ -96,5 +97,5 @@ pub(crate) fn write_parquet(
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    Ok(stretch_files::write_whole(path, |out| out.write_all(&bytes))?)
+    Ok(stretch_data::files::write_whole(path, |out| out.write_all(&bytes))?)
 }

@@ -1,4 +1,4 @@
-//! What lakes contain that nobody asked for: a sentence each, and no failed query.
+//! Unexpected content of lakes: one error sentence each, and no failed query.
 
 use std::{fs, path::Path, sync::Arc};
 
@@ -137,7 +137,7 @@ fn rates_of_another_estimator_are_refused() {
         .unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && told.contains("estimator"), "{told}");
-    // a file of such rates that somebody put there
+    // a file of such rates that was added by hand
     altered(&of_sensor(&lake, 2), "-", None, &|text| {
         text.replace(
             r#"{"savitzky_golay":{"window":11,"degree":2,"delay":0}}"#,
@@ -199,7 +199,7 @@ fn a_damaged_file_of_the_lake_is_set_aside() {
     assert!(told.contains("1 records of 1 sensors"), "{told}");
     assert!(path.exists(), "a question moved a file");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
-    // an ingest sets it aside, brings its trial in again, and says so
+    // an ingest sets it aside, adds its trial again, and reports this
     let line = "ingest {} --lake {} --sensor 2 --date 2026-01-01";
     let told = warned(line, &[&folder.path().join("2.csv"), &lake]);
     assert!(told.contains("1 trials written (600 rows), 0 there already, 1 refused"), "{told}");
@@ -235,7 +235,8 @@ fn what_stands_beside_a_damaged_file_is_read() {
     assert!(told.contains("left out:") && told.contains("2 records of 2 sensors"), "{told}");
 }
 
-/// A description that fits no trial is wrong itself: questions say so, and nobody moves a trial.
+/// If a description fits no trial, the description is wrong: queries report this and no trial is
+/// moved.
 #[test]
 fn a_wrong_number_in_lake_json_moves_nothing() {
     let folder = tempfile::tempdir().unwrap();

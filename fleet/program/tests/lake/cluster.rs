@@ -1,4 +1,4 @@
-//! The ready commands on a cluster: a scheduler and three executors beside the program.
+//! The ready commands on a cluster: a scheduler, three executors and the program.
 
 use std::{
     io::{BufRead, BufReader},
@@ -20,14 +20,12 @@ impl Drop for Cluster {
     }
 }
 
-/// A cluster and its URL; none where its programs were not built: a test of this crate alone builds none.
-fn cluster() -> Option<(Cluster, String)> {
+/// A cluster and its URL.
+fn cluster() -> (Cluster, String) {
     let beside = |name: &str| Path::new(PROGRAM).with_file_name(name);
     let [scheduler, executor] = ["stretch-scheduler", "stretch-executor"].map(beside);
-    if !scheduler.exists() || !executor.exists() {
-        println!("SKIPPED: {} is not built; test the whole workspace", scheduler.display());
-        return None;
-    }
+    let is_built = scheduler.exists() && executor.exists();
+    assert!(is_built, "{} is not built: test the whole workspace", scheduler.display());
     let start = |program: &Path, words: &[&str]| {
         let mut command = Command::new(program);
         command.args(words).stdout(Stdio::piped()).stderr(Stdio::null());
@@ -41,10 +39,10 @@ fn cluster() -> Option<(Cluster, String)> {
     for _ in 0..3 {
         all.0.push(start(&executor, &["--scheduler", url.trim_start_matches("df://")]));
     }
-    Some((all, url))
+    (all, url)
 }
 
-/// Sums of a cluster come in another order, and round otherwise.
+/// A cluster adds sums in another order, so rounding differs.
 fn assert_same_fits(here: &Path, there: &Path) {
     let rmse = |out: &Path| {
         let (rows, _) = parquet(&out.join("calibrations.parquet"));
@@ -61,8 +59,9 @@ fn assert_same_fits(here: &Path, there: &Path) {
 }
 
 #[test]
+#[ignore = "needs the programs of a cluster, which only a build of the whole workspace makes; gate.sh runs it"]
 fn ready_commands_answer_the_same_on_a_cluster() {
-    let Some((_cluster, url)) = cluster() else { return };
+    let (_cluster, url) = cluster();
     let folder = tempfile::tempdir().unwrap();
     let [lake, here, there] = ["lake", "here", "there"].map(|name| folder.path().join(name));
     said("make --lake {} --sensors 5 --days 62 --rows 200 --drifting 0.5 --drift 0.05", &[&lake]);
@@ -88,7 +87,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     assert_same_fits(&here, &there);
 }
 
-/// Two machines that are joined by a cable: network namespaces, which go with this.
+/// Two machines joined by a cable: network namespaces, which are removed on drop.
 struct Machines([String; 2]);
 
 impl Machines {

@@ -75,12 +75,15 @@ fn answers_come_as_a_table_csv_and_records() {
     let told = ask(&["--records", &out.display().to_string()], fit);
     assert!(told.contains("2 records, 0 refused"), "{told}");
     let record = stretch_calibrate::read_calibration(&out.join("a.json")).unwrap();
-    assert_eq!((record.signal.as_str(), record.reference.as_str()), ("bridge_v", "length_mm"));
+    assert_eq!(
+        (record.spec().signal.as_str(), record.spec().reference.as_str()),
+        ("bridge_v", "length_mm")
+    );
     let told = ask(&["--records", &out.display().to_string()], "select count(*) from trials");
     assert!(told.contains("the answer has no column record"), "{told}");
     let told = ask(&[], "select nonsense from trials");
     assert!(told.contains("nonsense"), "{told}");
-    // a query of its own, on what a record estimates
+    // a custom query on the estimates of a record
     let text = fs::read_to_string(out.join("a.json")).unwrap().replace('\n', "");
     let agreed = format!(
         "select agreement(contraction, strain_estimate('{text}', rate, bridge_v)) as a from trials where sensor = 'a'"
@@ -126,7 +129,8 @@ fn a_partition_is_diagnosed_once() {
     );
 }
 
-/// Three sensors of four days each: the prior knows each of them, and what it errs by on a new one; `stretch calibrate` reads it.
+/// Three sensors of four days each: the prior knows each of them, and its error on a new one;
+/// `stretch calibrate` reads it.
 #[test]
 fn a_prior_is_learnt_from_every_sensor() {
     let folder = tempfile::tempdir().unwrap();
@@ -134,7 +138,7 @@ fn a_prior_is_learnt_from_every_sensor() {
     said("make --lake {} --sensors 3 --days 4 --seed 5", &[&lake]);
     let told = said("prior --lake {} --out {}", &[&lake, &out]);
     assert!(told.contains("12 sessions, 0 left out"), "{told}");
-    let prior = stretch_calibrate::Prior::read(&out).unwrap();
+    let prior = stretch_sleeve::Prior::read(&out).unwrap();
     let mut sensors: Vec<String> = prior.paths().map(|path| path.join("/")).collect();
     sensors.sort();
     assert_eq!(sensors.len(), 3, "{sensors:?}");
@@ -184,7 +188,7 @@ fn a_question_only_reads_unless_it_may_write() {
     assert!(is_answered && to.exists(), "{told}");
 }
 
-/// A query may call anything a sensor; its record does not leave the folder.
+/// A query may return anything as a sensor name; its record does not leave the folder.
 #[test]
 fn records_stay_in_their_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,7 +215,7 @@ fn records_stay_in_their_folder() {
     assert!(told.contains("another row of the answer has that name"), "{told}");
 }
 
-/// Sums come in the order of files and rows, whoever takes them.
+/// Sums are added in the order of files and rows, whichever thread takes them.
 #[test]
 fn calibrations_have_the_same_bits_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Commands that write, and what must be there after a kill and a second run.
+//! Commands that write, and what must exist after a kill and a second run.
 
 use std::{
     collections::BTreeMap,
@@ -12,7 +12,7 @@ use std::{
 
 use crate::support::{PROGRAM, file, said, scratch, tree, trial};
 
-/// What is killed: a command on a folder, and what is there when it was not.
+/// A killed command: its folder, and the files that it leaves if it is not killed.
 pub(crate) struct Job {
     line: &'static str,
     prepare: fn(&Path),
@@ -58,7 +58,7 @@ pub(crate) const MAKE: Job = Job {
     answer: ["lake/trials", "lake"],
 };
 
-/// So few rows that a verdict is that they are too few: what is killed is how it is written.
+/// So few rows that the verdict is "too few", because the test is about how it is written.
 pub(crate) const DIAGNOSE: Job = Job {
     line: "diagnose --lake lake --out out",
     prepare: |folder| {
@@ -77,6 +77,14 @@ pub(crate) const RECORDS: Job = Job {
     answer: ["lake", "out"],
 };
 
+/// The example that aborts before one of its calls on the file system, which `cargo test` builds
+/// with the tests.
+fn killed_fleet() -> Command {
+    let program = Path::new(PROGRAM).with_file_name("examples").join("killed_fleet");
+    assert!(program.is_file(), "{}: cargo build --examples builds it", program.display());
+    Command::new(program)
+}
+
 impl Job {
     fn command(&self, folder: &Path) -> Command {
         let mut command = Command::new(PROGRAM);
@@ -89,7 +97,7 @@ impl Job {
         self.answer.map(|name| tree(&folder.join(name)))
     }
 
-    /// What is there when nothing was killed, and how long that takes.
+    /// The files that exist if nothing was killed, and how long that takes.
     fn expected(&self) -> ([BTreeMap<String, Vec<u8>>; 2], Duration) {
         let folder = scratch();
         (self.prepare)(folder.path());
@@ -98,7 +106,7 @@ impl Job {
         (self.answer(folder.path()), begun.elapsed())
     }
 
-    /// Runs the command again after a kill: all is there, and nothing else.
+    /// Runs the command again after a kill: everything is there, and nothing else.
     fn assert_mended(&self, folder: &Path, expected: &[BTreeMap<String, Vec<u8>>; 2], case: &str) {
         let names = |answer: &[BTreeMap<String, Vec<u8>>; 2]| {
             answer.each_ref().map(|tree| tree.keys().cloned().collect::<Vec<_>>())
@@ -111,20 +119,20 @@ impl Job {
         assert_eq!(left, None, "{case}: a temporary file is left");
     }
 
-    /// Ends the command before every `step`th of its calls on the file system; how many those are.
+    /// Ends the command before every `step`th of its calls on the file system; returns their
+    /// number.
     pub(crate) fn is_killed_before_its_calls(&self, step: usize) -> usize {
         let (expected, _) = self.expected();
         for at in (1..).step_by(step) {
             let folder = scratch();
             (self.prepare)(folder.path());
-            let output = Command::new(std::env::current_exe().unwrap())
-                .args(["kills::a_child_that_is_killed", "--exact", "--quiet"])
-                .env("KILLED_LINE", self.line)
-                .env("KILLED_AT", at.to_string())
+            let output = killed_fleet()
+                .arg(at.to_string())
+                .args(self.line.split(' '))
                 .current_dir(folder.path())
                 .output()
                 .unwrap();
-            // SIGABRT, which nobody handles
+            // SIGABRT, which has no handler
             let is_killed = output.status.signal() == Some(6);
             let case = format!("{} killed before call {at}: {output:?}", self.line);
             assert!(is_killed || output.status.success(), "{case}");
@@ -136,7 +144,8 @@ impl Job {
         0
     }
 
-    /// Kills the command at moments that are spread over the time that it takes; how many kills came before its end.
+    /// Kills the command at moments that are spread over its run time; returns how many kills came
+    /// before its end.
     pub(crate) fn is_killed_at_moments(&self, kills: u32) -> u32 {
         let (expected, takes) = self.expected();
         let mut hit = 0;

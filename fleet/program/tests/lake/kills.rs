@@ -1,11 +1,10 @@
-//! What a kill leaves is whole, and what is done is not done again.
+//! After a kill every file is complete, and finished work is not repeated.
 
 use std::{
     fs,
     io::{BufRead, BufReader},
     path::Path,
-    process::{Command, ExitCode, Stdio},
-    sync::atomic::{AtomicUsize, Ordering::Relaxed},
+    process::{Command, Stdio},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -76,7 +75,7 @@ fn what_an_ingest_wrote_before_it_was_killed_stays() {
     let mut one = trial("", 0.0);
     for k in 0..300 {
         one.name = format!("ulm/r2/{:04}/20260103_a.csv", k);
-        // no two files have the same bytes: they would be the same trial
+        // no two files have the same bytes, because they would be the same trial
         one.channels[1].values[0] = 1.24 + 1e-6 * f64::from(k);
         file(&logs, &one);
     }
@@ -97,7 +96,7 @@ fn what_an_ingest_wrote_before_it_was_killed_stays() {
     assert!(same_trials(&killed_lake, &whole), "a killed lake is another");
 }
 
-/// A kill between a trial's last byte and its name leaves a temporary file that is whole.
+/// A kill between a trial's last byte and its rename leaves a complete temporary file.
 #[test]
 fn a_trial_that_was_killed_before_it_had_its_name_is_ingested() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,25 +143,6 @@ fn calibrations_go_on_where_they_were_killed() {
     assert!(told.contains("3 months of rigs computed now"), "{told}");
 }
 
-/// What the tests below start as a process of its own; by itself it does nothing.
-#[test]
-fn a_child_that_is_killed() {
-    let Ok(line) = std::env::var("KILLED_LINE") else { return };
-    let at: usize = std::env::var("KILLED_AT").unwrap().parse().unwrap();
-    let calls = AtomicUsize::new(0);
-    assert!(stretch_files::ask_before_disk_calls(move |_| {
-        if calls.fetch_add(1, Relaxed) + 1 == at {
-            // as by kill -9: nothing is cleaned up
-            std::process::abort();
-        }
-        Ok(())
-    }));
-    let words = std::iter::once("stretch-fleet").chain(line.split(' '));
-    let status = stretch_fleet_program::run(words.map(Into::into));
-    // an ingest has refused a file, which is a status
-    assert!(status == ExitCode::SUCCESS || line.starts_with("ingest"));
-}
-
 #[test]
 fn an_ingest_killed_before_any_call_is_mended_by_the_next() {
     let calls = INGEST.is_killed_before_its_calls(3);
@@ -175,14 +155,16 @@ fn a_calibration_killed_before_any_call_is_mended_by_the_next() {
     assert!(calls > 20, "{calls}");
 }
 
-/// The table of a drift stands outside the lake, where no lock of the lake protects what another command writes.
+/// The table of a drift is outside the lake, where no lock of the lake protects what another
+/// command writes.
 #[test]
 fn a_drift_killed_before_any_call_is_mended_by_the_next() {
     let calls = DRIFT.is_killed_before_its_calls(2);
     assert!(calls > 10, "{calls}");
 }
 
-/// Verdicts and records stand outside the lake as well; a lake that is made is killed before it is one.
+/// Verdicts and records are outside the lake as well; a lake that is being made is killed before it
+/// is complete.
 #[test]
 fn what_else_writes_killed_before_any_call_is_mended_by_the_next() {
     for (job, step, least) in [(MAKE, 4, 20), (DIAGNOSE, 3, 15), (RECORDS, 2, 10)] {
@@ -207,7 +189,7 @@ fn thirty_kills_of_an_ingest_and_of_a_calibration_are_mended() {
     assert!(hit.iter().all(|&hit| hit > 15), "{hit:?}");
 }
 
-/// Whoever has the lock of a lake keeps it only while it lives.
+/// The lock of a lake ends with the process that holds it.
 #[test]
 fn the_lock_of_a_dead_command_is_nobodys() {
     let folder = tempfile::tempdir().unwrap();

@@ -19,7 +19,7 @@ use stretch_data::{Channel, Trial};
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_stretch-fleet");
 
-/// Runs the program; a word a piece of `line`, {} standing for the paths.
+/// Runs the program; the words of `line` are its arguments, with {} replaced by the paths.
 pub(crate) fn fleet(line: &str, paths: &[&Path]) -> Output {
     let mut paths = paths.iter();
     let words = line.split_whitespace().map(|word| match word {
@@ -44,7 +44,7 @@ pub(crate) fn refused(line: &str, paths: &[&Path]) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// What it says, having done its work and refused some files.
+/// Output of a run that did its work and refused some files.
 pub(crate) fn warned(line: &str, paths: &[&Path]) -> String {
     let output = fleet(line, paths);
     let told = String::from_utf8_lossy(&output.stderr);
@@ -52,7 +52,7 @@ pub(crate) fn warned(line: &str, paths: &[&Path]) -> String {
     format!("{}{told}", String::from_utf8_lossy(&output.stdout))
 }
 
-/// A question, what is said beside its answer, and whether it was answered.
+/// Asks a question; returns the answer with messages, and whether it was answered.
 pub(crate) fn asked(lake: &Path, query: &str, more: &[&str]) -> (bool, String) {
     let output = Command::new(PROGRAM)
         .args(["sql", "--lake", &lake.display().to_string(), query])
@@ -63,14 +63,14 @@ pub(crate) fn asked(lake: &Path, query: &str, more: &[&str]) -> (bool, String) {
     (output.status.success(), said + &told)
 }
 
-/// Every file below a folder with its bytes, by its path there; but not the empty one that is locked.
+/// Every file below a folder with its bytes, by its path there, except the empty lock file.
 pub(crate) fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let below = |path: PathBuf| path.strip_prefix(folder).unwrap().display().to_string();
     let all = bytes(folder).into_iter().map(|(path, bytes)| (below(path), bytes));
     all.filter(|(name, _)| !name.ends_with(".stretch-lock")).collect()
 }
 
-/// Where syncing takes no time, if there is such a place.
+/// A folder where syncing takes no time, if there is such a place.
 pub(crate) fn scratch() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
@@ -144,7 +144,7 @@ pub(crate) fn parquet(path: &Path) -> (RecordBatch, Vec<KeyValue>) {
     (batches.next().expect("a row").expect("rows"), about)
 }
 
-/// Writes a file of a lake anew with a column changed, or left out.
+/// Writes a file of a lake again with a column changed, or left out.
 pub(crate) fn altered(
     path: &Path,
     column: &str,

@@ -6,7 +6,7 @@ use crate::{
     evidence::{
         candidates::LEAST_CLOSED,
         detection_limit::{
-            asked::Asked,
+            LimitInputs,
             lags::Lags,
             probes::{Change, Probe, Probes},
         },
@@ -31,12 +31,12 @@ use crate::{
 const DRAWS: usize = 200;
 /// Probability with which an effect at its limit is named.
 const POWER: f64 = 0.9;
-/// Most probes that an effect is held against, and the least squared correlation of their changes with its own: a rival promises half as much as
-/// the best.
+/// Largest number of probes that an effect is compared with, and the smallest squared correlation
+/// of their changes with its own. At 0.5 an alternative promises half as much as the best.
 const HELD_AGAINST: usize = 8;
 const ALIKE: f64 = 0.3;
 
-/// Parts of the record: fitted, held out, tested.
+/// Parts of the record: fitted, held out, test.
 const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
 
 /// One stage in the space of some probes.
@@ -44,9 +44,10 @@ struct Place {
     stage: usize,
     /// Products u_i'V^-1 u_j by role.
     gram: [DMatrix<f64>; 3],
-    /// Those over the fitted samples that the fit weighs amplitudes with: what tolerances pay is in them.
+    /// Products over the fitted samples with which the fit weighs amplitudes, including the prior
+    /// cost of the nominal parameters.
     weighed: DMatrix<f64>,
-    /// Variance of the noise as a share of what it was taken for, and how it is remembered.
+    /// Variance of the noise relative to its description, and its memory.
     noise: f64,
     noise_lags: Lags,
     /// Draws of u'V^-1 n by role, and of |n|^2/N - 1.
@@ -58,9 +59,9 @@ struct Place {
 
 /// Records like the one at hand, in which one effect is missing.
 pub(super) struct Record<'a> {
-    asked: Asked<'a>,
+    inputs: LimitInputs<'a>,
     probes: &'a Probes,
-    /// The effect's own probe first, then those that may stand in for it.
+    /// The effect's own probe first, then those of the effects that can replace it.
     against: Vec<usize>,
     places: Vec<Place>,
     /// Of the effect's own change in each stage that it touches.
@@ -76,34 +77,34 @@ struct Shown {
     lags: Lags,
 }
 
-/// A hypothesis of one drawn record: the re-tuned nominal, or one effect beside it.
+/// A hypothesis for one drawn record: the re-tuned nominal simulator, alone or with one effect.
 struct Drawn {
     /// Which of the probes.
     at: usize,
     standing: Standing,
     /// Share of the gap of the test trials that closes.
     closed: f64,
-    /// Fall of the squares of the fitted samples, in nats as a screen promises them.
+    /// Reduction of the squares of the fitted samples, in nats as a screen promises them.
     gain: f64,
     is_accepted: bool,
 }
 
 impl<'a> Record<'a> {
-    pub(super) fn of(asked: Asked<'a>, probes: &'a Probes, own: usize) -> Self {
-        let roles = &asked.problem.compare.roles;
-        let against = against(asked, probes, own);
-        let mut random = RandomGenerator::new(asked.seed, 500 + own as u64);
+    pub(super) fn of(inputs: LimitInputs<'a>, probes: &'a Probes, own: usize) -> Self {
+        let roles = &inputs.problem.compare.roles;
+        let against = against(inputs, probes, own);
+        let mut random = RandomGenerator::new(inputs.seed, 500 + own as u64);
         let samples = ROLES.map(|role| roles.count(role) as f64);
-        let stages = 0..asked.problem.compare.metrics.len();
+        let stages = 0..inputs.problem.compare.metrics.len();
         let acts = |stage: &usize| {
             against.iter().any(|&p| probes.all[p].changes.iter().any(|c| c.stage == *stage))
         };
         let places = stages.filter(acts);
         let places = places
-            .map(|stage| Place::of(asked, probes, (&against, stage), samples, &mut random))
+            .map(|stage| Place::of(inputs, probes, (&against, stage), samples, &mut random))
             .collect();
         let shown = |change: &Change| {
-            let (compare, values) = (&asked.problem.compare, &change.column.values);
+            let (compare, values) = (&inputs.problem.compare, &change.column.values);
             let mut clean = values.clone();
             compare.metrics[change.stage].clean(roles, &mut clean);
             let (octaves, lags) =
@@ -111,13 +112,14 @@ impl<'a> Record<'a> {
             Shown { stage: change.stage, octaves, lags }
         };
         let own = probes.all[own].changes.iter().map(shown).collect();
-        Self { asked, probes, against, places, own, samples }
+        Self { inputs, probes, against, places, own, samples }
     }
 
-    /// Whether the effect is named in as many of the drawn records as a limit asks for, where it acts with an amplitude.
+    /// Whether the effect is named in as many of the drawn records as a limit requires, if it acts
+    /// with an amplitude.
     pub(super) fn names(&self, amplitude: f64) -> bool {
-        // What the octaves say is a matter of its size alone.
-        if self.rise(amplitude) <= self.asked.thresholds.rise {
+        // The octaves depend only on its size.
+        if self.rise(amplitude) <= self.inputs.thresholds.rise {
             return false;
         }
         let memory: Vec<f64> = self.places.iter().map(|p| self.memory(p, amplitude)).collect();
@@ -128,26 +130,27 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Rise of the likelihood by octaves from the nominal to the effect.
+    /// Rise of the likelihood by octaves from the nominal simulator to the effect.
     fn rise(&self, amplitude: f64) -> f64 {
         let of = self.own.iter().map(|own| {
-            let noise: Octaves = self.asked.best.misfits[own.stage].octaves;
+            let noise: Octaves = self.inputs.best.misfits[own.stage].octaves;
             noise.plus(&own.octaves.scaled(amplitude * amplitude)).rise(&noise)
         });
         of.sum()
     }
 
-    /// Samples that count as one observation of the nominal's misfit, where the effect's change is part of it.
+    /// Samples that count as one observation of the nominal simulator's misfit, with the effect's
+    /// change included.
     fn memory(&self, place: &Place, amplitude: f64) -> f64 {
         let change = self.own.iter().find(|c| c.stage == place.stage);
         let change = change.map(|c| (&c.lags, amplitude));
-        place.noise_lags.per_observation(change, self.asked.problem.compare.roles.block)
+        place.noise_lags.per_observation(change, self.inputs.problem.compare.roles.block)
     }
 
-    /// Whether the effect is named in one drawn record; a share where a coin decides.
+    /// Whether the effect is named in one drawn record; a share if a tie is decided by a coin.
     fn named(&self, draw: usize, amplitude: f64, memory: &[f64]) -> f64 {
         let (thresholds, catalogue) =
-            (self.asked.thresholds, self.asked.problem.simulator().effects());
+            (self.inputs.thresholds, self.inputs.problem.simulator().effects());
         let nominal = self.left(draw, amplitude, None);
         let all: Vec<Drawn> = (0..self.against.len())
             .map(|at| self.drawn(draw, at, amplitude, (&nominal, memory)))
@@ -174,13 +177,13 @@ impl<'a> Record<'a> {
         let mut standings: Vec<Standing> = weighed.iter().map(|d| d.standing).collect();
         let nothing = Standing { score: 0.0, left: retuned, is_at_bound: false, is_nothing: true };
         standings.push(nothing);
-        let gap = Gap { retuned, null_band: self.asked.null_band };
+        let gap = Gap { retuned, null_band: self.inputs.null_band };
         let (weights, unknown) = probabilities(thresholds, gap, &standings, None);
         let (sets, nothing) = weights.split_at(weighed.len());
         if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
             return 0.0;
         }
-        // Between sets that are as probable a coin decides.
+        // A coin decides between equally probable sets.
         let even = most_probable(sets);
         let own = self.probes.all[self.against[0]].effect;
         let is_own = |i: &&usize| effect(weighed[**i]) == own;
@@ -195,7 +198,7 @@ impl<'a> Record<'a> {
         amplitude: f64,
         (nominal, memory): (&[[f64; 3]], &[f64]),
     ) -> Drawn {
-        let problem = self.asked.problem;
+        let problem = self.inputs.problem;
         let probe = &self.probes.all[self.against[at]];
         let (mut own, mut mixed) = (0.0, 0.0);
         for place in &self.places {
@@ -223,10 +226,10 @@ impl<'a> Record<'a> {
         let mean = |x: &Misfit| problem.compare.mean_square(x);
         let closed: f64 = before.iter().zip(&after).map(|(a, b)| mean(a) - mean(b)).sum();
         let touched: f64 = before.iter().map(|x| gap(mean(x))).sum();
-        let acceptance = Acceptance { problem, thresholds: self.asked.thresholds };
+        let acceptance = Acceptance { problem, thresholds: self.inputs.thresholds };
         let is_accepted = score > acceptance.least_rise(closed)
             && closed > 0.0
-            && closed >= self.asked.thresholds.share * touched;
+            && closed >= self.inputs.thresholds.share * touched;
         let tested = |left: &[[f64; 3]]| -> f64 {
             self.places.iter().zip(left).map(|(p, x)| gap(x[2] / p.level)).sum()
         };
@@ -261,9 +264,9 @@ impl<'a> Record<'a> {
         self.places.iter().map(one).collect()
     }
 
-    /// The gap, of the fitted and the test trials the greater.
+    /// The gap, the larger of those on fitted and test trials.
     fn gap(&self, left: &[[f64; 3]]) -> f64 {
-        let compare = &self.asked.problem.compare;
+        let compare = &self.inputs.problem.compare;
         let looked = self.places.iter().zip(left).map(|(p, x)| {
             let misfit = Misfit { fit: x[0], held: x[1], ..Misfit::default() };
             gap(compare.mean_square(&misfit) / p.level)
@@ -273,9 +276,10 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The probe and those that may stand in for it, the most alike first; of its own effect the first alone.
-fn against(asked: Asked<'_>, probes: &Probes, own: usize) -> Vec<usize> {
-    let compare = &asked.problem.compare;
+/// The probe and those that can replace it, the most similar first; of its own effect only the
+/// first.
+fn against(inputs: LimitInputs<'_>, probes: &Probes, own: usize) -> Vec<usize> {
+    let compare = &inputs.problem.compare;
     let product = |a: &Probe, b: &Probe| -> f64 {
         let pairs = a.changes.iter().flat_map(|x| b.changes.iter().map(move |y| (x, y)));
         let pairs = pairs.filter(|(x, y)| x.stage == y.stage);
@@ -293,13 +297,13 @@ fn against(asked: Asked<'_>, probes: &Probes, own: usize) -> Vec<usize> {
 
 impl Place {
     fn of(
-        asked: Asked<'_>,
+        inputs: LimitInputs<'_>,
         probes: &Probes,
         (against, stage): (&[usize], usize),
         samples: [f64; 3],
         random: &mut RandomGenerator,
     ) -> Self {
-        let compare = &asked.problem.compare;
+        let compare = &inputs.problem.compare;
         let metric = &compare.metrics[stage];
         let changes: Vec<_> = against
             .iter()
@@ -322,7 +326,7 @@ impl Place {
             })
         };
         let mut gram = ROLES.map(of_role);
-        // Test trials that were not run are taken to show what the others do.
+        // Test trials that were not run are assumed to behave like the others.
         if !probes.covers_test(&compare.roles) {
             let share = samples[2] / (samples[0] + samples[1]).max(1.0);
             gram[2] = share * (&gram[0] + &gram[1]);
@@ -332,10 +336,10 @@ impl Place {
             (Some(x), Some(y)) => gram[0][(i, j)] + prior * dot(&x.shifts, &y.shifts),
             _ => 0.0,
         });
-        let noise = compare.mean_square(&asked.best.misfits[stage]).max(f64::MIN_POSITIVE);
+        let noise = compare.mean_square(&inputs.best.misfits[stage]).max(f64::MIN_POSITIVE);
         let noise_lags = probes.noise_lags(stage).clone();
         let memory = noise_lags.per_observation(None, compare.roles.block);
-        // Noise that is remembered weighs as its slow part does.
+        // Correlated noise counts by its slow part.
         let scale = (noise * memory).sqrt();
         let factors: Vec<Cholesky> =
             [&weighed, &gram[1], &gram[2]].map(|g| Cholesky::of(g.clone())).into();

@@ -1,19 +1,20 @@
-//! How many samples count as one observation, where a change is part of what is left.
+//! How many samples count as one observation if a change is part of the residual.
 //!
-//! The sum of [`samples_per_observation`](crate::fit::score::samples_per_observation), each of the first lags and every fourth of the others, which stands
-//! for its neighbours. Products of noise and of a change that does not know of it add up.
+//! The sum of [`samples_per_observation`](crate::fit::score::samples_per_observation) over the
+//! first lags and every fourth of the others, which represents its neighbours. Products of noise
+//! and of a change that is independent of it add up.
 
 use crate::{fit::comparison::Comparison, numerics::linear::dot, problem::sample_roles::Role};
 
-/// Lags of which each is summed, and the distance of the others.
+/// Number of lags that are all summed, and the distance of the others.
 const EACH: usize = 8;
 const APART: usize = 4;
 
-/// Sums over the fitted samples of products so many samples apart.
+/// Sums over the fitted samples of products with so many samples between them.
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
     square: f64,
-    /// Lags that it stands for, and the sum.
+    /// Number of lags that it represents, and the sum.
     sums: Vec<(f64, f64)>,
 }
 
@@ -32,7 +33,8 @@ impl Lags {
         Self { square: product(0), sums: each.chain(far).collect() }
     }
 
-    /// Samples that count as one observation with a change of so many times the amplitude beside, at most a block.
+    /// Samples that count as one observation, with a change of so many times the amplitude added;
+    /// at most a block.
     pub(super) fn per_observation(&self, change: Option<(&Self, f64)>, block: usize) -> f64 {
         let more = change.map_or(0.0, |(c, amplitude)| amplitude * amplitude * c.square);
         let power = (self.square + more).max(f64::MIN_POSITIVE);

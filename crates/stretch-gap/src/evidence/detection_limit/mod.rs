@@ -1,48 +1,52 @@
 //! Detection limits: how strong each effect would have to be to be named on these data.
 //!
-//! Let the re-tuned nominal be true, so that what the best set leaves is noise, and let an effect of the strength s be there beside. Around a
-//! probe at the strength s_0 its change of the output is
+//! Assume that the re-tuned nominal simulator is true, so that what the best set leaves is noise,
+//! and add an effect of the strength s. Around a probe at the strength s_0 its change of the output
+//! is
 //!
 //! ```text
 //! d(s) = (s/s_0)^(p/2) d(s_0),     u = d - A (A'V^-1 A + b I)^-1 A'V^-1 d
 //! ```
 //!
-//! in the metric V of every fit, with the sensitivities A of the nominal parameters (b samples a block, prior precision 1), and p = 2 where the
-//! change is linear. All that the verdict reads (scores, what is left of the fitted and the test trials, probabilities beside rivals) depends on
-//! the noise n through |n|^2 and the few products u_j'V^-1 n, which are normal with the Gram matrix u_i'V^-1 u_j as their covariance: so records
-//! are drawn in the space of the effects, never as time series, and the share of them in which the rule of the
-//! [posterior](crate::evidence::probability) names the effect is its power (Neyman and Pearson 1933, doi 10.1098/rsta.1933.0009). The detection
-//! limit is the strength at which that is 0.9.
+//! in the metric V of every fit, with the sensitivities A of the nominal parameters (b samples a
+//! block, prior precision 1), and p = 2 where the change is linear. The verdict reads scores,
+//! residuals of the fitted and the test trials, and probabilities against alternatives. All of
+//! these depend on the noise n only through |n|^2 and the few products u_j'V^-1 n, which are normal
+//! with the Gram matrix u_i'V^-1 u_j as their covariance. Therefore records are drawn in the space
+//! of the effects, never as time series. The share of records in which the rule of the
+//! [posterior](crate::evidence::probability) names the effect is its power (Neyman and Pearson
+//! 1933, doi 10.1098/rsta.1933.0009). The detection limit is the strength at which the power is
+//! 0.9.
 //!
-//! An effect's other parameters stand at the start from which it is found most easily. Rivals stand at each of their starts; a kink bends the
-//! change, so that a limit far from its probe is probed again, and p is that of the two last probes.
+//! An effect's other parameters have the values of the start from which it is detected most easily.
+//! Alternatives are taken at each of their starts. A kink bends the change; therefore a limit far
+//! from its probe is probed again, and p comes from the last two probes.
 
-mod asked;
 mod draws;
 mod lags;
 mod probes;
-mod tuned;
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use self::asked::Asked;
 use self::{
     draws::Record,
     probes::{Probes, Start, easiest, sizes},
 };
 use crate::{
-    problem::{error::GapError, spec::EffectSpec},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
+    problem::{error::GapError, spec::EffectSpec, thresholds::Thresholds},
     search::selection::Looked,
 };
 
 /// Halvings of the ratio within which a limit is bracketed: to a part in a hundred.
 const HALVINGS: usize = 6;
-/// Strengths below this share of the range are not asked for.
+/// Strengths below this share of the range are not tried.
 const LEAST: f64 = 1e-6;
-/// Share of the range that a limit lies within, and the ratio of the strengths that are asked for around a probe.
+/// Share of the range within which a limit lies, and the ratio of the strengths that are tried
+/// around a probe.
 const INSIDE: f64 = 0.99;
 const STEP: f64 = 1.5;
 /// Ratio of a limit to its probe beyond which it is probed again, and how often at most.
@@ -61,10 +65,12 @@ const ROUNDS: usize = 4;
 pub struct DetectionLimit {
     /// Effect.
     pub effect: String,
-    /// Parameter that says how strong it is.
+    /// Parameter that is its strength.
     pub parameter: String,
-    /// Value of the parameter at which the effect would be named with probability 0.9 if the re-tuned nominal were otherwise true, its other
-    /// parameters at the start from which it is found most easily; none where no value within its range would be.
+    /// Value of the parameter at which the effect would be named with probability 0.9 if the
+    /// re-tuned nominal simulator were otherwise true. The effect's other parameters have the
+    /// values of the start from which it is detected most easily. `None` if no value within its
+    /// range would be named.
     pub strength: Option<f64>,
     /// Unit of the value.
     pub unit: String,
@@ -73,26 +79,40 @@ pub struct DetectionLimit {
     pub others: BTreeMap<String, f64>,
 }
 
-/// The detection limit of every effect of the catalogue, in its order, but of those whose course is found in the record: they have no strength of their
-/// own; `looked` is a screen around the re-tuned nominal, where there is one.
+/// Inputs of detection limits: the problem, the best set, whose residual is taken for noise, and
+/// the rule.
+#[derive(Clone, Copy)]
+pub(crate) struct LimitInputs<'a> {
+    pub(crate) problem: &'a PreparedProblem<'a>,
+    pub(crate) best: &'a Hypothesis,
+    pub(crate) thresholds: &'a Thresholds,
+    /// Excess that noise alone stays below in 19 of 20 records.
+    pub(crate) null_band: f64,
+    pub(crate) seed: u64,
+}
+
+/// The detection limit of every effect of the catalogue, in its order, except effects whose course
+/// is found in the record, because these have no strength. `looked` is a screen around the re-tuned
+/// nominal simulator, if there is one.
 pub(crate) fn detection_limits(
-    asked: Asked<'_>,
+    inputs: LimitInputs<'_>,
     looked: Option<&Looked>,
 ) -> Result<Vec<DetectionLimit>, GapError> {
-    let problem = asked.problem;
+    let problem = inputs.problem;
     let sizes = sizes(problem, looked)?;
     let starts: Vec<Vec<Start>> =
-        sizes.into_iter().enumerate().map(|(e, own)| easiest(problem, e, own, asked)).collect();
-    let mut probes = Probes::of(problem, asked.best, &starts)?;
-    let mut found = limits(asked, &probes)?;
-    // What lies far from its probe is probed where it lies; where each run costs, the line has to do.
+        sizes.into_iter().enumerate().map(|(e, own)| easiest(problem, e, own, inputs)).collect();
+    let mut probes = Probes::of(problem, inputs.best, &starts)?;
+    let mut found = limits(inputs, &probes)?;
+    // A limit far from its probe is probed again at its own strength. If runs are costly, the
+    // linearisation has to suffice.
     let rounds = if problem.simulator().costly().is_none() { ROUNDS } else { 0 };
     for _ in 0..rounds {
         let moved = probes.moved(problem, &found, FAR)?;
         if moved.is_empty() {
             break;
         }
-        let again = moved.into_par_iter().map(|e| Ok((e, limit(asked, &probes, e)?)));
+        let again = moved.into_par_iter().map(|e| Ok((e, limit(inputs, &probes, e)?)));
         for (e, limit) in again.collect::<Result<Vec<_>, GapError>>()? {
             found[e] = limit;
         }
@@ -117,20 +137,20 @@ pub(crate) fn detection_limits(
 }
 
 /// The limit of every effect around its probe.
-fn limits(asked: Asked<'_>, probes: &Probes) -> Result<Vec<Option<f64>>, GapError> {
-    let count = asked.problem.simulator().effects().len();
-    (0..count).into_par_iter().map(|effect| limit(asked, probes, effect)).collect()
+fn limits(inputs: LimitInputs<'_>, probes: &Probes) -> Result<Vec<Option<f64>>, GapError> {
+    let count = inputs.problem.simulator().effects().len();
+    (0..count).into_par_iter().map(|effect| limit(inputs, probes, effect)).collect()
 }
 
 /// Bisection of the strength, in equal ratios, with the same draws at every strength.
-fn limit(asked: Asked<'_>, probes: &Probes, effect: usize) -> Result<Option<f64>, GapError> {
+fn limit(inputs: LimitInputs<'_>, probes: &Probes, effect: usize) -> Result<Option<f64>, GapError> {
     let Some(own) = probes.first(effect) else { return Ok(None) };
-    if (asked.problem.stop())() {
+    if (inputs.problem.stop())() {
         return Err(GapError::Stopped);
     }
-    let record = Record::of(asked, probes, own);
+    let record = Record::of(inputs, probes, own);
     let probe = &probes.all[own];
-    // At the very end of its range an effect rather stands in for something else.
+    // At the very end of its range an effect rather compensates for something else.
     let end = INSIDE * probe.reach;
     let (mut low, mut high) = (0.0, probe.distance.abs().min(end));
     while !record.names(probe.amplitude(high)) {

@@ -1,14 +1,15 @@
 //! Probes: what each effect changes at a strength near its limit, the nominal parameters projected out.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::{
-    evidence::detection_limit::{
-        asked::Asked,
-        lags::Lags,
-        tuned::{Tuned, change},
+    evidence::detection_limit::{LimitInputs, lags::Lags},
+    fit::{
+        comparison::Comparison, coordinate::coordinates, hypothesis::Hypothesis, metric::Column,
+        prepared::PreparedProblem,
     },
-    fit::{hypothesis::Hypothesis, metric::Column, prepared::PreparedProblem},
+    numerics::linear::Cholesky,
     problem::{
         error::GapError,
         sample_roles::{Role, SampleRoles},
@@ -20,7 +21,7 @@ use crate::{
 
 /// Starts of one effect that are probed: the easiest, and others for what it may pose as.
 const STARTS: usize = 2;
-/// Least and greatest power of the strength that is told from two probes.
+/// Smallest and largest power of the strength that is estimated from two probes.
 const POWERS: [f64; 2] = [0.5, 60.0];
 
 /// Where an effect is probed.
@@ -111,17 +112,18 @@ fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
     })
 }
 
-/// Starts of an effect from which a change is seen, one for each value of its other parameters, the easiest first, each moved to the strength at which it
-/// may be told; `sizes` are those of [`sizes`].
+/// Starts of an effect at which a change is visible, one for each value of its other parameters,
+/// the easiest to detect first. Each is moved to the strength at which it may be detected; `sizes`
+/// are those of [`sizes`].
 pub(super) fn easiest(
     problem: &PreparedProblem<'_>,
     effect: usize,
     sizes: Vec<Option<f64>>,
-    asked: Asked<'_>,
+    inputs: LimitInputs<'_>,
 ) -> Vec<Start> {
     let spec = &problem.simulator().effects()[effect];
     // A gap that counts in the mean: where its size alone decides, the limit lies there.
-    let target = asked.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
+    let target = inputs.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
     let is_costly = problem.simulator().costly().is_some();
     let mut known: Vec<(usize, f64, f64, &Vec<f64>)> = Vec::new();
     for (values, size) in spec.starts.iter().zip(sizes) {
@@ -172,7 +174,7 @@ pub(super) fn easiest(
 pub(super) struct Probes {
     pub(super) all: Vec<Probe>,
     trials: usize,
-    stages: Vec<Tuned>,
+    stages: Vec<TunedStage>,
     /// By stage: how what is taken for noise is remembered.
     noise_lags: Vec<Lags>,
 }
@@ -193,7 +195,7 @@ impl Probes {
         let stages = 0..problem.compare.metrics.len();
         let tuned = stages
             .into_par_iter()
-            .map(|stage| Tuned::of(&problem.compare, stage, model, trials))
+            .map(|stage| TunedStage::of(&problem.compare, stage, model, trials))
             .collect::<Result<_, GapError>>()?;
         let compare = &problem.compare;
         let noise = |stage: usize| {
@@ -289,7 +291,7 @@ impl Probes {
         Ok(begun.into_par_iter().filter_map(probe).collect())
     }
 
-    /// A probe from its outputs in the stages that it touches; none where nothing changes.
+    /// A probe from its outputs in the stages that it touches; `None` if nothing changes.
     fn probe(
         &self,
         problem: &PreparedProblem<'_>,
@@ -330,4 +332,73 @@ impl Probes {
         let column = metric.column(&compare.roles, values);
         Change { stage, column, shifts }
     }
+}
+
+/// One stage of the re-tuned nominal: its output, the sensitivities of its parameters, and the factor of their normal matrix with the prior.
+struct TunedStage {
+    output: Vec<f64>,
+    sensitivities: Vec<Column>,
+    factor: Cholesky,
+}
+
+impl TunedStage {
+    fn of(
+        compare: &Comparison<'_>,
+        stage: usize,
+        model: &Model,
+        trials: usize,
+    ) -> Result<Self, GapError> {
+        let run = Run::exact(stage, model, trials);
+        let output = compare.runs.run(run)?;
+        let own = coordinates(compare.simulator(), &[stage], model);
+        let mut models = Vec::new();
+        for (coordinate, bounds) in &own {
+            let x = coordinate.read(model);
+            let step = coordinate.probe(x);
+            let step = if x + step > bounds[1] { -step } else { step };
+            let mut moved = model.clone();
+            coordinate.write(&mut moved, x + step);
+            models.push((step, moved));
+        }
+        let runs: Vec<Run<'_>> = models
+            .iter()
+            .map(|(_, moved)| Run {
+                near: Some(&model.parameters),
+                ..Run::exact(stage, moved, trials)
+            })
+            .collect();
+        let mut sensitivities = Vec::new();
+        for (there, (step, _)) in compare.runs.run_many(&runs).into_iter().zip(&models) {
+            match there {
+                Ok(there) => {
+                    let change = change(compare, stage, &output, there, *step);
+                    sensitivities.push(compare.metrics[stage].column(&compare.roles, change));
+                }
+                Err(error) if error.ends_all() => return Err(error),
+                // What cannot be simulated a fit does not reach either.
+                Err(_) => {}
+            }
+        }
+        let n = sensitivities.len();
+        let normal = DMatrix::from_fn(n, n, |i, j| {
+            let prior = if i == j { compare.roles.block as f64 } else { 0.0 };
+            compare.product(stage, &sensitivities[i], &sensitivities[j]) + prior
+        });
+        Ok(Self { output, sensitivities, factor: Cholesky::of(normal) })
+    }
+}
+
+/// Change of an output for one step, in multiples of the noise.
+fn change(
+    compare: &Comparison<'_>,
+    stage: usize,
+    here: &[f64],
+    mut there: Vec<f64>,
+    step: f64,
+) -> Vec<f64> {
+    let sds = &compare.metrics[stage].noise.sd;
+    for ((x, here), sd) in there.iter_mut().zip(here).zip(sds) {
+        *x = (*x - here) / (sd * step);
+    }
+    there
 }

@@ -1,7 +1,8 @@
-//! Which slice every sample belongs to.
+//! Assigns every sample to a slice.
 //!
-//! Level and rate come from the measured motion by a straight line over 21 samples, whose slope has the standard deviation
-//! sigma/(dt sqrt(2 sum_1^10 k^2)) for noise sigma of one sample; motion slower than four of these is rest.
+//! Level and rate come from the measured motion by a straight line over 21 samples. The slope has
+//! the standard deviation sigma/(dt sqrt(2 sum_1^10 k^2)) for noise sigma of one sample; motion
+//! slower than four of these is rest.
 
 use stretch_filter::log::second_differences;
 
@@ -9,7 +10,7 @@ use stretch_data::ends;
 
 use crate::problem::{record_facts::Motion, sample_roles::SampleRoles, simulator::Simulator};
 
-/// Samples on each side that a rate is fitted over.
+/// Samples on each side over which a rate is fitted.
 const REACH: usize = 10;
 /// Time around a reversal that counts as turnaround, s.
 const TURN_S: f64 = 0.15;
@@ -20,18 +21,18 @@ const MOVING: f64 = 0.02;
 /// Ends of the slices of time in a trial, s.
 const TIMES_S: [f64; 6] = [1.0, 3.0, 7.0, 15.0, 30.0, 60.0];
 
-/// One way to cut the samples; those of no slice hold [`Axis::NONE`].
+/// One division of the samples; samples outside all slices hold [`Axis::NONE`].
 pub(super) struct Axis {
     pub(super) by: &'static str,
     pub(super) labels: Vec<String>,
     pub(super) of: Vec<u16>,
 }
 
-/// The motion that the slices go by.
+/// The motion by which samples are divided.
 pub(super) struct Course {
     level: Vec<f64>,
     rate: Vec<f64>,
-    /// Rate below which nothing moves.
+    /// Rate below which the motion is at rest.
     still: f64,
     /// Distance travelled since the session began.
     travel: Vec<f64>,
@@ -66,7 +67,7 @@ impl Course {
         let mut travel = Vec::with_capacity(samples);
         let (mut sum, mut last, mut next) = (0.0, level.first().copied().unwrap_or(0.0), 0);
         for (i, (&x, r)) in level.iter().zip(&rate).enumerate() {
-            // What moved in the pause counts, too.
+            // Motion during the pause counts as well.
             if starts[next] == i {
                 sum += f64::abs(x - last);
                 next += 1;
@@ -247,7 +248,7 @@ impl Axis {
     }
 }
 
-/// Three significant digits.
+/// Rounds to three significant digits.
 fn short(x: f64) -> String {
     let digits = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
     format!("{x:.*}", (2 - digits).clamp(0, 6) as usize)
@@ -304,7 +305,7 @@ mod tests {
         assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
     }
 
-    /// A course at 100 Hz that goes by these rates a second, from 0, without noise.
+    /// A noise-free course at 100 Hz with these rates per second, from 0.
     fn course(rate: Vec<f64>) -> Course {
         let mut at = 0.0;
         let level = rate
@@ -328,13 +329,14 @@ mod tests {
     #[test]
     fn a_reversal_lies_where_the_motion_turns() {
         let triangle = course([vec![1.0; 100], vec![-1.0; 100], vec![1.0; 50]].concat());
-        // Half-way between the last sample before and the first behind.
+        // Half-way between the last sample before and the first sample after the turn.
         assert_eq!(triangle.reversals(0.01), [99, 199]);
         assert!(course(vec![1.0; 100]).reversals(0.01).is_empty());
         assert!(course(vec![0.0; 100]).reversals(0.01).is_empty());
     }
 
-    /// A pause is no reversal where it goes on the same way; a long one before it goes back is a dwell, and the turn is at its end.
+    /// A pause is no reversal if the motion continues in the same direction. A long pause before a
+    /// reversal is a dwell, and the turn is at its end.
     #[test]
     fn pauses_are_told_from_turns() {
         let paused = |pause: usize, then: f64| {
@@ -349,7 +351,7 @@ mod tests {
     fn trials_turn_by_themselves() {
         let mut two = course([vec![1.0; 100], vec![-1.0; 100]].concat());
         two.starts = vec![0, 100, 200];
-        // The one rises, the next falls: between them nothing turned.
+        // One trial rises, the next falls: there is no turn between them.
         assert!(two.reversals(0.01).is_empty());
     }
 
@@ -367,7 +369,7 @@ mod tests {
         }
         assert!(axis.of[400..].iter().all(|of| *of == Axis::NONE));
         assert!(axis.labels[0].starts_with("1.00 to ") && axis.labels[0].ends_with(" mm/s"));
-        // What never moves has no rates to cut.
+        // A constant signal has no rates to divide.
         let still = Axis::rate(&course(vec![0.0; 50]), "");
         assert!(still.of.iter().all(|of| *of == Axis::NONE));
     }
@@ -382,7 +384,8 @@ mod tests {
         );
         let count = |slice: u16| axis.of.iter().filter(|of| **of == slice).count();
         assert_eq!([0, 1, 2, 3, 4].map(count), [20, 20, 20, 20, 21]);
-        // What lies outside goes to the nearest; a range of nothing, or of nonsense, is not cut.
+        // Values outside the range go to the nearest slice; an empty or invalid range is not
+        // divided.
         let out = Axis::even("level", &[-5.0, 50.0], 0.0, 10.0, 5, short, "");
         assert_eq!(out.of, [0, 4]);
         for high in [0.0, f64::NAN, f64::INFINITY] {

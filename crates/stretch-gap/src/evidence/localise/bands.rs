@@ -7,7 +7,7 @@ use crate::problem::sample_roles::SampleRoles;
 
 /// Samples of a window; neighbours overlap by half.
 const WINDOW: usize = 512;
-/// Octaves counted down from half the sample rate; the last takes all that is below.
+/// Octaves counted down from half the sample rate; the last holds all lower frequencies.
 const BANDS: usize = 8;
 
 /// Power in octave bands by window (Welch's method with Hann's window): white noise of one multiple has power 1 in
@@ -57,7 +57,7 @@ fn band(line: usize) -> usize {
     (1..BANDS).take_while(|b| line <= (WINDOW / 2) >> b).count()
 }
 
-/// Discrete Fourier transform in place of a power of two of values (Cooley and Tukey).
+/// In-place discrete Fourier transform of a power of two of values (Cooley and Tukey).
 fn transform(x: &mut [(f64, f64)]) {
     let n = x.len();
     let mut j = 0;
@@ -155,7 +155,8 @@ mod tests {
             let lines = |b: usize| if b + 1 == BANDS { 3.0 } else { f64::from(128 >> b) };
             let all: f64 = power.iter().enumerate().map(|(b, p)| p * lines(b)).sum();
             let own = power[band] * lines(band) / all;
-            // The narrowest octave has two lines, a third of the window's width hangs over its edges.
+            // The narrowest octave has two lines, and a third of the window's width extends over
+            // its edges.
             let least = if band < BANDS - 3 { 0.99 } else { 0.6 };
             assert!(own > least, "{hertz} Hz: {own} of {power:?}");
         }

@@ -1,7 +1,8 @@
-//! The place of a gap is that of its cause, once there is one.
+//! Once there is a named cause, a gap is located at the place of its cause.
 //!
-//! A potentiometer that is not linear shows in the voltage, too, for the length that a gauge is driven by is what the potentiometer says. So what a
-//! named effect closes belongs to the stage of the effect, and what is left to the stage that leaves it:
+//! A non-linear potentiometer also shows in the voltage, because the gauge is driven by the
+//! potentiometer's length. Therefore what a named effect closes belongs to the stage of the effect,
+//! and what is left belongs to the stage that leaves it:
 //!
 //! ```text
 //! share_s = (sum of what named effects of s close + max(0, e_s left)/e)/sum of the same over all stages
@@ -14,10 +15,10 @@ use crate::{
     problem::{simulator::Simulator, spec::EffectSpec},
 };
 
-/// Name of the stage in which lengths are measured, which no simulator has as one of its own.
+/// Name of the stage in which lengths are measured. No simulator has this stage.
 const REFERENCE: &str = "reference";
 
-/// Stages with the shares of what is caused in them; as they were where nothing is named.
+/// Stages with the shares of what is caused in them; unchanged if nothing is named.
 pub(crate) fn with_causes(
     mut stages: Vec<StageGap>,
     shares: &[EffectShare],
@@ -45,7 +46,8 @@ pub(crate) fn with_causes(
     stages
 }
 
-/// Index of the stage that an effect belongs to; one that the simulator has not is added behind its own.
+/// Index of the stage that an effect belongs to. A stage that the simulator lacks is added after
+/// its own stages.
 fn place(stages: &mut Vec<StageGap>, spec: &EffectSpec) -> Option<usize> {
     let shows = *spec.touches.first()?;
     let is_own = spec.stage == REFERENCE;
@@ -94,7 +96,7 @@ mod tests {
         EffectShare { effect: effect.into(), closes, closes_excess: closes, at_bound: false }
     }
 
-    /// Effects of a toy of two stages, and one of the reference that shows in both.
+    /// Effects of a toy with two stages, and one of the reference that shows in both.
     #[test]
     fn a_gap_lies_where_its_cause_does() {
         let mut toy = Toy::of(&[Law::Lag, Law::Line]);

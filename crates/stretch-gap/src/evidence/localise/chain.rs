@@ -1,29 +1,30 @@
-//! The stages run one on the other: who causes the gap of the last output.
+//! Runs the stages in a chain: which stage causes the gap of the last output.
 //!
-//! Errors of a stage pass through those behind it, so shares depend on the order in which stages are corrected. The Shapley value (1953,
-//! doi 10.1515/9781400881970-018) averages over all orders,
+//! Errors of a stage pass through the following ones, so shares depend on the order in which stages
+//! are corrected. The Shapley value (1953, doi 10.1515/9781400881970-018) averages over all orders,
 //!
 //! ```text
 //! phi_s = sum over sets T without s of |T|! (n - |T| - 1)!/n! (gap(T + s) - gap(T))
 //! ```
 //!
-//! where gap(T) is the mean square error of the last output with the stages of T simulated and the others corrected by what they get
-//! wrong on their measured input.
+//! where gap(T) is the mean square error of the last output with the stages of T simulated and the
+//! others corrected by their errors on their measured input.
 
 use crate::{
     evidence::gathered::Evidence,
     problem::{error::GapError, runs::Runs, sample_roles::Role, simulator::Run},
 };
 
-/// A variant of what one stage hands to the next.
+/// One variant of the output that a stage passes to the next.
 struct Variant {
-    /// Stages that are simulated, a bit each; the others are corrected.
+    /// Stages that are simulated, one bit each; the others are corrected.
     simulated: usize,
-    /// Values; none where they are the measured ones.
+    /// Values; `None` if they are the measured ones.
     output: Option<Vec<f64>>,
 }
 
-/// Share of every stage; empty where a stage cannot be run on another's output or there is nothing to share.
+/// Share of every stage; empty if a stage cannot be run on another's output or there is nothing to
+/// share.
 pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, GapError> {
     let simulator = runs.simulator();
     let stages = simulator.stages().len();
@@ -35,7 +36,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
     let mut variants = vec![Variant { simulated: 0, output: None }];
     for stage in 0..stages {
         let alone = &evidence.stages[stage].retuned;
-        // What a correction is added to: the measurement as the next stage is fed with it.
+        // Base of a correction: the measurement as it is fed to the next stage.
         let base = match stage + 1 {
             next if next == stages => Some(simulator.measured(stage).to_vec()),
             next => simulator.driven().and_then(|d| d.input(next)),
@@ -116,7 +117,7 @@ mod tests {
         }
     }
 
-    /// What every set of three players is worth, by a rule on who is in it.
+    /// The value of every set of three players, by a rule on its members.
     fn game(worth: impl Fn([bool; 3]) -> f64) -> Vec<f64> {
         (0..8).map(|set: usize| worth([set & 1 != 0, set & 2 != 0, set & 4 != 0])).collect()
     }
@@ -134,7 +135,7 @@ mod tests {
         assert_relative_eq!(found.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
     }
 
-    /// Where errors do not meet, every stage has what it makes alone.
+    /// If errors are independent, every stage has the share that it makes alone.
     #[test]
     fn independent_errors_are_shared_as_they_are() {
         let alone = [5.0, 0.25, 2.0];
@@ -145,7 +146,8 @@ mod tests {
         }
     }
 
-    /// Values of random games: the sum is the worth of all minus that of none, twins share alike, names do not matter, and neither does the unit.
+    /// Random games: the shares sum to the value of all minus that of none, equal players share
+    /// equally, and neither names nor the unit matter.
     #[test]
     fn shares_do_not_depend_on_names_or_units() {
         let mut random = crate::numerics::random::RandomGenerator::new(1, 0);
@@ -155,7 +157,7 @@ mod tests {
             let own = shares(&worth, 3);
             assert_relative_eq!(own.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
             let scaled: Vec<f64> = worth.iter().map(|w| 1e6 * w).collect();
-            // The first and the last stage change places: bits 0 and 2 of every set.
+            // Exchanges the first and the last stage: bits 0 and 2 of every set.
             let swap = |set: usize| set & 2 | (set & 1) << 2 | set >> 2;
             let swapped: Vec<f64> = (0..8).map(|set| worth[swap(set)]).collect();
             let (scaled, swapped) = (shares(&scaled, 3), shares(&swapped, 3));
@@ -166,7 +168,8 @@ mod tests {
         }
     }
 
-    /// A stage whose error makes up for another's has no negative share, and nothing has a share of nothing.
+    /// A stage whose error compensates for another's has no negative share, and nothing has a share
+    /// of nothing.
     #[test]
     fn no_share_is_negative() {
         let helps = game(|[a, b, _]| if a && !b { 4.0 } else { f64::from(u8::from(a)) });

@@ -5,11 +5,11 @@ use crate::{
     fit::score::excess, numerics::random::RandomGenerator, problem::sample_roles::SampleRoles,
 };
 
-/// Share of false discoveries allowed among the slices that stand out.
+/// False-discovery rate that is allowed among the reported slices.
 const FALSE_DISCOVERIES: f64 = 0.05;
 /// Draws of the bootstrap.
 const DRAWS: usize = 200;
-/// Blocks that a slice needs before it can stand out.
+/// Blocks that a slice needs before it can be reported.
 const LEAST_BLOCKS: usize = 6;
 
 /// Sums of squares and counts by block and slice.
@@ -108,7 +108,8 @@ impl Cells {
         sums
     }
 
-    /// Probability that a slice like the rest is this much worse, by the linearised variance of a ratio of block sums.
+    /// Probability that a slice like the rest is this much worse, by the linearised variance of a
+    /// ratio of block sums.
     fn p_value(&self, slice: usize, own: (f64, f64), whole: (f64, f64)) -> f64 {
         let rest = (whole.0 - own.0, whole.1 - own.1);
         if rest.1 <= 0.0 {
@@ -131,7 +132,7 @@ impl Cells {
     }
 }
 
-/// Which hypotheses fall at the level of false discoveries allowed.
+/// The hypotheses that are rejected at the allowed false-discovery rate.
 pub(super) fn discoveries(p: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
@@ -180,7 +181,7 @@ mod tests {
         assert_eq!(cells.sliced(1, 0), sliced);
     }
 
-    /// Cells of `blocks` blocks of 25 samples in each slice, of the standard deviations given.
+    /// Cells of `blocks` blocks of 25 samples in each slice, with the given standard deviations.
     fn drawn(sds: &[f64], blocks: usize, random: &mut RandomGenerator) -> Cells {
         let mut cells = Vec::new();
         for _ in 0..blocks {
@@ -197,14 +198,16 @@ mod tests {
         let sum: f64 = sliced.iter().map(|s| s.share).sum();
         approx::assert_relative_eq!(sum, 1.0, max_relative = testkit::tolerance::F64_ROUNDING);
         assert_eq!((sliced[1].share, sliced[1].excess < 0.0), (0.0, true));
-        // A gap of 1.25 beside one of 8; sums of 1500 squares are known to 4 %, the ratio to 6 %: three of these.
+        // Gaps of 1.25 and 8; sums of 1500 squares are known to 4 %, the ratio to 6 %: three of
+        // these.
         approx::assert_relative_eq!(sliced[0].share, 1.25 / 9.25, max_relative = 0.2);
         for s in &sliced {
             assert!(s.interval[0] <= s.excess && s.excess <= s.interval[1], "{s:?}");
         }
     }
 
-    /// Two slices are each other's rest: what the one is worse than, the other is better than, with the same variance.
+    /// With two slices each is the rest of the other: one is worse by what the other is better,
+    /// with the same variance.
     #[test]
     fn of_two_slices_one_p_value_is_the_others_complement() {
         let mut random = RandomGenerator::new(2, 0);
@@ -214,7 +217,8 @@ mod tests {
         }
     }
 
-    /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard deviation 4.4; three of these to either side.
+    /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard
+    /// deviation 4.4; three of these to either side.
     #[test]
     fn p_values_are_as_rare_as_they_say() {
         let mut random = RandomGenerator::new(3, 0);
@@ -223,8 +227,9 @@ mod tests {
         assert!((7..=33).contains(&rare), "{rare} of 400");
     }
 
-    /// Of 300 intervals 285 should hold the truth; a percentile bootstrap of 60 blocks holds some 93 %. Four standard deviations, 4.4 each,
-    /// below 280; an interval that always holds says nothing.
+    /// Of 300 intervals 285 should hold the truth; a percentile bootstrap of 60 blocks holds about
+    /// 93 %. The lower limit is four standard deviations, 4.4 each, below 280; an interval that
+    /// always holds would be useless.
     #[test]
     fn intervals_of_an_excess_hold_it() {
         let mut random = RandomGenerator::new(4, 0);
@@ -251,11 +256,12 @@ mod tests {
         let cells = (0..20).flat_map(|_| [(30.0, 25.0), (0.0, 0.0)]).collect();
         let sliced = Cells::new(2, cells).sliced(1, 0);
         assert_eq!(sliced[1], Sliced { share: 0.0, excess: 0.0, interval: [0.0; 2], p: 1.0 });
-        // The only slice that there is has no rest to stand out from.
+        // A single slice has no rest to be compared with.
         assert_eq!((sliced[0].share, sliced[0].p), (1.0, 1.0));
     }
 
-    /// Samples count once, in the block and the slice that they lie in; those of no slice and those of no segment count nowhere.
+    /// Samples count once, in their block and slice. Samples outside all slices or segments do not
+    /// count.
     #[test]
     fn samples_are_summed_by_block_and_slice() {
         use crate::problem::sample_roles::{Role, Segment};
@@ -284,8 +290,8 @@ mod tests {
         assert_eq!(cells.cells, expected.concat());
     }
 
-    /// Whatever stands above Bonferroni's limit stands above this one, nothing above 0.05 does, and a smaller p never falls where a larger one
-    /// stands; the order does not matter.
+    /// Every p-value below Bonferroni's limit is a discovery, and none above 0.05 is. If a p-value
+    /// is a discovery, every smaller one is too. The order does not matter.
     #[test]
     fn discoveries_lie_between_bonferroni_and_the_level() {
         let mut random = RandomGenerator::new(6, 0);
@@ -306,8 +312,9 @@ mod tests {
         }
     }
 
-    /// Where nothing is there, something is found in 5 of 100 records exactly (their theorem, for independent p-values): of 2000 in 100, standard
-    /// deviation 9.7; three of these to either side.
+    /// If nothing is present, something is found in 5 of 100 records exactly (their theorem, for
+    /// independent p-values): of 2000 in 100, standard deviation 9.7; three of these to either
+    /// side.
     #[test]
     fn false_discoveries_are_as_rare_as_allowed() {
         let mut random = RandomGenerator::new(7, 0);
@@ -319,8 +326,8 @@ mod tests {
         assert!((71..=129).contains(&alarms), "{alarms} of 2000");
     }
 
-    /// Twenty of forty are real: of what is found, 0.05 times 20/40 are false on average. The share in one record spreads by some 0.035, its mean
-    /// over 500 by 0.0016: five of these.
+    /// Twenty of forty are real, so 0.05 times 20/40 of the findings are false on average. The
+    /// share in one record spreads by about 0.035, its mean over 500 by 0.0016: five of these.
     #[test]
     fn among_true_ones_few_are_false() {
         let mut random = RandomGenerator::new(8, 0);
@@ -339,7 +346,7 @@ mod tests {
             true_share += right / 20.0 / 500.0;
         }
         assert!((false_share - 0.025).abs() < 0.008, "{false_share}");
-        // Four standard deviations stand beyond the limit of some 0.025, 1.96, with probability 0.98.
+        // Four standard deviations exceed the limit of about 0.025, 1.96, with probability 0.98.
         assert!(true_share > 0.95, "{true_share}");
     }
 }

@@ -1,4 +1,4 @@
-//! Where the gap sits, as a diagnosis lists it.
+//! The location of the gap in a diagnosis.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,24 +9,26 @@ pub struct StageGap {
     pub stage: String,
     /// Output channel.
     pub channel: String,
-    /// Share of the gap of the re-tuned nominal that has its cause here: what named effects of this stage close, and what is left in it.
+    /// Share of the gap of the re-tuned nominal simulator whose cause is here: what named effects
+    /// of this stage close, and what is left in it.
     pub share: f64,
     /// Excess with the parameters as shipped.
     pub raw: f64,
-    /// Excess of the re-tuned nominal.
+    /// Excess of the re-tuned nominal simulator.
     pub excess: f64,
     /// Excess with the named (or best) effects.
     pub after: f64,
-    /// Root mean square of what the re-tuned nominal leaves, nuisance taken out.
+    /// Root mean square of the residual of the re-tuned nominal simulator, without its nuisances.
     pub rms: f64,
     /// Noise, one standard deviation.
     pub floor: f64,
-    /// Where the noise is known from.
+    /// Source of the noise.
     pub floor_source: String,
     /// Unit of the two.
     pub unit: String,
-    /// Whether the simulator has no such stage, and only the cause of the gap lies there: in the reference that lengths are measured by. What
-    /// is told of it is what its effects close in the channels where they show.
+    /// Whether the simulator has no such stage and only the cause of the gap lies there, in the
+    /// reference that measures lengths. Its figures are what its effects close in the channels
+    /// where they show.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_cause_only: bool,
 }
@@ -46,11 +48,11 @@ pub struct SliceGap {
     pub excess: f64,
     /// 95 % interval of the excess.
     pub excess_ci: [f64; 2],
-    /// Whether it stands out after a false-discovery correction.
+    /// Whether it is significant after a false-discovery correction.
     pub stands_out: bool,
 }
 
-/// Share of one stage when the stages run one on the other.
+/// Share of one stage when the stages run in a chain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageShare {
     /// Stage.
@@ -59,20 +61,21 @@ pub struct StageShare {
     pub share: f64,
 }
 
-/// Where the gap sits.
+/// Location of the gap.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Where {
     /// Gap of every stage.
     pub stages: Vec<StageGap>,
     /// Gap of every slice of the trials.
     pub slices: Vec<SliceGap>,
-    /// By stage in the gap of the last output, when nothing but the commands is given; empty where the stages cannot be run one on the other.
+    /// Shares of the stages in the gap of the last output, if only the commands are given. Empty if
+    /// the stages cannot be run in a chain.
     #[serde(default)]
     pub end_to_end: Vec<StageShare>,
 }
 
 impl Where {
-    /// The stage of the simulator with the largest gap; none without a stage.
+    /// The stage of the simulator with the largest gap; `None` without a stage.
     pub fn worst(&self) -> Option<usize> {
         let stages = self.stages.iter().enumerate().filter(|(_, s)| !s.is_cause_only);
         stages.max_by(|a, b| a.1.excess.total_cmp(&b.1.excess)).map(|(i, _)| i)

@@ -1,4 +1,4 @@
-//! Where the gap sits: by regime, level, rate, frequency, time and trial, and by stage from end to end.
+//! Locates the gap: by regime, level, rate, frequency, time and trial, and by stage in the chain.
 
 mod axes;
 mod bands;
@@ -18,12 +18,12 @@ use crate::{
 use axes::{Axis, Course};
 use excess::{Cells, Sliced};
 
-/// Cuts the residual of the re-tuned nominal, over all trials, along every axis.
+/// Divides the residual of the re-tuned nominal simulator, over all trials, along every axis.
 ///
-/// The excess of a slice is the mean square in it, in multiples of the noise, minus 1; its interval is a bootstrap over blocks of
-/// 0.5 s (over windows for frequency bands). A slice stands out when its excess is above 0 and above that of the
-/// rest of the stage, after Benjamini and Hochberg's correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over
-/// all slices.
+/// The excess of a slice is the mean square in it, in multiples of the noise, minus 1. Its interval
+/// is a bootstrap over blocks of 0.5 s (over windows for frequency bands). A slice is significant
+/// if its excess is above 0 and above that of the rest of the stage, after Benjamini and Hochberg's
+/// correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over all slices.
 pub(crate) fn slices(
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -70,13 +70,13 @@ pub(crate) fn slices(
         .collect()
 }
 
-/// Share of every stage in the gap of the last output when the stages run one on the other, by Shapley value.
+/// Shapley value of every stage in the gap of the last output when the stages run in a chain.
 ///
-/// A stage outside the set is corrected by what it gets wrong on its measured input, so that errors of the
-/// stages before it still pass through it. Empty where a stage cannot be run on another's output.
+/// A stage outside the set is corrected by its errors on its measured input, so that errors of
+/// previous stages still pass through it. Empty if a stage cannot be run on another's output.
 ///
 /// # Errors
-/// What the simulator says.
+/// Errors of the simulator.
 pub(crate) fn end_to_end(
     runs: &Runs<'_>,
     evidence: &Evidence,

@@ -1,4 +1,5 @@
-//! A line is linear in its parameters: its maximum a posteriori is a ridge regression that nalgebra solves.
+//! A line is linear in its parameters: its maximum a posteriori is a ridge regression that nalgebra
+//! solves.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,16 +10,16 @@ use crate::{
     toys::{Law, Measured, Toy},
 };
 
-/// Of a tolerance. Each of the two fits of a preparation ends on a step damped by a thousandth, so that it leaves no more than that of a
-/// way of three tolerances: 3e-6.
+/// Relative to a tolerance. Each of the two fits of a preparation ends on a step damped by a
+/// thousandth, so it leaves at most that share of a way of three tolerances: 3e-6.
 const DAMPED: f64 = 1e-5;
 /// Relative: sensitivities are differences of outputs near 1 over steps of 0.03 tolerances of 0.05, each rounded by 1e-16.
 const DIFFERENCED: f64 = 1e-9;
 
 /// Minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2 over the fitted samples that count, a = (x, 1), and the covariance there.
 ///
-/// With an offset of standard deviation `offset` in each trial, sigma^2 I becomes sigma^2 I + offset^2 11', inverted as Sherman and
-/// Morrison do.
+/// With an offset of standard deviation `offset` in each trial, sigma^2 I becomes sigma^2 I +
+/// offset^2 11', inverted by the formula of Sherman and Morrison.
 fn ridge(
     record: &Measured,
     counts: impl Fn(usize) -> bool,
@@ -76,7 +77,8 @@ fn re_tuning_a_line_is_ridge_regression() {
     }
 }
 
-/// What was not measured counts for nothing, whatever stands in its place, and so does a sample that stands alone.
+/// Samples that were not measured do not count, whatever their value, and neither do isolated
+/// outliers.
 #[test]
 fn samples_that_do_not_count_are_left_out_of_the_regression() {
     let mut toy = Toy::of(&[Law::Line]).off_by(&[1.0, -1.0]);
@@ -89,13 +91,14 @@ fn samples_that_do_not_count_are_left_out_of_the_regression() {
     let spiked = [130, 777, 1500, 2222];
     for i in spiked {
         assert!(!is_lost(i));
-        // thirty deviations: one of eight stands alone
+        // thirty deviations at one isolated sample of eight
         record.outputs[0][i] += 0.3;
     }
     assert_agrees(&record, |i| !is_lost(i) && !spiked.contains(&i), 0.0);
 }
 
-/// An offset in each trial is a nuisance: what the trials' means say of the zero is worth three numbers, not three thousand.
+/// An offset in each trial is a nuisance: the trials' means determine the zero by three numbers,
+/// not by three thousand.
 #[test]
 fn offsets_by_trial_are_marginalised_as_generalised_least_squares_does() {
     let mut toy = Toy::of(&[Law::Line]).off_by(&[0.5, 0.5]);
@@ -105,7 +108,8 @@ fn offsets_by_trial_are_marginalised_as_generalised_least_squares_does() {
     assert_agrees(&toy.measured(4), |_| true, 0.02);
 }
 
-/// Beyond three tolerances a parameter stays at the end of them; the other one is then a regression by itself.
+/// Beyond three tolerances a parameter stays at the bound; the other one is then a separate
+/// regression.
 #[test]
 fn a_parameter_is_held_at_three_tolerances() {
     for side in [-1.0, 1.0] {
@@ -133,7 +137,8 @@ fn exact_parameters_and_bounds_are_kept() {
     assert_eq!(found, [0.96, toy.parameters[1].nominal]);
 }
 
-/// A line has no memory: cut in two, a trial says the same. Sums are taken in another order, so that bits may differ.
+/// A line has no memory, so cutting a trial in two changes nothing. Sums are computed in another
+/// order, so bits may differ.
 #[test]
 fn cutting_a_trial_of_a_line_in_two_changes_nothing() {
     let toy = Toy::of(&[Law::Line]).off_by(&[1.5, -0.5]);
@@ -161,7 +166,7 @@ fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     let expected = fitted.clone().map(square).sum::<f64>() / fitted.len() as f64;
     let misfit = &problem.nominal.misfits[0];
     approx::assert_relative_eq!(misfit.fit, expected, max_relative = DIFFERENCED);
-    // No trial is so long that it lends a part to be held out.
+    // No trial is long enough for a held-out part.
     assert_eq!(misfit.held, 1.0);
     approx::assert_relative_eq!(
         problem.gap_in(&problem.nominal, 0),
@@ -170,7 +175,8 @@ fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     );
 }
 
-/// What was not measured counts for nothing: of 2400 samples that were, three standard errors sqrt(2/2400).
+/// Samples that were not measured do not count: of 2400 samples that were, three standard errors
+/// sqrt(2/2400).
 #[test]
 fn a_misfit_is_a_mean_over_what_was_measured() {
     let mut toy = Toy::of(&[Law::Line]);

@@ -1,4 +1,5 @@
-//! Slow drift marginalised out, beside dense matrices; its size and its correlation time found in the record.
+//! Slow drift marginalised out, compared with dense matrices; its size and correlation time
+//! estimated from the record.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +10,7 @@ use crate::{
     toys::{Law, Toy, slow},
 };
 
-/// Relative: a dense factor of 250 rows of condition up to 1e4 beside one of a few knots.
+/// Relative: a dense factor of 250 rows with condition up to 1e4, against one of a few knots.
 const DENSE: f64 = 1e-9;
 /// Samples between knots of a drift: 0.1 s.
 const KNOT: usize = 10;
@@ -60,7 +61,7 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
             expected,
             max_relative = DENSE
         );
-        // What is left of a residual without its most likely drift is V^-1 of it.
+        // The residual without its most likely drift is V^-1 of it.
         let mut cleaned = x.as_slice().to_vec();
         metric.clean(roles, &mut cleaned);
         let expected = factor.solve(&x);
@@ -68,7 +69,8 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
     }
 }
 
-/// The re-tuned line beside a drift of its zero, by generalised least squares with the dense covariance.
+/// The re-tuned line with a drift of its zero, by generalised least squares with the dense
+/// covariance.
 #[test]
 fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let samples = 245;
@@ -89,13 +91,14 @@ fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let right = weighted.transpose() * (measured - &a * &start) / 50.0;
     let expected = start + normal.cholesky().expect("definite").solve(&right);
     for (p, spec) in toy.parameters.iter().enumerate() {
-        // As a fit without drift: it ends on a step damped by a thousandth.
+        // As in a fit without drift: it ends on a step damped by a thousandth.
         assert!((found[p] - expected[p]).abs() < 1e-5 * spec.sd, "{found:?} {expected}");
     }
 }
 
-/// Three trials of 29 s hold 15 to 60 correlation times, which tell a size to a tenth and a time to some thirty per cent; sizes are tried in
-/// steps of up to 1.75, times in steps of up to 2.5, so that the neighbour of the right one may win and none beyond it.
+/// Three trials of 29 s hold 15 to 60 correlation times, which determine a size to a tenth and a
+/// time to about thirty per cent. Sizes are tried in steps of up to 1.75, times in steps of up to
+/// 2.5, so the neighbour of the right one may win and none beyond it.
 #[test]
 fn size_and_time_of_a_drift_are_found_to_the_next_that_is_tried() {
     let described = SlowDrift { sd: 0.05, correlation_s: 3.0 };

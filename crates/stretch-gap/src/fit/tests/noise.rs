@@ -1,4 +1,4 @@
-//! Noise of the measured input that arrives at an output, beside the variance that theory gives it.
+//! Noise of the measured input that arrives at an output, compared with the variance from theory.
 
 use super::prepared;
 use crate::{
@@ -39,19 +39,21 @@ fn noise_of_the_input_arrives_as_theory_says() {
     assert_eq!(root_mean_square(&quiet, 0), 0.01);
 }
 
-/// An error in variables is no gap: with the noise that is transmitted in it, the reduced chi-square is one.
+/// An error in variables is no gap: with the transmitted noise included, the reduced chi-square is
+/// one.
 #[test]
 fn an_input_that_is_noisy_leaves_no_gap() {
     for law in [Law::Line, Law::Lag, Law::Oscillator] {
         let toy = Toy { input_noise: 0.03, ..Toy::of(&[law]) };
         let record = toy.measured(2);
         let problem = prepared(&record);
-        // 3000 samples of neighbours that are alike over ten: sqrt(2/300) = 0.08, three of them.
+        // 3000 samples that are correlated over ten: sqrt(2/300) = 0.08, three of them.
         approx::assert_abs_diff_eq!(problem.nominal.misfits[0].fit, 1.0, epsilon = 0.25);
     }
 }
 
-/// Where nothing is stated, the record's second differences tell its noise: 1.6/sqrt(3000) of it is one standard error, five of them.
+/// If no noise is stated, the record's second differences determine it: 1.6/sqrt(3000) of it is one
+/// standard error, five of them.
 #[test]
 fn noise_that_is_not_stated_comes_from_the_record() {
     for law in [Law::Line, Law::Lag, Law::Oscillator] {
@@ -64,7 +66,8 @@ fn noise_that_is_not_stated_comes_from_the_record() {
     }
 }
 
-/// Four samples a turn: second differences of the record hold the motion itself, those of what the true law leaves hold the noise.
+/// Four samples per turn: second differences of the record hold the motion itself, those of the
+/// residual of the true law hold the noise.
 #[test]
 fn motion_that_is_quick_is_no_noise() {
     let toy = Toy { dt_s: 0.25, noise: 0.01, stated: None, ..Toy::of(&[Law::Oscillator]) };

@@ -1,11 +1,11 @@
-//! Jitter of a known size put into records, and records without any.
+//! Jitter of a known size added to records, and records without any.
 
 use super::jitter_sd_s;
 use crate::numerics::random::RandomGenerator;
 
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 3000;
-/// Noise of the sensor, which is the unit of all records here.
+/// Amplitude of the signal in multiples of the sensor noise, which is the unit of all records here.
 const SIGNAL: f64 = 100.0;
 
 /// What a test record lacks.
@@ -14,11 +14,11 @@ enum Lack {
     Nothing,
     /// Time stamps that jitter, s.
     Jitter(f64),
-    /// It is late, s.
+    /// A delay, s.
     Late(f64),
-    /// Noise of a share of what is shown.
+    /// Noise proportional to the value.
     ByLevel(f64),
-    /// Jumps of that size, to and fro.
+    /// Jumps of that size, back and forth.
     Jumps(f64),
     /// A play of that width.
     Play(f64),
@@ -28,7 +28,7 @@ enum Lack {
 #[derive(Debug, Clone, Copy)]
 enum Noise {
     White,
-    /// Autoregressive of first order with that share kept, beside white noise.
+    /// Autoregressive of first order with that share kept, plus white noise.
     Coloured(f64),
 }
 
@@ -81,7 +81,7 @@ fn found(lack: Lack, noise: Noise, seed: u64) -> Option<f64> {
     jitter_sd_s(&stretches, &shown, DT_S, 0.5 * above)
 }
 
-/// Of 6,000 samples half move enough to show it: its variance is told to some 3 %.
+/// Half of 6,000 samples move enough to show it: its variance is estimated to about 3 %.
 #[test]
 fn jitter_is_told_with_its_size_in_white_noise() {
     for seed in 0..4 {
@@ -105,7 +105,7 @@ fn jitter_is_told_with_its_size_in_coloured_noise() {
     }
 }
 
-/// Of 96 records without jitter none is said to have any.
+/// None of 96 records without jitter is reported to have any.
 #[test]
 fn nothing_else_is_jitter() {
     let lacks = [

@@ -1,4 +1,4 @@
-//! What terms, the library and the weighing of sums do by themselves, on records whose every sample is known.
+//! Tests terms, the library and the weighing of sums alone, on records whose every sample is known.
 
 mod shelf;
 mod terms;
@@ -6,8 +6,7 @@ mod weighing;
 mod words;
 
 use crate::{
-    missing::term_inputs::{Signal, TermInputs},
-    numerics::differences::central,
+    missing::term_inputs::{Signal, TermInputs, central_differences},
     problem::sample_roles::{Role, SampleRoles, Segment},
 };
 use stretch_effects::Grid;
@@ -15,14 +14,14 @@ use stretch_effects::Grid;
 /// Sample time, s.
 const DT_S: f64 = 0.01;
 
-/// A signal on its own scale whose rate is that of central differences.
+/// A scaled signal whose rate is that of central differences.
 fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
-    let v = central(&x, DT_S);
+    let v = central_differences(&x, DT_S);
     let (name, unit) = (name.to_owned(), "mm".to_owned());
     Signal { name, unit, offset: 40.0, scale: 25.0, rate: 1.0, is_command, x, v }
 }
 
-/// Signals over trials of so many samples, a minute apart.
+/// Signals over trials of so many samples, one minute apart.
 fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
     let mut end = 0;
     let trials: Vec<std::ops::Range<usize>> = samples
@@ -42,7 +41,7 @@ fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
     }
 }
 
-/// Every trial fitted but for its last part.
+/// Every trial fitted except its last part.
 fn roles(samples: &[usize], held: usize) -> SampleRoles {
     let mut end = 0;
     let mut segments = Vec::new();

@@ -1,4 +1,4 @@
-//! The library as a whole: what it holds, and what it may not hold.
+//! The library as a whole: what it contains, and what it must not contain.
 
 use super::{inputs, roles, signal, wave};
 use crate::missing::{
@@ -33,7 +33,7 @@ fn no_term_stands_in_it_twice_and_each_has_its_words() {
         assert_eq!(told.len(), terms.len(), "a term twice would be paid for twice");
         let words: BTreeSet<String> = terms.iter().map(|t| words(t, &scales)).collect();
         assert!(words.iter().all(|w| !w.is_empty()));
-        // Shapes are told with three digits: none of these differs by less.
+        // Shapes are written with three digits; the smallest difference between these is larger.
         assert_eq!(words.len(), terms.len());
     }
 }
@@ -47,7 +47,7 @@ fn every_term_is_finite_on_what_is_recorded() {
     }
 }
 
-/// Signals that terms speak of exist, and shapes lie within what a refinement may reach.
+/// Signals of terms exist, and shapes are within the reach of a refinement.
 #[test]
 fn terms_speak_of_what_was_recorded() {
     let inputs = three();
@@ -71,13 +71,14 @@ fn what_leaks_through_openings_is_only_where_commands_drive() {
     let is_leak = |t: &Term| matches!(t.passage, Passage::Leak { .. });
     let of = |is_commanded| library(&inputs, &roles(&[300, 300], 0), is_commanded);
     assert!(!of(false).iter().any(is_leak) && of(true).iter().any(is_leak));
-    // One signal is never crossed with itself or with what was not recorded.
+    // A signal is never crossed with itself or with an unrecorded one.
     let alone = super::inputs(vec![signal("rod", wave(300), false)], &[300]);
     let terms = library(&alone, &roles(&[300], 0), false);
     assert!(terms.len() < of(false).len() / 2);
 }
 
-/// What the issue of a missing term is tested with: squares, cubes, products with the rate, sines, memories are on the shelf.
+/// The usual test cases of missing terms are in the library: squares, cubes, products with the
+/// rate, sines, memories.
 #[test]
 fn the_usual_causes_are_on_the_shelf() {
     use Factor::{Play, Power, Sine};
@@ -90,7 +91,7 @@ fn the_usual_causes_are_on_the_shelf() {
     assert!(holds(&[Play { signal: 0, width: 0.1 }]));
 }
 
-/// Knees lie where the fitted samples lie, not where the tested ones do.
+/// Knees are placed by the fitted samples, not by the test samples.
 #[test]
 fn quantiles_are_those_of_fitted_samples() {
     let x: Vec<f64> = (0..100).map(|i| if i < 60 { f64::from(i) / 59.0 } else { 50.0 }).collect();
@@ -102,7 +103,8 @@ fn quantiles_are_those_of_fitted_samples() {
     assert!((middle - 0.5).abs() < 0.02, "{middle}");
 }
 
-/// Where little was held out every third trial is: nothing is added or lost, and the last trials stay as they are.
+/// If little was held out, every third trial is used: nothing is added or lost, and the last trials
+/// do not change.
 #[test]
 fn terms_are_chosen_by_samples_that_were_not_fitted() {
     let enough = roles(&[400, 400, 400], 100);

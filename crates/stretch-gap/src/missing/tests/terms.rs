@@ -39,7 +39,8 @@ fn curves_are_what_their_equations_say() {
     }
 }
 
-/// Below the fitted range, where a power has no root and an exponential no end, a test trial may go: everything stays finite there.
+/// A test trial may go below the fitted range, where a power has no root and an exponential no
+/// bound: everything stays finite.
 #[test]
 fn below_its_range_a_signal_counts_as_its_least() {
     let x = [-0.5, -0.01, 0.0, 0.2];
@@ -71,7 +72,7 @@ fn forms_of_the_rate_are_even_or_odd_as_friction_is() {
     assert!((at(Sign, &x) - 1.0).abs() < 1e-8 && at(Striction, &x) < 0.04);
 }
 
-/// What a play of half-width w holds back: w behind a motion one way, nothing at the start.
+/// A play of half-width w lags w behind a motion in one direction, and not at all at the start.
 #[test]
 fn a_play_follows_its_width_behind() {
     let x: Vec<f64> = (0..200).map(|i| 0.005 * f64::from(i)).collect();
@@ -79,12 +80,12 @@ fn a_play_follows_its_width_behind() {
     assert_like(&held, x.iter().map(|x| x.min(0.1)));
 }
 
-/// A ramp of slope r is followed r tau behind once its start is forgotten.
+/// A lag follows a ramp of slope r with a distance of r tau once its start is forgotten.
 #[test]
 fn a_lag_of_a_ramp_is_its_slope_times_its_time() {
     let x: Vec<f64> = (0..2000).map(|i| 0.0005 * f64::from(i)).collect();
     let behind = of(Lag { signal: 0, tau_s: 0.5 }, &x);
-    // On straight lines between samples or on steps: half a sample of 10 ms apart.
+    // Linear interpolation and steps between samples differ by half a sample of 10 ms.
     let expected = 0.05 * 0.5;
     assert!((behind[1999] - expected).abs() <= 0.05 * 0.5 * DT_S + LOCAL_VALUE, "{}", behind[1999]);
     assert_eq!(behind[0], 0.0);
@@ -108,7 +109,7 @@ fn peaks_and_turns_remember_what_they_should() {
     assert_abs_diff_eq!(peak[314], 1.0, epsilon = 1e-3); // back at the bottom, as far as samples meet it
     let turned = of(Turned { signal: 0, width: 0.1 }, &x);
     assert!(turned.iter().all(|t| t.abs() <= 1.0));
-    // A whole way of 1 after the turn: sign times 1 - exp(-10).
+    // A way of 1 after the turn: sign times 1 - exp(-10).
     assert!(turned[150] > 0.999 && turned[310] < -0.999, "{} {}", turned[150], turned[310]);
 }
 
@@ -116,7 +117,7 @@ fn peaks_and_turns_remember_what_they_should() {
 fn travel_counts_both_ways_and_no_noise() {
     let x = wave(629); // two ways up, two down: 4 ranges
     let far = of(Travel { signal: 0, power: 1.0 }, &x);
-    // A play of a hundredth is behind at every turn: three turns and the end.
+    // A play of a hundredth lags at every turn: three turns and the end.
     assert!((far[628] - 4.0).abs() < 0.1, "{}", far[628]);
     assert!(far.windows(2).all(|pair| pair[0] <= pair[1]));
     let rest: Vec<f64> = (0..500).map(|i| 0.5 + 0.004 * f64::from(i % 3 - 1)).collect();
@@ -138,7 +139,7 @@ fn clocks_begin_with_the_trial_or_with_the_session() {
     assert_abs_diff_eq!(fade[100], (-1.0_f64).exp(), epsilon = LOCAL_VALUE);
 }
 
-/// What a trial remembers it forgets before the next: two trials alike have values alike, whatever went before.
+/// Memories are cleared between trials: two equal trials have equal values, whatever came before.
 #[test]
 fn memories_begin_anew_with_every_trial() {
     let x = [wave(300), wave(300)].concat();
@@ -158,13 +159,13 @@ fn memories_begin_anew_with_every_trial() {
         for passage in passages {
             let all = Term::new(&[factor], passage).values(&inputs, 2);
             assert_eq!(all[..300], all[300..], "{factor:?} {passage:?}");
-            // Of fewer trials the same.
+            // The same for fewer trials.
             assert_eq!(Term::new(&[factor], passage).values(&inputs, 1), all[..300]);
         }
     }
 }
 
-/// Nothing looks ahead: what comes later changes nothing before.
+/// Terms are causal: later samples change nothing before.
 #[test]
 fn no_term_looks_ahead() {
     let (x, mut other) = (wave(400), wave(400));
@@ -193,7 +194,7 @@ fn a_product_is_that_of_its_factors_and_nothing_is_one() {
     assert_like(&of(&[a, b]), product);
 }
 
-/// A lag and what it leaves are the whole; of a constant, from 0, the lag is 1 - exp(-t/tau).
+/// A lag and its remainder add up to the whole. For a constant, from 0, the lag is 1 - exp(-t/tau).
 #[test]
 fn passages_part_what_they_are_given() {
     let inputs = inputs(vec![signal("x", wave(300), false)], &[300]);
@@ -208,7 +209,8 @@ fn passages_part_what_they_are_given() {
     }
 }
 
-/// z' = g/tau - u z/tau: with everything shut it integrates, open it tends to g/u with the time tau/u.
+/// z' = g/tau - u z/tau: with everything shut it integrates, with valves open it tends to g/u with
+/// the time constant tau/u.
 #[test]
 fn a_leak_integrates_while_shut_and_forgets_while_open() {
     let with = |opening: f64| {
@@ -222,7 +224,7 @@ fn a_leak_integrates_while_shut_and_forgets_while_open() {
     assert_like(&shut, (1..=600).map(|i| f64::from(i) * DT_S / 0.5));
     let open = with(2.0);
     assert_like(&open, (1..=600).map(|i| 0.5 * (1.0 - (-f64::from(i) * DT_S * 2.0 / 0.5).exp())));
-    // More than all: an opening below nothing counts as shut.
+    // A negative opening counts as shut.
     assert_eq!(with(-1.0), shut);
 }
 

@@ -1,15 +1,16 @@
-//! Whether a sum is a function of what was recorded: the ridge, and the odds against noise that is coloured.
+//! Whether a sum is a function of what was recorded: the ridge, and the odds against coloured
+//! noise.
 
 use super::roles;
 use crate::{
     missing::{
         coloured::odds,
-        dense::{Rows, ridge},
+        sparse::{Rows, ridge},
     },
     numerics::random::RandomGenerator,
 };
 
-/// Rows of which the residual is 2 a - b plus noise; a, b and `idle` others are noise themselves.
+/// Rows whose residual is 2 a - b plus noise; a, b and `idle` other columns are noise themselves.
 fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> Rows {
     let columns: Vec<Vec<f64>> =
         (0..2 + idle).map(|_| (0..count).map(|_| random.gauss()).collect()).collect();
@@ -22,19 +23,21 @@ fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> 
 fn a_ridge_finds_weights_where_there_is_no_noise() {
     let mut random = RandomGenerator::new(1, 0);
     let weights = ridge(&rows(300, 3, 0.0, &mut random), &rows(100, 3, 0.0, &mut random));
-    // The smallest ridge is 1e-5 of the diagonal, which shrinks by as much; cross products of 300 draws add a tenth of that.
+    // The smallest ridge is 1e-5 of the diagonal, which shrinks the weights by as much; cross
+    // products of 300 draws add a tenth of that.
     for (weight, expected) in weights.iter().zip([2.0, -1.0, 0.0, 0.0, 0.0]) {
         assert!((weight - expected).abs() < 1e-4, "{weights:?}");
     }
 }
 
-/// Fifty-two columns on sixty rows: least squares leave nothing of the rows and foretell noise. The ridge that was chosen on samples held out
-/// leaves less of such samples than the smallest ridge does.
+/// Fifty-two columns on sixty rows: least squares leave nothing of the rows and predict noise. The
+/// ridge that was chosen on held-out samples leaves less of such samples than the smallest ridge
+/// does.
 #[test]
 fn a_ridge_shrinks_where_columns_are_many() {
     let mut random = RandomGenerator::new(2, 0);
     let (fit, held) = (rows(60, 50, 3.0, &mut random), rows(400, 50, 3.0, &mut random));
-    // Held against the rows that they were fitted to, weights do best without a ridge.
+    // On the rows that they were fitted to, weights are best without a ridge.
     let again = Rows { residual: fit.residual.clone(), columns: fit.columns.clone() };
     let (chosen, least) = (ridge(&fit, &held), ridge(&fit, &again));
     let left = |rows: &Rows, weights: &[f64]| -> f64 {
@@ -51,7 +54,7 @@ fn without_columns_there_are_no_weights() {
     assert!(ridge(&empty(), &empty()).is_empty());
 }
 
-/// Noise whose next value keeps a share of the last.
+/// Noise that keeps a share of its previous value.
 fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64> {
     let mut x = random.gauss() / (1.0 - kept * kept).sqrt();
     let next = |_| {
@@ -61,7 +64,7 @@ fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64>
     (0..samples).map(next).collect()
 }
 
-/// A term that takes nothing away gains nothing, and costs ln M for each that was chosen.
+/// A term that explains nothing gains nothing, and costs ln M for each that was chosen.
 #[test]
 fn a_choice_costs_what_there_was_to_choose_from() {
     let mut random = RandomGenerator::new(3, 0);
@@ -72,15 +75,16 @@ fn a_choice_costs_what_there_was_to_choose_from() {
     }
 }
 
-/// A known function beside noise: its residual, and the same without it. It stands against any coloured process where it is no slow
-/// wave: of the 20 records each is told.
+/// A known function plus noise: its residual, and the same without it. The function is preferred to
+/// any coloured process if it is no slow wave; it is found in each of the 20 records.
 #[test]
 fn a_function_is_told_from_coloured_noise() {
     let mut random = RandomGenerator::new(4, 0);
     let roles = roles(&[3000, 3000], 900);
     for inputs in 0..20 {
         let noise: Vec<f64> = (0..6000).map(|_| random.gauss()).collect();
-        // Steps at irregular times, as a play or a valve makes them: no process of the past foretells them.
+        // Steps at irregular times, as a play or a valve makes them, which no autoregression
+        // predicts.
         let mut level = 1.0;
         let function: Vec<f64> = (0..6000)
             .map(|_| {
@@ -96,8 +100,9 @@ fn a_function_is_told_from_coloured_noise() {
     }
 }
 
-/// What wanders on its own is foretold no better once a term that has nothing to do with it was taken out with its best weight: in none of
-/// 40 records do the odds favour it, for one chance weight gains half a nat on average, and ln 500 are asked for.
+/// An independent drift is predicted no better after an unrelated term was subtracted with its best
+/// weight. In none of 40 records do the odds favour the term, because one chance weight gains half
+/// a nat on average, and ln 500 are required.
 #[test]
 fn a_chance_term_is_no_function() {
     let mut random = RandomGenerator::new(5, 0);
@@ -123,7 +128,7 @@ fn odds_are_finite_whatever_is_left() {
         assert!(odds(&roles, &left, &[0.0; 300], 1, 10).is_finite());
         assert!(odds(&roles, &[0.0; 300], &left, 1, 10).is_finite());
     }
-    // A record of less than the memory of the process has nothing to score.
+    // A record shorter than the memory of the process cannot be scored.
     let short = super::roles(&[20], 0);
     assert!(odds(&short, &[1.0; 20], &[0.5; 20], 1, 10).is_finite());
 }

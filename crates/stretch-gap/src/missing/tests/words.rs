@@ -31,7 +31,7 @@ fn proposed(terms: Vec<ProposedTerm>, random: bool) -> Proposed {
         random,
         course: None,
         log_odds: 3.0,
-        foretold: 0.95,
+        predicted: 0.95,
         sentence: String::new(),
     }
 }

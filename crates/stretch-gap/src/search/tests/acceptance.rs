@@ -1,4 +1,4 @@
-//! What an effect must bring to be taken, and how often noise brings it.
+//! Criteria for accepting an effect, and how often noise meets them.
 
 use super::index;
 use crate::{
@@ -17,8 +17,8 @@ fn is_any_taken(record: &Measured) -> bool {
     !search.best(&problem.nominal, &|_: &str| ()).expect("a search").effects.is_empty()
 }
 
-/// An effect of two numbers rises by 12 nats and 2 ln(60)/2 nats of price by chance once in exp(16): of 20 records of four toys, with seven
-/// effects each, none.
+/// By chance an effect with two parameters rises by 12 nats plus the penalty of 2 ln(60)/2 nats
+/// once in exp(16): none in 20 records of four toys, with seven effects each.
 #[test]
 fn pure_noise_is_no_effect() {
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
@@ -29,7 +29,8 @@ fn pure_noise_is_no_effect() {
     }
 }
 
-/// The same beside noise half of whose variance is remembered for 0.05 s, which its stated size includes: octaves know no colour.
+/// The same with noise half of whose variance is remembered for 0.05 s. Its stated size includes
+/// this part, because octaves do not model colour.
 #[test]
 fn coloured_noise_is_no_effect() {
     for seed in 0..20 {
@@ -40,8 +41,8 @@ fn coloured_noise_is_no_effect() {
     }
 }
 
-/// Of a number that does nothing chance makes chi^2/2 with one degree of freedom: half a nat in the mean, of deviation 0.71. The price of
-/// Schwarz is taken off: ln(blocks)/2.
+/// For a parameter that does nothing chance yields chi^2/2 with one degree of freedom: half a nat
+/// on average, with deviation 0.71. Schwarz's penalty ln(blocks)/2 is subtracted.
 #[test]
 fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
     const DRAWS: u64 = 40;
@@ -72,12 +73,12 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
     assert!(is_accepted(&problem.nominal, &play));
     assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
-    // All that was left in the stage is closed, so that no further effect can be more than model discrepancy.
+    // All that was left in the stage is closed, so no further effect can exceed model discrepancy.
     assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
     assert!(!worth.is_possible(&play, index(&record, "cubic")));
 }
 
-/// What closes less than counts as a gap has to rise further.
+/// An effect that closes less than a gap that counts has to rise further.
 #[test]
 fn what_closes_little_has_to_rise_more() {
     let record = Toy::of(&[Law::Line]).measured(1);
@@ -88,7 +89,7 @@ fn what_closes_little_has_to_rise_more() {
     assert!(thresholds.faint_rise > thresholds.rise);
 }
 
-/// An effect that is larger than its range ends at the end of it, and says so.
+/// An effect that is larger than its range ends at the end of the range, and reports this.
 #[test]
 fn an_effect_at_the_end_of_its_range_is_told() {
     for (size, is_bound) in [(0.15, false), (0.5, true)] {

@@ -1,4 +1,4 @@
-//! What another form of an effect explains, and what it must not.
+//! What another form of an effect explains, and what it must not explain.
 
 use crate::{
     fit::{
@@ -10,7 +10,8 @@ use crate::{
     toys::{Effect, Law, Toy},
 };
 
-/// A quadratic fitted to a line that hides some effects: as it is, and with deviations of at most `share`.
+/// A quadratic fitted to a line that hides some effects: without, and with deviations of at most
+/// `share`.
 fn quadratic(hidden: &[(Effect, &[f64])], share: f64) -> [Hypothesis; 2] {
     let record = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).hiding(hidden).measured(5);
     let problem = prepared(&record);
@@ -20,7 +21,8 @@ fn quadratic(hidden: &[(Effect, &[f64])], share: f64) -> [Hypothesis; 2] {
     [set, deviating]
 }
 
-/// x + c x^2 + b x^3 with b a quarter of c is a quadratic of another form: z times what the quadratic does.
+/// x + c x^2 + b x^3 with b a quarter of c is a quadratic of another form: z times the contribution
+/// of the quadratic.
 #[test]
 fn a_curve_that_bends_otherwise_is_the_same_effect() {
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.4]), (Effect::Cubic, &[0.1])];
@@ -31,7 +33,7 @@ fn a_curve_that_bends_otherwise_is_the_same_effect() {
     assert!(deviating.score > set.score);
 }
 
-/// Five coefficients that explain nothing cost more than they bring.
+/// Five coefficients that explain nothing cost more than they gain.
 #[test]
 fn an_effect_of_the_right_form_has_no_deviations() {
     let [set, deviating] = quadratic(&[(Effect::Quadratic, &[0.4])], 0.17);
@@ -39,7 +41,7 @@ fn an_effect_of_the_right_form_has_no_deviations() {
     assert_eq!(deviating.misfits, set.misfits);
 }
 
-/// A deviation is a share of what its effect does: a small effect explains no large one.
+/// A deviation is a share of its effect's contribution, so a small effect explains no large one.
 #[test]
 fn a_small_effect_does_not_stand_in_for_a_large_one() {
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.02]), (Effect::Cubic, &[0.4])];

@@ -1,10 +1,10 @@
-//! The search on toys: what is screened, taken, and dropped again.
+//! The search on toys: what is screened, accepted, and removed again.
 
 mod acceptance;
 mod deviations;
 mod screening;
 mod selecting;
-mod unstrained;
+mod shipped_start;
 
 use crate::{fit::hypothesis::Hypothesis, fit::prepared::PreparedProblem, toys::Measured};
 

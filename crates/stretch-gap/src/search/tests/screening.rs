@@ -1,4 +1,4 @@
-//! One simulation a start says which effects are worth a fit.
+//! One simulation per start shows which effects are worth a fit.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -34,7 +34,8 @@ fn the_effect_that_is_hidden_promises_most() {
             let problem = prepared(&record);
             let mut all = screened(&problem);
             all.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-            // A delay and a lag of the same time part in the second order of time and frequency only.
+            // A delay and a lag of the same time differ only in the second order of time and
+            // frequency.
             let mut ranks = all.iter().map(|s| Effect::ALL[s.effect]);
             let first = ranks.find(|e| effect != Effect::Late || *e != Effect::Slow);
             if first != Some(effect) {
@@ -46,7 +47,8 @@ fn the_effect_that_is_hidden_promises_most() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The fall of a ridge regression's cost by one regressor more, of a flat prior: what a screen promises of an effect that is linear.
+/// The reduction of a ridge regression's cost by one more regressor with a flat prior: what a
+/// screen promises for a linear effect.
 #[test]
 fn the_gain_of_a_linear_effect_is_the_fall_of_a_regression() {
     for size in [0.004, 0.02, 0.1] {
@@ -72,19 +74,23 @@ fn the_gain_of_a_linear_effect_is_the_fall_of_a_regression() {
             0.5 * weight * (r - a * &step).norm_squared()
                 + 0.5 * (step.transpose() * prior * &step)[0]
         };
-        // The pull of the priors is left out of a screen, a share of 1/(1 + data) with data of 180 at least, and twice that in a square.
+        // A screen ignores the pull of the priors, a share of 1/(1 + data) with data of at least
+        // 180, and twice that in a square.
         approx::assert_relative_eq!(found.gain(), cost(2) - cost(3), max_relative = 0.02);
-        // ... at the size that a regression finds, known to 0.01/sqrt(3000 * 0.02) = 0.0013, three of them.
+        // ... at the size that a regression finds, known to 0.01/sqrt(3000 * 0.02) = 0.0013, three
+        // of them.
         approx::assert_abs_diff_eq!(found.starts[0].0[0], size, epsilon = 0.004);
     }
 }
 
-/// What the re-tuned parameters can do by themselves promises nothing: an effect of the gain alone is projected out.
+/// What the re-tuned parameters can do alone promises nothing: an effect of the gain alone is
+/// projected out.
 #[test]
 fn what_parameters_can_do_is_no_gain() {
     let toy = Toy::of(&[Law::Lag]).may_lack(&[Effect::Slow, Effect::Late]).off_by(&[2.0, 2.0]);
     let record = toy.measured(3);
     let problem = prepared(&record);
-    // One regressor that does nothing brings half a nat of each sample, and a block counts as one of fifty: 12 nats are 25 in 10^6.
+    // A regressor that does nothing yields half a nat per sample, and a block counts as one of
+    // fifty: 12 nats are 25 in 10^6.
     assert!(screened(&problem).iter().all(|s| s.gain() < 12.0 / 50.0));
 }

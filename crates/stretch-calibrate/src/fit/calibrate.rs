@@ -1,0 +1,144 @@
+//! From logged trials to a calibration.
+
+use std::collections::{HashMap, hash_map::Entry};
+
+use stretch_core::{Calibration, Provenance};
+use stretch_data::Trial;
+
+use crate::{CalibrateError, Memory, ModelKind, Options, prepare::Prepared};
+
+use super::{
+    diagnosed::{DiagnosedChoice, diagnosed},
+    history::{HistoryChoice, history},
+    observer::observer,
+    observer_model::ObserverChoice,
+    report::{FitReport, Fitted},
+    surfaces::{curve, linear, surfaces},
+};
+
+/// A calibration with the reports and notes of its fit.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// The record.
+    pub calibration: Calibration,
+    /// The report of the linear fit, or one report for each branch.
+    pub fits: Vec<FitReport>,
+    /// Changes made to the data before the fit, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Fits a calibration to logged trials.
+///
+/// Ranges are pooled over all trials (of rates, over each branch) and frozen.
+/// Trials are brought onto an even grid by [`Trial::even`]: lost samples are bridged, long gaps cut a trial, uneven
+/// stamps are resampled. [`Calibrated::notes`] says where.
+///
+/// # Errors
+/// [`CalibrateError`], which names the trial and column, or the branch and term.
+///
+/// ```
+/// use stretch_calibrate::{Options, calibrate, evaluate};
+/// use stretch_data::{Channel, Trial};
+///
+/// // a gauge whose voltage follows the contraction of a 180 mm muscle, up and down
+/// let time_s: Vec<f64> = (0..2000).map(|n| n as f64 * 0.01).collect();
+/// let length_mm: Vec<f64> = time_s.iter().map(|t| 165.0 + 15.0 * (0.7 * t).cos()).collect();
+/// let bridge_v = length_mm.iter().map(|l| 1.24 + 0.03 * (180.0 - l)).collect();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let trial = Trial {
+///     name: "loop".into(),
+///     time_s,
+///     channels: vec![channel("length_mm", length_mm), channel("bridge_v", bridge_v)],
+/// };
+/// let calibrated = calibrate(std::slice::from_ref(&trial), &Options::default())?;
+/// assert_eq!(calibrated.fits.len(), 2); // inflation and deflation
+/// let evaluation = evaluate(&[("poly13", &calibrated.calibration)], &[trial])?;
+/// assert!(evaluation.pooled[1].rmse < 0.01); // millimetres
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, CalibrateError> {
+    calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
+}
+
+/// Fits a calibration, with an earlier choice where one is given; answers with the choice that was made.
+pub(crate) fn calibrate_with(
+    trials: &[Trial],
+    options: &Options,
+    choice: Option<Choice>,
+) -> Result<(Calibrated, Option<Choice>), CalibrateError> {
+    let mut made = None;
+    let prepared = Prepared::new(trials, options)?;
+    let (model, fits, mut notes) = match options.model {
+        ModelKind::Linear => linear(&prepared, options)?,
+        ModelKind::Curve => curve(&prepared, options)?,
+        ModelKind::Surface(degree) => surfaces(&prepared, options, degree)?,
+        ModelKind::Remembering { kind, rest } => {
+            let (fitted, chosen) = remembering(&prepared, kind, rest, choice)?;
+            made = Some(chosen);
+            fitted
+        }
+    };
+    notes.splice(0..0, prepared.notes.iter().cloned());
+    let names = trials.iter().map(|t| t.name.as_str());
+    let columns = [options.signal.as_str(), options.reference.as_str()];
+    let checksums: Vec<Option<u32>> = trials.iter().map(|t| t.checksum(&columns)).collect();
+    notes.extend(notes_on_copies(names.clone(), checksums.iter().copied()));
+    let provenance =
+        Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
+    let calibration = prepared.calibration(model, provenance)?;
+    Ok((Calibrated { calibration, fits, notes }, made))
+}
+
+/// A note for each trial that holds the samples of an earlier one, by the checksums of the trials.
+fn notes_on_copies<'a>(
+    names: impl IntoIterator<Item = &'a str>,
+    checksums: impl IntoIterator<Item = Option<u32>>,
+) -> Vec<String> {
+    let mut seen = HashMap::new();
+    let notes = names.into_iter().zip(checksums).filter_map(|(name, checksum)| {
+        match seen.entry(checksum?) {
+            Entry::Vacant(first) => {
+                first.insert(name);
+                None
+            }
+            Entry::Occupied(first) => Some(format!(
+                "{name} holds the samples of {}: they weigh double, and cross-validation judges a fit by what it was fitted on; name one of the two",
+                first.get()
+            )),
+        }
+    });
+    notes.collect()
+}
+
+/// Choices about a model that remembers, kept when the model is fitted to parts of the same data.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Choice {
+    History(HistoryChoice),
+    Observer(ObserverChoice),
+    Diagnosed(DiagnosedChoice),
+}
+
+fn remembering(
+    prepared: &Prepared,
+    kind: Memory,
+    rest: bool,
+    choice: Option<Choice>,
+) -> Result<(Fitted, Choice), CalibrateError> {
+    match kind {
+        Memory::History => {
+            let choice =
+                choice.and_then(|c| if let Choice::History(c) = c { Some(c) } else { None });
+            history(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::History(c)))
+        }
+        Memory::Observer => {
+            let choice =
+                choice.and_then(|c| if let Choice::Observer(c) = c { Some(c) } else { None });
+            observer(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Observer(c)))
+        }
+        Memory::Diagnosed => {
+            let choice =
+                choice.and_then(|c| if let Choice::Diagnosed(c) = c { Some(c) } else { None });
+            diagnosed(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Diagnosed(c)))
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The parameters of named defects: initial values and ranges of a fit, and the map that the parameters make.
+
+use stretch_core::{DiagnosedMap, FitSummary, Interval, Target as Polarity, Values};
+use stretch_effects::{
+    Effect, EffectParameter, Extent, GAUGE, Grid, Live, Need, Place, Target, gauge_effect,
+};
+
+use crate::{CalibrateError, Cause, prepare::Prepared};
+
+/// One parameter of a defect.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moved {
+    pub(crate) effect: &'static Effect,
+    parameter: &'static EffectParameter,
+}
+
+impl Moved {
+    pub(crate) fn name(&self) -> String {
+        format!("{} {}", self.effect.name, self.parameter.name)
+    }
+
+    /// The coordinate of a value that a fit moves: its logarithm where the parameter spans decades, else the value
+    /// itself.
+    fn coordinate(&self, value: f64) -> f64 {
+        let value = value.clamp(self.parameter.min, self.parameter.max);
+        if self.parameter.is_log() { value.ln() } else { value }
+    }
+
+    pub(crate) fn value(&self, coordinate: f64) -> f64 {
+        let value = if self.parameter.is_log() { coordinate.exp() } else { coordinate };
+        value.clamp(self.parameter.min, self.parameter.max)
+    }
+
+    fn range(&self) -> f64 {
+        self.parameter.max - self.parameter.min
+    }
+
+    /// The step of a difference quotient, in the coordinate.
+    pub(crate) fn step(&self) -> f64 {
+        if self.parameter.is_log() { 0.01 } else { 0.002 * self.range() }
+    }
+
+    /// Likely distance of the coordinate from its initial value. The distance of a form parameter is smaller than
+    /// that of a size.
+    fn likely(&self) -> f64 {
+        match (self.parameter.is_log(), self.parameter.is_form()) {
+            (true, true) => 0.3,
+            (true, false) => 1.0,
+            (false, true) => 0.1 * self.range(),
+            (false, false) => 0.3 * self.range(),
+        }
+    }
+
+    /// The nearest coordinate within the parameter's range.
+    pub(crate) fn held(&self, coordinate: f64) -> f64 {
+        self.coordinate(self.value(coordinate))
+    }
+
+    /// Converts a standard error of the coordinate into a standard error of the value.
+    pub(crate) fn error(&self, value: f64, of_coordinate: f64) -> f64 {
+        if self.parameter.is_log() { value * of_coordinate } else { of_coordinate }
+    }
+}
+
+/// The defects that a diagnosis named, with the coordinates of their parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Defects {
+    named: Vec<(&'static Effect, Live)>,
+    /// Parameters of all defects, in the order of the defects.
+    pub(crate) moved: Vec<Moved>,
+    pub(crate) at: Vec<f64>,
+    target: Target,
+}
+
+impl Defects {
+    /// The defects that a diagnosis named, at the values that it found.
+    pub(crate) fn of(prepared: &Prepared) -> Result<Self, CalibrateError> {
+        let causes = &prepared.options.causes;
+        if causes.is_empty() {
+            return Err(CalibrateError::NotDiagnosed);
+        }
+        let falls = matches!(prepared.target, Polarity::Contraction { .. });
+        let pressures = prepared.series.iter().flat_map(|s| s.pressure.iter().copied());
+        let pressure = pressures.fold(0.0, |most: f64, p| most.max(p.abs()));
+        let target = Target { falls, pressure };
+        let mut all = Self { named: Vec::new(), moved: Vec::new(), at: Vec::new(), target };
+        for cause in causes {
+            all.add(cause)?;
+        }
+        let needs =
+            |effect: &&(&Effect, Live)| effect.0.needs == Some(Need::Pressure) && pressure == 0.0;
+        if let Some((effect, _)) = all.named.iter().find(needs) {
+            let effect = effect.name.to_owned();
+            let (trial, column) = (prepared.first_trial.clone(), prepared.options.pressure.clone());
+            return Err(CalibrateError::NoPressure { effect, trial, column });
+        }
+        Ok(all)
+    }
+
+    fn add(&mut self, cause: &Cause) -> Result<(), CalibrateError> {
+        let known = gauge_effect(&cause.effect).and_then(|e| Some((e, e.live?)));
+        let Some((effect, live)) = known else {
+            let known = GAUGE.iter().filter(|e| e.live.is_some()).map(|e| e.name);
+            let known = known.collect::<Vec<_>>().join(", ");
+            return Err(CalibrateError::UnknownCause { effect: cause.effect.clone(), known });
+        };
+        if self.named.iter().any(|(e, _)| e.name == effect.name) {
+            return Ok(());
+        }
+        self.named.push((effect, live));
+        for parameter in live.parameters {
+            let moved = Moved { effect, parameter };
+            let value = cause.value(&parameter.name).unwrap_or(parameter.typical);
+            self.at.push(moved.coordinate(value));
+            self.moved.push(moved);
+        }
+        Ok(())
+    }
+
+    /// Whether any of the defects lets the resting signal drift.
+    pub(crate) fn drifts(&self) -> bool {
+        self.named.iter().any(|(_, live)| live.drifts)
+    }
+
+    /// The same defects at other coordinates, each held to its range.
+    pub(crate) fn moved_to(&self, at: Vec<f64>) -> Self {
+        let at = self.moved.iter().zip(at).map(|(parameter, x)| parameter.held(x)).collect();
+        Self { at, ..self.clone() }
+    }
+
+    /// For each parameter, the distance from the initial coordinate and the weight of that distance: one over the
+    /// square of the likely distance.
+    pub(crate) fn strayed(&self, from: &Self) -> Vec<(f64, f64)> {
+        let all = self.moved.iter().zip(&self.at).zip(&from.at);
+        all.map(|((parameter, x), from)| (x - from, parameter.likely().powi(-2))).collect()
+    }
+
+    /// Every effect with the values of its parameters.
+    fn values(&self) -> impl Iterator<Item = (&'static Effect, Live, Vec<f64>)> {
+        let mut pairs = self.moved.iter().zip(&self.at);
+        self.named.iter().map(move |(effect, live)| {
+            let own = pairs.by_ref().take(live.parameters.len());
+            (*effect, *live, own.map(|(parameter, x)| parameter.value(*x)).collect())
+        })
+    }
+
+    /// The map of the defects, whose curve and filter are not fitted yet.
+    pub(crate) fn map(&self) -> DiagnosedMap {
+        let open = Interval { min: 0.0, max: 1.0 };
+        let mut map = DiagnosedMap {
+            rest: None,
+            slack_low: None,
+            slack_high: None,
+            slip: None,
+            crosstalk: None,
+            hysteresis: None,
+            relaxation: None,
+            worn: None,
+            floor: None,
+            ceiling: None,
+            lowpass_s: None,
+            skew_s: 0.0,
+            // A stream that begins at one end of the range came there from the other end.
+            initial_hysteresis: [-1.0, 1.0],
+            curve: Values::EMPTY,
+            drive_domain: open,
+            noise: 1.0,
+            agility: 1.0,
+            steady_s: 1.0,
+            spread: 1.0,
+            estimate_domain: open,
+            fit: FitSummary { samples: 0, r_squared: 0.0, rmse: 0.0 },
+        };
+        for (_, live, values) in self.values() {
+            (live.set)(&values, &self.target, &mut map);
+        }
+        map
+    }
+
+    /// Removes the effects of the reference itself from targets that were recorded every `period_s`.
+    pub(crate) fn undo(&self, period_s: f64, targets: &mut [f64]) {
+        let Ok(grid) = Grid::samples(period_s) else { return };
+        for (effect, _, values) in self.values().filter(|(.., values)| !values.is_empty()) {
+            if let Some((kind, Place::Length)) = effect.at() {
+                let rest = effect.parameters.iter().skip(values.len()).map(|p| p.typical);
+                let values: Vec<f64> = values.into_iter().chain(rest).collect();
+                (kind.operator)(&values, &Extent::between(0.0, 1.0), &grid).undo(targets);
+            }
+        }
+    }
+}

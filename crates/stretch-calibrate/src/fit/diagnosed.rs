@@ -1,0 +1,456 @@
+//! Fits the forward model of the effects that a diagnosis named, then the filter that inverts this model.
+
+use stretch_core::{
+    Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
+};
+use stretch_receptor::{Defects as LiveDefects, DiagnosedReceptor};
+
+use crate::{
+    CalibrateError, Memory,
+    prepare::{Prepared, Tally, extent},
+};
+
+use super::{
+    curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
+    defects::Defects,
+    observer_model::{Piece, SETTLE, pieces},
+    report::{Coefficient, FitReport, Fitted, Order},
+    rest::{LIVE_CATCH_UP_S, candidates},
+};
+
+const ITERATIONS: usize = 14;
+/// Least slope by which an error in signal is divided, as a share of the mean slope: where the curve is flat, the
+/// signal does not determine the target.
+const LEAST_SLOPE: f64 = 0.25;
+/// A fit ends when a step lowers the sum of squares by less than this share.
+const ENDED: f64 = 1e-4;
+/// Time over which errors of the model are taken to be correlated, s.
+const BLOCK_S: f64 = 2.0;
+/// Spectral densities of the rate's random walk that are tried, in 1/s^3.
+const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
+/// Correlation times of the rate that are tried, in seconds.
+const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
+/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+const ACCEPTED: f64 = 0.97;
+
+/// The choices of a fit. A fit that is given earlier choices begins with them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DiagnosedChoice {
+    at: Vec<f64>,
+    errors_in: ErrorsIn,
+    rest: Option<RestTracker>,
+    agility: f64,
+    steady_s: f64,
+}
+
+/// Fits the effects of [`Options::causes`](crate::Options::causes); with `rest` the baseline is followed.
+pub(crate) fn diagnosed(
+    prepared: &Prepared,
+    rest: bool,
+    choice: Option<DiagnosedChoice>,
+) -> Result<(Fitted, DiagnosedChoice), CalibrateError> {
+    let defects = Defects::of(prepared)?;
+    let mut trackers = vec![choice.as_ref().and_then(|c| c.rest)];
+    if choice.is_none() && (rest || defects.drifts()) {
+        trackers = candidates(prepared).into_iter().map(Some).collect();
+    }
+    let mut best: Option<(Forward, DiagnosedMap)> = None;
+    for rest in trackers {
+        let (forward, map) = match &choice {
+            Some(c) => {
+                let record = Record::of(prepared, rest, c.errors_in)?;
+                let forward = record.fit(defects.moved_to(c.at.clone()))?;
+                let map = record.judged(&forward, c.agility, c.steady_s)?;
+                (forward, map)
+            }
+            None => refined(prepared, rest, &defects)?,
+        };
+        if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < ACCEPTED * b.fit.rmse) {
+            best = Some((forward, map));
+        }
+    }
+    let (forward, map) = best.ok_or(CalibrateError::NoTrials)?;
+    let report = report(&forward, &map);
+    let note = format!(
+        "diagnosed: {}; noise of the signal {:.4}; the speed of the motion is taken as a random walk of {} 1/s^3 with a correlation time of {} s",
+        prepared.options.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(", "),
+        map.noise,
+        map.agility,
+        map.steady_s,
+    );
+    let Forward { defects, rest, errors_in, .. } = forward;
+    let at = defects.at;
+    let choice =
+        DiagnosedChoice { at, errors_in, rest, agility: map.agility, steady_s: map.steady_s };
+    Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
+}
+
+/// Fits the forward model to the signal first, then to the error of the target, which the slope of the curve weights
+/// differently. Of the two fits the one with the smaller live error is kept.
+fn refined(
+    prepared: &Prepared,
+    rest: Option<RestTracker>,
+    defects: &Defects,
+) -> Result<(Forward, DiagnosedMap), CalibrateError> {
+    let record = Record::of(prepared, rest, ErrorsIn::Signal)?;
+    let forward = record.fit(defects.clone())?;
+    let map = record.tuned(&forward)?;
+    let record = Record { errors_in: ErrorsIn::Target, ..record };
+    let fine = record.fit(forward.defects.clone())?;
+    let fine_map = record.tuned(&fine)?;
+    Ok(if fine_map.fit.rmse < map.fit.rmse { (fine, fine_map) } else { (forward, map) })
+}
+
+/// The numbers that a fit determined.
+struct Forward {
+    errors_in: ErrorsIn,
+    defects: Defects,
+    rest: Option<RestTracker>,
+    /// The curve in signed signal, rising.
+    curve: Vec<f64>,
+    domain: Interval,
+    noise: f64,
+    /// Standard errors of the coordinates.
+    errors: Vec<f64>,
+    /// Hysteresis state of the plays where a trial begins.
+    initial_hysteresis: [f64; 2],
+    /// Travel of the gauge at the end of the trials.
+    travelled: f64,
+}
+
+fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
+    let named = |(i, error): (usize, &f64)| {
+        let parameter = &forward.defects.moved[i];
+        let value = parameter.value(forward.defects.at[i]);
+        Coefficient::named(parameter.name(), value, 1.96 * parameter.error(value, *error))
+    };
+    let coefficients: Vec<Coefficient> = forward.errors.iter().enumerate().map(named).collect();
+    let kind = Memory::Diagnosed.to_string();
+    let order = Order {
+        model: kind.clone(),
+        terms: forward.curve.len() + coefficients.len() + 3,
+        r_squared: Some(map.fit.r_squared),
+        rmse: Some(map.fit.rmse),
+        cross_validated_rmse: None,
+        problem: None,
+    };
+    let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
+    FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, order)
+}
+
+/// The errors whose squares a fit minimises.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ErrorsIn {
+    /// Errors of the signal.
+    Signal,
+    /// Errors of the target: errors of the signal divided by the curve's slope.
+    Target,
+}
+
+/// The trials, prepared for a forward fit.
+struct Record<'a> {
+    prepared: &'a Prepared,
+    rest: Option<RestTracker>,
+    errors_in: ErrorsIn,
+    pieces: Vec<Piece>,
+    /// The range of the targets, without outliers.
+    targets: Option<Interval>,
+    period_s: f64,
+    least_step: f64,
+}
+
+/// A forward model at given parameter values, and its residuals.
+struct Seen {
+    curve: Vec<f64>,
+    domain: Interval,
+    residuals: Vec<f64>,
+    square: f64,
+    /// Sum of squared errors of the signal, whichever errors `square` counts.
+    volts: f64,
+    initial_hysteresis: [f64; 2],
+    travelled: f64,
+}
+
+/// Every drive with its signal, and the state of the defects.
+struct Simulated {
+    pairs: Vec<(f64, f64)>,
+    initial_hysteresis: [f64; 2],
+    travelled: f64,
+}
+
+impl<'a> Record<'a> {
+    fn of(
+        prepared: &'a Prepared,
+        rest: Option<RestTracker>,
+        errors_in: ErrorsIn,
+    ) -> Result<Self, CalibrateError> {
+        let pieces = pieces(prepared, rest)?;
+        let range = extent(pieces.iter().flat_map(|p| p.signal.iter().copied()));
+        let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
+        let period_s = prepared.sample_rate.period_s();
+        let targets = inner(pieces.iter().flat_map(|p| p.smooth.iter().copied()).collect());
+        Ok(Self { prepared, rest, errors_in, pieces, targets, period_s, least_step })
+    }
+
+    /// Pairs of drive and signal; the drive is that of `skew_s` earlier.
+    fn pairs(&self, defects: &Defects) -> Simulated {
+        let map = defects.map();
+        let live = LiveDefects::<f64>::new(&map, self.period_s);
+        let late = map.skew_s / self.period_s;
+        let mut memory = None;
+        let (mut pairs, mut states) = (Vec::new(), Vec::new());
+        for piece in &self.pieces {
+            let mut targets = piece.smooth.clone();
+            defects.undo(self.period_s, &mut targets);
+            let pressure = |i: usize| piece.pressure.get(i).copied().unwrap_or(0.0);
+            let mut now = match &memory {
+                None => live.begin(targets[0], pressure(0)),
+                Some(before) => {
+                    let now = live.carry(before, targets[0], pressure(0));
+                    let stands = live.hysteresis_state(&now, targets[0], pressure(0));
+                    states.extend(stands.map(|share| (targets[0], share)));
+                    now
+                }
+            };
+            let each = targets.iter().enumerate();
+            let drives: Vec<f64> =
+                each.map(|(i, &y)| live.advance(&mut now, y, pressure(i))).collect();
+            memory = Some(now);
+            for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
+                // Beyond an end the drive is held, so that every value of the skew gives the same number of pairs.
+                let place = (i as f64 - late).clamp(0.0, (drives.len() - 1) as f64);
+                let below = (place as usize).min(drives.len() - 2);
+                let share = place - below as f64;
+                let drive = drives[below] + share * (drives[below + 1] - drives[below]);
+                pairs.push((drive, signal));
+            }
+        }
+        // A stream begins in the state of trials that follow other trials.
+        let mean = |is_upper: bool, otherwise: f64| {
+            let own = states.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
+            let (n, sum) = own.fold((0.0, 0.0), |(n, sum), (_, share)| (n + 1.0, sum + share));
+            if n > 0.0 { sum / n } else { otherwise }
+        };
+        let initial_hysteresis = [mean(false, -1.0), mean(true, 1.0)];
+        Simulated { pairs, initial_hysteresis, travelled: memory.map_or(0.0, |m| m.travelled()) }
+    }
+
+    /// The curve with the least residuals, and these residuals.
+    fn look(&self, defects: &Defects) -> Option<Seen> {
+        let Simulated { pairs, initial_hysteresis, travelled } = self.pairs(defects);
+        if pairs.len() <= KNOTS + defects.at.len() {
+            return None;
+        }
+        let domain = inner(pairs.iter().map(|(drive, _)| *drive).collect())?;
+        let mut rows = CurveRows::new(0);
+        for (drive, signal) in &pairs {
+            rows.push(Place::new(*drive, domain), &[], *signal);
+        }
+        let solution = rows.factor().solve(|_, power| 1e-12 * (1.0 + power))?;
+        let curve = rising(&solution.weights, self.least_step);
+        let mean_slope = (curve[KNOTS - 1] - curve[0]) / (domain.max - domain.min);
+        let mut volts = 0.0;
+        let left = |(drive, signal): &(f64, f64)| {
+            let place = Place::new(*drive, domain);
+            let left = signal - place.on(&curve);
+            volts += left * left;
+            match self.errors_in {
+                ErrorsIn::Signal => left,
+                ErrorsIn::Target => {
+                    left / place.slope(&curve, domain).max(LEAST_SLOPE * mean_slope)
+                }
+            }
+        };
+        let residuals: Vec<f64> = pairs.iter().map(left).collect();
+        let square = residuals.iter().map(|r| r * r).sum::<f64>();
+        Some(Seen { curve, domain, residuals, square, volts, initial_hysteresis, travelled })
+    }
+
+    /// Levenberg-Marquardt over the parameters of the defects; the curve is solved for at each step.
+    fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
+        let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
+        // a block counts as one observation, and so does the value that the diagnosis found
+        let block = (BLOCK_S / self.period_s).max(1.0);
+        let strayed = |defects: &Defects| defects.strayed(&begin);
+        let mut defects = begin.clone();
+        let mut seen = self.look(&defects).ok_or_else(undetermined)?;
+        let count = defects.at.len();
+        let mut damping = 1e-2;
+        let mut normal = nalgebra::DMatrix::zeros(count, count);
+        let iterations = if count > 0 { ITERATIONS } else { 0 };
+        for _ in 0..iterations {
+            let columns = self.sensitivities(&defects, &seen);
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
+            let mut slope =
+                nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
+            let level = self.mean(&seen) * block;
+            let cost = |seen: &Seen, defects: &Defects| {
+                let stray: f64 = strayed(defects).iter().map(|(d, w)| w * d * d).sum();
+                seen.square + level * stray
+            };
+            let before = cost(&seen, &defects);
+            for (i, (distance, weight)) in strayed(&defects).into_iter().enumerate() {
+                normal[(i, i)] += level * weight;
+                slope[i] += level * weight * distance;
+            }
+            let mut now = before;
+            for _ in 0..6 {
+                let mut damped = normal.clone();
+                for i in 0..count {
+                    damped[(i, i)] += damping * damped[(i, i)] + 1e-12 * before;
+                }
+                let Some(step) = damped.lu().solve(&slope) else { break };
+                let at = defects.at.iter().zip(step.iter()).map(|(x, dx)| x - dx).collect();
+                let next = defects.moved_to(at);
+                match self.look(&next).filter(|s| cost(s, &next) < now) {
+                    Some(better) => {
+                        now = cost(&better, &next);
+                        (defects, seen) = (next, better);
+                        damping = (damping * 0.3).max(1e-6);
+                        break;
+                    }
+                    None => damping = (damping * 4.0).min(1e6),
+                }
+            }
+            if now > before * (1.0 - ENDED) {
+                break;
+            }
+        }
+        let errors = self.errors(&normal, self.mean(&seen).sqrt());
+        let noise = (seen.volts / seen.residuals.len() as f64).sqrt();
+        let range = seen.curve[KNOTS - 1] - seen.curve[0];
+        // a curve that follows noiseless data exactly still needs a positive noise for the weights
+        let noise = noise.max(1e-6 * range);
+        let Seen { curve, domain, initial_hysteresis, travelled, .. } = seen;
+        let errors_in = self.errors_in;
+        Ok(Forward {
+            errors_in,
+            defects,
+            rest: self.rest,
+            curve,
+            domain,
+            noise,
+            errors,
+            initial_hysteresis,
+            travelled,
+        })
+    }
+
+    fn mean(&self, seen: &Seen) -> f64 {
+        seen.square / seen.residuals.len() as f64
+    }
+
+    /// Derivatives of the residuals with respect to each parameter.
+    fn sensitivities(&self, defects: &Defects, seen: &Seen) -> Vec<Vec<f64>> {
+        use rayon::prelude::*;
+        let one = |i: usize| {
+            let parameter = &defects.moved[i];
+            let mut at = defects.at.clone();
+            let step = parameter.step();
+            at[i] = if parameter.held(at[i] + step) == at[i] { at[i] - step } else { at[i] + step };
+            let next = defects.moved_to(at);
+            let moved = next.at[i] - defects.at[i];
+            match self.look(&next).filter(|_| moved != 0.0) {
+                Some(there) => {
+                    let pairs = there.residuals.iter().zip(&seen.residuals);
+                    pairs.map(|(a, b)| (a - b) / moved).collect()
+                }
+                None => vec![0.0; seen.residuals.len()],
+            }
+        };
+        (0..defects.at.len()).into_par_iter().map(one).collect()
+    }
+
+    /// Standard errors of the coordinates, where a block counts as one observation.
+    fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
+        let block = (BLOCK_S / self.period_s).max(1.0);
+        if normal.is_empty() {
+            return Vec::new();
+        }
+        match normal.clone().try_inverse() {
+            Some(inverse) => {
+                inverse.diagonal().iter().map(|v| noise * (v.max(0.0) * block).sqrt()).collect()
+            }
+            None => vec![f64::NAN; normal.nrows()],
+        }
+    }
+
+    /// The filter with the least live error.
+    fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
+        use rayon::prelude::*;
+        let grid = STEADY_S.iter().flat_map(|s| AGILITIES.iter().map(move |a| (*a, *s)));
+        let grid: Vec<(f64, f64)> = grid.collect();
+        let maps: Result<Vec<DiagnosedMap>, CalibrateError> =
+            grid.into_par_iter().map(|(a, s)| self.judged(forward, a, s)).collect();
+        let best = maps?.into_iter().min_by(|a, b| a.fit.rmse.total_cmp(&b.fit.rmse));
+        best.ok_or(CalibrateError::NoTrials)
+    }
+
+    /// The map with the statistics of its estimates, computed by the receptor that runs live.
+    fn judged(
+        &self,
+        forward: &Forward,
+        agility: f64,
+        steady_s: f64,
+    ) -> Result<DiagnosedMap, CalibrateError> {
+        let prepared = self.prepared;
+        let map = self.map(forward, agility, steady_s)?;
+        let calibration = prepared.calibration(Model::Diagnosed(map), Provenance::new("", []))?;
+        let receptor = DiagnosedReceptor::<f64>::new(&calibration)?;
+        let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
+        let (mut tally, mut apart) = (Tally::default(), 0.0);
+        for series in &prepared.series {
+            let mut memory = receptor.memory();
+            for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
+                if let Some(&p) = series.pressure.get(i) {
+                    memory.set_pressure(p);
+                }
+                let Ok(reading) = receptor.step(&mut memory, Volts(v)) else { continue };
+                if i < SETTLE {
+                    continue;
+                }
+                let truth = prepared.target_range.normalise(target);
+                let estimate = prepared.target.from_reference(reading.estimate);
+                let error = truth - prepared.target_range.normalise(estimate);
+                tally.take(truth, error);
+                apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));
+            }
+        }
+        let spread = f64::max(apart / f64::max(tally.count(), 1.0), 1e-12).sqrt();
+        Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
+    }
+
+    fn map(
+        &self,
+        forward: &Forward,
+        agility: f64,
+        steady_s: f64,
+    ) -> Result<DiagnosedMap, CalibrateError> {
+        let prepared = self.prepared;
+        let sign = prepared.polarity.sign();
+        let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
+        let estimate_domain = self.targets.unwrap_or(forward.domain);
+        let map = forward.defects.map();
+        // the fitted curve gives the signal at rest without noise
+        let live = LiveDefects::<f64>::new(&map, self.period_s);
+        let mut still = live.begin(estimate_domain.min, 0.0);
+        let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);
+        let level = Place::new(at_rest, forward.domain).on(&curve);
+        let rest =
+            forward.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
+        let travelled = forward.travelled;
+        Ok(DiagnosedMap {
+            rest,
+            initial_hysteresis: forward.initial_hysteresis,
+            worn: map.worn.map(|worn| stretch_core::Worn { travelled, ..worn }),
+            curve: Values::new("curve", &curve)?,
+            drive_domain: forward.domain,
+            noise: forward.noise,
+            agility,
+            steady_s,
+            estimate_domain,
+            ..map
+        })
+    }
+}

@@ -1,0 +1,379 @@
+//! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts this model.
+
+use stretch_core::{
+    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
+};
+use stretch_receptor::ObserverReceptor;
+
+use crate::{
+    CalibrateError, Memory,
+    prepare::{Prepared, Tally, extent},
+};
+
+use super::{
+    curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
+    observer_model::{Forward, ObserverChoice, Piece, SETTLE, Sample, pieces},
+    report::{Coefficient, FitReport, Fitted, Order},
+    rest::{LIVE_CATCH_UP_S, candidates},
+};
+
+/// Ridge on the dynamic parameters, as a share of each one's own power.
+const RIDGE: f64 = 1e-4;
+const ITERATIONS: usize = 12;
+/// Spectral densities of the rate's random walk that are tried, in 1/s^3.
+const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
+/// Time constants of the first search, in seconds.
+const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
+/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+const ACCEPTED: f64 = 0.97;
+/// Time over which errors of the model are taken to be correlated, s: that of the slowest relevant part of the model,
+/// not a few samples.
+const BLOCK_S: f64 = 2.0;
+/// Relative step of a time constant for the derivative of the drive.
+const NUDGE: f64 = 0.01;
+/// Ridge that avoids a division by zero for a parameter that no data determine, as a share of its column's power. The
+/// share is far below that of any data that determine the parameter.
+const BOUNDS_RIDGE: f64 = 1e-9;
+
+/// Fits an observer; with `rest` the baseline is followed. An earlier `choice`, made on more data, is kept.
+pub(crate) fn observer(
+    prepared: &Prepared,
+    rest: bool,
+    choice: Option<ObserverChoice>,
+) -> Result<(Fitted, ObserverChoice), CalibrateError> {
+    let (forward, map) = match choice {
+        Some(choice) => {
+            let forward = forward(prepared, &pieces(prepared, choice.rest)?, choice)?;
+            let map = map(prepared, &forward)?;
+            (forward, judged(prepared, map)?)
+        }
+        None => choose(prepared, rest)?,
+    };
+    let choice = forward.choice;
+    let terms = forward.curve.len() + forward.dynamics.len() + 2;
+    let mut names = vec!["lead, s".to_owned()];
+    names.extend(choice.taus().map(|tau| format!("relaxation over {tau:.3} s")));
+    names.extend(choice.radii().iter().map(|w| format!("play of {w} of the range")));
+    names.extend(choice.taus().map(|_| "time constant, s".to_owned()));
+    let values: Vec<f64> = forward.dynamics.iter().copied().chain(choice.taus()).collect();
+    let bounds = bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
+    let coefficients = names.into_iter().zip(&values).zip(&bounds.errors);
+    let coefficients =
+        coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
+    let kind = Memory::Observer.to_string();
+    let order = Order {
+        model: kind.clone(),
+        terms,
+        r_squared: Some(map.fit.r_squared),
+        rmse: Some(map.fit.rmse),
+        cross_validated_rmse: None,
+        problem: None,
+    };
+    let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
+    let report = FitReport::of_model(kind, &map.fit, sse, bounds.condition, coefficients, order);
+    let note = format!(
+        "observer: {terms} numbers; noise of the signal {:.4}; the speed of the motion is taken as a random walk of {} 1/s^3{}",
+        forward.noise,
+        choice.agility,
+        choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),
+    );
+    Ok(((Model::Observer(map), vec![report], vec![note]), choice))
+}
+
+fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), CalibrateError> {
+    let mut trackers = vec![None];
+    if rest {
+        trackers = candidates(prepared).into_iter().map(Some).collect();
+    }
+    let bare = ObserverChoice { taus: [None; 2], plays: false, agility: 10.0, rest: None };
+    let mut best: Option<(Forward, ObserverMap)> = None;
+    for rest in trackers {
+        let pieces = pieces(prepared, rest)?;
+        let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
+        let two = second_relaxation(prepared, &pieces, one)?;
+        // the structures are compared by the spread of the signal around them, simplest first
+        let mut chosen: Option<(f64, ObserverChoice)> = None;
+        for taus in [[None; 2], one.taus, two.taus] {
+            for plays in [false, true] {
+                let choice = ObserverChoice { taus, plays, ..one };
+                let Ok(found) = forward(prepared, &pieces, choice) else { continue };
+                let is_accepted = chosen.is_none_or(|(noise, _)| found.noise < ACCEPTED * noise);
+                if is_accepted && found.answers() {
+                    chosen = Some((found.noise, choice));
+                }
+            }
+        }
+        let Some((_, choice)) = chosen else { continue };
+        let found = tuned(prepared, &pieces, choice)?;
+        if best.as_ref().is_none_or(|(_, map)| found.1.fit.rmse < ACCEPTED * map.fit.rmse) {
+            best = Some(found);
+        }
+    }
+    best.ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
+}
+
+/// The time constant that explains the signal best: a grid, then golden sections.
+fn one_relaxation(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<ObserverChoice, CalibrateError> {
+    let noise = |tau: f64| {
+        let with = ObserverChoice { taus: [Some(tau), None], ..choice };
+        forward(prepared, pieces, with).map_or(f64::INFINITY, |f| f.noise)
+    };
+    let errors = TAUS.map(noise);
+    let best = (0..TAUS.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
+    let (mut low, mut high) =
+        (TAUS[best.saturating_sub(1)].ln(), TAUS[(best + 1).min(TAUS.len() - 1)].ln());
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    for _ in 0..6 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if noise(a.exp()) < noise(b.exp()) { high = b } else { low = a }
+    }
+    Ok(ObserverChoice { taus: [Some((0.5 * (low + high)).exp()), None], ..choice })
+}
+
+fn second_relaxation(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    one: ObserverChoice,
+) -> Result<ObserverChoice, CalibrateError> {
+    let first = one.taus[0];
+    let mut best = (f64::INFINITY, one);
+    for tau in TAUS {
+        // two time constants this close cannot be distinguished
+        if first.is_some_and(|first| (tau / first).ln().abs() < 1.0) {
+            continue;
+        }
+        let two = ObserverChoice { taus: [first, Some(tau)], ..one };
+        if let Ok(forward) = forward(prepared, pieces, two)
+            && forward.noise < best.0
+        {
+            best = (forward.noise, two);
+        }
+    }
+    Ok(best.1)
+}
+
+/// A forward model, and the map whose agility gives the least live error.
+fn tuned(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<(Forward, ObserverMap), CalibrateError> {
+    let mut forward = forward(prepared, pieces, choice)?;
+    let mut best: Option<ObserverMap> = None;
+    for agility in AGILITIES {
+        forward.choice.agility = agility;
+        let map = judged(prepared, map(prepared, &forward)?)?;
+        if best.as_ref().is_none_or(|b| map.fit.rmse < b.fit.rmse) {
+            best = Some(map);
+        }
+    }
+    let map = best.ok_or(CalibrateError::NoTrials)?;
+    forward.choice.agility = map.agility;
+    Ok((forward, map))
+}
+
+/// Gauss-Newton over curve and dynamics together.
+fn forward(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<Forward, CalibrateError> {
+    let undetermined = || CalibrateError::Undetermined { model: Memory::Observer.to_string() };
+    let period_s = prepared.sample_rate.period_s();
+    let features: Vec<_> = pieces.iter().map(|p| p.features(choice, period_s)).collect();
+    let dynamic = choice.dynamics();
+    let samples: Vec<Sample> =
+        pieces.iter().zip(&features).flat_map(|(p, features)| p.samples(features)).collect();
+    if samples.len() <= KNOTS + dynamic {
+        return Err(undetermined());
+    }
+    let range = extent(samples.iter().map(|s| s.signal));
+    let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
+    let mut dynamics = vec![0.0; dynamic];
+    let mut curve = Vec::new();
+    for pass in 0..ITERATIONS {
+        let drive = drives(&samples, &dynamics)?;
+        let frozen = solve(&samples, &dynamics, drive, None).ok_or_else(undetermined)?;
+        curve = rising(&frozen.0, least_step);
+        let (_, moved) =
+            solve(&samples, &dynamics, drive, Some(&curve)).ok_or_else(undetermined)?;
+        // smaller steps first, because the curve still absorbs a part of the dynamics
+        let share = if pass < 2 { 0.7 } else { 1.0 };
+        let mut change: f64 = 0.0;
+        for (d, m) in dynamics.iter_mut().zip(&moved) {
+            change = change.max((m - *d).abs());
+            *d += share * (m - *d);
+        }
+        if change < 1e-4 {
+            break;
+        }
+    }
+    let drive = drives(&samples, &dynamics)?;
+    if let Some((knots, _)) = solve(&samples, &dynamics, drive, None) {
+        curve = rising(&knots, least_step);
+    }
+    let noise = spread(&samples, &dynamics, drive, &curve);
+    // a curve that follows noiseless data exactly still needs a positive noise for the weights
+    let noise = noise.max(1e-6 * (range.max - range.min));
+    Ok(Forward { choice, curve, drive, dynamics, noise })
+}
+
+/// The range of the drives, without outliers (see `inner`).
+fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateError> {
+    inner(samples.iter().map(|s| s.drive(dynamics)).collect())
+        .ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
+}
+
+/// Solves for the knots alone, or for knots and dynamics linearised about a curve.
+fn solve(
+    samples: &[Sample],
+    dynamics: &[f64],
+    drive: Interval,
+    about: Option<&[f64]>,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let mut rows = CurveRows::new(if about.is_some() { dynamics.len() } else { 0 });
+    let mut more = Vec::new();
+    for sample in samples {
+        let at = Place::new(sample.drive(dynamics), drive);
+        more.clear();
+        let mut value = sample.signal;
+        if let Some(curve) = about {
+            let slope = at.slope(curve, drive);
+            more.extend(sample.features.iter().map(|f| slope * f));
+            value += slope * sample.added(dynamics);
+        }
+        rows.push(at, &more, value);
+    }
+    let penalty = |term: usize, power: f64| {
+        if term < KNOTS { 1e-12 * (1.0 + power) } else { RIDGE * power + 1e-12 }
+    };
+    let mut knots = rows.factor().solve(penalty)?.weights;
+    let moved = knots.split_off(KNOTS);
+    Some((knots, moved))
+}
+
+/// Spread of the signal around the model.
+fn spread(samples: &[Sample], dynamics: &[f64], drive: Interval, curve: &[f64]) -> f64 {
+    let square = |sample: &Sample| {
+        let at = Place::new(sample.drive(dynamics), drive);
+        (sample.signal - at.on(curve)).powi(2)
+    };
+    (samples.iter().map(square).sum::<f64>() / samples.len() as f64).sqrt()
+}
+
+fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
+    let sign = prepared.polarity.sign();
+    let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
+    let taus: Vec<f64> = forward.choice.taus().collect();
+    let (lead, rest) = forward.dynamics.split_at(1);
+    let (amplitudes, weights) = rest.split_at(taus.len());
+    let targets = prepared.series.iter().flat_map(|s| s.target.iter());
+    let estimate_domain = extent(targets.map(|&t| prepared.target_range.normalise(t)));
+    // the fitted curve gives the signal at rest without noise
+    let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
+    let rest =
+        forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
+    Ok(ObserverMap {
+        rest,
+        curve: Values::new("curve", &curve)?,
+        drive_domain: forward.drive,
+        relaxations_s: Values::new("relaxations_s", &taus)?,
+        amplitudes: Values::new("amplitudes", amplitudes)?,
+        lead_s: lead[0],
+        radii: Values::new("radii", forward.choice.radii())?,
+        play_weights: Values::new("play_weights", weights)?,
+        noise: forward.noise,
+        agility: forward.choice.agility,
+        estimate_domain,
+        fit: FitSummary { samples: 0, r_squared: 0.0, rmse: 0.0 },
+    })
+}
+
+/// The map with the statistics of its estimates, computed by the receptor that runs live.
+fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, CalibrateError> {
+    let calibration = prepared.calibration(Model::Observer(map), Provenance::new("", []))?;
+    let design = ObserverReceptor::<f64>::new(&calibration)?;
+    let mut receptor = Runner::new(design);
+    let mut tally = Tally::default();
+    for series in &prepared.series {
+        receptor.reset();
+        for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
+            let Ok(reading) = receptor.step(Volts(v)) else { continue };
+            if i < SETTLE {
+                continue;
+            }
+            let truth = prepared.target_range.normalise(target);
+            let estimate = prepared.target.from_reference(reading.estimate);
+            tally.take(truth, truth - prepared.target_range.normalise(estimate));
+        }
+    }
+    Ok(ObserverMap { fit: tally.summary(), ..map })
+}
+
+/// Standard errors and condition of a forward model.
+struct Bounds {
+    /// Standard errors of lead, amplitudes and weights of plays, then of the time
+    /// constants; NaN where the data do not determine them.
+    errors: Vec<f64>,
+    /// Condition number of the rows behind the standard errors.
+    condition: f64,
+}
+
+/// Bounds of a forward model on the pieces that it was fitted to.
+///
+/// The bounds are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
+/// together: an effect that the curve or a time constant could absorb is
+/// not counted as known. The choice of the structure is taken as known.
+fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Bounds {
+    let Forward { choice, curve, drive, dynamics, .. } = forward;
+    let taus: Vec<f64> = choice.taus().collect();
+    let more = dynamics.len() + taus.len();
+    let mut rows = CurveRows::new(more);
+    let mut blocks: Vec<Vec<f64>> = Vec::new();
+    let length = ((BLOCK_S / period_s) as usize).max(1);
+    let mut values = Vec::new();
+    for piece in pieces {
+        let features = piece.features(*choice, period_s);
+        let nudged: Vec<_> = (0..taus.len())
+            .map(|i| {
+                let mut other = *choice;
+                other.taus[i] = other.taus[i].map(|tau| tau * (1.0 + NUDGE));
+                piece.features(other, period_s)
+            })
+            .collect();
+        for (n, sample) in piece.samples(&features).enumerate() {
+            let at = forward.place(&sample);
+            let slope = at.slope(curve, *drive);
+            let residual = sample.signal - at.on(curve);
+            values.clear();
+            values.extend(sample.features.iter().map(|f| slope * f));
+            values.extend((0..taus.len()).map(|i| {
+                let moved = nudged[i][SETTLE + n][1 + i] - sample.features[1 + i];
+                slope * dynamics[1 + i] * moved / (NUDGE * taus[i])
+            }));
+            rows.push(at, &values, residual);
+            if n.is_multiple_of(length) {
+                blocks.push(vec![0.0; KNOTS + more]);
+            }
+            if let Some(block) = blocks.last_mut() {
+                block[at.below] += residual * (1.0 - at.share);
+                block[at.below + 1] += residual * at.share;
+                for (sum, x) in block[KNOTS..].iter_mut().zip(&values) {
+                    *sum += residual * x;
+                }
+            }
+        }
+    }
+    // the least positive number keeps a column of zeros from dividing by nothing
+    match rows.factor().solve(|_, power| BOUNDS_RIDGE * power + 1e-300) {
+        Some(solution) => Bounds {
+            errors: solution.block_errors(&blocks).split_off(KNOTS),
+            condition: solution.condition(),
+        },
+        None => Bounds { errors: vec![f64::NAN; more], condition: f64::INFINITY },
+    }
+}

@@ -1,0 +1,138 @@
+//! The report of a fit.
+
+use serde::Serialize;
+use stretch_core::{Branch, Degree, FitSummary, Model, Surface};
+
+/// A fitted model, a report for each fit, and remarks of one sentence each.
+pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
+
+/// The placeholder for the surface of a model without a surface.
+fn no_surface() -> Surface {
+    Surface::new(Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
+}
+
+/// One fitted surface (or line) with its statistics, in normalised units.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitReport {
+    /// Name of the fit: `inflation`, `deflation` or `linear fit`.
+    pub name: String,
+    /// The branch; `None` for a line.
+    #[serde(skip)]
+    pub branch: Option<Branch>,
+    /// Name of the model, as `poly13` or `linear`.
+    pub model: String,
+    /// Samples in the fit.
+    pub samples: u64,
+    /// Sum of squared residuals.
+    pub sse: f64,
+    /// Coefficient of determination.
+    pub r_squared: f64,
+    /// Coefficient of determination, adjusted for the number of terms.
+    pub adjusted_r_squared: f64,
+    /// `sqrt(SSE/(n - p))`, in normalised target.
+    pub rmse: f64,
+    /// Condition number of the design matrix, with the rows of a ridge where the fit has one. The design matrix of an
+    /// observer holds curve, dynamics and time constants.
+    pub condition: f64,
+    /// Samples that a bisquare fit rejected altogether.
+    pub rejected: Option<u64>,
+    /// Coefficients with 95 % bounds.
+    pub coefficients: Vec<Coefficient>,
+    /// Neighbouring orders.
+    pub orders: Vec<Order>,
+    /// The lowest order that satisfies the acceptance criterion of `stretch_fit::OrderTable`.
+    pub recommended: Option<String>,
+    /// Samples for a picture, `[rate, signal, target]`, at most a few thousand.
+    #[serde(skip)]
+    pub cloud: Vec<[f64; 3]>,
+    /// The surface, for a picture.
+    #[serde(skip)]
+    pub surface: Surface,
+}
+
+/// A coefficient and its 95 % bounds.
+#[derive(Debug, Clone, Serialize)]
+pub struct Coefficient {
+    /// Name of the coefficient in MATLAB's form: `p12`.
+    pub name: String,
+    /// Power of the rate.
+    pub rate_power: u8,
+    /// Power of the signal.
+    pub signal_power: u8,
+    /// The estimate.
+    pub estimate: f64,
+    /// Lower bound at 95 %.
+    pub lower: f64,
+    /// Upper bound at 95 %.
+    pub upper: f64,
+}
+
+/// One row of the order table.
+#[derive(Debug, Clone, Serialize)]
+pub struct Order {
+    /// Name of the order, as `poly12`.
+    pub model: String,
+    /// Number of terms.
+    pub terms: usize,
+    /// Coefficient of determination.
+    pub r_squared: Option<f64>,
+    /// `sqrt(SSE/(n - p))`.
+    pub rmse: Option<f64>,
+    /// Root mean square error on data left out of the fit.
+    pub cross_validated_rmse: Option<f64>,
+    /// Why there are no numbers.
+    pub problem: Option<String>,
+}
+
+impl Coefficient {
+    /// A coefficient that is no power of rate and signal.
+    pub(crate) fn named(name: String, estimate: f64, half_width: f64) -> Self {
+        let (lower, upper) = (estimate - half_width, estimate + half_width);
+        Self { name, rate_power: 0, signal_power: 0, estimate, lower, upper }
+    }
+}
+
+impl FitReport {
+    /// The report of a model that is no surface.
+    pub(crate) fn of_model(
+        name: String,
+        fit: &FitSummary,
+        sse: f64,
+        condition: f64,
+        coefficients: Vec<Coefficient>,
+        order: Order,
+    ) -> Self {
+        let terms = order.terms as f64;
+        let dof = (fit.samples as f64 - terms).max(1.0);
+        Self {
+            model: name.clone(),
+            name,
+            branch: None,
+            samples: fit.samples,
+            sse,
+            r_squared: fit.r_squared,
+            adjusted_r_squared: 1.0 - (1.0 - fit.r_squared) * (fit.samples as f64 - 1.0) / dof,
+            rmse: fit.rmse,
+            condition,
+            rejected: None,
+            coefficients,
+            recommended: None,
+            orders: vec![order],
+            cloud: Vec::new(),
+            surface: no_surface(),
+        }
+    }
+
+    pub(crate) fn summary(&self) -> FitSummary {
+        FitSummary { samples: self.samples, r_squared: self.r_squared, rmse: self.rmse }
+    }
+
+    /// A sentence where cross-validation prefers another order.
+    pub(crate) fn note(&self) -> Option<String> {
+        let better = self.recommended.as_ref().filter(|r| **r != self.model)?;
+        Some(format!(
+            "{}: {better} is the order that cross-validation prefers (fitted: {})",
+            self.name, self.model
+        ))
+    }
+}

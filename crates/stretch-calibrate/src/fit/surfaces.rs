@@ -1,0 +1,342 @@
+//! Fits a line, a curve, or a surface for each branch.
+
+use stretch_core::{
+    Branch, BranchSurface, Degree, Interval, LinearMap, MAX_DEGREE, Model, Range, RangeSpec,
+    RateSource, Surface, sizes::MOST,
+};
+use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, robust_fit};
+
+use crate::{
+    CalibrateError, Options, Robust,
+    prepare::{Prepared, branches, extent},
+};
+
+use super::report::{Coefficient, FitReport, Fitted, Order};
+
+/// A normalised sample, and the number of the fold that contains it.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    fold: usize,
+    rate: f64,
+    signal: f64,
+    target: f64,
+}
+
+impl Sample {
+    /// The row that least squares takes.
+    pub(crate) fn row(&self) -> stretch_fit::Sample<f64> {
+        stretch_fit::Sample { rate: self.rate, volts: self.signal, value: self.target }
+    }
+}
+
+/// All samples without their rates, and the signals among them.
+fn of_signal(prepared: &Prepared) -> (Vec<Sample>, Interval) {
+    let all = || prepared.series.iter().flat_map(|s| s.signal.iter().zip(&s.target));
+    let mut samples: Vec<Sample> = Vec::new();
+    let (total, mut before) = (all().count(), 0);
+    for series in &prepared.series {
+        for (i, (&v, &t)) in series.signal.iter().zip(&series.target).enumerate() {
+            samples.push(Sample {
+                fold: prepared.fold(series, i, before, total),
+                rate: 0.0,
+                signal: prepared.signal_range.normalise(v),
+                target: prepared.target_range.normalise(t),
+            });
+        }
+        before += series.signal.len();
+    }
+    (samples, extent(all().map(|(&v, _)| v)))
+}
+
+/// Fits a line of the signal.
+pub(crate) fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateError> {
+    let (samples, signal_domain) = of_signal(prepared);
+    let (report, surface) = fit("linear fit", None, &samples, Degree::LINE, options.robust)?;
+    Ok((line(&surface, signal_domain, &report), vec![report], Vec::new()))
+}
+
+fn line(surface: &Surface, signal_domain: Interval, report: &FitReport) -> Model {
+    Model::Linear(LinearMap {
+        slope: surface.coefficient(0, 1),
+        intercept: surface.coefficient(0, 0),
+        signal_domain,
+        fit: report.summary(),
+    })
+}
+
+/// Parts that a table, or the levels of a reference, are cut into for cross-validation.
+pub(crate) const TABLE_PARTS: usize = 10;
+
+/// Fits a polynomial of the signal alone, for both directions. Its degree is the lowest that cross-validation accepts:
+/// see [`OrderTable`].
+pub(crate) fn curve(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateError> {
+    let failed = |cause| CalibrateError::Fit { branch: "curve", cause };
+    let (mut samples, signal_domain) = of_signal(prepared);
+    leave_out_levels(&mut samples, options.is_table);
+    let highest = Degree::new(0, MAX_DEGREE as u8)?;
+    let folds = factors(&samples, highest).map_err(failed)?;
+    let table = OrderTable::curves(&folds).map_err(failed)?;
+    let degree = table.recommended().unwrap_or(Degree::LINE);
+    let (mut report, surface) = fit("curve", None, &samples, degree, options.robust)?;
+    let named = |degree: Degree| format!("degree {}", degree.volts());
+    report.model = "curve".to_owned();
+    (report.orders, report.recommended) = (orders(&table, named), Some(named(degree)));
+    let model = if degree == Degree::LINE {
+        line(&surface, signal_domain, &report)
+    } else {
+        let any = RangeSpec { mode: options.normalisation, zero: 0.0, min: -0.5, max: 0.5 };
+        let both = BranchSurface {
+            rate_range: Range::new(any)?,
+            surface,
+            signal_domain,
+            // every rate is inside
+            rate_domain: Interval { min: -MOST, max: MOST },
+            fit: report.summary(),
+        };
+        Model::Surfaces { inflation: both, deflation: both }
+    };
+    let note = format!("the curve is of degree {}, by cross-validation", degree.volts());
+    Ok((model, vec![report], vec![note]))
+}
+
+/// Assigns samples to the folds of a cross-validation by the level of the reference, where it has levels (weights
+/// that were held for many samples) or the samples are a table: neighbours of one level would judge themselves.
+fn leave_out_levels(samples: &mut [Sample], is_table: bool) {
+    let mut levels: Vec<f64> = samples.iter().map(|s| s.target).collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    if is_table || 2 * levels.len() <= samples.len() {
+        for sample in samples {
+            sample.fold = levels.partition_point(|&level| level < sample.target) % TABLE_PARTS;
+        }
+    }
+}
+
+/// Samples of one branch before normalisation.
+#[derive(Default)]
+struct Raw {
+    fold: Vec<usize>,
+    signal: Vec<f64>,
+    signal_rate: Vec<f64>,
+    target: Vec<f64>,
+    target_rate: Vec<f64>,
+}
+
+/// Fits a surface of signal and rate for each branch.
+pub(crate) fn surfaces(
+    prepared: &Prepared,
+    options: &Options,
+    degree: Degree,
+) -> Result<Fitted, CalibrateError> {
+    let mut raw = [Raw::default(), Raw::default()];
+    let total = prepared.series.iter().map(|s| s.signal.len()).sum();
+    let mut before = 0;
+    for series in &prepared.series {
+        for (i, branch) in branches(series, options, prepared.dead).into_iter().enumerate() {
+            let (Some(branch), Some(signal_rate)) = (branch, series.signal_rate[i]) else {
+                continue;
+            };
+            let raw = &mut raw[usize::from(branch == Branch::Deflation)];
+            raw.fold.push(prepared.fold(series, i, before, total));
+            raw.signal.push(series.signal[i]);
+            raw.signal_rate.push(signal_rate);
+            raw.target.push(series.target[i]);
+            raw.target_rate.push(series.target_rate[i]);
+        }
+        before += series.signal.len();
+    }
+    for (raw, branch) in raw.iter().zip(["inflation", "deflation"]) {
+        let (samples, terms) = (raw.signal.len() as u64, degree.terms());
+        if samples <= terms as u64 {
+            return Err(CalibrateError::OneBranch { branch, samples, terms });
+        }
+    }
+    let [up, down] = raw;
+    let (inflation, first) = surface(prepared, options, degree, Branch::Inflation, up)?;
+    let (deflation, second) = surface(prepared, options, degree, Branch::Deflation, down)?;
+    let notes = [&first, &second].into_iter().filter_map(FitReport::note).collect();
+    Ok((Model::Surfaces { inflation, deflation }, vec![first, second], notes))
+}
+
+fn surface(
+    prepared: &Prepared,
+    options: &Options,
+    degree: Degree,
+    branch: Branch,
+    raw: Raw,
+) -> Result<(BranchSurface, FitReport), CalibrateError> {
+    let name = match branch {
+        Branch::Inflation => "inflation",
+        Branch::Deflation => "deflation",
+    };
+    let range = |rates: &[f64]| {
+        let Interval { min, max } = extent(rates.iter().copied());
+        Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max }).map_err(|_| {
+            CalibrateError::Constant {
+                column: format!("the rate in the {name} branch"),
+                value: min,
+            }
+        })
+    };
+    let rate_range = range(&raw.signal_rate)?;
+    let (rates, fitted_range) = match options.rate_source {
+        RateSource::Voltage => (&raw.signal_rate, rate_range),
+        RateSource::Strain => (&raw.target_rate, range(&raw.target_rate)?),
+    };
+    let samples: Vec<Sample> = (0..raw.signal.len())
+        .map(|i| Sample {
+            fold: raw.fold[i],
+            rate: fitted_range.normalise(rates[i]),
+            signal: prepared.signal_range.normalise(raw.signal[i]),
+            target: prepared.target_range.normalise(raw.target[i]),
+        })
+        .collect();
+    let (report, surface) = fit(name, Some(branch), &samples, degree, options.robust)?;
+    let fitted = BranchSurface {
+        rate_range,
+        surface,
+        signal_domain: extent(raw.signal.iter().copied()),
+        rate_domain: extent(raw.signal_rate.iter().copied()),
+        fit: report.summary(),
+    };
+    Ok((fitted, report))
+}
+
+/// The triangular factor of each fold.
+type Factors = Vec<Factor<f64>>;
+
+/// Fits `degree` to samples.
+fn fit(
+    name: &'static str,
+    branch: Option<Branch>,
+    samples: &[Sample],
+    degree: Degree,
+    robust: Robust,
+) -> Result<(FitReport, Surface), CalibrateError> {
+    let failed = |cause| CalibrateError::Fit { branch: name, cause };
+    // the order table around a surface needs higher degrees; a line has no table
+    let wide = if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree };
+    let folds = factors(samples, wide).map_err(failed)?;
+    let whole = merged(&folds).map_err(failed)?;
+    let mut rejected = None;
+    let fitted: Fit<f64> = match robust {
+        Robust::Off => whole.fit_degree(degree).map_err(failed)?,
+        Robust::Bisquare | Robust::Lar => {
+            let loss =
+                if robust == Robust::Bisquare { Loss::Bisquare } else { Loss::LeastAbsolute };
+            let rows = || samples.iter().map(Sample::row);
+            let mut memory = vec![0.0; samples.len()];
+            let robust = robust_fit(degree, loss, rows, &mut memory).map_err(failed)?;
+            rejected = Some(robust.rejected);
+            robust.fit
+        }
+    };
+    let step = samples.len().div_ceil(CLOUD).max(1);
+    let cloud = samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect();
+    report(name, branch, degree, &folds, fitted, Seen { rejected, cloud })
+}
+
+/// Parts of a report other than the numbers of the fit.
+struct Seen {
+    rejected: Option<u64>,
+    cloud: Vec<[f64; 3]>,
+}
+
+/// The report of a fit; the `folds` hold the neighbouring orders, too.
+fn report(
+    name: &'static str,
+    branch: Option<Branch>,
+    degree: Degree,
+    folds: &Factors,
+    fitted: Fit<f64>,
+    Seen { rejected, cloud }: Seen,
+) -> Result<(FitReport, Surface), CalibrateError> {
+    let failed = |cause| CalibrateError::Fit { branch: name, cause };
+    let bounds = fitted.confidence(0.95).map_err(failed)?;
+    let coefficients = degree
+        .exponents()
+        .enumerate()
+        .filter_map(|(place, (i, j))| {
+            let b = bounds.coefficient(place)?;
+            Some(Coefficient {
+                name: format!("p{i}{j}"),
+                rate_power: i,
+                signal_power: j,
+                estimate: b.estimate,
+                lower: b.lower,
+                upper: b.upper,
+            })
+        })
+        .collect();
+    let (orders, recommended) = match branch {
+        Some(_) => {
+            let table = OrderTable::new(folds, degree).map_err(failed)?;
+            let named = |degree: Degree| degree.to_string();
+            (orders(&table, named), table.recommended().map(named))
+        }
+        None => (Vec::new(), None),
+    };
+    let model = if branch.is_some() { degree.to_string() } else { "linear".to_owned() };
+    let fit_report = FitReport {
+        name: name.to_owned(),
+        branch,
+        model,
+        samples: fitted.samples(),
+        sse: fitted.sse(),
+        r_squared: fitted.r_squared().unwrap_or(0.0),
+        adjusted_r_squared: fitted.adjusted_r_squared().unwrap_or(0.0),
+        rmse: fitted.rmse().unwrap_or(0.0),
+        condition: fitted.condition(),
+        rejected,
+        coefficients,
+        orders,
+        recommended,
+        cloud,
+        surface: fitted.surface(),
+    };
+    Ok((fit_report, fitted.surface()))
+}
+
+/// Greatest number of points in a picture.
+const CLOUD: usize = 3000;
+
+/// The triangular factor of each fold, of the widest degree that the order table needs.
+fn factors(samples: &[Sample], degree: Degree) -> Result<Factors, FitError> {
+    let folds = samples.iter().map(|s| s.fold).max().map_or(0, |last| last + 1);
+    let mut factors = Vec::with_capacity(folds);
+    for fold in 0..folds {
+        let mut sums = SurfaceAccumulator::<f64>::new(degree)?;
+        let rows = samples.iter().filter(|s| s.fold == fold);
+        sums.extend(rows.map(Sample::row))?;
+        if sums.samples() > 0 {
+            factors.push(sums.factor());
+        }
+    }
+    Ok(factors)
+}
+
+fn merged(folds: &Factors) -> Result<Factor<f64>, FitError> {
+    let too_few = FitError::TooFewSamples { needed: 1, got: 0 };
+    let (first, rest) = folds.split_first().ok_or(too_few)?;
+    let mut whole = *first;
+    rest.iter().try_for_each(|fold| whole.merge(fold))?;
+    Ok(whole)
+}
+
+/// The rows of a table, with the names of their degrees.
+fn orders(table: &OrderTable<f64>, named: impl Fn(Degree) -> String) -> Vec<Order> {
+    table
+        .rows()
+        .map(|(degree, row)| Order {
+            model: named(*degree),
+            terms: degree.terms(),
+            r_squared: row.as_ref().ok().and_then(|row| row.r_squared),
+            rmse: row.as_ref().ok().and_then(|row| row.rmse),
+            cross_validated_rmse: row
+                .as_ref()
+                .ok()
+                .and_then(|row| row.cross_validation.as_ref().ok().map(|cv| cv.rmse)),
+            problem: row.as_ref().err().map(ToString::to_string),
+        })
+        .collect()
+}

@@ -1,0 +1,146 @@
+//! Acceptance criteria: whether a calibration can be used, and whether a log belongs to the calibration.
+
+use stretch_core::{Calibration, Label};
+use stretch_data::Trial;
+
+use crate::{fit::FitReport, prepare::without_gross_errors};
+
+use super::evaluate::MethodErrors;
+
+/// A fit that leaves this share of the reference's standard deviation explains nothing: the error of the mean of the
+/// reference alone is at most a twentieth larger. (A model may also cost a twentieth before another form is
+/// preferred.)
+const LEFT: f64 = 0.95;
+
+/// Why a fit should not be used: its error is that of the mean of the reference, without any signal.
+///
+/// ```text
+/// sqrt(1 - R^2) > 0.95,  R^2 < 0.0975
+/// ```
+///
+/// The answer is `None` for a fit that explains more. Such fits come from an error of the reference itself (a
+/// placeholder that the recorder writes for a missing value), a sensor that is not connected, or the column of
+/// another quantity.
+pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
+    let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
+    let left = (1.0 - worst.r_squared).max(0.0).sqrt();
+    (left > LEFT || worst.r_squared.is_nan()).then(|| {
+        format!(
+            "the {} explains nothing: R^2 is {:.4}, so that its error is {:.0} % of what the mean of the reference alone \
+             would err; look at signal and reference side by side (a sensor that is not connected, a column of \
+             something else, values that the recorder makes up)",
+            worst.name,
+            worst.r_squared,
+            100.0 * left
+        )
+    })
+}
+
+/// A sentence for a fit that leaves more of the reference than the fit explains; `None` for any other fit.
+pub fn explains_little(fits: &[FitReport]) -> Option<String> {
+    let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
+    (worst.r_squared < 0.5).then(|| {
+        let (name, r_squared) = (&worst.name, worst.r_squared);
+        format!("the {name} leaves more of the reference than it explains: R^2 is {r_squared:.4}")
+    })
+}
+
+/// A sentence for a log most of whose samples lie outside the calibrated domain.
+///
+/// Most means more than half: the estimates of such a log are those of the domain's ends more often than not.
+pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
+    (2 * clamped > samples).then(|| {
+        format!(
+            "{} % of the samples lie outside of what was calibrated and were held at its ends: is this a log of that \
+             sensor, in that unit? If it is, calibrate on trials that reach as far",
+            share(clamped, samples)
+        )
+    })
+}
+
+/// A sentence for estimates that err more than the mean of the reference does.
+pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
+    (errors.r_squared < 0.0).then(|| {
+        let r_squared = errors.r_squared;
+        format!(
+            "it errs more than the mean of the reference would (R^2 {r_squared:.4}): this log does not belong to \
+             that calibration, or its reference is not what was calibrated on"
+        )
+    })
+}
+
+/// Share of the range of the reference from which a constant error is worth a sentence.
+const FAR_OFF_PERCENT: f64 = 5.0;
+
+/// A sentence for estimates whose error is mostly a constant: `bias^2` at least half of `rmse^2`, and a twentieth of the range.
+///
+/// A reference in centimetres beside a calibration in millimetres looks like that, and so does a sensor that was mounted anew.
+pub fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
+    let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
+    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
+    (is_far && 2.0 * bias * bias >= rmse * rmse).then(|| {
+        let off = format!("{:.4} {unit}", bias.abs());
+        let side = if bias > 0.0 { "above" } else { "below" };
+        format!(
+            "it is {} {side} the reference on average, which is most of its error: is the reference in the unit of the calibration \
+             (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was mounted anew or has drifted: \
+             calibrate again, or with --model observer+rest, which follows a drifting zero",
+            off.trim_end()
+        )
+    })
+}
+
+/// A sentence for estimates that were held against a reference that stands still, where no R^2 tells how good they are.
+pub fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
+    (!errors.r_squared.is_finite()).then(|| {
+        format!(
+            "the reference stands still, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
+            errors.mae
+        )
+    })
+}
+
+/// A sentence for trials that a calibration was fitted on; `None` where none is. A record holds the names of its first trials and the
+/// checksums of their samples: a trial is found again under another name, and a name that another trial has is told as well.
+pub fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
+    let (provenance, columns) = (
+        &calibration.spec().provenance,
+        [calibration.spec().signal.as_str(), calibration.spec().reference.as_str()],
+    );
+    let is_known = |trial: &Trial| {
+        let checksum = trial.checksum(&columns);
+        checksum.is_some_and(|sum| provenance.checksums().contains(&sum))
+    };
+    // a fit leaves out what holds a gross error, and its checksums are of what it kept
+    let cleaned = |trial: &Trial| {
+        let (kept, _) =
+            without_gross_errors(std::slice::from_ref(trial), &[columns[1], columns[0]]);
+        kept.iter().any(is_known)
+    };
+    let has_checksums = !provenance.checksums().is_empty();
+    let told = trials.iter().filter_map(|trial| {
+        let label = Label::truncated(&trial.name);
+        let is_named = provenance.trials().any(|fitted| fitted == label.as_str());
+        let how = match has_checksums && (is_known(trial) || cleaned(trial)) {
+            true if is_named => "",
+            true => " (under another name)",
+            false if !is_named => return None,
+            false if has_checksums => " (by its name: its samples are others)",
+            false => "",
+        };
+        Some(format!("{}{how}", trial.name))
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "it was fitted on {}: how good it is on other trials these do not tell; evaluate on trials that were held back",
+            told.join(", ")
+        )
+    })
+}
+
+/// A share in percent, which is 100 only where `part` is all of `of`.
+fn share(part: u64, of: u64) -> f64 {
+    let percent = 100.0 * part as f64 / of.max(1) as f64;
+    if part < of { (10.0 * percent).floor() / 10.0 } else { percent }
+}

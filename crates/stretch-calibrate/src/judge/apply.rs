@@ -1,0 +1,286 @@
+//! A calibration applied to time-stamped samples, live or from a file.
+
+use stretch_core::{
+    Branch, Calibration, Design, Interval, Model, Range, RangeSpec, RateEstimator, Runner,
+    SampleRate, Seconds, Stage, Volts,
+};
+use stretch_data::Trial;
+use stretch_filter::{Arrival, Cadence, RateFilter};
+use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, StretchReceptor, Withheld};
+
+use crate::{
+    CalibrateError,
+    prepare::{extent, rates_at_use, sample_rate_hz},
+};
+
+/// An interval between samples that differs from the period by more than this share is counted as jitter.
+const JITTER_TOLERANCE: f64 = 0.2;
+
+/// A receptor that checks the time stamps: missing ticks are stepped as missing samples, and a stamp that runs
+/// backwards resets the receptor.
+///
+/// A calibration that [needs the signal only](Model::needs_signal_only) answers from the first sample on. The rate of
+/// such a reading is NaN until the rate estimator has seen enough samples.
+///
+/// ```
+/// use stretch_calibrate::LiveReceptor;
+/// use stretch_receptor::Withheld;
+/// # let calibration = stretch_receptor::example_calibration();
+/// let mut live = LiveReceptor::new(&calibration)?;
+/// for n in 0..10 {
+///     assert_eq!(live.step(n as f64 * 0.01, 1.5), Err(Withheld::Warming));
+/// }
+/// assert!(live.step(0.10, 1.5).is_ok());
+/// assert!(live.step(0.13, 1.5).is_ok()); // two samples missing: bridged
+/// assert_eq!(live.step(9.0, 1.5), Err(Withheld::Warming)); // a long gap
+/// assert_eq!(live.faults().missing, 2 + 886);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct LiveReceptor {
+    receptor: Receptor<f64>,
+    /// The same calibration without a rate, where it needs none.
+    without_rate: Option<StretchReceptor<f64, ()>>,
+    memory: <Receptor<f64> as Design>::Memory,
+    cadence: Runner<Cadence>,
+    faults: Faults,
+}
+
+/// Faults of a stream's time stamps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Faults {
+    /// Samples that did not come.
+    pub missing: u64,
+    /// Samples early or late by more than a fifth of a period.
+    pub jittered: u64,
+    /// Stamps that repeated or ran backwards.
+    pub backwards: u64,
+}
+
+impl LiveReceptor {
+    /// A receptor for a calibration whose estimator can run live.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Receptor`] for the paper's central difference, which
+    /// needs the next sample.
+    pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
+        let receptor = Receptor::new(calibration)?;
+        let without_rate = match calibration.spec().model.needs_signal_only() {
+            true => Some(StretchReceptor::with_rate(calibration, ())?),
+            false => None,
+        };
+        Ok(Self {
+            memory: receptor.memory(),
+            receptor,
+            without_rate,
+            cadence: Runner::new(Cadence::new(
+                calibration.spec().sample_rate_hz,
+                JITTER_TOLERANCE,
+            )?),
+            faults: Faults::default(),
+        })
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// [`Withheld`] when there is no reading for the sample.
+    pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
+        match self.cadence.step(Seconds(time_s)) {
+            Arrival::Gap { missing } => {
+                self.faults.missing += u64::from(missing);
+                for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
+                    let _ = self.receptor.step(&mut self.memory, Volts(f64::NAN));
+                }
+            }
+            Arrival::Backwards { .. } => {
+                self.faults.backwards += 1;
+                self.memory = self.receptor.memory();
+            }
+            Arrival::Jitter { .. } => self.faults.jittered += 1,
+            _ => {}
+        }
+        let reading = self.receptor.step(&mut self.memory, Volts(signal));
+        match (reading, &self.without_rate) {
+            (Err(Withheld::Warming), Some(receptor)) => {
+                Ok(Reading { rate: f64::NAN, ..receptor.at(Branch::Inflation, 0.0, signal) })
+            }
+            _ => reading,
+        }
+    }
+
+    /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.
+    pub fn set_pressure(&mut self, pressure: f64) {
+        self.memory.set_pressure(pressure);
+    }
+
+    /// Faults of the time stamps so far.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+}
+
+/// A trial's readings, one for each sample, and the faults of the trial's time stamps.
+#[derive(Debug, Clone)]
+pub struct Applied {
+    /// One answer for each sample.
+    pub readings: Vec<Result<Reading, Withheld>>,
+    /// Faults of the time stamps.
+    pub faults: Faults,
+}
+
+/// Applies a calibration to a logged trial, sample by sample, as it would run live.
+///
+/// A calibration that needs the signal only takes its rates at the trial's sample rate: see [`at_rate`].
+///
+/// A calibration that names the paper's central difference is applied as published: the rates are taken over the
+/// whole log, one sample ahead.
+///
+/// # Errors
+/// [`CalibrateError::Data`] when the trial lacks the signal,
+/// [`CalibrateError::Filter`] when the estimator cannot be designed.
+pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
+    trial.check_lengths()?;
+    let signal = trial.require(calibration.spec().signal.as_str())?;
+    if calibration.spec().rate_estimator == RateEstimator::CentralDifference {
+        let rate = calibration.spec().sample_rate_hz;
+        let rates = Logged(rates_at_use(calibration.spec().rate_estimator, rate, signal)?);
+        let mut receptor = Runner::new(Receptor::with_rate(calibration, rates)?);
+        let readings = signal.iter().map(|&v| receptor.step(Volts(v))).collect();
+        return Ok(Applied { readings, faults: Faults::default() });
+    }
+    let own_hz = calibration.spec().sample_rate_hz.hz();
+    let mut live =
+        LiveReceptor::new(&at_rate(calibration, sample_rate_hz(trial).unwrap_or(own_hz))?)?;
+    let pressure = match pressure_column(calibration) {
+        Some(column) => Some(trial.require(column)?),
+        None => None,
+    };
+    let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
+        if let Some(pressure) = pressure {
+            live.set_pressure(pressure[i]);
+        }
+        live.step(t, v)
+    };
+    let readings = trial.time_s.iter().zip(signal).enumerate().map(one).collect();
+    Ok(Applied { readings, faults: live.faults() })
+}
+
+/// A calibration that [needs the signal only](Model::needs_signal_only), at another sample rate. Any other calibration
+/// is returned as it is, because it holds at its own sample rate only.
+///
+/// # Errors
+/// [`CalibrateError::Design`] for a rate outside 1e-3 to 1e7 Hz.
+///
+/// ```
+/// use stretch_calibrate::at_rate;
+/// let surfaces = stretch_receptor::example_calibration();
+/// assert_eq!(at_rate(&surfaces, 10.0)?, surfaces);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn at_rate(calibration: &Calibration, rate_hz: f64) -> Result<Calibration, CalibrateError> {
+    if !calibration.spec().model.needs_signal_only() {
+        return Ok(calibration.clone());
+    }
+    let mut spec = calibration.clone().into_spec();
+    spec.sample_rate_hz = SampleRate::new(rate_hz)?;
+    Ok(Calibration::new(spec)?)
+}
+
+/// The column of the pressure, where a calibration needs one beside its signal.
+pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
+    match &calibration.spec().model {
+        Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),
+        _ => None,
+    }
+}
+
+/// How late the calibration's rate is, in seconds; zero for the paper's
+/// central difference.
+///
+/// # Errors
+/// [`CalibrateError::Filter`] when the estimator cannot be designed.
+pub fn rate_delay_s(calibration: &Calibration) -> Result<f64, CalibrateError> {
+    match calibration.spec().rate_estimator {
+        RateEstimator::CentralDifference => Ok(0.0),
+        live => Ok(RateFilter::<f64>::new(live, calibration.spec().sample_rate_hz)?.delay_s()),
+    }
+}
+
+/// Rates that were taken over a whole log beforehand.
+struct Logged(Vec<Option<f64>>);
+
+impl Design for Logged {
+    type Memory = usize;
+    fn memory(&self) -> usize {
+        0
+    }
+}
+
+impl Stage<f64> for Logged {
+    type Out = Option<f64>;
+    fn step(&self, next: &mut usize, _: f64) -> Option<f64> {
+        let rate = self.0.get(*next).copied().flatten();
+        *next += 1;
+        rate
+    }
+}
+
+/// The same calibration with the ranges of one trial: the trial's signal and rate are divided by their own total
+/// ranges, and nothing is clamped (paper section 2.5).
+///
+/// This function exists for comparison with the paper. A trial's ranges are known only at its end, so that such a
+/// calibration cannot run live.
+///
+/// # Errors
+/// [`CalibrateError::Data`] when the trial lacks the signal,
+/// [`CalibrateError::Constant`] when the signal never changes.
+///
+/// ```
+/// use stretch_calibrate::on_own_ranges;
+/// use stretch_data::{Channel, Trial};
+/// # let calibration = stretch_receptor::example_calibration();
+/// let trial = Trial {
+///     name: "short".into(),
+///     time_s: (0..100).map(|n| n as f64 * 0.01).collect(),
+///     channels: vec![Channel {
+///         name: "bridge_v".into(),
+///         values: (0..100).map(|n| 1.3 + 4e-5 * f64::from(n * n)).collect(),
+///     }],
+/// };
+/// let own = on_own_ranges(&calibration, &trial)?;
+/// approx::assert_abs_diff_eq!(own.spec().signal_range.span(), 0.39204, epsilon = 1e-9);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn on_own_ranges(
+    calibration: &Calibration,
+    trial: &Trial,
+) -> Result<Calibration, CalibrateError> {
+    let mut spec = calibration.clone().into_spec();
+    let signal = trial.require(spec.signal.as_str())?;
+    let rates = rates_at_use(spec.rate_estimator, spec.sample_rate_hz, signal)?;
+    let signed = rates.iter().flatten().map(|rate| spec.polarity.sign() * rate);
+    let (signal_extent, rate_extent) = (extent(signal.iter().copied()), extent(signed));
+    let constant =
+        || CalibrateError::Constant { column: spec.signal.to_string(), value: signal_extent.min };
+    let range = |old: Range, seen: Interval| {
+        Range::new(RangeSpec { min: seen.min, max: seen.max, ..old.into() }).map_err(|_| constant())
+    };
+    let signal_range = range(spec.signal_range, signal_extent)?;
+    let mut model = spec.model;
+    match &mut model {
+        Model::Linear(line) => line.signal_domain = signal_extent,
+        Model::Surfaces { inflation, deflation } => {
+            for branch in [inflation, deflation] {
+                branch.rate_range = range(branch.rate_range, rate_extent)?;
+                branch.signal_domain = signal_extent;
+                branch.rate_domain = rate_extent;
+            }
+        }
+        // other models have no ranges that a trial could replace
+        _ => {}
+    }
+    spec.signal_range = signal_range;
+    spec.model = model;
+    Ok(Calibration::new(spec)?)
+}

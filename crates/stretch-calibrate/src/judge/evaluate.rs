@@ -1,0 +1,317 @@
+//! Errors of estimates, by the paper's measures.
+
+use serde::Serialize;
+use stretch_core::{Calibration, Polarity};
+use stretch_data::{Trial, unit_of};
+use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
+use stretch_receptor::Domain;
+
+use crate::{
+    CalibrateError,
+    prepare::{extent, polarity, sample_rate_hz},
+};
+
+use super::apply::apply;
+
+/// Blocks of the paired test, in seconds.
+const BLOCK_S: f64 = 0.5;
+
+/// The largest lag that is looked for, in seconds.
+const MAX_LAG_S: f64 = 1.0;
+
+/// One method's errors, on one trial or pooled.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodErrors {
+    /// `raw`, or the calibration's name.
+    pub method: String,
+    /// Samples compared.
+    pub samples: u64,
+    /// Samples without an estimate: warm-up and gaps.
+    pub withheld: u64,
+    /// Samples whose inputs were outside the calibrated domain.
+    pub clamped: u64,
+    /// Root mean square error, in the unit of the reference.
+    pub rmse: f64,
+    /// Root mean square error in percent of the reference's range.
+    pub rmse_percent: f64,
+    /// The paper's average error: `100 mean|d_p - d_s|/range of d_s`.
+    pub average_error_percent: f64,
+    /// `100 mean|d_p - d_s|/range of the reference`.
+    pub average_error_percent_of_reference: f64,
+    /// `100 mean(d_p - d_s)/range of d_s`.
+    pub signed_error_percent: f64,
+    /// Mean of estimate minus reference.
+    pub bias: f64,
+    /// Mean absolute error.
+    pub mae: f64,
+    /// Greatest absolute error.
+    pub max: f64,
+    /// Coefficient of determination.
+    pub r_squared: f64,
+    /// Seconds by which the estimate runs behind the reference; `None` where no trial determines the lag.
+    pub lag_s: Option<f64>,
+}
+
+/// A paired t test between two methods' absolute errors.
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// First method.
+    pub first: String,
+    /// Second method.
+    pub second: String,
+    /// Mean of first minus second, in the unit of the reference.
+    pub mean_difference: f64,
+    /// P with samples taken as independent, as the paper did.
+    pub p_samples: Option<f64>,
+    /// P on means of half-second blocks.
+    pub p_blocks: Option<f64>,
+    /// Number of blocks.
+    pub blocks: u64,
+    /// 95 % interval of the mean difference, on blocks.
+    pub interval_95: Option<(f64, f64)>,
+}
+
+/// Errors of each trial and pooled errors, and tests between the methods.
+#[derive(Debug, Clone, Serialize)]
+pub struct Evaluation {
+    /// Unit of the reference, as in `mm` or `N`.
+    pub unit: String,
+    /// Errors by trial; the order of the methods is the same in all trials.
+    pub trials: Vec<TrialErrors>,
+    /// Errors over all trials.
+    pub pooled: Vec<MethodErrors>,
+    /// Tests of `raw` against each calibration, and of each calibration against the next.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// One trial's errors and, for pictures, its curves.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrialErrors {
+    /// The trial.
+    pub trial: String,
+    /// Errors of each method.
+    pub methods: Vec<MethodErrors>,
+    /// Time stamps, in seconds.
+    #[serde(skip)]
+    pub time_s: Vec<f64>,
+    /// The reference.
+    #[serde(skip)]
+    pub reference: Vec<f64>,
+    /// Estimates of each method; NaN where withheld.
+    #[serde(skip)]
+    pub estimates: Vec<Vec<f64>>,
+    /// Rates of each method's estimate; NaN where a method has no rate.
+    #[serde(skip)]
+    pub rates: Vec<Vec<f64>>,
+}
+
+/// The estimates of one method for one trial.
+struct Estimates {
+    values: Vec<f64>,
+    rates: Vec<f64>,
+    clamped: u64,
+}
+
+/// Judges calibrations against the reference of each trial.
+///
+/// The first method is always `raw`: the trial's voltage, scaled so that its
+/// extremes meet the reference's. All calibrations must share signal and
+/// reference.
+///
+/// # Errors
+/// [`CalibrateError::Data`] when a trial lacks signal or reference,
+/// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up, or with fewer samples a second than the calibration expects.
+pub fn evaluate(
+    calibrations: &[(&str, &Calibration)],
+    trials: &[Trial],
+) -> Result<Evaluation, CalibrateError> {
+    let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
+    let names: Vec<&str> =
+        std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect();
+    let mut pooled = vec![Tally::default(); names.len()];
+    let mut tests = Tests::new(names.len(), first.spec().sample_rate_hz.hz());
+    let mut rows = Vec::new();
+    for trial in trials {
+        trial.check_lengths()?;
+        let reference = trial.require(first.spec().reference.as_str())?;
+        let mut methods = vec![raw(first, trial)?];
+        for (_, calibration) in calibrations {
+            methods.push(estimates(calibration, trial)?);
+        }
+        let rate_hz = sample_rate_hz(trial)?;
+        let period_s = 1.0 / rate_hz;
+        let mut errors = Vec::new();
+        for ((name, method), all) in names.iter().zip(&methods).zip(&mut pooled) {
+            let tally = Tally::of(reference, method, period_s);
+            all.merge(&tally);
+            let nothing = || CalibrateError::NothingEstimated {
+                trial: trial.name.clone(),
+                rate_hz,
+                expected_hz: first.spec().sample_rate_hz.hz(),
+            };
+            errors.push(tally.errors(name).ok_or_else(nothing)?);
+        }
+        tests.push(reference, &methods);
+        rows.push(TrialErrors {
+            trial: trial.name.clone(),
+            methods: errors,
+            time_s: trial.time_s.clone(),
+            reference: reference.to_vec(),
+            rates: methods.iter().map(|m| m.rates.clone()).collect(),
+            estimates: methods.into_iter().map(|m| m.values).collect(),
+        });
+    }
+    let nothing = || CalibrateError::NoTrials;
+    let pooled =
+        names.iter().zip(&pooled).map(|(name, tally)| tally.errors(name).ok_or_else(nothing));
+    Ok(Evaluation {
+        unit: unit_of(first.spec().reference.as_str()),
+        trials: rows,
+        pooled: pooled.collect::<Result<_, _>>()?,
+        comparisons: tests.compare(&names),
+    })
+}
+
+/// The uncalibrated signal: its extremes scaled onto the reference's.
+fn raw(calibration: &Calibration, trial: &Trial) -> Result<Estimates, CalibrateError> {
+    let signal = trial.require(calibration.spec().signal.as_str())?;
+    let reference = trial.require(calibration.spec().reference.as_str())?;
+    let (seen, stroke) = (extent(signal.iter().copied()), extent(reference.iter().copied()));
+    let together = polarity(signal.iter().copied().zip(reference.iter().copied()));
+    let (start, end) = match together {
+        Polarity::Rising => (stroke.min, stroke.max),
+        Polarity::Falling => (stroke.max, stroke.min),
+    };
+    let gain = (end - start) / (seen.max - seen.min);
+    let gain = if gain.is_finite() { gain } else { 0.0 };
+    let values: Vec<f64> = signal.iter().map(|v| start + gain * (v - seen.min)).collect();
+    Ok(Estimates { rates: vec![f64::NAN; values.len()], values, clamped: 0 })
+}
+
+fn estimates(calibration: &Calibration, trial: &Trial) -> Result<Estimates, CalibrateError> {
+    let applied = apply(calibration, trial)?;
+    let read = |of: fn(&stretch_receptor::Reading) -> f64| {
+        applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, of)).collect()
+    };
+    let outside = |r: &&Result<_, _>| matches!(r, Ok(stretch_receptor::Reading { domain, .. }) if *domain != Domain::Inside);
+    let clamped = applied.readings.iter().filter(outside).count() as u64;
+    Ok(Estimates { values: read(|r| r.estimate), rates: read(|r| r.rate), clamped })
+}
+
+/// Sums behind one [`MethodErrors`], which can be merged over trials.
+#[derive(Debug, Clone)]
+struct Tally {
+    agreement: Agreement<f64>,
+    withheld: u64,
+    clamped: u64,
+    /// Sum of the lags, each weighted by its samples, and the sum of these samples.
+    lag: (f64, u64),
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self { agreement: Agreement::new(), withheld: 0, clamped: 0, lag: (0.0, 0) }
+    }
+}
+
+impl Tally {
+    fn of(reference: &[f64], method: &Estimates, period_s: f64) -> Self {
+        let mut tally = Self { clamped: method.clamped, ..Self::default() };
+        for (&truth, &estimate) in reference.iter().zip(&method.values) {
+            if estimate.is_nan() {
+                tally.withheld += 1;
+            } else {
+                tally.agreement.push(truth, estimate);
+            }
+        }
+        // the warm-up stands at the start, and the estimates behind it are one piece without a hole
+        let start = method.values.iter().position(|x| !x.is_nan()).unwrap_or(reference.len());
+        let (truth, estimate) = (&reference[start..], &method.values[start..]);
+        let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
+        if let Ok(found) = lag(truth, estimate, most)
+            && !found.at_limit
+        {
+            tally.lag = (found.samples * period_s * truth.len() as f64, truth.len() as u64);
+        }
+        tally
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.agreement.merge(&other.agreement);
+        self.withheld += other.withheld;
+        self.clamped += other.clamped;
+        self.lag.0 += other.lag.0;
+        self.lag.1 += other.lag.1;
+    }
+
+    fn errors(&self, method: &str) -> Option<MethodErrors> {
+        let (all, errors) = (&self.agreement, self.agreement.errors());
+        Some(MethodErrors {
+            method: method.to_owned(),
+            samples: all.count(),
+            withheld: self.withheld,
+            clamped: self.clamped,
+            rmse: errors.rmse()?,
+            rmse_percent: all.rmse_percent(Delta::Truth).unwrap_or(f64::NAN),
+            average_error_percent: all.average_error_percent(Delta::Estimate).unwrap_or(f64::NAN),
+            average_error_percent_of_reference: all
+                .average_error_percent(Delta::Truth)
+                .unwrap_or(f64::NAN),
+            signed_error_percent: all.signed_error_percent(Delta::Estimate).unwrap_or(f64::NAN),
+            bias: errors.bias()?,
+            mae: errors.mae()?,
+            max: errors.max_abs()?,
+            r_squared: all.r_squared().unwrap_or(f64::NAN),
+            lag_s: (self.lag.1 > 0).then(|| self.lag.0 / self.lag.1 as f64),
+        })
+    }
+}
+
+/// Paired tests of absolute errors between all pairs of methods that are reported.
+struct Tests {
+    pairs: Vec<(usize, usize)>,
+    samples: Vec<PairedT<f64>>,
+    blocks: Vec<PairedBlocks<f64>>,
+}
+
+impl Tests {
+    fn new(methods: usize, rate_hz: f64) -> Self {
+        let raw = (1..methods).map(|m| (0, m));
+        let next = (2..methods).map(|m| (m - 1, m));
+        let pairs: Vec<_> = raw.chain(next).collect();
+        let length = ((BLOCK_S * rate_hz) as u64).max(1);
+        let blocks = pairs.iter().filter_map(|_| PairedBlocks::new(length).ok()).collect();
+        Self { samples: vec![PairedT::new(); pairs.len()], blocks, pairs }
+    }
+
+    fn push(&mut self, reference: &[f64], methods: &[Estimates]) {
+        for (test, &(a, b)) in self.pairs.iter().enumerate() {
+            for (i, truth) in reference.iter().enumerate() {
+                let first = (truth - methods[a].values[i]).abs();
+                let second = (truth - methods[b].values[i]).abs();
+                if first.is_finite() && second.is_finite() {
+                    self.samples[test].push(first, second);
+                    self.blocks[test].push(first, second);
+                }
+            }
+            self.blocks[test].end_recording();
+        }
+    }
+
+    fn compare(&self, names: &[&str]) -> Vec<Comparison> {
+        let row = |(test, &(a, b)): (usize, &(usize, usize))| {
+            let samples: Option<TTest> = self.samples[test].test().ok();
+            let blocks = self.blocks[test].test().ok();
+            Comparison {
+                first: names[a].to_owned(),
+                second: names[b].to_owned(),
+                mean_difference: samples.as_ref().map_or(f64::NAN, |t| t.mean_difference),
+                p_samples: samples.map(|t| t.p),
+                p_blocks: blocks.as_ref().map(|t| t.p),
+                blocks: self.blocks[test].count(),
+                interval_95: blocks.map(|t| (t.interval_95.min, t.interval_95.max)),
+            }
+        };
+        self.pairs.iter().enumerate().map(row).collect()
+    }
+}

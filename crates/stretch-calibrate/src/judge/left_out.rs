@@ -1,0 +1,282 @@
+//! Errors of one model on parts of the trials that are left out of its fit in turn.
+
+use serde::{Deserialize, Serialize};
+use stretch_core::{Calibration, Model};
+use stretch_data::Trial;
+use stretch_metrics::lag;
+
+use crate::{
+    CalibrateError, ModelKind, Options,
+    fit::{Choice, TABLE_PARTS, calibrate_with},
+    prepare::{extent, rows, sample_rate_hz},
+};
+
+use super::apply::apply;
+
+/// Seconds on either side of a part left out that are not fitted either, because neighbouring samples are correlated.
+const GAP_S: f64 = 2.0;
+/// Samples of warm-up that no model is judged on.
+const SETTLE: usize = 20;
+/// Fewer trials than this are cut into parts.
+pub(crate) const LEAST_TRIALS: usize = 3;
+/// Number of parts that each trial is cut into where there are few trials.
+pub(crate) const PARTS: usize = 6;
+/// A turn counts when the reference has come back by this share of its range.
+const TURN: f64 = 0.1;
+/// A trial with at least this many turns counts as one that reverses.
+const LEAST_TURNS: usize = 3;
+const MAX_LAG_S: f64 = 0.5;
+
+/// Whether a trial can distinguish memory from position: such a trial turns at least three times.
+fn reverses(reference: &[f64]) -> bool {
+    let range = extent(reference.iter().copied());
+    let turn = TURN * (range.max - range.min);
+    if turn <= 0.0 {
+        return false;
+    }
+    let (mut turns, mut rising, mut extreme) = (0, None, reference[0]);
+    for &x in reference {
+        let back = if rising == Some(true) { extreme - x } else { x - extreme };
+        match rising {
+            None if (x - extreme).abs() > turn => {
+                rising = Some(x > extreme);
+                extreme = x;
+            }
+            Some(up) if back > turn => {
+                turns += 1;
+                rising = Some(!up);
+                extreme = x;
+            }
+            Some(up) => extreme = if up { extreme.max(x) } else { extreme.min(x) },
+            None => {}
+        }
+    }
+    turns >= LEAST_TURNS
+}
+
+/// A part of the data whose samples are left out together: samples `from..to` of a trial.
+struct Fold {
+    trial: usize,
+    from: usize,
+    to: usize,
+}
+
+/// The cross-validation of one model, from which [`choose_among`](crate::choose_among) chooses. The value serialises as JSON, so that
+/// workers that share no memory can judge models.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judged {
+    /// Numbers that the fit determines.
+    pub(crate) parameters: usize,
+    pub(crate) errors: Errors,
+}
+
+/// Errors of one model on everything left out.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Errors {
+    /// Mean squared error of each part left out; `None` where nothing was estimated.
+    pub(crate) parts: Vec<Option<f64>>,
+    /// Sums of squares and counts: arbitrary, pulses, ramps.
+    kinds: [(f64, f64); 3],
+    pub(crate) worst: f64,
+    /// Sum of the lags, in seconds, and their count.
+    pub(crate) lag: (f64, f64),
+}
+
+/// Judges one model as [`choose_model`](crate::choose_model) does.
+///
+/// # Errors
+/// As [`calibrate`](crate::calibrate).
+pub fn judge_model(
+    trials: &[Trial],
+    options: &Options,
+    kind: ModelKind,
+) -> Result<Judged, CalibrateError> {
+    judge(trials, &folds(trials, options), &turning(trials, options)?, options, kind)
+}
+
+/// Which trials reverse; a table, whose rows have no order, does not.
+pub(crate) fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, CalibrateError> {
+    let one = |trial: &Trial| Ok(!options.is_table && reverses(trial.require(&options.reference)?));
+    trials.iter().map(one).collect()
+}
+
+fn folds(trials: &[Trial], options: &Options) -> Vec<Fold> {
+    let parts = match trials.len() >= LEAST_TRIALS {
+        true => 1,
+        false if options.is_table => TABLE_PARTS,
+        false => PARTS,
+    };
+    let cut = |trial: usize| {
+        let samples = trials[trial].len();
+        let parts = parts.min(samples);
+        (0..parts).map(move |part| Fold {
+            trial,
+            from: samples * part / parts,
+            to: samples * (part + 1) / parts,
+        })
+    };
+    (0..trials.len()).flat_map(cut).collect()
+}
+
+/// The trials without a fold.
+fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
+    let mut rest = Vec::new();
+    for (index, trial) in trials.iter().enumerate() {
+        if index != fold.trial {
+            rest.push(trial.clone());
+            continue;
+        }
+        if options.is_table {
+            let stays: Vec<bool> =
+                (0..trial.len()).map(|i| i < fold.from || i >= fold.to).collect();
+            let mut part = rows(trial, &stays);
+            // no row was lost: they have no order
+            part.time_s = (0..part.len()).map(|i| i as f64).collect();
+            rest.extend((!part.is_empty()).then_some(part));
+            continue;
+        }
+        let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
+        for span in [0..fold.from.saturating_sub(gap), fold.to.saturating_add(gap)..trial.len()] {
+            // a short remainder is not fitted, because the estimators would hardly warm up on it
+            if span.len() > 5 * SETTLE {
+                let mut part = trial.clone();
+                part.time_s = trial.time_s[span.clone()].to_vec();
+                for (own, whole) in part.channels.iter_mut().zip(&trial.channels) {
+                    own.values = whole.values[span.clone()].to_vec();
+                }
+                rest.push(part);
+            }
+        }
+    }
+    rest
+}
+
+fn judge(
+    trials: &[Trial],
+    folds: &[Fold],
+    turning: &[bool],
+    options: &Options,
+    kind: ModelKind,
+) -> Result<Judged, CalibrateError> {
+    let options = Options { model: kind, ..options.clone() };
+    let (whole, choice): (_, Option<Choice>) = calibrate_with(trials, &options, None)?;
+    let parameters = whole
+        .fits
+        .iter()
+        .map(|fit| {
+            let own = fit.orders.iter().find(|order| order.model == fit.model);
+            own.map_or(fit.coefficients.len(), |order| order.terms)
+        })
+        .sum::<usize>()
+        + if matches!(kind, ModelKind::Remembering { rest: true, .. }) { 3 } else { 0 };
+    let mut errors = Errors::default();
+    for fold in folds {
+        let rest = without(trials, fold, &options);
+        let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
+        let trial = &trials[fold.trial];
+        let reference = trial.require(&options.reference)?;
+        let calibration = match options.is_table {
+            true => beyond_its_ends(calibrated.calibration, trial.require(&options.signal)?)?,
+            false => calibrated.calibration,
+        };
+        let applied = apply(&calibration, trial)?;
+        let estimates: Vec<f64> =
+            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
+        let period_s = 1.0 / sample_rate_hz(trial)?;
+        let which = match (trial.name.contains("pulse"), turning[fold.trial]) {
+            (true, true) => 1,
+            (false, true) => 0,
+            (_, false) => 2,
+        };
+        let settle = if options.is_table { 0 } else { SETTLE };
+        let judged = fold.from.max(settle).min(fold.to)..fold.to;
+        errors.take(&reference[judged.clone()], &estimates[judged], period_s, which);
+    }
+    Ok(Judged { parameters, errors })
+}
+
+/// A line or a curve that is not held at the ends of the signals that it was fitted to: of a table without its largest
+/// weight the estimate of that weight is an extrapolation, and tells how good the form is.
+fn beyond_its_ends(
+    calibration: Calibration,
+    signals: &[f64],
+) -> Result<Calibration, CalibrateError> {
+    let mut spec = calibration.into_spec();
+    let all = extent(signals.iter().copied());
+    match &mut spec.model {
+        Model::Linear(line) => line.signal_domain = all,
+        Model::Surfaces { inflation, deflation } => {
+            (inflation.signal_domain, deflation.signal_domain) = (all, all);
+        }
+        _ => {}
+    }
+    Ok(Calibration::new(spec)?)
+}
+
+impl Errors {
+    /// Root mean square error over everything.
+    pub(crate) fn rmse(&self) -> Option<f64> {
+        root_mean(self.kinds.iter().fold((0.0, 0.0), |(s, n), k| (s + k.0, n + k.1)))
+    }
+
+    /// Root mean square error over arbitrary motion (0), pulses (1) or ramps (2).
+    pub(crate) fn rmse_of(&self, kind: usize) -> Option<f64> {
+        root_mean(self.kinds[kind])
+    }
+
+    fn take(&mut self, truth: &[f64], estimate: &[f64], period_s: f64, which: usize) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (t, e) in truth.iter().zip(estimate) {
+            let error = (t - e).abs();
+            if error.is_finite() {
+                sum += error * error;
+                count += 1.0;
+                self.worst = self.worst.max(error);
+            }
+        }
+        self.kinds[which].0 += sum;
+        self.kinds[which].1 += count;
+        self.parts.push((count > 0.0).then_some(sum / count));
+        let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
+        if which < 2
+            && let Ok(found) = lag(truth, estimate, most)
+            && !found.at_limit
+        {
+            self.lag.0 += found.samples * period_s;
+            self.lag.1 += 1.0;
+        }
+    }
+}
+
+fn root_mean((sum, count): (f64, f64)) -> Option<f64> {
+    (count > 0.0).then(|| (sum / count).sqrt())
+}
+
+/// Mean difference of two models' errors, part by part, and its standard error. A part of any length counts as one
+/// draw.
+pub(crate) fn excess(parts: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
+    let differences: Vec<f64> =
+        parts.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();
+    let n = differences.len() as f64;
+    if n < 2.0 {
+        return None;
+    }
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Some((mean, (variance / n).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ramps_do_not_reverse() {
+        let ramp: Vec<f64> = (0..500).map(|n| 180.0 - 0.05 * f64::from(n)).collect();
+        let noisy: Vec<f64> =
+            ramp.iter().enumerate().map(|(n, x)| x + 0.3 * (n as f64).sin()).collect();
+        let wave: Vec<f64> = (0..500).map(|n| 165.0 + 15.0 * (0.05 * f64::from(n)).sin()).collect();
+        assert!(!reverses(&ramp) && !reverses(&noisy) && !reverses(&[1.0; 9]));
+        assert!(reverses(&wave));
+    }
+}

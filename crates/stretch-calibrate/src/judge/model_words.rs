@@ -1,0 +1,118 @@
+//! Sentences that say why a model was chosen.
+
+use super::reach::four_digits;
+
+/// The numbers of a candidate that the choice compared.
+#[derive(Debug, Clone)]
+pub(crate) struct Seen {
+    pub(crate) model: String,
+    /// Root mean square error on the data left out.
+    pub(crate) rmse: f64,
+    /// Numbers that the fit determines.
+    pub(crate) numbers: usize,
+}
+
+/// The figures behind a choice.
+#[derive(Debug)]
+pub(crate) struct Grounds<'a> {
+    /// The candidate of the least error, among the candidates that may be chosen.
+    pub(crate) best: &'a Seen,
+    /// The runner-up of the best.
+    pub(crate) second: Option<&'a Seen>,
+    /// The simplest candidate that counts as equally good.
+    pub(crate) simplest: &'a Seen,
+    /// Mean squared error of the simplest candidate minus that of the best, part by part, and its standard error.
+    pub(crate) excess: Option<(f64, f64)>,
+    /// The simplest candidate with a followed baseline, where this form was taken instead.
+    pub(crate) insured: Option<&'a Seen>,
+    /// Unit of the reference.
+    pub(crate) unit: &'a str,
+    /// Whether models that remember were among the candidates.
+    pub(crate) memory_shows: bool,
+    /// Largest multiple of the best error that counts as equally good.
+    pub(crate) as_good: f64,
+}
+
+/// A sentence with the figures that were compared and the rule that decided.
+pub(crate) fn why(grounds: &Grounds<'_>) -> String {
+    let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
+    let error = |seen: &Seen| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
+    // the form with a followed baseline is no candidate of this comparison
+    let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.model));
+    let mut sentence = if simplest.model == best.model {
+        let before = second.map_or(String::new(), |s| format!(", {} {}", s.model, error(s)));
+        let (model, least) = (&best.model, error(best));
+        let among = if *memory_shows { "" } else { " of those without memory" };
+        format!(
+            "{chosen}{model} errs least{among} on what was left out of the fit, {least}{before}"
+        )
+    } else {
+        let by_chance = excess.filter(|(mean, error)| mean <= error);
+        let decided = match by_chance {
+            Some((mean, error)) if mean > 0.0 => format!(
+                "the difference of their squares is {:.1} of its standard errors, which is chance",
+                mean / error
+            ),
+            Some(_) => "trial by trial it is no better".to_owned(),
+            None => format!("which is within {:.0} %", 100.0 * (as_good - 1.0)),
+        };
+        format!(
+            "{chosen}{} errs {} on what was left out of the fit, the best, {}, {}; {decided}, and {} numbers are fewer than {}",
+            simplest.model,
+            error(simplest),
+            best.model,
+            error(best),
+            simplest.numbers,
+            best.numbers
+        )
+    };
+    if let Some(insured) = insured {
+        let cost = 100.0 * (insured.rmse / simplest.rmse - 1.0);
+        sentence += &match cost >= 0.05 {
+            true => {
+                format!("; to follow a drifting baseline costs {cost:.1} % of that and is taken")
+            }
+            false => "; to follow a drifting baseline costs nothing and is taken".to_owned(),
+        };
+    }
+    sentence
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_decided_is_said_with_its_figures() {
+        let seen = |model: &str, rmse, numbers| Seen { model: model.to_owned(), rmse, numbers };
+        let (best, simple) = (seen("observer", 0.5, 31), seen("history", 0.52, 13));
+        let rest = seen("history+rest", 0.53, 16);
+        let grounds = Grounds {
+            best: &best,
+            second: Some(&simple),
+            simplest: &best,
+            excess: None,
+            insured: None,
+            unit: "mm",
+            memory_shows: true,
+            as_good: 1.05,
+        };
+        assert_eq!(
+            why(&grounds),
+            "observer errs least on what was left out of the fit, 0.5 mm, history 0.52 mm"
+        );
+        let chance = Grounds { simplest: &simple, excess: Some((0.1, 0.2)), ..grounds };
+        assert_eq!(
+            why(&chance),
+            "history errs 0.52 mm on what was left out of the fit, the best, observer, 0.5 mm; the \
+             difference of their squares is 0.5 of its standard errors, which is chance, and 13 numbers are fewer than 31"
+        );
+        let close = Grounds { excess: Some((0.3, 0.2)), insured: Some(&rest), ..chance };
+        let sentence = why(&close);
+        assert!(
+            sentence.starts_with("history+rest: ") && sentence.contains("within 5 %"),
+            "{sentence}"
+        );
+        assert!(sentence.ends_with("costs 1.9 % of that and is taken"), "{sentence}");
+    }
+}

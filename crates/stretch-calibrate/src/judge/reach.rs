@@ -1,0 +1,167 @@
+//! Whether a log's signal lies in the range of a calibration, as given or in another unit.
+
+use stretch_core::{Calibration, Range};
+use stretch_data::unit_of;
+
+/// Powers of ten by which a signal is multiplied for a trial: from nano to giga.
+const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
+/// Number of powers.
+const COUNT: usize = 19;
+
+/// Samples of a signal beside the range of a calibration.
+///
+/// ```
+/// use stretch_calibrate::Reach;
+///
+/// // fitted on bridge_v; the same sensor, logged in millivolts
+/// let calibration = stretch_receptor::example_calibration();
+/// let mut reach = Reach::of(&calibration);
+/// let (low, high) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
+/// (0..=100).for_each(|i| reach.take(1000.0 * (low + (high - low) * f64::from(i) / 100.0)));
+/// let doubt = reach.doubt().expect("none of them is inside");
+/// assert!(doubt.contains("101 of 101 samples") && doubt.contains("are they in mV?"), "{doubt}");
+/// ```
+#[derive(Debug, Clone)]
+pub struct Reach {
+    range: Range<f64>,
+    unit: String,
+    samples: u64,
+    /// For each power of ten, the number of samples that lie inside after multiplication by that power.
+    inside: [u64; COUNT],
+}
+
+impl Reach {
+    /// The counts of a calibration, before the first sample.
+    pub fn of(calibration: &Calibration) -> Self {
+        let unit = unit_of(calibration.spec().signal.as_str());
+        Self { range: calibration.spec().signal_range, unit, samples: 0, inside: [0; COUNT] }
+    }
+
+    /// Takes a sample; a missing sample is not counted.
+    pub fn take(&mut self, signal: f64) {
+        if !signal.is_finite() {
+            return;
+        }
+        self.samples += 1;
+        for (power, inside) in POWERS.zip(&mut self.inside) {
+            *inside += u64::from(self.range.contains(signal * ten_to(power)));
+        }
+    }
+
+    /// A sentence for a log most of whose samples lie outside. The sentence names the unit in which most samples
+    /// would lie inside, where there is one.
+    pub fn doubt(&self) -> Option<String> {
+        let as_they_are = self.inside[COUNT / 2];
+        let outside = self.samples - as_they_are;
+        if 2 * outside <= self.samples {
+            return None;
+        }
+        let [low, high] = [self.range.min(), self.range.max()].map(four_digits);
+        let (count, all) = (thousands(outside), thousands(self.samples));
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        let sentence = format!(
+            "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were held at its ends"
+        );
+        let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
+        Some(match best.filter(|(_, inside)| 2 * inside > self.samples) {
+            Some((power, inside)) => {
+                let asked = in_other_unit(&self.unit, power)
+                    .map_or("is the unit another".to_owned(), |unit| format!("are they in {unit}"));
+                let by = ten_to(power.abs());
+                let how = if power > 0 { "multiplied" } else { "divided" };
+                format!(
+                    "{sentence}: {asked}? {how} by {by}, {} would lie inside",
+                    thousands(inside)
+                )
+            }
+            None => format!(
+                "{sentence}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
+            ),
+        })
+    }
+}
+
+fn ten_to(power: i32) -> f64 {
+    let up = (0..power.abs()).fold(1.0, |x, _| 10.0 * x);
+    if power < 0 { 1.0 / up } else { up }
+}
+
+/// The unit of numbers that must be multiplied by a power of ten to be in `unit`: `mV` for `V` and -3.
+fn in_other_unit(unit: &str, power: i32) -> Option<String> {
+    const PREFIXES: [(&str, i32); 7] =
+        [("n", -9), ("u", -6), ("m", -3), ("c", -2), ("k", 3), ("M", 6), ("", 0)];
+    const BASES: [&str; 10] = ["V", "A", "N", "Pa", "Hz", "m", "W", "Ohm", "T", "g"];
+    let split = PREFIXES.iter().find_map(|(prefix, own)| {
+        let base = unit.strip_prefix(prefix).filter(|base| BASES.contains(base))?;
+        Some((base, own))
+    });
+    let (base, own) = split?;
+    let meant = PREFIXES.iter().find(|(_, p)| *p == own + power);
+    // nobody writes cV
+    let is_used = |prefix: &&str| *prefix != "c" || base == "m";
+    meant.map(|(prefix, _)| *prefix).filter(is_used).map(|prefix| format!("{prefix}{base}"))
+}
+
+/// `5,990`.
+fn thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// Four significant digits, without zeros behind them.
+pub(crate) fn four_digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
+        return format!("{rounded:e}");
+    }
+    rounded.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_told_by_their_powers_of_ten() {
+        for (unit, power, expected) in [
+            ("V", -3, Some("mV")),
+            ("V", -6, Some("uV")),
+            ("mV", 3, Some("V")),
+            ("mm", 3, Some("m")),
+            ("mm", 1, Some("cm")),
+            ("kPa", -3, Some("Pa")),
+            ("V", -2, None),
+            ("counts", -3, None),
+        ] {
+            assert_eq!(in_other_unit(unit, power).as_deref(), expected, "{unit} {power}");
+        }
+        assert_eq!([7, 990, 5990, 1_234_567].map(thousands), ["7", "990", "5,990", "1,234,567"]);
+        assert_eq!([2.10004, 1.5e-9, 0.0].map(four_digits), ["2.1", "1.5e-9", "0"]);
+    }
+
+    #[test]
+    fn a_log_inside_or_of_another_sensor_differs_from_one_in_another_unit() {
+        let calibration = stretch_receptor::example_calibration();
+        let middle =
+            0.5 * (calibration.spec().signal_range.min() + calibration.spec().signal_range.max());
+        let doubt = |values: [f64; 3]| {
+            let mut reach = Reach::of(&calibration);
+            values.iter().for_each(|v| reach.take(*v));
+            reach.doubt()
+        };
+        assert_eq!(doubt([middle, middle, 1e3 * middle]), None);
+        assert_eq!(doubt([f64::NAN; 3]), None);
+        // values that no single power of ten brings inside
+        let other = doubt([-1.0, -2.0, -3.0]).expect("all are outside");
+        assert!(other.contains("a log of that sensor"), "{other}");
+        let other = doubt([1e2 * middle; 3]).expect("all are outside");
+        assert!(other.contains("is the unit another? divided by 100, 3 would"), "{other}");
+    }
+}

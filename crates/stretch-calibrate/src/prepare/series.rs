@@ -1,0 +1,152 @@
+//! A trial prepared for a fit: even in time, with the rates of signal and target and the branch of each sample.
+
+use stretch_core::{
+    Branch, Design, Interval, Polarity, RateEstimator, RateSource, SampleRate, Stage, Target,
+};
+use stretch_data::Trial;
+use stretch_filter::{
+    RateFilter, SgFilter, SgShape,
+    log::{central_difference, noise_of_differences, second_differences},
+};
+
+use crate::{CalibrateError, Options, SplitBy};
+
+/// A stretch of a trial without gaps, on an even grid.
+#[derive(Debug, Clone)]
+pub(crate) struct Series {
+    pub trial: usize,
+    pub signal: Vec<f64>,
+    pub target: Vec<f64>,
+    /// Pressures; empty where no pressure is needed.
+    pub pressure: Vec<f64>,
+    /// Rate of the signal, signed by polarity, by the estimator of the live receptor.
+    pub signal_rate: Vec<Option<f64>>,
+    /// Rate of the target, by central differences or the centred form of the estimator.
+    pub target_rate: Vec<f64>,
+}
+
+/// The median sample rate of a trial, in hertz.
+///
+/// # Errors
+/// [`CalibrateError::TooShort`] for fewer than two samples.
+pub fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
+    let too_short = || CalibrateError::TooShort { trial: trial.name.clone(), samples: trial.len() };
+    let hz = trial.rate_hz().ok_or_else(too_short)?;
+    // time stamps are printed to the millisecond, so that 100.0000001 Hz means 100 Hz
+    let whole = hz.round();
+    Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
+}
+
+/// Standard deviation of the noise of some records; zero for less than three samples.
+pub fn noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let mut bends: Vec<f64> = records.flat_map(second_differences).collect();
+    noise_of_differences(&mut bends).unwrap_or(0.0)
+}
+
+/// The least and the greatest value.
+pub fn extent(values: impl Iterator<Item = f64>) -> Interval {
+    values.fold(Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }, |e, x| Interval {
+        min: e.min.min(x),
+        max: e.max.max(x),
+    })
+}
+
+/// The rates of a log by the estimator of the calibration: the live estimator, or the paper's central difference over
+/// the whole log.
+pub(crate) fn rates_at_use(
+    estimator: RateEstimator,
+    rate: SampleRate,
+    signal: &[f64],
+) -> Result<Vec<Option<f64>>, CalibrateError> {
+    if estimator == RateEstimator::CentralDifference {
+        let mut out = vec![0.0; signal.len()];
+        central_difference(rate, signal, &mut out)?;
+        return Ok(out.into_iter().map(Some).collect());
+    }
+    let filter = RateFilter::<f64>::new(estimator, rate)?;
+    let mut memory = filter.memory();
+    Ok(signal.iter().map(|&x| filter.step(&mut memory, x)).collect())
+}
+
+/// The rates of the target without delay, by the centred form of a Savitzky-Golay estimator or by central
+/// differences.
+fn target_rates(
+    estimator: RateEstimator,
+    rate: SampleRate,
+    target: &[f64],
+) -> Result<Vec<f64>, CalibrateError> {
+    let mut out = vec![0.0; target.len()];
+    match estimator {
+        RateEstimator::SavitzkyGolay { window, degree, .. } if target.len() >= window.into() => {
+            let shape = SgShape::centred_rate(window.into(), degree.into());
+            SgFilter::<f64>::new(shape, rate)?.over_log(target, &mut out)?;
+        }
+        _ => central_difference(rate, target, &mut out)?,
+    }
+    Ok(out)
+}
+
+/// Whether the signal rises with the target: the sign of their covariance.
+pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polarity {
+    let count = pairs.clone().count().max(1) as f64;
+    let (x, y) = pairs.clone().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
+    let covariance: f64 = pairs.map(|(a, b)| (a - x) * (b - y)).sum();
+    if covariance < 0.0 { Polarity::Falling } else { Polarity::Rising }
+}
+
+/// The series of one even piece of a trial, with the rates of signal and target.
+pub(crate) fn series(
+    trial: usize,
+    piece: [Vec<f64>; 3],
+    target: Target,
+    polarity: Polarity,
+    estimator: RateEstimator,
+    rate: SampleRate,
+) -> Result<Series, CalibrateError> {
+    let [signal, reference, pressure] = piece;
+    let target: Vec<f64> = reference.iter().map(|&x| target.from_reference(x)).collect();
+    let signed = |r: Option<f64>| r.map(|r| polarity.sign() * r);
+    let signal_rate = rates_at_use(estimator, rate, &signal)?.into_iter().map(signed).collect();
+    let target_rate = target_rates(estimator, rate, &target)?;
+    Ok(Series { trial, signal, target, pressure, signal_rate, target_rate })
+}
+
+/// Dead bands of the two rates, each in its own unit per second.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeadBands {
+    pub signal: f64,
+    pub target: f64,
+}
+
+/// The branch of each sample; `None` where the estimator had no rate yet.
+pub(crate) fn branches(series: &Series, options: &Options, dead: DeadBands) -> Vec<Option<Branch>> {
+    match options.split {
+        SplitBy::Rate => by_rate(series, options.rate_source, dead),
+        SplitBy::Trial => {
+            let rises = series.target.last() > series.target.first();
+            let branch = if rises { Branch::Inflation } else { Branch::Deflation };
+            series.signal_rate.iter().map(|rate| rate.map(|_| branch)).collect()
+        }
+    }
+}
+
+fn by_rate(series: &Series, source: RateSource, dead: DeadBands) -> Vec<Option<Branch>> {
+    let decide = |i: usize| match source {
+        RateSource::Voltage => series.signal_rate[i].map(|rate| (rate, dead.signal)),
+        RateSource::Strain => series.signal_rate[i].map(|_| (series.target_rate[i], dead.target)),
+    };
+    // before the first movement the branch is that of the movement
+    let first = (0..series.target.len())
+        .filter_map(decide)
+        .find(|(rate, dead)| rate.abs() > *dead)
+        .map_or(Branch::Inflation, |(rate, dead)| Branch::Inflation.next(rate, dead));
+    let mut branch = first;
+    (0..series.target.len())
+        .map(|i| {
+            decide(i).map(|(rate, dead)| {
+                branch = branch.next(rate, dead);
+                branch
+            })
+        })
+        .collect()
+}

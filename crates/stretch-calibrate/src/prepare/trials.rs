@@ -1,0 +1,295 @@
+//! Trials made ready to fit: even in time, with pooled ranges.
+
+use stretch_core::{
+    Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
+    Polarity, Provenance, Range, RangeSpec, RateEstimator, SampleRate, Schema, Target,
+};
+use stretch_data::{EvenSpec, Rows, Trial};
+use stretch_filter::RateFilter;
+
+use crate::{CalibrateError, Options};
+
+use super::series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series};
+
+/// Parts of a trial with fewer samples have no rate.
+pub const SHORTEST: usize = 3;
+
+/// The most rows of all trials together that a calibration is fitted to: a day at 100 Hz, which takes about 2 GB.
+pub const MOST_ROWS: usize = 10_000_000;
+
+/// Refuses trials that are too long to be fitted in memory.
+///
+/// # Errors
+/// [`CalibrateError::TooLong`] for more than [`MOST_ROWS`] rows of all trials together.
+pub fn check_rows(trials: &[Trial]) -> Result<(), CalibrateError> {
+    let rows = trials.iter().map(Trial::len).sum();
+    if rows <= MOST_ROWS {
+        return Ok(());
+    }
+    Err(CalibrateError::TooLong { rows, most: MOST_ROWS })
+}
+
+/// All trials, even in time, with pooled ranges.
+pub(crate) struct Prepared {
+    pub series: Vec<Series>,
+    pub sample_rate: SampleRate,
+    pub target: Target,
+    pub polarity: Polarity,
+    pub signal_range: Range,
+    pub target_range: Range,
+    pub dead: DeadBands,
+    pub notes: Vec<String>,
+    pub options: Options,
+    /// Name of the first trial.
+    pub first_trial: String,
+}
+
+impl Prepared {
+    pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
+        let (sample_rate, Evened { pieces, rows, mut notes }) = Evened::of(trials, options)?;
+        notes.extend(rows.note());
+        let target = target(options, &pieces)?;
+        let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
+            signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
+        });
+        let polarity = polarity(pairs.clone());
+        let range =
+            |column: &str, zero, seen| pooled_range(column, options.normalisation, zero, seen);
+        let seen = extent(pairs.clone().map(|(v, _)| v));
+        let signal_range = range(&options.signal, options.zero(seen), seen)?;
+        let target_range = range(&options.reference, 0.0, extent(pairs.map(|(_, t)| t)));
+        let target_range = target_range.map_err(|error| match (error, pieces.first()) {
+            // the message gives the value in the file, not the contraction computed from it
+            (CalibrateError::Constant { column, .. }, Some((_, [_, reference, _]))) => {
+                let value = reference.first().copied().unwrap_or_default();
+                CalibrateError::Constant { column, value }
+            }
+            (other, _) => other,
+        })?;
+        let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
+        let dead = dead_bands(options, sample_rate, noise_v, signal_range, target_range)?;
+        let series = pieces
+            .into_iter()
+            .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
+            .collect::<Result<_, _>>()?;
+        let options = options.clone();
+        Ok(Self {
+            series,
+            sample_rate,
+            target,
+            polarity,
+            signal_range,
+            target_range,
+            dead,
+            notes,
+            options,
+            first_trial: trials[0].name.clone(),
+        })
+    }
+
+    /// A record of a model fitted to these trials.
+    pub(crate) fn calibration(
+        &self,
+        model: Model,
+        provenance: Provenance,
+    ) -> Result<Calibration, CalibrateError> {
+        Ok(Calibration::new(CalibrationSpec {
+            schema: Schema::CURRENT,
+            signal: Label::new(&self.options.signal)?,
+            reference: Label::new(&self.options.reference)?,
+            sample_rate_hz: self.sample_rate,
+            target: self.target,
+            polarity: self.polarity,
+            signal_range: self.signal_range,
+            target_range: self.target_range,
+            rate_estimator: self.options.rate,
+            rate_source: self.options.rate_source,
+            dead_band: self.dead.signal,
+            model,
+            provenance,
+        })?)
+    }
+
+    /// Number of the fold of a sample in cross-validation: each trial is a fold, or each tenth of the samples when
+    /// there are fewer than three trials.
+    pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
+        let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
+        if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
+    }
+}
+
+/// The dead bands: those of the options where given, else three standard deviations of the rate's noise.
+fn dead_bands(
+    options: &Options,
+    sample_rate: SampleRate,
+    noise_v: f64,
+    signal_range: Range,
+    target_range: Range,
+) -> Result<DeadBands, CalibrateError> {
+    let signal = match options.dead_band {
+        Some(dead_band) => dead_band,
+        None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
+    };
+    Ok(DeadBands { signal, target: signal * target_range.span() / signal_range.span() })
+}
+
+/// Trials, or their parts between gaps, on the grid of the first trial, with the counts of their rows.
+#[derive(Default)]
+struct Evened {
+    pieces: Vec<Piece>,
+    rows: Rows,
+    notes: Vec<String>,
+}
+
+impl Evened {
+    /// All trials on the grid of the first one, and its rate.
+    fn of(trials: &[Trial], options: &Options) -> Result<(SampleRate, Self), CalibrateError> {
+        let first = trials.first().ok_or(CalibrateError::NoTrials)?;
+        check_rows(trials)?;
+        let sample_rate = SampleRate::new(sample_rate_hz(first)?)?;
+        let mut evened = Self::default();
+        for (index, trial) in trials.iter().enumerate() {
+            evened.take(index, trial, (&first.name, sample_rate), options)?;
+        }
+        if evened.pieces.is_empty() {
+            let (trial, samples) = (first.name.clone(), first.len());
+            return Err(CalibrateError::TooShort { trial, samples });
+        }
+        Ok((sample_rate, evened))
+    }
+
+    /// Takes in a trial; `first` names the trial whose grid is used.
+    fn take(
+        &mut self,
+        index: usize,
+        trial: &Trial,
+        (first, sample_rate): (&str, SampleRate),
+        options: &Options,
+    ) -> Result<(), CalibrateError> {
+        let (rate_hz, first_hz) = (sample_rate_hz(trial)?, sample_rate.hz());
+        if (rate_hz / first_hz - 1.0).abs() > 0.05 {
+            let (trial, first) = (trial.name.clone(), first.to_owned());
+            return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
+        }
+        let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
+        // Only where the pressure was recorded: an error names the cause that lacks it.
+        let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
+        columns.extend(has_pressure.then_some(options.pressure.as_str()));
+        let rate_hz = first_hz;
+        let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
+        let even = trial.even(&columns, spec)?;
+        self.rows.add(even.rows);
+        self.notes.extend(even.notes);
+        self.pieces.extend(even.parts.into_iter().filter_map(|part| {
+            let mut columns = part.columns.into_iter();
+            Some((index, [columns.next()?, columns.next()?, columns.next().unwrap_or_default()]))
+        }));
+        Ok(())
+    }
+}
+
+/// The signals of trials, brought onto an even grid as [`calibrate`](crate::calibrate()) does before a fit: a list for
+/// each part without a gap.
+///
+/// # Errors
+/// Those of [`calibrate`](crate::calibrate()) about the trials.
+pub fn even_signals(trials: &[Trial], options: &Options) -> Result<Vec<Vec<f64>>, CalibrateError> {
+    let (_, evened) = Evened::of(trials, options)?;
+    Ok(evened.pieces.into_iter().map(|(_, [signal, ..])| signal).collect())
+}
+
+/// Errors of estimates in normalised target, summed sample by sample.
+#[derive(Default)]
+pub(crate) struct Tally {
+    squares: f64,
+    sum: f64,
+    power: f64,
+    count: f64,
+}
+
+impl Tally {
+    /// Takes in a normalised target and its error.
+    pub(crate) fn take(&mut self, truth: f64, error: f64) {
+        self.squares += error * error;
+        self.sum += truth;
+        self.power += truth * truth;
+        self.count += 1.0;
+    }
+
+    /// Number of errors taken in.
+    pub(crate) fn count(&self) -> f64 {
+        self.count
+    }
+
+    pub(crate) fn summary(&self) -> FitSummary {
+        let count = f64::max(self.count, 1.0);
+        let total = (self.power - self.sum * self.sum / count).max(f64::MIN_POSITIVE);
+        FitSummary {
+            samples: self.count as u64,
+            r_squared: 1.0 - self.squares / total,
+            rmse: (self.squares / count).sqrt(),
+        }
+    }
+}
+
+/// Standard deviation of an estimator's rate for white noise of unit standard deviation.
+pub(crate) fn noise_gain(
+    estimator: RateEstimator,
+    rate: SampleRate,
+) -> Result<f64, CalibrateError> {
+    match estimator {
+        RateEstimator::CentralDifference => Ok(rate.hz() / 2f64.sqrt()),
+        live => Ok(RateFilter::<f64>::new(live, rate)?.noise_gain()),
+    }
+}
+
+/// Number of the trial; signal, reference and, where needed, the pressure.
+type Piece = (usize, [Vec<f64>; 3]);
+
+fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
+    let all = pieces.iter().flat_map(|(_, [_, reference, _])| reference.iter().copied());
+    let longest = all.fold(f64::MIN, f64::max);
+    let rest_length = match options.rest_length {
+        Some(rest_length) => Some(rest_length),
+        None => options.reference.starts_with("length").then_some(longest),
+    };
+    Ok(match rest_length {
+        Some(rest_length) => {
+            DesignError::check("rest_length", rest_length, rest_length > 0.0)?;
+            Target::Contraction { rest_length }
+        }
+        None => Target::Direct,
+    })
+}
+
+/// The range of a column from its extent.
+fn pooled_range(
+    column: &str,
+    mode: Normalisation,
+    zero: f64,
+    Interval { min, max }: Interval,
+) -> Result<Range, CalibrateError> {
+    Range::new(RangeSpec { mode, zero, min, max })
+        .map_err(|_| CalibrateError::Constant { column: column.to_owned(), value: min })
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_data::Trial;
+
+    use super::{MOST_ROWS, check_rows};
+
+    #[test]
+    fn trials_that_are_too_long_are_refused_with_what_to_do() {
+        let of = |rows: usize| Trial {
+            name: "long.csv".into(),
+            time_s: vec![0.0; rows],
+            channels: Vec::new(),
+        };
+        let half = of(MOST_ROWS / 2);
+        assert!(check_rows(&[half.clone(), half.clone()]).is_ok());
+        let error = check_rows(&[half.clone(), half, of(1)]).unwrap_err().to_string();
+        assert!(error.contains("10000001 rows together, and at most 10000000"), "{error}");
+        assert!(error.contains("--grid HZ"), "{error}");
+    }
+}

@@ -1,0 +1,94 @@
+//! The digest of a record in JSON: the record's last field, computed over every other byte that is no white space.
+
+use serde::Serialize;
+use stretch_core::record::checksum;
+
+use crate::CalibrateError;
+
+/// The white space of JSON, and no other.
+const SPACE: [char; 4] = [' ', '\n', '\r', '\t'];
+
+/// The digest of an object as the text of the digest field: `crc32c 5a0e17c3`.
+///
+/// White space outside of strings does not count, so that a record can be reformatted. The order of the fields and
+/// the spelling of numbers count.
+pub fn digest(object: &str) -> String {
+    let (mut in_string, mut escaped) = (false, false);
+    let counts = |byte: &u8| {
+        if in_string {
+            in_string = escaped || *byte != b'"';
+            escaped = !escaped && *byte == b'\\';
+            return true;
+        }
+        in_string = *byte == b'"';
+        !matches!(byte, b' ' | b'\n' | b'\r' | b'\t')
+    };
+    let bytes: Vec<u8> = object.bytes().filter(counts).collect();
+    format!("crc32c {:08x}", checksum(&bytes))
+}
+
+/// The object without its digest, and the digest where the last field is one.
+pub fn split(text: &str) -> (String, Option<&str>) {
+    let cut = || {
+        let text = trimmed(trimmed(text).strip_suffix('}')?);
+        let (before, digest) = text.strip_suffix('"')?.rsplit_once('"')?;
+        let before = trimmed(trimmed(before).strip_suffix(':')?).strip_suffix("\"digest\"")?;
+        Some((format!("{}}}", trimmed(before).strip_suffix(',')?), digest))
+    };
+    match cut() {
+        Some((object, digest)) => (object, Some(digest)),
+        None => (text.to_owned(), None),
+    }
+}
+
+/// The object with its digest behind the last field.
+pub fn join(object: &str) -> Option<String> {
+    let open = trimmed(trimmed(object).strip_suffix('}')?);
+    Some(format!("{open},\n  \"digest\": \"{}\"\n}}\n", digest(object)))
+}
+
+/// A record in indented JSON, with its digest as the last field.
+///
+/// # Errors
+/// [`CalibrateError::Record`] for what is no object, or has numbers that are not finite.
+pub fn seal(record: &impl Serialize) -> Result<String, CalibrateError> {
+    let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
+    let object = serde_json::to_string_pretty(record).map_err(|e| problem(e.to_string()))?;
+    join(&object).ok_or_else(|| problem("it is no object".to_owned()))
+}
+
+fn trimmed(text: &str) -> &str {
+    text.trim_end_matches(SPACE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_space_between_does_not_count_and_all_else_does() {
+        let same = ["{\"a\": [1, 2],\n\t\"b\": \"c d\"}", "{\"a\":[1,2],\"b\":\"c d\"}\r\n"];
+        assert_eq!(digest(same[0]), digest(same[1]));
+        for other in [
+            "{\"a\":[1,2],\"b\":\"cd\"}",
+            "{\"a\":[1,2.0],\"b\":\"c d\"}",
+            "{\"b\":\"c d\",\"a\":[1,2]}",
+            "{\"a\":[1,2],\"b\":\"c\\\" d\"}",
+        ] {
+            assert_ne!(digest(same[0]), digest(other), "{other}");
+        }
+        // a quote that is escaped ends no string
+        assert_ne!(digest(r#"{"a":"\" x"}"#), digest(r#"{"a":"\"x"}"#));
+        assert_eq!(digest(r#"{"a":"\\" }"#), digest(r#"{"a":"\\"}"#));
+    }
+
+    #[test]
+    fn what_is_joined_is_split_again() {
+        let object = "{\n  \"a\": 1.5\n}";
+        let text = join(object).unwrap();
+        let (back, found) = split(&text);
+        assert_eq!(found, Some(digest(&back).as_str()));
+        assert_eq!(digest(&back), digest(object));
+        assert_eq!(split(object), (object.to_owned(), None));
+    }
+}

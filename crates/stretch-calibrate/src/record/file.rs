@@ -1,0 +1,181 @@
+//! Calibration records as files, in JSON for people or in postcard for a board. Both forms carry a seal.
+
+use std::path::Path;
+
+use stretch_core::{Calibration, CalibrationSpec, Schema, record};
+use stretch_data::files::{read_whole, write_whole};
+
+use crate::CalibrateError;
+
+use super::digest;
+
+/// Room for the largest record in postcard: two poly55 surfaces and sixteen trials.
+const POSTCARD_BYTES: usize = 4096;
+
+/// How a record's seal is treated.
+#[derive(Clone, Copy, PartialEq)]
+enum Seal {
+    /// The seal must be that of the record.
+    Checked,
+    /// The seal is ignored, because the record was edited by hand.
+    Ignored,
+}
+
+/// Whether a record of that name is in postcard.
+pub fn is_postcard(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "postcard")
+}
+
+/// A calibration from its record: postcard when the name ends in `.postcard`, else JSON.
+///
+/// # Errors
+/// [`CalibrateError::Record`] with the file, the field and the fault of that field. A seal that does not match the
+/// record is refused as well.
+pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
+    let file = path.display().to_string();
+    let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
+    let bytes = read_whole(path).map_err(|e| {
+        problem(format!("cannot read it: {e}; name a record made by stretch calibrate"))
+    })?;
+    if !is_postcard(path) {
+        let text = String::from_utf8(bytes);
+        let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is no text: {e}")))?;
+        return calibration_from_json(&text, &file);
+    }
+    // the specification is loaded without its checks, so that a message can name the field
+    let spec = record::load::<CalibrationSpec>(&bytes);
+    let made = spec.and_then(Calibration::new);
+    made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
+}
+
+/// A calibration from a record in JSON that is held in memory; messages call the record `name`.
+///
+/// # Errors
+/// As [`read_calibration`].
+///
+/// ```
+/// use stretch_calibrate::{calibration_from_json, calibration_to_json};
+///
+/// let calibration = stretch_receptor::example_calibration();
+/// let text = calibration_to_json(&calibration)?;
+/// assert_eq!(calibration_from_json(&text, "cal.json")?, calibration);
+/// // edited by hand: `stretch export --seal` renews the digest
+/// let edited = text.replace("\"dead_band\": 0", "\"dead_band\": 1");
+/// let error = calibration_from_json(&edited, "cal.json").unwrap_err().to_string();
+/// assert!(error.contains("stretch export --calibration cal.json --seal"), "{error}");
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, CalibrateError> {
+    from_json(text, name, Seal::Checked)
+}
+
+/// A calibration from a record in JSON that may have been edited by hand: its digest is not checked.
+///
+/// # Errors
+/// As [`read_calibration`], except that of the digest.
+pub fn calibration_from_edited_json(text: &str, name: &str) -> Result<Calibration, CalibrateError> {
+    from_json(text, name, Seal::Ignored)
+}
+
+/// The record of a calibration in JSON, sealed.
+///
+/// # Errors
+/// Never for a [`Calibration`], because all of its numbers are finite.
+pub fn calibration_to_json(calibration: &Calibration) -> Result<String, CalibrateError> {
+    digest::seal(calibration)
+}
+
+/// The number under which the record of a calibration is sealed: CRC-32C of its bytes in postcard.
+///
+/// The number identifies the calibration where the record is held in another form (constants in C, a board that
+/// answers with the seal of its record).
+///
+/// # Errors
+/// Never for a [`Calibration`], because the buffer has room for the largest record.
+pub fn calibration_seal(calibration: &Calibration) -> Result<u32, CalibrateError> {
+    let mut buffer = [0; POSTCARD_BYTES];
+    let bytes = record::store(calibration, &mut buffer)?;
+    Ok(record::seal(bytes)?.unwrap_or_default())
+}
+
+/// Writes a calibration record, whole or not at all: postcard when the name ends
+/// in `.postcard`, else JSON.
+///
+/// # Errors
+/// [`CalibrateError::Data`] with path and cause.
+pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), CalibrateError> {
+    let bytes = calibration_bytes(path, calibration)?;
+    Ok(write_whole(path, |out| out.write_all(&bytes))?)
+}
+
+/// The record of a calibration as the bytes of a file of that name: postcard when the name ends in `.postcard`, else
+/// JSON.
+///
+/// # Errors
+/// Never for a [`Calibration`], because the buffer has room for the largest record and all numbers are finite.
+pub fn calibration_bytes(
+    path: &Path,
+    calibration: &Calibration,
+) -> Result<Vec<u8>, CalibrateError> {
+    if is_postcard(path) {
+        let mut buffer = [0; POSTCARD_BYTES];
+        return Ok(record::store(calibration, &mut buffer)?.to_vec());
+    }
+    Ok(calibration_to_json(calibration)?.into_bytes())
+}
+
+const UNUSABLE: &str = "this is no calibration that can be used";
+
+/// An object without where its movements turn, which are a record of `stretch-sleeve`; `None` where it has none.
+fn without_turns(object: &str) -> Option<serde_json::Value> {
+    let mut value: serde_json::Value = serde_json::from_str(object).ok()?;
+    value.as_object_mut()?.remove("turns").map(|_| value)
+}
+
+fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, CalibrateError> {
+    let unusable = |cause: String| {
+        let problem = format!("{UNUSABLE}: {cause}");
+        CalibrateError::Record { file: name.to_owned(), problem }
+    };
+    let (object, found) = digest::split(text);
+    let (parsed, end) = match without_turns(&object) {
+        Some(value) => (serde_path_to_error::deserialize(value), Ok(())),
+        None => {
+            let mut json = serde_json::Deserializer::from_str(&object);
+            (serde_path_to_error::deserialize(&mut json), json.end())
+        }
+    };
+    let spec: CalibrationSpec = parsed.map_err(|error| {
+        let field = error.path().to_string();
+        let cause = error.into_inner();
+        if object.contains("\"largest_jump\"") {
+            return unusable(
+                "it is of several gauges, which stretch apply, sleeve renew and export take alone"
+                    .into(),
+            );
+        }
+        unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
+    })?;
+    end.map_err(|error| unusable(error.to_string()))?;
+    let schema = spec.schema;
+    let calibration = Calibration::new(spec).map_err(|error| unusable(error.to_string()))?;
+    let computed = digest::digest(&object);
+    let advice = format!(
+        "check every number, then renew it with: stretch export --calibration {name} --seal; or calibrate again"
+    );
+    match found {
+        _ if seal == Seal::Ignored => {}
+        Some(found) if found == computed => {}
+        Some(found) => {
+            return Err(unusable(format!(
+                "its digest is {found} and its text gives {computed}: it was edited or damaged; {advice}"
+            )));
+        }
+        // records of schema 1 had no digest
+        None if schema != Schema::CURRENT => {}
+        None => {
+            return Err(unusable(format!("it has no digest as its last field; {advice}")));
+        }
+    }
+    Ok(calibration)
+}

@@ -1,0 +1,11 @@
+//! Records of calibrations: files under a seal, and integers for a board.
+
+pub mod digest;
+mod file;
+mod fixed;
+
+pub use file::{
+    calibration_bytes, calibration_from_edited_json, calibration_from_json, calibration_seal,
+    calibration_to_json, is_postcard, read_calibration, write_calibration,
+};
+pub use fixed::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};

@@ -1,0 +1,142 @@
+//! Folders: what may be replaced, and what of an old one stays.
+
+use std::{
+    collections::BTreeSet,
+    env,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    FileError,
+    draft::{Draft, ask, rename, sync, sync_folder},
+};
+use crate::data_set::unchanged_trials;
+
+/// Refuses a folder that cannot be written, or that holds something unless `force` is set.
+pub(super) fn check(path: &Path, force: bool) -> Result<(), FileError> {
+    let fail = |cause| Err(FileError::io(path.display(), "write it", cause));
+    if path.as_os_str() == "-" {
+        return fail(io::Error::other("a folder cannot go to standard output; name one"));
+    }
+    let holds = match fs::symlink_metadata(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Ok(_) if path.is_dir() => fs::read_dir(path).map(|mut entries| entries.next().is_some()),
+        Ok(_) if force => Err(io::Error::other("it exists and is not a folder")),
+        Ok(_) => Ok(true),
+        Err(e) => Err(e),
+    };
+    match holds {
+        Err(cause) => fail(cause),
+        Ok(true) if !force => Err(FileError::exists(path)),
+        Ok(_) if env::current_dir().is_ok_and(|here| is_inside(&here, path)) => {
+            fail(io::Error::other(
+                "the folder in which a program is run cannot be replaced; name another, or run it from outside",
+            ))
+        }
+        Ok(_) => Ok(()),
+    }
+}
+
+fn is_inside(here: &Path, folder: &Path) -> bool {
+    fs::canonicalize(folder).is_ok_and(|folder| here.starts_with(folder))
+}
+
+/// Links what is the user's in the old folder into the new one, and waits until all is on the disk.
+pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
+    if let Ok(meta) = fs::metadata(old) {
+        carry(old, new, &mut BTreeSet::new())?;
+        fs::set_permissions(new, meta.permissions())?;
+    }
+    sync_tree(new)
+}
+
+/// All names and files below a folder, on the disk.
+fn sync_tree(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let kind = entry.file_type()?;
+        if kind.is_dir() {
+            sync_tree(&entry.path())?;
+        } else if kind.is_file() {
+            // Windows flushes only what was opened to be written
+            sync(&File::options().read(true).write(cfg!(windows)).open(entry.path())?)?;
+        }
+    }
+    sync_folder(folder);
+    Ok(())
+}
+
+/// Gives a complete folder the name of the one that is there.
+pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
+    let (new, real) = (&draft.temporary, &draft.real);
+    exchange(new, real)?;
+    // what came into the old folder in the meantime
+    carry(new, real, &mut BTreeSet::new()).map_err(|why| {
+        // not removed, because something of the user's is in it
+        let left = std::mem::take(&mut draft.temporary);
+        io::Error::other(format!("all is written, but {why}; the old folder is {}", left.display()))
+    })
+}
+
+/// Swaps the names of two folders.
+fn exchange(new: &Path, real: &Path) -> io::Result<()> {
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    {
+        use rustix::{
+            fs::{CWD, RenameFlags, renameat_with},
+            io::Errno,
+        };
+        let in_one_step = || match renameat_with(CWD, new, CWD, real, RenameFlags::EXCHANGE) {
+            Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP) => {
+                Err(io::ErrorKind::Unsupported.into())
+            }
+            exchanged => Ok(exchanged?),
+        };
+        match ask("exchange").and_then(|()| in_one_step()) {
+            Err(e) if e.kind() == io::ErrorKind::Unsupported => {}
+            exchanged => return exchanged,
+        }
+    }
+    // in three steps, where it cannot be one
+    let aside = new.with_extension("old");
+    rename(real, &aside)?;
+    rename(new, real).inspect_err(|_| drop(rename(&aside, real)))?;
+    rename(&aside, new)
+}
+
+/// Brings every file of `old` whose name is not in `new` into `new`: as a second name, or a copy where there is no such thing.
+///
+/// If `new` is a data set, unchanged trials of the old data set (`replaced`) are left behind.
+fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result<()> {
+    if new.join("dataset.toml").is_file() {
+        replaced.extend(unchanged_trials(old));
+    }
+    for entry in fs::read_dir(old)? {
+        let entry = entry?;
+        let (from, to) = (entry.path(), new.join(entry.file_name()));
+        let is_folder = entry.file_type()?.is_dir();
+        match fs::symlink_metadata(&to) {
+            Ok(meta) if meta.is_dir() != is_folder => {
+                let kind = if is_folder { "folder" } else { "file" };
+                let name = from.display();
+                return Err(io::Error::other(format!("{name} is a {kind}")));
+            }
+            Ok(_) => {}
+            Err(_) if is_folder => {
+                fs::create_dir(&to)?;
+                fs::set_permissions(&to, entry.metadata()?.permissions())?;
+            }
+            Err(_) if replaced.contains(&from) => {}
+            Err(_) => {
+                ask("link")?;
+                fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop))?;
+            }
+        }
+        if is_folder {
+            carry(&from, &to, replaced)?;
+        }
+    }
+    Ok(())
+}

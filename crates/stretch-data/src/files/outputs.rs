@@ -1,0 +1,187 @@
+//! One file, one folder, or several that belong together.
+
+use std::{
+    fs,
+    io::{self, BufWriter, Write},
+    path::Path,
+};
+
+use super::{
+    FileError,
+    draft::{Draft, ask, sync},
+    folder::{check, complete},
+    is_standard_output,
+    stream::open_stream,
+};
+
+/// Writes a file whole or not at all.
+///
+/// `fill` writes into a temporary file beside the target, which takes the target's name
+/// only when everything has reached the disk. After any error (a full disk, a folder that may
+/// not be written to, an error of `fill`) the old file is still there. A symbolic link stays one: the
+/// file that it points to is replaced. Output is buffered.
+///
+/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
+/// the bytes come; a pipe that nobody reads is refused after two seconds, and so are standard
+/// input and disks.
+///
+/// # Errors
+/// [`FileError::Io`] with path and cause.
+///
+/// ```
+/// use stretch_data::files::write_whole;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("cal.json");
+/// write_whole(&path, |out| out.write_all(b"{}"))?;
+/// assert!(write_whole(&path, |_| Err(std::io::Error::other("no"))).is_err());
+/// assert_eq!(std::fs::read(&path)?, b"{}", "still the old one");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_whole(
+    path: impl AsRef<Path>,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let mut outputs = Outputs::default();
+    outputs.file(path, fill)?;
+    outputs.keep()
+}
+
+/// Writes a folder whole or not at all.
+///
+/// `fill` gets an empty folder beside the target and writes into it; then all of it is
+/// synced and takes the target's name. After any error the target is as it was.
+///
+/// A target that holds something is refused unless `force` is set. With `force` it is replaced: files of the same name
+/// are replaced, and so are the trials that a data set was written with. All else in it is the user's, and stays. On Linux and
+/// macOS the two folders swap their names in one step, so that a kill leaves the old one or the new one. Elsewhere the old one
+/// is moved aside first.
+///
+/// # Errors
+/// [`FileError::Exists`], [`FileError::Io`], or what `fill` says.
+///
+/// ```
+/// use stretch_data::files::{FileError, write_folder, write_whole};
+/// let parent = tempfile::tempdir()?;
+/// let out = parent.path().join("bench-07");
+/// let fill = |folder: &std::path::Path| {
+///     write_whole(folder.join("a.csv"), |file| file.write_all(b"time_s\n0\n"))
+/// };
+/// write_folder(&out, false, fill)?;
+/// let again = write_folder(&out, false, fill);
+/// assert!(matches!(again, Err(FileError::Exists { .. })));
+/// std::fs::write(out.join("notes.txt"), "mine")?;
+/// write_folder(&out, true, fill)?;
+/// assert!(out.join("a.csv").is_file() && out.join("notes.txt").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_folder<E: From<FileError>>(
+    path: impl AsRef<Path>,
+    force: bool,
+    fill: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut outputs = Outputs::default();
+    outputs.folder(path, force, fill)?;
+    Ok(outputs.keep()?)
+}
+
+/// What one command writes: all of it is on the disk under temporary names before any of it gets its name.
+///
+/// When a part cannot be written nothing is. A kill between two names leaves each file whole, the old one or the new one.
+///
+/// ```
+/// let folder = tempfile::tempdir()?;
+/// let [record, report] = ["cal.json", "none/cal.html"].map(|name| folder.path().join(name));
+/// let mut outputs = stretch_data::files::Outputs::default();
+/// outputs.file(&record, |out| out.write_all(b"{}"))?;
+/// assert!(outputs.file(&report, |out| out.write_all(b"<html>")).is_err(), "there is no folder");
+/// drop(outputs);
+/// assert!(!record.exists(), "nor is there a record without its report");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Default)]
+pub struct Outputs(Vec<Draft>);
+
+impl Outputs {
+    /// Writes a file beside its target. What goes to standard output or into a pipe is written at once.
+    ///
+    /// # Errors
+    /// As [`write_whole`]; two files of one name.
+    pub fn file(
+        &mut self,
+        path: impl AsRef<Path>,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), FileError> {
+        let path = path.as_ref();
+        self.stage(path, fill).map_err(|cause| match is_standard_output(path) {
+            true => FileError::io("standard output", "write it", cause),
+            false => FileError::io(path.display(), "write it", cause),
+        })
+    }
+
+    fn stage(
+        &mut self,
+        path: &Path,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let meta = match fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => return Err(io::Error::other("it is a folder")),
+            Ok(meta) => Some(meta),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
+            Err(e) => return Err(e),
+        };
+        if let Some(stream) = open_stream(path, meta.as_ref())? {
+            let mut out = BufWriter::new(stream);
+            let written = fill(&mut out).and_then(|()| out.flush());
+            // what could not be written is not tried again
+            let _ = out.into_parts();
+            return written;
+        }
+        if meta.as_ref().is_some_and(|meta| meta.permissions().readonly()) {
+            return Err(io::Error::other("it is read-only"));
+        }
+        let draft = Draft::file(path)?;
+        if self.0.iter().any(|other| other.real == draft.real) {
+            return Err(io::Error::other("two files of this command have that name"));
+        }
+        let Some(file) = &draft.file else { return Ok(()) };
+        let mut out = BufWriter::with_capacity(1 << 16, file);
+        fill(&mut out)?;
+        ask("write")?;
+        out.flush()?;
+        drop(out);
+        if let Some(meta) = meta {
+            file.set_permissions(meta.permissions())?;
+        }
+        sync(file)?;
+        self.0.push(draft);
+        Ok(())
+    }
+
+    /// Writes a folder beside its target, as [`write_folder`].
+    ///
+    /// # Errors
+    /// As [`write_folder`], or what `fill` says.
+    pub fn folder<E: From<FileError>>(
+        &mut self,
+        path: impl AsRef<Path>,
+        force: bool,
+        fill: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let path = path.as_ref();
+        let fail = |cause| FileError::io(path.display(), "write it", cause);
+        check(path, force)?;
+        let draft = Draft::folder(path, force).map_err(fail)?;
+        fill(&draft.temporary)?;
+        complete(&draft.temporary, &draft.real).map_err(fail)?;
+        self.0.push(draft);
+        Ok(())
+    }
+
+    /// Gives everything its name.
+    ///
+    /// # Errors
+    /// [`FileError::Io`] with path and cause, [`FileError::Exists`].
+    pub fn keep(mut self) -> Result<(), FileError> {
+        Draft::rename(&mut self.0)
+    }
+}

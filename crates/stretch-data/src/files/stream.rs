@@ -1,0 +1,80 @@
+//! Outputs that are no files: standard output, pipes, devices.
+
+use std::{
+    fs::{File, Metadata},
+    io::{self, Write},
+    path::Path,
+};
+
+const STDIN: [&str; 3] = ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"];
+const STDOUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+
+fn is_one_of(path: &Path, names: [&str; 3]) -> bool {
+    cfg!(unix) && names.iter().any(|name| path == Path::new(name))
+}
+
+/// Whether a path is standard output, as a file that is written: `-`, `/dev/stdout`.
+///
+/// ```
+/// use stretch_data::files::is_standard_output;
+/// assert!(is_standard_output("-") && is_standard_output("/dev/stdout"));
+/// assert!(!is_standard_output("out.csv"));
+/// ```
+pub fn is_standard_output(path: impl AsRef<Path>) -> bool {
+    path.as_ref().as_os_str() == "-" || is_one_of(path.as_ref(), STDOUT)
+}
+
+/// What bytes can go to as they come; none where the path is that of a file, or of nothing yet.
+///
+/// Standard output is not opened again: where it is redirected into a file, that would
+/// begin to write at its start again.
+pub(super) fn open_stream(
+    path: &Path,
+    meta: Option<&Metadata>,
+) -> io::Result<Option<Box<dyn Write>>> {
+    if is_standard_output(path) {
+        return Ok(Some(Box::new(io::stdout())));
+    }
+    if is_one_of(path, STDIN) {
+        return Err(io::Error::other("it is standard input, which is read; name a file"));
+    }
+    let is_descriptor = path.starts_with("/dev/fd") || path.starts_with("/proc");
+    match meta.filter(|meta| is_descriptor || !meta.is_file()) {
+        Some(meta) => Ok(Some(Box::new(open_device(path, meta)?))),
+        None => Ok(None),
+    }
+}
+
+#[cfg(unix)]
+fn open_device(path: &Path, meta: &Metadata) -> io::Result<File> {
+    use rustix::{
+        fs::{Mode, OFlags, fcntl_setfl, open},
+        io::Errno,
+    };
+    use std::{os::unix::fs::FileTypeExt, thread, time::Duration};
+
+    if meta.file_type().is_block_device() {
+        return Err(io::Error::other("it is a disk; name a file"));
+    }
+    // to open a pipe waits for its reader, to open a serial port for a carrier, for ever
+    let flags = OFlags::WRONLY | OFlags::CLOEXEC | OFlags::NOCTTY;
+    // a reader may begin two seconds later
+    for _ in 0..200 {
+        match open(path, flags | OFlags::NONBLOCK, Mode::empty()) {
+            Err(Errno::NXIO) if meta.file_type().is_fifo() => {
+                thread::sleep(Duration::from_millis(10));
+            }
+            opened => {
+                let file = File::from(opened?);
+                fcntl_setfl(&file, flags)?;
+                return Ok(file);
+            }
+        }
+    }
+    Err(io::Error::other("it is a pipe that nobody reads; begin to read it first"))
+}
+
+#[cfg(not(unix))]
+fn open_device(path: &Path, _meta: &Metadata) -> io::Result<File> {
+    File::options().write(true).open(path)
+}

@@ -1,0 +1,10 @@
+//! The tests of stretch-effects from outside, one program: linking takes longer than most of them.
+
+mod catalogue;
+mod inverses;
+mod limits;
+mod linear;
+mod loops;
+mod ranges;
+mod session;
+mod support;

@@ -1,0 +1,38 @@
+//! Two halves of a log, fitted apart and merged, equal one pass:
+//! `cargo run -p stretch-fit --example merge_two_logs`.
+//!
+//! The halves could come from two days, two threads or two boards; what is
+//! kept of each is one triangle of a few hundred bytes.
+
+use stretch_core::Degree;
+use stretch_fit::{FitError, Sample, SurfaceAccumulator};
+
+type Log = SurfaceAccumulator<f64, { Degree::POLY13.terms() }>;
+
+/// Sample `k` of a log; its value is a strain.
+fn sample(k: u32) -> Sample<f64> {
+    let (rate, volts) = ((f64::from(k) * 0.05).cos(), 0.5 + 0.5 * (f64::from(k) * 0.0519).sin());
+    let noise = 0.004 * (f64::from(k * k % 17) / 8.0 - 1.0);
+    let value = 0.06 + 0.77 * volts - 0.12 * rate * volts + 0.2 * volts * volts + noise;
+    Sample { rate, volts, value }
+}
+
+fn main() -> Result<(), FitError> {
+    let mut whole = Log::new(Degree::POLY13)?;
+    whole.extend((0..2000).map(sample))?;
+
+    let (mut first, mut second) = (Log::new(Degree::POLY13)?, Log::new(Degree::POLY13)?);
+    first.extend((0..700).map(sample))?;
+    second.extend((700..2000).map(sample))?;
+    second.merge(&first)?; // in either order
+
+    let (whole, merged) = (whole.fit()?, second.fit()?);
+    println!("term   one pass            merged              difference");
+    let pairs = whole.coefficients().iter().zip(merged.coefficients());
+    for ((i, j), (one, two)) in Degree::POLY13.exponents().zip(pairs) {
+        println!("p{i}{j}    {one:18.15}  {two:18.15}  {:8.1e}", one - two);
+        assert!((one - two).abs() < 1e-12, "merging must equal one pass");
+    }
+    println!("SSE    {:18.15}  {:18.15}", whole.sse(), merged.sse());
+    Ok(())
+}

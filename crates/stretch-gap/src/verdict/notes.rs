@@ -1,0 +1,156 @@
+//! Notes that a verdict carries: parameters that swing, laws of session time that were extrapolated, and effects that would have been named.
+
+use crate::{
+    evidence::{detection_limit::DetectionLimit, gathered::Evidence},
+    fit::{prepared::PreparedProblem, swing::Swing},
+    problem::{
+        sample_roles::{Role, SampleRoles},
+        simulator::Simulator,
+        spec::EffectSpec,
+    },
+};
+
+/// Probability from which a swing is noted.
+const SWINGS: f64 = 0.95;
+
+/// A note for each parameter of each stage that swings rather than drifts.
+///
+/// A regulator that hunts explains no gap, and the verdict counts it as drift, but a reader should know of the line.
+pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<String> {
+    let simulator = problem.simulator();
+    let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
+    let note = |swing: &Swing, stage: &str| {
+        let spec = &simulator.parameters()[swing.parameter];
+        let size = match spec.nominal {
+            0.0 => format!("{:.2e} {}", swing.amplitude, spec.unit),
+            nominal => format!("{:.2} %", 100.0 * (swing.amplitude / nominal).abs()),
+        };
+        format!(
+            "{} swings at {:.2} Hz by {size} to either side, as stage {stage} tells with a probability of {:.2}: \
+             the diagnosis counts it as drift, and no effect is blamed for it",
+            spec.name, swing.hertz, swing.probability
+        )
+    };
+    stages
+        .flat_map(|((metric, traces), stage)| {
+            let swings = metric.swings(&evidence.roles, &traces.residual_after);
+            let told = swings.into_iter().filter(|swing| swing.probability > SWINGS);
+            told.map(|swing| note(&swing, &stage.name)).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// Share of the fitted span by which test trials must lie outside of it.
+const BEYOND: f64 = 0.1;
+
+/// A note for each named effect that is a law of session time and was extrapolated to test trials: from where to where.
+///
+/// Within the fitted span one law is as good as another; beyond it they differ.
+pub(crate) fn extrapolation_notes(
+    simulator: &dyn Simulator,
+    roles: &SampleRoles,
+    named: &[String],
+) -> Vec<String> {
+    let drifts = |name: &&String| {
+        simulator.effects().iter().any(|effect| effect.name == **name && effect.drifts)
+    };
+    let fitted = span_s(simulator, roles, |role| role != Role::Test);
+    let tested = span_s(simulator, roles, |role| role == Role::Test);
+    let least = BEYOND * (fitted[1] - fitted[0]);
+    let is_beyond = fitted[0] - tested[0] > least || tested[1] - fitted[1] > least;
+    let note = |name: &String| {
+        format!(
+            "{name} is a law of session time: it was fitted from {:.0} to {:.0} s and extrapolated to the test trials, from {:.0} to {:.0} s; \
+             a drift of another law is far off there",
+            fitted[0], fitted[1], tested[0], tested[1]
+        )
+    };
+    named.iter().filter(drifts).filter(|_| is_beyond).map(note).collect()
+}
+
+/// Session time of the first and behind the last sample in some roles, s.
+fn span_s(
+    simulator: &dyn Simulator,
+    roles: &SampleRoles,
+    is_in: impl Fn(Role) -> bool,
+) -> [f64; 2] {
+    let (trials, dt_s) = (simulator.trials(), simulator.dt_s());
+    let own = roles.segments.iter().filter(|s| is_in(s.role));
+    own.fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], s| {
+        let before: usize = trials[..s.trial].iter().map(|t| t.samples).sum();
+        let at = |sample: usize| trials[s.trial].start_s + (sample - before) as f64 * dt_s;
+        [first.min(at(s.from)), last.max(at(s.to))]
+    })
+}
+
+/// Most effects that are listed in words.
+const LISTED: usize = 6;
+
+/// The effects of which the least share of the range would have been named, with their limits; none where no effect would have been.
+pub(crate) fn detection_limit_note(
+    limits: &[DetectionLimit],
+    effects: &[EffectSpec],
+) -> Option<String> {
+    let share = |limit: &DetectionLimit| {
+        let spec = effects.iter().find(|spec| spec.name == limit.effect)?;
+        let parameter = spec.parameters.iter().find(|p| *p.name == *limit.parameter)?;
+        let distance = (limit.strength? - parameter.off()?).abs();
+        Some(distance / (parameter.max - parameter.min))
+    };
+    let known = limits.iter().filter_map(|limit| Some((share(limit)?, limit)));
+    let mut known: Vec<(f64, &DetectionLimit)> = known.collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let words = |(_, limit): &(f64, &DetectionLimit)| {
+        let unit = if limit.unit == "1" { String::new() } else { format!(" {}", limit.unit) };
+        format!("{} {}{unit}", limit.effect, in_digits(limit.strength.unwrap_or(0.0)))
+    };
+    let listed: Vec<String> = known.iter().take(LISTED).map(words).collect();
+    let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
+    (!listed.is_empty()).then(|| {
+        format!(
+            "It would have been named if it were stronger than: {}{rest} (with probability 0.9, by linearised draws).",
+            listed.join(", ")
+        )
+    })
+}
+
+/// Two digits.
+fn in_digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
+    let is_long = rounded != 0.0 && (rounded.abs() < 1e-3 || rounded.abs() >= 1e5);
+    if is_long { format!("{rounded:e}") } else { format!("{rounded}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stretch_effects::EffectParameter;
+
+    #[test]
+    fn the_six_that_are_seen_best_stand_in_words() {
+        let spec = |i: usize| {
+            let parameters = vec![EffectParameter::sized("c", "V", 0.0..=1.0)];
+            EffectSpec::new(&format!("e{i}"), (0, "toy"), parameters)
+        };
+        let limit = |i: usize, strength| DetectionLimit {
+            effect: format!("e{i}"),
+            parameter: "c".into(),
+            strength,
+            unit: "V".into(),
+            others: Default::default(),
+        };
+        let effects: Vec<EffectSpec> = (0..9).map(spec).collect();
+        let limits: Vec<DetectionLimit> =
+            (0..9).map(|i| limit(i, (i > 0).then(|| 0.1 * (10 - i) as f64))).collect();
+        let words = detection_limit_note(&limits, &effects).expect("limits");
+        assert!(
+            words.starts_with(
+                "It would have been named if it were stronger than: e8 0.2 V, e7 0.3 V, "
+            ),
+            "{words}"
+        );
+        assert!(words.contains("e3") && !words.contains("e2") && words.contains("in the table"));
+        assert_eq!(detection_limit_note(&limits[..1], &effects), None);
+        assert_eq!(in_digits(2.04e-11), "2e-11");
+    }
+}

@@ -1,0 +1,109 @@
+//! Properties of the naming for all candidates, over thousands of drawn cases.
+
+use std::collections::BTreeSet;
+
+use crate::{
+    evidence::{candidates::Candidate, shares::EffectShare},
+    numerics::random::RandomGenerator,
+    problem::thresholds::Thresholds,
+    verdict::naming::Naming,
+};
+
+const NAMES: [&str; 6] = ["play", "drift", "lag", "leak", "slack", "sag"];
+
+/// A set of up to three different effects.
+fn set(random: &mut RandomGenerator) -> Vec<String> {
+    let count = random.below(4);
+    let mut names: Vec<String> = Vec::new();
+    while names.len() < count {
+        let name = NAMES[random.below(NAMES.len())].to_owned();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn candidate(effects: Vec<String>, probability: f64, random: &mut RandomGenerator) -> Candidate {
+    let closed = 1.2 * random.unit() - 0.2;
+    Candidate {
+        effects,
+        probability,
+        score: 10.0 * probability,
+        gap_before: 10.0,
+        gap_after: 10.0 * (1.0 - closed),
+        left: 10.0 * (1.0 - closed),
+        at_bound: false,
+        closed,
+        closed_ci: [closed - 0.1, closed + 0.1],
+        is_confirmed: random.unit() < 0.7,
+        by_name: Default::default(),
+        parameters: Vec::new(),
+    }
+}
+
+/// Candidates, the most probable first, and the shares of the first one's effects, the strongest first.
+fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
+    let mut candidates = Vec::new();
+    for probability in [0.6, 0.3, 0.1] {
+        let effects = set(random);
+        candidates.push(candidate(effects, probability, random));
+    }
+    let mut shares: Vec<EffectShare> = candidates[0]
+        .effects
+        .iter()
+        .map(|effect| {
+            let closes = random.unit() * random.unit();
+            let at_bound = random.unit() < 0.2;
+            EffectShare { effect: effect.clone(), closes, closes_excess: closes, at_bound }
+        })
+        .collect();
+    shares.sort_by(|a, b| b.closes.total_cmp(&a.closes));
+    (candidates, shares, random.unit() < 0.2)
+}
+
+/// Named and faint effects together are the first set. A tie is between a name and an effect
+/// outside the first set. Every name is reported once.
+#[test]
+fn names_part_the_first_set() {
+    let mut random = RandomGenerator::new(4, 0);
+    let thresholds = Thresholds::frozen();
+    let mut ties = 0;
+    for _ in 0..5000 {
+        let (candidates, shares, is_short) = drawn(&mut random);
+        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let both: Vec<&String> = naming.named.iter().chain(&naming.faint).collect();
+        let parted: BTreeSet<&String> = both.iter().copied().collect();
+        assert_eq!(parted.len(), both.len());
+        assert_eq!(parted, candidates[0].effects.iter().collect());
+        for (own, other) in &naming.ties {
+            assert!(naming.named.contains(own) && !candidates[0].effects.contains(other));
+        }
+        ties += naming.ties.len();
+        let tied = naming.tied();
+        assert_eq!(tied.iter().collect::<BTreeSet<_>>().len(), tied.len());
+        let told = naming.alternatives();
+        assert_eq!(told.len(), naming.named.len());
+        for (name, told) in naming.named.iter().zip(&told) {
+            assert!(told.split(" or ").next() == Some(name), "{told}");
+        }
+    }
+    assert!(ties > 100, "{ties} ties are enough to say something");
+}
+
+/// An effect that closes less than a gap that counts is not in the headline with a larger one.
+#[test]
+fn what_is_named_counts() {
+    let mut random = RandomGenerator::new(5, 0);
+    let thresholds = Thresholds::frozen();
+    for _ in 0..5000 {
+        let (candidates, shares, is_short) = drawn(&mut random);
+        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let share = |name: &String| shares.iter().find(|s| s.effect == *name);
+        let counts =
+            |name: &String| share(name).is_some_and(|s| s.closes_excess >= thresholds.least_gap);
+        if naming.named.len() > 1 {
+            assert!(naming.named.iter().all(counts), "{naming:?}");
+        }
+    }
+}

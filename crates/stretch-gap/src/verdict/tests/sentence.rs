@@ -1,0 +1,335 @@
+//! What is said of answers of every kind, each built from values: `sentences.txt` has them all.
+
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+
+use serde_json::{from_value, json};
+use testkit::corpus::is_in_file;
+
+use crate::{
+    evidence::{
+        candidates::Candidate,
+        gathered::{Evidence, Excess},
+        sanity::{AtBounds, Sanity},
+        shares::EffectShare,
+    },
+    missing::Proposed,
+    problem::{column::Column, record_facts::RowsUsed, simulator::Simulator},
+    record::gross::Gross,
+    toys::{Effect, Law, Measured, Toy},
+    verdict::{
+        coverage::TooLittle,
+        diagnosis::{Unexplained, VerdictKind},
+        judge::{Judged, Overruled},
+        naming::Naming,
+        sentence::{Answer, cut_short, tell},
+    },
+};
+
+const PLAY: &str = "lag.output.backlash";
+const LAG: &str = "line.input.lag";
+const LOOP: &str = "lag.output.bouc_wen";
+
+/// An answer by its values. By default simulator and rig agree, and nothing was noticed.
+struct Case {
+    seen: VerdictKind,
+    overruled: Option<Overruled>,
+    naming: Naming,
+    proposed: Option<Proposed>,
+    /// Excess as shipped, re-tuned and with the best set.
+    gap: [f64; 3],
+    first: Candidate,
+    shares: Vec<EffectShare>,
+    sanity: Sanity,
+    unexplained: Option<Unexplained>,
+    gross: Vec<Gross>,
+    borrowed_test: bool,
+    /// Whether some effect closes a part of the gap.
+    has_best: bool,
+}
+
+impl Default for Case {
+    fn default() -> Self {
+        Self {
+            seen: VerdictKind::NoGap,
+            overruled: None,
+            naming: Naming::default(),
+            proposed: None,
+            gap: [0.004; 3],
+            first: candidate(0.97, 0.002),
+            shares: Vec::new(),
+            sanity: Sanity { left: vec![0.001, 0.002], allowed: 0.1, at_bounds: None },
+            unexplained: None,
+            gross: Vec::new(),
+            borrowed_test: false,
+            has_best: false,
+        }
+    }
+}
+
+/// The most probable set, which closes 98 % of the gap.
+fn candidate(probability: f64, left: f64) -> Candidate {
+    Candidate {
+        effects: vec![PLAY.into()],
+        probability,
+        score: 100.0,
+        gap_before: 8.0,
+        gap_after: 0.002,
+        left,
+        at_bound: false,
+        closed: 0.98,
+        closed_ci: [0.962, 1.0],
+        is_confirmed: true,
+        by_name: BTreeMap::new(),
+        parameters: Vec::new(),
+    }
+}
+
+fn names(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+fn share(effect: &str, closes: f64, at_bound: bool) -> EffectShare {
+    EffectShare { effect: effect.into(), closes, closes_excess: 8.0 * closes, at_bound }
+}
+
+/// Effects are missing, which close nearly all of the gap.
+fn missing(named: &[&str]) -> Case {
+    Case {
+        seen: VerdictKind::Effect,
+        naming: Naming { named: names(named), ..Naming::default() },
+        gap: [30.0, 8.0, 0.002],
+        ..Case::default()
+    }
+}
+
+/// Effects are missing that close a share of the gap.
+fn part(closed: f64, shares: Vec<EffectShare>) -> Case {
+    let named: Vec<&str> = shares.iter().map(|s| s.effect.as_str()).collect();
+    Case {
+        seen: VerdictKind::Partial,
+        gap: [30.0, 8.0, 8.0 * (1.0 - closed)],
+        first: Candidate { closed, ..candidate(0.8, 8.0 * (1.0 - closed)) },
+        unexplained: Some(Unexplained {
+            share: 1.0 - closed,
+            stage: "line".into(),
+            sits: names(&["rising", "30 to 40 mm"]),
+        }),
+        ..missing(&named)
+    }
+    .shared(shares)
+}
+
+/// There is a gap that nothing explains.
+fn unknown() -> Case {
+    Case { seen: VerdictKind::Unknown, gap: [30.0, 8.0, 8.0], ..Case::default() }
+}
+
+/// Something is wrong with the record or the rig file.
+fn wrong(gross: Vec<Gross>) -> Case {
+    Case { seen: VerdictKind::Record, gap: [30.0, 8.0, 0.002], gross, ..Case::default() }
+}
+
+fn gross(what: &str, sentence: &str, hint: &str) -> Gross {
+    from_value(json!({ "what": what, "unit": "V", "sentence": sentence, "hint": hint }))
+        .expect("an error of the record")
+}
+
+/// A term that the catalogue does not hold.
+fn proposed() -> Proposed {
+    from_value(json!({
+        "stage": "line", "channel": "y0", "equation": "y0 += 0.31 x^2", "terms": [], "signals": [],
+        "time_scales_s": [10.0, 600.0], "initial": "at rest", "closes_held": 0.9, "closes_test": 0.88,
+        "acts": "output y0", "random": false, "log_odds": 12.0,
+        "sentence": "A term in x^2 closes 88 % of what is left in y0.",
+    }))
+    .expect("a proposal")
+}
+
+impl Case {
+    fn shared(self, shares: Vec<EffectShare>) -> Self {
+        Self { shares, ..self }
+    }
+
+    fn tied(mut self, name: &str, other: &str) -> Self {
+        self.naming.ties.push((name.into(), other.into()));
+        self
+    }
+
+    fn faint(mut self, name: &str) -> Self {
+        self.naming.faint.push(name.into());
+        self
+    }
+
+    fn overruled(self, by: Overruled) -> Self {
+        Self { overruled: Some(by), ..self }
+    }
+
+    /// The sentence and the notes.
+    fn text(&self, simulator: &dyn Simulator, evidence: &Evidence) -> String {
+        let judged = Judged {
+            kind: if self.overruled.is_some() { VerdictKind::Unknown } else { self.seen },
+            seen: self.seen,
+            overruled: self.overruled.clone(),
+            seen_naming: self.naming.clone(),
+            proposed: self.proposed.clone(),
+        };
+        let [raw, retuned, left] = self.gap;
+        let answer = Answer {
+            judged: &judged,
+            gap: Excess { raw, retuned, left },
+            first: Some(&self.first),
+            shares: &self.shares,
+            sanity: &self.sanity,
+            unexplained: self.unexplained.as_ref(),
+            gross: &self.gross,
+            null_band: 0.02,
+        };
+        let mut evidence = evidence.clone();
+        evidence.roles.borrowed_test = self.borrowed_test;
+        evidence.best_effect = self.has_best.then_some(0);
+        let words = tell(answer, simulator, &evidence);
+        let notes = words.notes.iter().map(|note| format!("note: {note}\n"));
+        format!("{}\n{}", words.sentence, notes.collect::<String>())
+    }
+}
+
+/// A line with a lag behind it, which leaves most.
+fn line_and_lag() -> (Measured, Evidence) {
+    let toy = Toy { trials: vec![(600, false), (400, true)], ..Toy::of(&[Law::Line, Law::Lag]) };
+    let measured = toy.may_lack(&[Effect::Quadratic]).measured(1);
+    let (_, mut evidence) = measured.diagnosed();
+    for (stage, excess) in evidence.stages.iter_mut().zip([0.5, 7.0]) {
+        (stage.excess_retuned, stage.excess_after) = (excess, excess);
+    }
+    (measured, evidence)
+}
+
+fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
+    use VerdictKind::Parameters;
+    let [line, lag] = [0, 1].map(|stage| Column::output(stage, &simulator.stages()[stage]));
+    let retuned = || Case { seen: Parameters, gap: [24.0, 0.004, 0.004], ..Case::default() };
+    let faint = || Case { seen: Parameters, gap: [24.0, 0.08, 0.08], ..Case::default() };
+    let scale =
+        || gross("scale", "y0 looks 1.250 times too large", "check the gain of the amplifier");
+    let ended = AtBounds { stage: 1, ended: vec![0, 1], left: 8.0, rivals: None };
+    let mostly = || part(0.8, vec![share(PLAY, 0.7, false), share(LAG, 0.1, true)]);
+    vec![
+        ("agrees", Case::default()),
+        ("agrees, one effect faint", Case::default().faint(PLAY)),
+        ("agrees, last quarters tested on", Case { borrowed_test: true, ..Case::default() }),
+        ("re-tuned", retuned()),
+        ("re-tuned, one effect faint", retuned().faint(PLAY)),
+        ("more than noise, nothing found", faint()),
+        ("more than noise, found and small", faint().faint(PLAY).faint(LAG)),
+        ("one missing", missing(&[PLAY])),
+        ("one missing, certain", Case { first: candidate(1.0, 0.002), ..missing(&[PLAY]) }),
+        (
+            "one missing, certain, more than noise left",
+            Case {
+                gap: [30.0, 20.0, 1.6],
+                first: Candidate { closed: 1.0, gap_after: 1.6, ..candidate(1.0, 1.6) },
+                ..missing(&[PLAY])
+            },
+        ),
+        (
+            "one missing, fits worse than it tests",
+            Case {
+                gap: [30.0, 8.0, 0.9],
+                first: Candidate { gap_after: 0.1, ..candidate(0.97, 0.9) },
+                ..missing(&[PLAY])
+            },
+        ),
+        ("tie", Case { first: candidate(0.55, 0.002), ..missing(&[PLAY]) }.tied(PLAY, LOOP)),
+        ("two missing", missing(&[PLAY, LAG])),
+        (
+            "two missing, one tied, a third faint",
+            missing(&[PLAY, LAG]).tied(PLAY, LOOP).faint("lag.output.drift"),
+        ),
+        ("mostly", mostly()),
+        ("mostly, tied", mostly().tied(PLAY, LOOP)),
+        ("mostly, with a proposal", Case { proposed: Some(proposed()), ..mostly() }),
+        ("in part", part(0.3, vec![share(PLAY, 0.295, true), share(LAG, 0.005, false)])),
+        ("unknown", unknown()),
+        (
+            "unknown, parts close",
+            Case { has_best: true, ..unknown() }.shared(vec![
+                share(PLAY, 0.2, true),
+                share(LAG, 0.06, false),
+                share(LOOP, 0.01, false),
+            ]),
+        ),
+        ("unknown, with a proposal", Case { proposed: Some(proposed()), ..unknown() }),
+        ("wrong record", wrong(vec![scale()])),
+        (
+            "wrong record, one of two",
+            wrong(vec![scale(), gross("delay", "y0 comes 0.030 s late", "check the clocks")]),
+        ),
+        ("copied column", wrong(vec![Gross::copied(&lag, &line, 0.5)])),
+        (
+            "columns that stand still",
+            wrong(vec![
+                Gross::still(&line, &("a.csv".into(), 1.0, 4.5), 1),
+                Gross::still(&lag, &("b.csv".into(), 0.25, 9.0), 3),
+            ]),
+        ),
+        (
+            "wrong rig file",
+            wrong(vec![gross(
+                "parameter",
+                "bridge_v is 2.5 V, the rig file says 5",
+                "correct the rig file, or what is set on the rig",
+            )]),
+        ),
+        (
+            "other units",
+            wrong(vec![gross(
+                "factor",
+                "the simulator's y0 is 57.3 times the record's: that is deg for rad",
+                "convert the record",
+            )]),
+        ),
+        ("parameters at their bounds", missing(&[PLAY]).overruled(Overruled::AtBounds(ended))),
+        (
+            "too short",
+            missing(&[PLAY]).overruled(Overruled::TooLittle(TooLittle::Short {
+                fit_s: 3.75,
+                test_s: 1.25,
+                block_s: 0.5,
+            })),
+        ),
+        (
+            "too few rows",
+            missing(&[PLAY]).overruled(Overruled::TooLittle(TooLittle::Rows(RowsUsed {
+                used: 1200,
+                read: 4000,
+            }))),
+        ),
+        (
+            "a channel that is not simulated",
+            Case {
+                sanity: Sanity { left: vec![0.02, 0.64], allowed: 0.1, at_bounds: None },
+                ..unknown()
+            },
+        ),
+    ]
+}
+
+#[test]
+fn every_answer_has_its_words() {
+    let (measured, evidence) = line_and_lag();
+    let mut text = String::new();
+    for (name, case) in cases(&measured) {
+        let _ = writeln!(text, "# {name}\n{}", case.text(&measured, &evidence));
+    }
+    let not_looked_at: &[&[&str]] = &[&[], &["lag"], &["a", "b", "c", "d", "e", "f", "g", "h"]];
+    for names in not_looked_at {
+        let _ = writeln!(
+            text,
+            "# budget spent, {} left\n{}\n",
+            names.len(),
+            cut_short(names).trim_end()
+        );
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests/sentences.txt");
+    is_in_file(&file, &text);
+}

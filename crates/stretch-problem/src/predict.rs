@@ -1,0 +1,284 @@
+//! Runs a fixed simulator on recordings that were not fitted, with the fix and without, and scores both.
+
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use serde::Serialize;
+use stretch_data::{SessionTrial, Split, ends};
+use stretch_gap::{Model, Run, Simulator};
+use stretch_recording::Recording;
+
+use crate::{
+    black_box::{BlackBox, Checked, ProblemSpec, Source, velocity::of_position},
+    error::ProblemError,
+    problem::Reading,
+    worker::Workers,
+};
+
+/// How far a fitted range may be left before it counts, as a share of the range.
+const MARGIN: f64 = 0.025;
+/// Pause between recordings, s.
+const PAUSE_S: f64 = 15.0;
+
+/// What a simulator predicts of new recordings, with a fix and without. Its serde form is the JSON of `stretch predict`, schema 2, without
+/// the traces.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// Version of this schema: 2.
+    pub schema: u32,
+    /// Name of the problem.
+    pub name: String,
+    /// Effects of the fix.
+    pub effects: Vec<String>,
+    /// Sample time, s.
+    pub dt_s: f64,
+    /// Geometric mean of the ratios of all outputs of all recordings.
+    pub ratio: f64,
+    /// The largest error with the fix of any output of any recording, in multiples of the noise: `--fail-above` looks at it.
+    pub largest_times_noise: f64,
+    /// The new recordings; a recording with a long gap has several parts.
+    pub trials: Vec<PredictedTrial>,
+    /// Notes on the recordings, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// A new recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PredictedTrial {
+    /// Its name.
+    pub name: String,
+    /// Its length, s.
+    pub seconds: f64,
+    /// Its outputs, in the order of the stages.
+    pub outputs: Vec<PredictedOutput>,
+    /// Columns and rates that leave the range in which the fix was fitted, in sentences: do not trust the prediction there.
+    pub extrapolated: Vec<String>,
+}
+
+/// An output of a new recording, measured and predicted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PredictedOutput {
+    /// The stage.
+    pub stage: String,
+    /// Column of the output.
+    pub column: String,
+    /// Unit of the output.
+    pub unit: String,
+    /// Noise of the output, one standard deviation.
+    pub noise: f64,
+    /// Root mean square error with the fix, in the unit.
+    pub rmse: f64,
+    /// The same without the fix, parameters re-tuned.
+    pub rmse_without: f64,
+    /// Root mean square error with the fix in multiples of the noise.
+    pub times_noise: f64,
+    /// Error with the fix over error without it: the fix helps if it is below 1.
+    pub ratio: f64,
+    /// The measured samples.
+    #[serde(skip)]
+    pub measured: Vec<f64>,
+    /// The samples that the simulator predicts with the fix.
+    #[serde(skip)]
+    pub with: Vec<f64>,
+    /// The samples that it predicts without the fix.
+    #[serde(skip)]
+    pub without: Vec<f64>,
+}
+
+impl Prediction {
+    /// All outputs of all recordings.
+    pub fn outputs(&self) -> impl Iterator<Item = &PredictedOutput> {
+        self.trials.iter().flat_map(|trial| &trial.outputs)
+    }
+
+    /// The result in a sentence.
+    pub fn sentence(&self) -> String {
+        let better = self.outputs().filter(|o| o.ratio < 1.0).count();
+        format!(
+            "with {} the simulator predicts {better} of {} outputs better than without, parameters re-tuned: the ratio of the errors is {:.2} (geometric mean), the largest error is {:.1} times the noise",
+            self.effects.join(" and "),
+            self.outputs().count(),
+            self.ratio,
+            self.largest_times_noise,
+        )
+    }
+}
+
+/// Predicts recordings with the problem's file that a fix was written as (`stretch diagnose --fix`): every stage is simulated on the measured
+/// inputs of the new recordings, once with the effects of the fix and once without any, its parameters re-tuned alone (`alone` in the file).
+///
+/// The recordings that were fitted are read as well, because the noise and the fitted ranges come from them. The new ones follow them in
+/// session time, which matters for an effect that drifts.
+///
+/// # Errors
+/// Files that cannot be read, a file without a fix, unknown names, and a simulator that fails.
+pub fn predict(
+    fixed: &Path,
+    new: &[PathBuf],
+    reading: &Reading<'_>,
+) -> Result<Prediction, ProblemError> {
+    let file = ProblemSpec::read(fixed)?;
+    let shown = fixed.display().to_string();
+    let workers = file.workers(1)?.ok_or_else(|| {
+        let hint = "predict needs a simulator of your own; for the rig: stretch diagnose NEW --rig fixed.toml";
+        ProblemError::value(&shown, "its simulator is built in", hint)
+    })?;
+    if effects_of(&file).is_empty() {
+        let hint = "give the file that stretch diagnose --fix wrote: it has [[wrapped]] entries, or an [[effect]] with a value";
+        return Err(ProblemError::value(&shown, "it holds no effect that was found", hint));
+    }
+    if let Some(announce) = reading.announce {
+        let (program, folder) = (workers.shown(), workers.folder.display());
+        announce(&format!("{shown} runs, in the folder {folder}: {program}"));
+    }
+    let mut spec = file.load()?;
+    let fitted = spec.trials.len();
+    for path in new {
+        let mut trial = SessionTrial::from(Recording::read(path, &file.reading())?);
+        trial.trial.name = path.display().to_string();
+        trial.split = Split::Test;
+        spec.trials.push(trial);
+    }
+    // Recordings without a start follow one another by themselves.
+    if spec.trials[..fitted].windows(2).all(|pair| pair[1].start_s > pair[0].start_s) {
+        for at in fitted.max(1)..spec.trials.len() {
+            let before = &spec.trials[at - 1];
+            spec.trials[at].start_s = before.start_s + before.trial.duration_s() + PAUSE_S;
+        }
+    }
+    let bare = ProblemSpec { wrap: Vec::new(), without: Vec::new(), ..spec.clone() };
+    let source = Arc::new(Workers::start(workers, Checked::new(bare)?.session())?);
+    Ok(Prediction { name: file.shown_name().to_owned(), ..predict_with(spec, fitted, source)? })
+}
+
+/// Predicts the trials of a problem in memory from the index `fitted` on; see [`predict`].
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_with(
+    mut spec: ProblemSpec,
+    fitted: usize,
+    source: Arc<dyn Source>,
+) -> Result<Prediction, ProblemError> {
+    spec.trials[fitted..].iter_mut().for_each(|t| t.split = Split::Test);
+    // No further effect is looked for.
+    spec.wrap.clear();
+    spec.without.clear();
+    let effects = effects_of(&spec);
+    let (bare, is_tuned) = without_fix(&spec);
+    let (with, without) = (Checked::new(spec)?, Checked::new(bare)?);
+    let mut in_front = with.standing.iter().filter(|(at, _)| with.is_in_front(*at));
+    if let Some((at, _)) = in_front.next().filter(|_| !source.takes_inputs()) {
+        let hint = "let it take them (inputs = true in its hello)";
+        let found = "the simulator takes no altered inputs";
+        return Err(ProblemError::value(&with.wrappers[*at].name, found, hint));
+    }
+    let outputs = [simulate(&with, &source)?, simulate(&without, &source)?];
+    let session = with.session();
+    let trial = |at: usize| {
+        let (name, samples) = (session.trials[at].name.clone(), &session.trials[at].samples);
+        let seconds = samples.len() as f64 * session.dt_s;
+        let stages = 0..with.stages.len();
+        let outputs = stages.map(|stage| score(&with, stage, samples, &outputs)).collect();
+        PredictedTrial { name, seconds, outputs, extrapolated: extrapolated(&with, samples) }
+    };
+    let trials: Vec<_> = with.columns.sources_from(fitted).into_iter().map(trial).collect();
+    if trials.is_empty() {
+        let hint = "record 50 samples in a row or more";
+        return Err(ProblemError::too_little("no new recording is long enough", hint));
+    }
+    let mut notes: Vec<String> = with.notes().iter().cloned().chain(source.notes()).collect();
+    if !is_tuned {
+        notes.push("the file has no parameter values that were re-tuned without the effects (alone), so the values of the fix are used; this makes the simulator without the fix look worse than it is".into());
+    }
+    let all = || trials.iter().flat_map(|t| &t.outputs);
+    let ratio = (all().map(|o| o.ratio.ln()).sum::<f64>() / all().count() as f64).exp();
+    let largest_times_noise = all().map(|o| o.times_noise).fold(0.0, f64::max);
+    let (name, dt_s) = ("problem".to_owned(), session.dt_s);
+    Ok(Prediction { schema: 2, name, effects, dt_s, ratio, largest_times_noise, trials, notes })
+}
+
+/// Names of the effects that act in every run.
+fn effects_of(spec: &ProblemSpec) -> Vec<String> {
+    let own = spec.effects.iter().filter(|e| e.is_standing()).map(|e| e.name.clone());
+    spec.wrapped.iter().map(|w| w.name.clone()).chain(own).collect()
+}
+
+/// The problem without its fix, parameters as they were re-tuned alone, and whether the file has such parameters.
+fn without_fix(spec: &ProblemSpec) -> (ProblemSpec, bool) {
+    let mut spec = spec.clone();
+    spec.wrapped.clear();
+    spec.effects.iter_mut().flat_map(|e| &mut e.arguments).for_each(|a| a.value = None);
+    let is_tuned = spec.parameters.iter().any(|p| p.alone.is_some());
+    spec.parameters.iter_mut().for_each(|p| p.value = p.alone.unwrap_or(p.value));
+    (spec, is_tuned)
+}
+
+/// The outputs of every stage over all trials.
+fn simulate(problem: &Checked, source: &Arc<dyn Source>) -> Result<Vec<Vec<f64>>, ProblemError> {
+    let simulator = BlackBox::new(problem.clone(), Arc::clone(source));
+    let (model, trials) = (Model::nominal(&simulator), problem.session().trials.len());
+    let stage = |stage: usize| {
+        let mut out = vec![0.0; problem.session().samples(trials)];
+        let done = simulator.simulate(Run::exact(stage, &model, trials), &mut out);
+        done.map(|()| out).map_err(|error| ProblemError::Simulator(error.to_string()))
+    };
+    (0..problem.stages.len()).map(stage).collect()
+}
+
+/// Scores a stage on some samples; `outputs` are those with the fix and those without.
+fn score(
+    problem: &Checked,
+    stage: usize,
+    samples: &Range<usize>,
+    outputs: &[Vec<Vec<f64>>; 2],
+) -> PredictedOutput {
+    let (spec, noise) = (&problem.description().stages[stage], problem.noise[stage]);
+    let measured = problem.columns.of(&spec.channel).map_or(&[][..], |all| &all[samples.clone()]);
+    let [with, without] = outputs.each_ref().map(|all| all[stage][samples.clone()].to_vec());
+    let [rmse, rmse_without] = [&with, &without].map(|predicted| {
+        let squares = measured.iter().zip(predicted).map(|(m, p)| (m - p) * (m - p));
+        (squares.sum::<f64>() / samples.len() as f64).sqrt()
+    });
+    PredictedOutput {
+        stage: spec.name.clone(),
+        column: spec.channel.clone(),
+        unit: spec.unit.clone(),
+        noise,
+        rmse,
+        rmse_without,
+        times_noise: rmse / noise.max(f64::MIN_POSITIVE),
+        ratio: rmse / rmse_without.max(f64::MIN_POSITIVE),
+        measured: measured.to_vec(),
+        with,
+        without,
+    }
+}
+
+/// Inputs, outputs and their rates that leave the range of the fitted recordings, in sentences.
+fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
+    let (columns, dt_s) = (&problem.columns, problem.session().dt_s);
+    let (trials, fitted) = (columns.ranges(), columns.looked_at());
+    let sentence = |name: String, values: &[f64]| {
+        let (low, high) = ends(fitted.iter().flat_map(|range| &values[range.clone()]));
+        let margin = MARGIN * (high - low);
+        let own = &values[samples.clone()];
+        let outside = own.iter().filter(|x| **x < low - margin || **x > high + margin).count();
+        let share = 100.0 * outside as f64 / own.len() as f64;
+        let (least, greatest) = ends(own);
+        (outside > 0).then(|| format!("{name} is {least:.4} to {greatest:.4}, fitted were {low:.4} to {high:.4}: {share:.1} % of the recording are outside"))
+    };
+    let mut names: Vec<&String> =
+        problem.stages.iter().flat_map(|s| s.inputs.iter().chain([&s.output])).collect();
+    names.sort_unstable();
+    names.dedup();
+    let of = |name: &String| {
+        let values = columns.of(name).unwrap_or(&[]);
+        let rates = of_position(values, &trials, dt_s);
+        [sentence(name.clone(), values), sentence(format!("the rate of {name}"), &rates)]
+    };
+    names.into_iter().flat_map(of).flatten().collect()
+}

@@ -1,0 +1,101 @@
+//! A fix predicts recordings that were not fitted, and says where they leave the fitted ranges.
+
+use std::sync::Arc;
+
+use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_gap::RandomGenerator;
+use stretch_problem::{
+    Ask, EffectEntry, Parameter, Prediction, ProblemSpec, StageEntry, Tolerance, closure,
+    predict_with,
+};
+
+const DT_S: f64 = 0.01;
+const SAMPLES: usize = 2000;
+
+/// A shaft turned by hand, as far and as quickly as these say, and the gear behind it with a play of 0.4 and a ratio of 3.05.
+fn recorded(number: u64, far: f64, quick: f64) -> SessionTrial {
+    let mut random = RandomGenerator::new(8, number);
+    let phase = number as f64;
+    let shaft = |t: f64| far * ((0.9 * quick * t + phase).sin() + 0.6 * (2.3 * quick * t).sin());
+    let time_s: Vec<f64> = (0..SAMPLES).map(|i| DT_S * i as f64).collect();
+    let shafts: Vec<f64> = time_s.iter().map(|t| shaft(*t)).collect();
+    let mut held = 3.05 * shafts[0];
+    let gears = shafts.iter().map(|x| {
+        held = held.clamp(3.05 * x - 0.4, 3.05 * x + 0.4);
+        held + 0.02 * random.gauss()
+    });
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let channels = vec![channel("gear_deg", gears.collect()), channel("shaft_deg", shafts)];
+    let trial = Trial { name: format!("{number}.csv"), time_s, channels };
+    SessionTrial { start_s: 60.0 * number as f64, ..SessionTrial::new(trial) }
+}
+
+fn predicted(new: &[(f64, f64)], play: f64) -> Prediction {
+    let mut trials = vec![recorded(0, 10.0, 1.0), recorded(1, 10.0, 1.0)];
+    let numbered = new.iter().zip(2..);
+    trials.extend(numbered.map(|((far, quick), n)| recorded(n, *far, *quick)));
+    let spec = ProblemSpec {
+        stages: vec![StageEntry {
+            name: "gear".into(),
+            output: "gear_deg".into(),
+            inputs: vec!["shaft_deg".into()],
+            ..StageEntry::default()
+        }],
+        parameters: vec![Parameter {
+            name: "ratio".into(),
+            unit: "1".into(),
+            value: 3.05,
+            tolerance: Tolerance::Relative(0.05),
+            alone: Some(3.03),
+            ..Parameter::default()
+        }],
+        wrapped: vec![EffectEntry {
+            name: "output.backlash".into(),
+            parameters: [("w".to_owned(), play), ("softness".to_owned(), 0.0)].into(),
+        }],
+        trials,
+        ..ProblemSpec::default()
+    };
+    // What drives the gear is measured: the closure is handed the recorded shaft.
+    let shafts: Vec<f64> =
+        spec.trials.iter().flat_map(|t| t.trial.channels[1].values.iter().copied()).collect();
+    let gear = closure(move |ask: &Ask<'_>| {
+        Ok(shafts[..ask.trials * SAMPLES].iter().map(|x| ask.parameters[0] * x).collect())
+    });
+    predict_with(spec, 2, Arc::new(gear)).expect("a prediction")
+}
+
+#[test]
+fn the_right_fix_predicts_within_the_noise_and_the_bare_simulator_does_not() {
+    let found = predicted(&[(9.5, 1.0), (8.0, 0.9)], 0.4);
+    assert_eq!(
+        (found.trials.len(), found.effects.as_slice()),
+        (2, &["output.backlash".to_owned()][..])
+    );
+    assert!((0.9..1.1).contains(&found.largest_times_noise), "{}", found.sentence());
+    // The play is 0.4 and the noise 0.02, so the error without the fix is some twenty times the noise.
+    assert!(found.outputs().all(|o| o.rmse_without > 10.0 * o.noise && o.ratio < 0.1));
+    assert!(
+        found.trials.iter().all(|t| t.extrapolated.is_empty()),
+        "{:?}",
+        found.trials[0].extrapolated
+    );
+    assert!(found.sentence().contains("predicts 2 of 2 outputs better"), "{}", found.sentence());
+}
+
+#[test]
+fn a_wrong_fix_is_no_better() {
+    let found = predicted(&[(9.5, 1.0)], 1.2);
+    assert!(found.ratio > 1.0 && found.largest_times_noise > 10.0, "{}", found.sentence());
+}
+
+#[test]
+fn columns_and_rates_outside_the_fitted_ranges_are_listed() {
+    let found = predicted(&[(9.5, 1.0), (15.0, 1.0), (9.0, 2.0)], 0.4);
+    let of = |trial: usize| &found.trials[trial].extrapolated;
+    let has = |trial: usize, what: &str| of(trial).iter().any(|s| s.starts_with(what));
+    assert!(of(0).is_empty(), "{:?}", of(0));
+    assert!(has(1, "shaft_deg is ") && has(1, "gear_deg is "), "{:?}", of(1));
+    assert!(has(2, "the rate of shaft_deg is "), "{:?}", of(2));
+    assert!(of(2).iter().all(|s| s.starts_with("the rate of ")), "{:?}", of(2));
+}

@@ -1,0 +1,140 @@
+//! A branch's surface over integers, and the bounds of its domain.
+
+use stretch_core::DesignError;
+
+use crate::Domain;
+
+/// Bits by which a converter's code is shifted up from its 16-bit place for the comparison with the domain's ends.
+pub(super) const COARSE_BITS: u32 = 15;
+
+/// Ends of a domain in integers, and the factor that spreads the domain over 32 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Span {
+    /// The lower end.
+    pub min: i32,
+    /// Difference of the upper and the lower end.
+    pub width: u32,
+    /// The factor, a power of two.
+    pub factor: i32,
+}
+
+impl Span {
+    /// From `min` to `max`, spread as far as both ends allow.
+    pub(super) fn new(min: i32, max: i32) -> Self {
+        let size = min.unsigned_abs().max(max.unsigned_abs()).max(1);
+        // an end of exactly 2^31 has no factor but 1
+        let factor = 1 << size.leading_zeros().saturating_sub(1).min(30);
+        Self { min, width: max.wrapping_sub(min) as u32, factor }
+    }
+
+    /// Whether both ends fit 32 bits when spread.
+    #[cfg(feature = "serde")]
+    fn holds(&self) -> bool {
+        let max = i64::from(self.min) + i64::from(self.width);
+        let fits = |end: i64| i32::try_from(end * i64::from(self.factor)).is_ok();
+        self.factor > 0 && fits(self.min.into()) && fits(max)
+    }
+
+    /// The nearest value inside, and 1 where the value was outside.
+    #[inline(always)]
+    fn clamp(&self, x: i32) -> (i32, u8) {
+        // one comparison is enough, because below the lower end the difference wraps to a large number
+        if x.wrapping_sub(self.min) as u32 <= self.width { (x, 0) } else { self.nearest_end(x) }
+    }
+
+    /// A value inside, spread over 32 bits.
+    #[inline(always)]
+    pub(super) fn spread(&self, inside: i32) -> i32 {
+        inside.wrapping_mul(self.factor)
+    }
+
+    #[cold]
+    fn nearest_end(&self, x: i32) -> (i32, u8) {
+        (if x < self.min { self.min } else { self.min.wrapping_add_unsigned(self.width) }, 1)
+    }
+}
+
+/// A surface and the domain of its inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CodeSurface<S> {
+    /// The code, aligned to 16 bits, about which the surface is expanded.
+    pub centre: u16,
+    /// Range to which the signal is clamped, in `2^-15` of a 16-bit sample from the centre.
+    pub signal: Span,
+    /// Range to which the integer rate is clamped.
+    pub rate: Span,
+    /// The surface over spread signal and rate.
+    pub surface: S,
+}
+
+impl<S> CodeSurface<S> {
+    /// Whether both domains fit 32 bits when spread.
+    #[cfg(feature = "serde")]
+    pub(super) fn holds(&self) -> bool {
+        self.signal.holds() && self.rate.holds()
+    }
+
+    /// Signal and rate inside the domain, not yet spread.
+    #[inline(always)]
+    pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
+        let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));
+        let (rate, rate_outside) = self.rate.clamp(rate);
+        (volts, rate, domain(signal_outside | rate_outside << 1))
+    }
+
+    /// The signal alone, for a line.
+    #[inline(always)]
+    pub(super) fn input(&self, sample: u16) -> (i32, Domain) {
+        let (volts, outside) = self.signal.clamp(self.coarse(sample));
+        (volts, domain(outside))
+    }
+
+    #[inline(always)]
+    fn coarse(&self, sample: u16) -> i32 {
+        // 17 bits shifted up by 15 fit 32 bits
+        (i32::from(sample) - i32::from(self.centre)) << COARSE_BITS
+    }
+}
+
+/// The domain from a bit for the signal and a bit for the rate.
+#[inline(always)]
+fn domain(outside: u8) -> Domain {
+    match outside & 3 {
+        0 => Domain::Inside,
+        1 => Domain::SignalClamped,
+        2 => Domain::RateClamped,
+        _ => Domain::BothClamped,
+    }
+}
+
+/// The surfaces of a calibration with their ranges: one line, or a surface for each branch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum CodeMap<L, P> {
+    /// One line for both branches.
+    Line(CodeSurface<L>),
+    /// A surface each for inflation and deflation.
+    Poly13([CodeSurface<P>; 2]),
+}
+
+impl<L, P> CodeMap<L, P> {
+    pub(super) fn try_map<M, Q>(
+        &self,
+        line: impl Fn(&L) -> Result<M, DesignError>,
+        surface: impl Fn(&P) -> Result<Q, DesignError>,
+    ) -> Result<CodeMap<M, Q>, DesignError> {
+        fn with<S, T>(ranged: &CodeSurface<S>, surface: T) -> CodeSurface<T> {
+            let CodeSurface { centre, signal, rate, .. } = *ranged;
+            CodeSurface { centre, signal, rate, surface }
+        }
+        Ok(match self {
+            Self::Line(ranged) => CodeMap::Line(with(ranged, line(&ranged.surface)?)),
+            Self::Poly13([up, down]) => CodeMap::Poly13([
+                with(up, surface(&up.surface)?),
+                with(down, surface(&down.surface)?),
+            ]),
+        })
+    }
+}

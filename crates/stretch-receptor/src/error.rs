@@ -1,0 +1,52 @@
+//! Why a calibration gives no receptor.
+
+use core::fmt;
+
+use stretch_core::DesignError;
+use stretch_filter::FilterError;
+
+/// Why a calibration gives no receptor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum ReceptorError {
+    /// The calibration holds another model, or a number that the receptor cannot hold.
+    Calibration(DesignError),
+    /// The rate estimator that the calibration names needs later samples, which only a log has.
+    LooksAhead,
+}
+
+impl From<DesignError> for ReceptorError {
+    fn from(error: DesignError) -> Self {
+        Self::Calibration(error)
+    }
+}
+
+impl From<FilterError> for ReceptorError {
+    fn from(error: FilterError) -> Self {
+        match error {
+            FilterError::Design(error) => Self::Calibration(error),
+            // errors of logs do not come from a design
+            _ => Self::LooksAhead,
+        }
+    }
+}
+
+impl fmt::Display for ReceptorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Calibration(error) => error.fmt(f),
+            Self::LooksAhead => f.write_str(
+                "the rate estimator looks ahead: it works on a log, not live; choose a Savitzky-Golay, a differentiator or a tracker",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ReceptorError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Calibration(error) => Some(error),
+            Self::LooksAhead => None,
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The clock of a live stream, a stamp at a time.
+
+use crate::{
+    ReadOptions, TimeUnit,
+    clock::{order, unit},
+};
+
+/// The clock of a stream.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LiveClock {
+    /// Counts in a second, once they are known.
+    per_second: Option<f64>,
+    /// Samples a second, if samples are counted.
+    rate_hz: Option<f64>,
+    /// The newest stamp, as it was recorded.
+    last: Option<f64>,
+    /// What roll-overs add to it.
+    added: f64,
+    /// The newest step that rises.
+    tick: Option<f64>,
+    /// Samples and steps that rise.
+    samples: u64,
+    ticks: u64,
+    /// Samples since the stamp last rose.
+    run: u64,
+    pub(crate) notes: Vec<String>,
+}
+
+/// A time that stands still or goes back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NotRising {
+    pub(crate) time_s: f64,
+    pub(crate) previous_s: f64,
+}
+
+impl LiveClock {
+    /// The clock of a column, or of samples that are counted.
+    pub(crate) fn new(column: Option<&str>, rate_hz: Option<f64>, options: &ReadOptions) -> Self {
+        let named = || TimeUnit::of(column?);
+        let per_second = options.time_unit.or_else(named).map(TimeUnit::per_second);
+        Self { per_second, rate_hz, ..Self::default() }
+    }
+
+    /// Counts a row that is lost.
+    pub(crate) fn skip(&mut self) {
+        self.samples += 1;
+    }
+
+    /// The stamps are dates, which count seconds whatever their column is called.
+    pub(crate) fn count_seconds(&mut self) {
+        self.per_second = Some(1.0);
+    }
+
+    /// Seconds of the next sample, whose stamp is a count from an origin.
+    ///
+    /// # Errors
+    /// Time stands still or goes back. The clock goes on from there.
+    pub(crate) fn take(&mut self, row: u64, count: f64, origin: f64) -> Result<f64, NotRising> {
+        let sample = self.samples;
+        self.samples += 1;
+        if let Some(rate_hz) = self.rate_hz {
+            return Ok(sample as f64 / rate_hz);
+        }
+        let usual = || unit::epoch(origin + count).unwrap_or(TimeUnit::Seconds).per_second();
+        let per_second = *self.per_second.get_or_insert_with(usual);
+        let Some(last) = self.last.replace(count) else { return Ok(count / per_second) };
+        let mut step = count - last;
+        if let Some(tick) = self.tick.filter(|_| step < 0.0)
+            && let Some(modulus) = order::roll_over(step, tick, per_second)
+        {
+            (step, self.added) = (step + modulus, self.added + modulus);
+            self.notes.push(order::note(row, modulus / per_second, 1));
+        }
+        let stamp = count + self.added;
+        if step > 0.0 {
+            (self.tick, self.ticks, self.run) = (Some(step), self.ticks + 1, 0);
+            return Ok(stamp / per_second);
+        }
+        if let Some(tick) = self.tick.filter(|_| step == 0.0) {
+            if self.run == 0 && self.ticks + 1 == sample {
+                self.notes.push(format!(
+                    "stamps repeat, first in row {row}; such samples are spread evenly"
+                ));
+            }
+            self.run += 1;
+            let share = self.run as f64 * self.ticks as f64 / sample as f64;
+            // whatever comes, before the next tick
+            let share = share.min((self.run + 1) as f64 / (self.run + 2) as f64);
+            return Ok((stamp + share * tick) / per_second);
+        }
+        let previous_s = (last + self.added) / per_second;
+        *self = Self {
+            per_second: self.per_second,
+            last: Some(count),
+            samples: 1,
+            notes: std::mem::take(&mut self.notes),
+            ..Self::default()
+        };
+        Err(NotRising { time_s: count / per_second, previous_s })
+    }
+}

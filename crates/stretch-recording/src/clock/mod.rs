@@ -1,0 +1,275 @@
+//! What a clock is: which column holds the time, what its numbers count, and when each row was recorded.
+//!
+//! Every reader gives its time column to [`read`] (a live stream to [`live::LiveClock`]). What is repaired or left out is counted in a
+//! note; what could mean two things is an error that names the option to use.
+
+pub(crate) mod live;
+mod order;
+mod spread;
+pub(crate) mod unit;
+
+use stretch_data::Place;
+
+use crate::{
+    ReadOptions, RecordingError,
+    grid::Track,
+    names::{may_be_time, time_rank},
+    options::TIME,
+    stamps::date,
+    text::bad_rows::BadRows,
+};
+
+/// Seconds since 1970 in any recording; no recorder runs for three years.
+pub(crate) const EPOCH_S: f64 = 1e8;
+/// Samples that may be lost where a clock rolls over or stands still, and one; as many as a live receptor bridges.
+pub(crate) const BRIDGED: f64 = 4.5;
+
+/// A column of time as it was recorded.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Stamps {
+    /// What the column is called.
+    pub(crate) name: String,
+    /// What was recorded, less `origin`.
+    pub(crate) counts: Vec<f64>,
+    /// What the counts are counted from.
+    pub(crate) origin: f64,
+    /// Counts in a second, if the format says so or the samples are counted.
+    pub(crate) per_second: Option<f64>,
+    /// Where each count is in the file.
+    pub(crate) rows: Rows,
+}
+
+/// Rows of a file, in the order in which they were read: where they begin anew, and from which row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Rows {
+    begins: Vec<(usize, u64)>,
+    count: usize,
+    next: u64,
+}
+
+impl Rows {
+    /// So many rows, the first of which is row 1.
+    pub(crate) fn counted(count: usize) -> Self {
+        Self { begins: vec![(0, 1)], count, next: count as u64 + 1 }
+    }
+
+    #[inline]
+    pub(crate) fn push(&mut self, row: u64) {
+        if row != self.next || self.count == 0 {
+            self.begins.push((self.count, row));
+        }
+        (self.count, self.next) = (self.count + 1, row + 1);
+    }
+
+    /// The row of the file from which sample `index` was read.
+    pub(crate) fn row(&self, index: usize) -> u64 {
+        let after = self.begins.partition_point(|(begin, _)| *begin <= index);
+        let (begin, row) = after.checked_sub(1).map_or((0, 1), |i| self.begins[i]);
+        row + (index - begin) as u64
+    }
+
+    /// The rows of some of the samples.
+    pub(crate) fn of(&self, samples: impl Iterator<Item = usize>) -> Self {
+        let mut rows = Self::default();
+        samples.for_each(|i| rows.push(self.row(i)));
+        rows
+    }
+}
+
+impl Stamps {
+    /// The time of so many samples that are counted at a rate.
+    pub(crate) fn at_rate(count: usize, rate_hz: f64) -> Self {
+        Self {
+            name: TIME.to_owned(),
+            counts: (0..count).map(|i| i as f64).collect(),
+            origin: 0.0,
+            per_second: Some(rate_hz),
+            rows: Rows::counted(count),
+        }
+    }
+
+    fn place(&self, file: &str, index: usize) -> Place {
+        Place { file: file.to_owned(), row: self.rows.row(index), column: self.name.clone() }
+    }
+
+    /// The stamp of a sample as it was recorded.
+    fn recorded(&self, index: usize) -> f64 {
+        self.origin + self.counts[index]
+    }
+}
+
+/// Steps from stamp to stamp.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Steps {
+    /// Median of those that rise.
+    tick: f64,
+    /// Mean step from sample to sample without gaps: shorter than a tick if stamps repeat.
+    sample: f64,
+    /// How many do not rise, and how many go back.
+    repeated: usize,
+    back: usize,
+}
+
+impl Steps {
+    /// None if no step rises.
+    fn of(counts: &[f64]) -> Option<Self> {
+        let mut rising = Vec::with_capacity(counts.len());
+        let (mut repeated, mut back) = (0, 0);
+        for pair in counts.windows(2) {
+            let step = pair[1] - pair[0];
+            if step > 0.0 {
+                rising.push(step);
+            } else if step == 0.0 {
+                repeated += 1;
+            } else {
+                back += 1;
+            }
+        }
+        let (middle, count) = (rising.len() / 2, rising.len());
+        if count == 0 {
+            return None;
+        }
+        let tick = *rising.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let sample = tick * count as f64 / (count + repeated) as f64;
+        tick.is_finite().then_some(Self { tick, sample, repeated, back })
+    }
+}
+
+/// Where the time is among names: under the name that is asked for, or under one that is usual for it.
+pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usize> {
+    let wanted = &options.time;
+    let usual = || {
+        let ranked = names.iter().enumerate().filter_map(|(i, name)| Some((time_rank(name)?, i)));
+        ranked.min().map(|(_, i)| i)
+    };
+    // A name of which only a word says so must be the only one.
+    let only = || {
+        let mut may_be = names.iter().enumerate().filter(|(_, name)| may_be_time(name));
+        may_be.next().filter(|_| may_be.next().is_none()).map(|(i, _)| i)
+    };
+    let guessed = || usual().or_else(|| options.sample_rate_hz.map_or_else(only, |_| None));
+    names
+        .iter()
+        .position(|name| name == wanted)
+        .or_else(|| if wanted == TIME { guessed() } else { None })
+}
+
+/// A note on samples that are counted, whatever a column of time says.
+pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
+    let time =
+        column.map_or("there is no time".to_owned(), |name| format!("column {name} is not read"));
+    format!("{time}: {rate_hz} samples a second, as {by}")
+}
+
+/// A note on a time that counts from long ago, or is a time of day, and is counted from its first sample instead.
+pub(crate) fn note_on_epoch(first_s: f64) -> String {
+    if first_s.abs() < EPOCH_S {
+        return "time counts from the first sample".to_owned();
+    }
+    format!("time counts from the first sample, {}", date(first_s))
+}
+
+/// Reads a track's clock: its counts then rise and are free of roll-overs, and what a second is in them is known.
+///
+/// # Errors
+/// What the counts mean is open; no recording has such a rate; too many rows have a stamp that cannot be right.
+pub(crate) fn read(
+    file: &str,
+    track: &mut Track,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(), RecordingError> {
+    let not_finite = |i: &usize| !track.stamps.counts[*i].is_finite();
+    let lost: Vec<usize> = (0..track.stamps.counts.len()).filter(not_finite).collect();
+    leave_out(file, track, &lost, "is no number", options, notes)?;
+    let stamps = &mut track.stamps;
+    let Some(steps) = Steps::of(&stamps.counts) else {
+        return match stamps.counts[..] {
+            [] | [_] => {
+                stamps.per_second.get_or_insert(options.divisor(&stamps.name));
+                Ok(())
+            }
+            _ => Err(never_rises(file, stamps)),
+        };
+    };
+    let per_second = unit::decide(file, stamps, steps, options, notes)?;
+    stamps.per_second = Some(per_second);
+    if steps.back > 0 {
+        notes.extend(order::unroll(stamps, steps.tick, per_second));
+        let stale = order::stale(&stamps.counts);
+        leave_out(file, track, &stale, "is not in the order of the others", options, notes)?;
+    } else {
+        let unset = order::before_the_clock_was_set(&stamps.counts, steps.tick);
+        let what = "is long before the others";
+        leave_out(file, track, &(0..unset).collect::<Vec<_>>(), what, options, notes)?;
+    }
+    let Some(steps) = Steps::of(&track.stamps.counts) else {
+        return Err(never_rises(file, &track.stamps));
+    };
+    let copies = spread::spread(&mut track.stamps, steps, per_second, notes);
+    leave_out(file, track, &copies, "is that of the row before", options, notes)?;
+    unit::check_rate(file, &track.stamps, steps, options)
+}
+
+/// Leaves out rows whose stamps cannot be right, with a note.
+///
+/// # Errors
+/// They are too many, or no row may be left out.
+fn leave_out(
+    file: &str,
+    track: &mut Track,
+    rows: &[usize],
+    what: &str,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(), RecordingError> {
+    let [first, ..] = rows else { return Ok(()) };
+    let (stamps, all) = (&track.stamps, track.stamps.counts.len());
+    let (at, count) = (stamps.place(file, *first), rows.len());
+    let evidence = format!("its stamp {} {what}", stamps.recorded(*first));
+    if options.strict || !BadRows::are_few(count, all) {
+        let (at, evidence) = goes_back(file, stamps).unwrap_or((at, evidence));
+        let why = match options.strict {
+            true => "--strict leaves no row out".to_owned(),
+            false => format!(
+                "{count} of {all} rows would be left out, and no more than one in five is; split the recording where its time begins again"
+            ),
+        };
+        return Err(RecordingError::Stamps { at, problem: format!("{evidence}: {why}") });
+    }
+    notes.push(match count {
+        1 => format!("row {} is left out: {evidence}", at.row),
+        _ => format!("{count} rows are left out, the first of them row {}: {evidence}", at.row),
+    });
+    track.remove(rows);
+    Ok(())
+}
+
+/// Where time goes back for the first time.
+fn goes_back(file: &str, stamps: &Stamps) -> Option<(Place, String)> {
+    let last = stamps.counts.windows(2).position(|t| t[1] < t[0])?;
+    let (from, to) = (stamps.recorded(last), stamps.recorded(last + 1));
+    Some((stamps.place(file, last + 1), format!("time goes back from {from} to {to}")))
+}
+
+/// The error for stamps of which none rises.
+fn never_rises(file: &str, stamps: &Stamps) -> RecordingError {
+    let still = || (stamps.place(file, 1), format!("time stands still at {}", stamps.recorded(1)));
+    let (at, problem) = goes_back(file, stamps).unwrap_or_else(still);
+    RecordingError::Stamps { at, problem }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Rows;
+
+    #[test]
+    fn rows_are_found_by_their_sample() {
+        let mut rows = Rows::default();
+        [2, 3, 4, 7, 9, 10].into_iter().for_each(|row| rows.push(row));
+        assert_eq!((0..6).map(|i| rows.row(i)).collect::<Vec<_>>(), [2, 3, 4, 7, 9, 10]);
+        let some = rows.of([1, 2, 5].into_iter());
+        assert_eq!((0..3).map(|i| some.row(i)).collect::<Vec<_>>(), [3, 4, 10]);
+        assert_eq!(Rows::counted(3).row(2), 3);
+    }
+}

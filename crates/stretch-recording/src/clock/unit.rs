@@ -1,0 +1,125 @@
+//! What the numbers of a time column count: by an option, by the format, by the column's name and by the numbers themselves.
+
+use std::ops::RangeInclusive;
+
+use crate::{
+    ReadOptions, RecordingError, TimeUnit,
+    clock::{Stamps, Steps},
+};
+
+/// Rates that are recorded, Hz, if an option says what the time counts.
+pub(crate) const RATES_HZ: RangeInclusive<f64> = 1e-3..=1e7;
+/// Rates that are recorded if no option does: a stretch is not sampled at megahertz.
+const USUAL_HZ: RangeInclusive<f64> = 1e-3..=1e6;
+/// Rates of nearly all recordings.
+const LIKELY_HZ: RangeInclusive<f64> = 0.5..=5e3;
+/// Seconds since 1970, from 1989 to 2103.
+const SINCE_1970_S: RangeInclusive<f64> = 6e8..=4.2e9;
+/// Days of a spreadsheet (from 1954 to 2119), of MATLAB, and Julian days.
+const DAYS: [RangeInclusive<f64>; 3] = [2e4..=8e4, 7e5..=7.8e5, 2.43e6..=2.5e6];
+/// A clock of seconds that is faster than this may be one of days.
+const DAYS_HZ: f64 = 1e4;
+/// Fewest samples that distinguish a slow recording from a wrong unit.
+const TELLING: usize = 50;
+
+/// Units of a count since 1970.
+const EPOCHS: [TimeUnit; 4] =
+    [TimeUnit::Seconds, TimeUnit::Milliseconds, TimeUnit::Microseconds, TimeUnit::Nanoseconds];
+
+/// Counts in a second.
+///
+/// # Errors
+/// Two units are as likely.
+pub(super) fn decide(
+    file: &str,
+    stamps: &Stamps,
+    steps: Steps,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<f64, RecordingError> {
+    if let Some(known) = stamps.per_second.or(options.time_unit.map(TimeUnit::per_second)) {
+        return Ok(known);
+    }
+    let named = TimeUnit::of(&stamps.name);
+    let unit = named.unwrap_or(TimeUnit::Seconds);
+    if let Some(other) = by_values(stamps, steps, named) {
+        notes.push(format!("by its values, column {} counts {}", stamps.name, other.plural()));
+        return Ok(other.per_second());
+    }
+    let rate_hz = unit.per_second() / steps.sample;
+    let is_whole = || stamps.counts.iter().all(|t| t.fract() == 0.0);
+    let is_slow = unit == TimeUnit::Seconds && rate_hz <= 1.0 && stamps.counts.len() >= TELLING;
+    if is_slow && USUAL_HZ.contains(&rate_hz) && (named.is_none() || is_whole()) {
+        let column = stamps.name.clone();
+        let column_ms = format!("{}_ms", column.strip_suffix("_s").unwrap_or(&column));
+        return Err(RecordingError::SlowSeconds {
+            file: file.to_owned(),
+            step: steps.sample,
+            rate_hz,
+            column,
+            column_ms,
+        });
+    }
+    Ok(unit.per_second())
+}
+
+/// The unit that the numbers show, if it is not the one of the name.
+fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<TimeUnit> {
+    let value = stamps.recorded(stamps.counts.len() / 2);
+    let rate_hz = |unit: TimeUnit| unit.per_second() / steps.sample;
+    let own = named.unwrap_or(TimeUnit::Seconds);
+    let other = if let Some(epoch) = epoch(value).filter(|unit| USUAL_HZ.contains(&rate_hz(*unit)))
+        // A name is wrong only if it makes a date that no recording has.
+        && (named.is_none() || value / own.per_second() > *SINCE_1970_S.end())
+    {
+        Some(epoch)
+    } else if own == TimeUnit::Seconds && rate_hz(own) > DAYS_HZ && are_days(value) {
+        Some(TimeUnit::Days).filter(|days| USUAL_HZ.contains(&rate_hz(*days)))
+    } else if named.is_none() && rate_hz(own) < *USUAL_HZ.start() {
+        let mut likely = EPOCHS.into_iter().filter(|unit| LIKELY_HZ.contains(&rate_hz(*unit)));
+        likely.next().filter(|_| likely.next().is_none())
+    } else {
+        None
+    };
+    other.filter(|other| *other != own)
+}
+
+/// The unit in which a number is a time since 1970 of our days.
+pub(super) fn epoch(value: f64) -> Option<TimeUnit> {
+    EPOCHS.into_iter().find(|unit| SINCE_1970_S.contains(&(value / unit.per_second())))
+}
+
+fn are_days(value: f64) -> bool {
+    DAYS.iter().any(|days| days.contains(&value))
+}
+
+/// Refuses a rate that no recording has.
+pub(super) fn check_rate(
+    file: &str,
+    stamps: &Stamps,
+    steps: Steps,
+    options: &ReadOptions,
+) -> Result<(), RecordingError> {
+    let Some(per_second) = stamps.per_second.filter(|_| stamps.counts.len() > 2) else {
+        return Ok(());
+    };
+    let rate_hz = per_second / steps.sample;
+    let is_said = options.time_unit.is_some() || options.sample_rate_hz.is_some();
+    let usual = if is_said { RATES_HZ } else { USUAL_HZ };
+    check_range(file, &stamps.name, rate_hz, usual)
+}
+
+/// Refuses a rate outside a range.
+pub(crate) fn check_range(
+    file: &str,
+    column: &str,
+    rate_hz: f64,
+    range: RangeInclusive<f64>,
+) -> Result<(), RecordingError> {
+    if range.contains(&rate_hz) {
+        return Ok(());
+    }
+    let (file, column) = (file.to_owned(), column.to_owned());
+    let (least_hz, most_hz) = (*range.start(), *range.end());
+    Err(RecordingError::Rate { file, column, rate_hz, least_hz, most_hz })
+}

@@ -1,0 +1,331 @@
+//! Time stamps as loggers really write them, and sparse tables: each recording is 400 samples at 50 Hz unless a test says otherwise.
+
+use proptest::prelude::*;
+use stretch_recording::{Array, ReadOptions, Recording, RecordingError, RowReader, TimeUnit};
+
+const SAMPLES: usize = 400;
+const RATE_HZ: f64 = 50.0;
+
+/// A table whose time column is called `name`, with stamps of the instants of 50 Hz.
+fn table(name: &str, stamp: impl Fn(usize, f64) -> String) -> String {
+    let rows = (0..SAMPLES).map(|i| format!("{},{i}\n", stamp(i, i as f64 / RATE_HZ)));
+    std::iter::once(format!("{name},bridge_v\n")).chain(rows).collect()
+}
+
+fn read_as(text: &str, options: &ReadOptions) -> Result<Recording, RecordingError> {
+    Recording::from_reader(text.as_bytes(), "t.csv", options)
+}
+
+fn read(text: &str) -> Recording {
+    read_as(text, &ReadOptions::new().require("bridge_v")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The recording is the one at 50 Hz from sample `first` on, within `within_s`, and one of its notes says so.
+#[track_caller]
+fn is_at_50_hz(recording: &Recording, first: usize, within_s: f64, says: &str) {
+    let Recording { trial, notes } = recording;
+    assert_eq!(trial.len(), SAMPLES - first, "{notes:?}");
+    assert_eq!(trial.require("bridge_v").unwrap()[0], first as f64);
+    for (i, time_s) in trial.time_s.iter().enumerate() {
+        let off_s = (time_s - trial.time_s[0] - i as f64 / RATE_HZ).abs();
+        assert!(off_s <= within_s, "sample {i} is off by {off_s} s: {notes:?}");
+    }
+    assert!((trial.rate_hz().unwrap() / RATE_HZ - 1.0).abs() < 1e-3, "{:?}", trial.rate_hz());
+    assert!(says.is_empty() || notes.iter().any(|note| note.contains(says)), "{notes:?}");
+}
+
+#[test]
+fn units_come_from_the_name_and_the_values() {
+    let cases: [(&str, f64, f64, &str); 17] = [
+        ("Millis", 0.3, 1e3, "the time is column Millis"),
+        ("TimeUS", 0.0, 1e6, ""),
+        ("Time (Seconds)", 0.0, 1.0, ""),
+        ("t_us", 12.0, 1e6, ""),
+        ("Elapsed Time [ms]", 0.0, 1e3, ""),
+        ("time_min", 0.0, 1.0 / 60.0, ""),
+        ("Time (hours)", 0.0, 1.0 / 3600.0, ""),
+        ("time", 45_339.5, 1.0 / 86_400.0, "counts days"),
+        ("Timestamp", 739_299.5, 1.0 / 86_400.0, "counts days"),
+        ("time_s", 2_460_357.5, 1.0 / 86_400.0, "counts days"),
+        ("timestamp", 1_714_564_800.0, 1.0, "2024-05-01T12:00:00Z"),
+        ("timestamp", 1_714_564_800_000.0, 1e3, "counts milliseconds"),
+        ("timestamp", 1_714_564_800_000_000.0, 1e6, "counts microseconds"),
+        ("timestamp", 1_714_564_800_000_000_000.0, 1e9, "counts nanoseconds"),
+        ("time_s", 1_714_564_800_000.0, 1e3, "counts milliseconds"),
+        ("time", 0.0, 1e6, "counts microseconds"),
+        ("time", 7.0, 1e9, "counts nanoseconds"),
+    ];
+    for (name, begin, per_second, says) in cases {
+        // as many digits as a logger writes
+        let decimals = if per_second < 1.0 { 10 } else { 3 };
+        let stamp = |_, t: f64| match begin > 1e17 {
+            true => (begin as i128 + (t * per_second).round() as i128).to_string(),
+            false => format!("{:.decimals$}", begin + t * per_second),
+        };
+        is_at_50_hz(&read(&table(name, stamp)), 0, 1e-3, says);
+    }
+}
+
+#[test]
+fn units_that_are_open_are_asked_for() {
+    for (name, per_second) in [("time", 1e3), ("t", 1e3), ("time_s", 1e3), ("time", 1e5)] {
+        let text = table(name, |_, t| format!("{:.1}", t * per_second));
+        let text = if name == "time_s" { text.replace(".0,", ",") } else { text };
+        let error = read_as(&text, &ReadOptions::new()).expect_err("two meanings").to_string();
+        assert!(error.contains(&format!("--time {name}:s")), "{error}");
+    }
+    // Whoever says what is counted is believed.
+    let text = table("time", |_, t| format!("{:.1}", t * 1e3));
+    let options = ReadOptions::new().time("time").time_unit(TimeUnit::Milliseconds);
+    is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-9, "");
+    let slow = ReadOptions::new().time("time").time_unit(TimeUnit::Seconds);
+    let trial = read_as(&text, &slow).unwrap().trial;
+    assert!((trial.rate_hz().unwrap() - 0.05).abs() < 1e-9);
+}
+
+#[test]
+fn clocks_roll_over() {
+    let wrapped = |modulus: f64, begin: f64, per_second: f64| {
+        move |_: usize, t: f64| format!("{}", ((begin + t * per_second).round()) % modulus)
+    };
+    let two = |bits| 2_f64.powi(bits);
+    for (name, modulus, begin, per_second) in [
+        ("time_us", two(32), 4_291_967_296.0, 1e6),
+        ("time_ms", two(32), two(32) - 3000.0, 1e3),
+        ("time_ms", two(16), 62_000.0, 1e3),
+        ("time_us", two(16), 0.0, 1e6),
+        ("time_us", two(24), two(24) - 1e6, 1e6),
+    ] {
+        let text = table(name, wrapped(modulus, begin, per_second));
+        is_at_50_hz(&read(&text), 0, 1e-6, "rolls over");
+    }
+    let of_day = |begin_s: f64| {
+        move |_: usize, t: f64| {
+            let ms = ((begin_s + t) * 1e3).round() as u64 % 86_400_000;
+            let (s, ms) = (ms / 1000, ms % 1000);
+            format!("{:02}:{:02}:{:02}.{ms:03}", s / 3600, s / 60 % 60, s % 60)
+        }
+    };
+    is_at_50_hz(&read(&table("time", of_day(86_397.0))), 0, 1e-6, "86400 s are added");
+    let seconds = |_: usize, t: f64| format!("{:.3}", (86_395.0 + t) % 86_400.0);
+    is_at_50_hz(&read(&table("time_s", seconds)), 0, 1e-6, "row 252: 86400 s are added");
+    // a signed counter
+    let signed = |_: usize, t: f64| ((2_147_480_000.0 + t * 1e3) as i64 as i32).to_string();
+    let signed = |i: usize, t: f64| {
+        let count = (2_147_480_000.0 + t * 1e3).round() as u32 as i32;
+        if count > 0 { signed(i, t) } else { count.to_string() }
+    };
+    is_at_50_hz(&read(&table("time_ms", signed)), 0, 1e-2, "rolls over");
+}
+
+#[test]
+fn repeated_and_coarse_stamps_are_spread() {
+    let ticks = |tick_s: f64| {
+        move |_: usize, t: f64| format!("{:.5}", (t / tick_s + 1e-9).floor() * tick_s)
+    };
+    for tick_s in [0.031_25, 0.015_625, 0.015_6, 0.1, 1.0] {
+        let text = table("time_s", ticks(tick_s));
+        is_at_50_hz(&read(&text), 0, 1e-3, "spread evenly");
+    }
+    let once = |i: usize, t: f64| format!("{:.3}", if i == 100 { t - 0.02 } else { t });
+    is_at_50_hz(&read(&table("time_s", once)), 0, 1e-9, "row 102 has the stamp of the row before");
+    let seconds = |_: usize, t: f64| format!("2024-02-17 23:59:{:02.0}", (50.0 + t + 1e-9).floor());
+    is_at_50_hz(&read(&table("time", seconds)), 0, 1e-6, "50 a second");
+    // the first second is not whole
+    let late = |_: usize, t: f64| format!("{}", (1_714_564_800.4 + t + 1e-9).floor());
+    is_at_50_hz(&read(&table("timestamp", late)), 0, 1e-6, "50 a second");
+    // stamps that stood still while the clock went on
+    let stuck = |i: usize, t: f64| format!("{:.2}", if (100..130).contains(&i) { 2.0 } else { t });
+    is_at_50_hz(&read(&table("time_s", stuck)), 0, 1e-9, "29 rows have the stamp");
+    // lost samples are no ticks, not even regular ones
+    for every in [9, 37] {
+        let text = table("time_s", |_, t| format!("{t:.2}"));
+        let lines = text.split_inclusive('\n').enumerate();
+        let text: String = lines.filter(|(i, _)| i % every != 5).map(|(_, line)| line).collect();
+        let trial = read(&text).trial;
+        assert!(trial.time_s.iter().all(|t| (t * RATE_HZ - (t * RATE_HZ).round()).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn stale_rows_are_left_out() {
+    for stale in [1, 3] {
+        let text =
+            table("Time (s)", |i, t| format!("{:.3}", if i < stale { 2.445 + t } else { t }));
+        let says = if stale == 1 { "row 2 is left out" } else { "3 rows are left out" };
+        is_at_50_hz(&read(&text), stale, 1e-9, says);
+    }
+    let unset =
+        table("time_s", |i, t| format!("{:.3}", if i < 2 { t } else { 1_714_564_800.0 + t }));
+    is_at_50_hz(&read(&unset), 2, 1e-6, "2 rows are left out");
+    let again = table("time_s", |i, t| format!("{:.3}", if i < 200 { t } else { t - 4.0 }));
+    let error = read_as(&again, &ReadOptions::new()).expect_err("two recordings").to_string();
+    assert!(error.contains("row 202, column time_s: time goes back from 3.98 to 0"), "{error}");
+    assert!(error.contains("split the recording") && error.contains("--sample-rate"), "{error}");
+    let strict = ReadOptions::new().strict(true);
+    let one = table("time_s", |i, t| format!("{:.3}", if i == 0 { 2.445 } else { t }));
+    assert!(read_as(&one, &strict).expect_err("strict").to_string().contains("--strict"));
+    let still = table("time_s", |_, _| "5".to_owned());
+    let error = read_as(&still, &ReadOptions::new()).expect_err("no clock").to_string();
+    assert!(error.contains("time stands still at 5"), "{error}");
+}
+
+#[test]
+fn a_rate_replaces_a_column_of_time() {
+    let text = table("time_s", |_, t| format!("{:.3}", t / 2.0));
+    let options = ReadOptions::new().require("bridge_v").sample_rate_hz(RATE_HZ);
+    let says = "column time_s is not read: 50 samples a second";
+    is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-12, says);
+    let still = table("time_s", |_, _| "oops".to_owned());
+    is_at_50_hz(&read_as(&still, &options).unwrap(), 0, 1e-12, says);
+    let mut rows = RowReader::new(text.as_bytes(), "live", &options).unwrap();
+    assert_eq!(rows.next_row().unwrap().unwrap().time_s, 0.0);
+    assert_eq!(rows.next_row().unwrap().unwrap().time_s, 0.02);
+}
+
+/// Times of a stream, and its notes.
+fn live(text: &str) -> (Vec<f64>, Vec<String>) {
+    let options = ReadOptions::new().require("bridge_v");
+    let mut rows = RowReader::new(text.as_bytes(), "live", &options).unwrap();
+    let (mut times, mut notes) = (Vec::new(), Vec::new());
+    while let Some(row) = rows.next_row() {
+        times.extend(row.map(|row| row.time_s).ok());
+        notes.extend(rows.take_notes());
+    }
+    (times, notes)
+}
+
+#[test]
+fn a_stream_has_the_same_clock() {
+    let micros =
+        |_: usize, t: f64| format!("{}", (4_291_967_296.0 + t * 1e6).round() % 2_f64.powi(32));
+    let (times, notes) = live(&table("time_us", micros));
+    assert_eq!(times.len(), SAMPLES);
+    assert!(times.windows(2).all(|t| (t[1] - t[0] - 0.02).abs() < 1e-6));
+    assert!(notes.iter().any(|note| note.contains("rolls over in row 152")), "{notes:?}");
+    let (times, notes) =
+        live(&table("time_s", |_, t| format!("{:.5}", (t / 0.03125).floor() * 0.03125)));
+    assert_eq!(times.len(), SAMPLES - 1, "before the first tick nothing is known of the clock");
+    assert!(times.windows(2).all(|t| t[1] > t[0]));
+    assert!(
+        times.iter().enumerate().skip(50).all(|(i, t)| (t - 0.02 * (i + 1) as f64).abs() < 0.032)
+    );
+    assert!(notes.iter().any(|note| note.contains("stamps repeat")), "{notes:?}");
+    let (times, _) =
+        live(&table("timestamp", |_, t| format!("{:.0}", 1_714_564_800_000.0 + t * 1e3)));
+    assert!((times[1] - times[0] - 0.02).abs() < 1e-6);
+}
+
+/// A stamp of a time in seconds.
+type Stamp = fn(f64) -> f64;
+
+#[test]
+fn arrays_have_the_same_clock() {
+    let array = |name: &str, value: Stamp| Array {
+        name: name.to_owned(),
+        shape: vec![SAMPLES],
+        values: (0..SAMPLES).map(|i| value(i as f64 / RATE_HZ)).collect(),
+    };
+    let bridge = array("bridge_v", |t| t * RATE_HZ);
+    let clocks: [(&str, Stamp, &str); 5] = [
+        ("time_us", |t| (4_291_967_296.0 + t * 1e6).round() % 2_f64.powi(32), "rolls over"),
+        ("time_s", |t| (t / 0.03125 + 1e-9).floor() * 0.03125, "spread evenly"),
+        ("time", |t| 45_339.5 + t / 86_400.0, "counts days"),
+        ("t", |t| 1_714_564_800_000.0 + t * 1e3, "counts milliseconds"),
+        ("Millis", |t| 0.3 + t * 1e3, ""),
+    ];
+    for (name, value, says) in clocks {
+        let arrays = vec![array(name, value), bridge.clone()];
+        let (recording, clocks) =
+            Recording::from_arrays("a.npz", arrays, Vec::new(), &ReadOptions::new()).unwrap();
+        is_at_50_hz(&recording, 0, 1e-3, says);
+        assert_eq!(clocks[0].time_s.len(), SAMPLES);
+    }
+}
+
+#[test]
+fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
+    let rows = (0..300).map(|i| {
+        let t = f64::from(i) / RATE_HZ;
+        format!("{t:.4},{},\n{:.4},,{}\n", 100.0 + t, t + 0.003, 1.0 + t)
+    });
+    let text: String =
+        std::iter::once("__time,/joint/position,/cmd/data\n".to_owned()).chain(rows).collect();
+    let asked = ReadOptions::new().require("/joint/position").require("/cmd/data");
+    let on_grid = asked.clone().grid_hz(RATE_HZ);
+    let grid = read_as(&text, &on_grid).unwrap();
+    assert_eq!(grid.trial.len(), 299, "{:?}", grid.notes);
+    for options in [asked, ReadOptions::new()] {
+        let Recording { trial, notes } = read_as(&text, &options).unwrap();
+        assert!(notes.iter().any(|note| note.contains("clock of their own rows")), "{notes:?}");
+        let (joint, bridge) =
+            (trial.require("/joint/position").unwrap(), trial.require("/cmd/data").unwrap());
+        for ((t, joint), bridge) in trial.time_s.iter().zip(joint).zip(bridge) {
+            assert!((joint - 100.0 - t).abs() < 1e-9, "at {t}");
+            // what is written three milliseconds late was sampled then
+            assert!((bridge - 1.0 - (t - 0.003)).abs() < 1e-9, "at {t}");
+        }
+    }
+    // what other programs write in place of a blank
+    for missing in ["nan", "NA", "N/A", "null", "None"] {
+        let filled = text.replace(",\n", &format!(",{missing}\n"));
+        let filled = filled.replace(",,", &format!(",{missing},"));
+        assert_ne!(filled, text);
+        assert_eq!(read_as(&filled, &on_grid).unwrap().trial, grid.trial, "{missing}");
+    }
+    // one of the topics alone
+    let one = read_as(&text, &ReadOptions::new().require("/cmd/data")).unwrap();
+    assert_eq!(one.trial.len(), 300);
+    assert!((one.trial.rate_hz().unwrap() - RATE_HZ).abs() < 1e-6);
+    // a slow column beside a fast one
+    let slow = table("time_s,length_mm", |i, t| {
+        if i % 5 == 0 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
+    });
+    let options = ReadOptions::new().require("bridge_v").require("length_mm");
+    let trial = read_as(&slow, &options).unwrap().trial;
+    assert_eq!(trial.len(), 396);
+    let length = trial.require("length_mm").unwrap();
+    assert!(length.iter().zip(&trial.time_s).all(|(x, t)| (x - 100.0 - t).abs() < 1e-9));
+    // A sensor that is lost has no clock of its own.
+    let lost = table("time_s,length_mm", |i, t| {
+        if i < 250 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
+    });
+    let error = read_as(&lost, &options).expect_err("too many blanks").to_string();
+    assert!(error.contains("row 252, column length_mm") && error.contains("150 of 400"), "{error}");
+    // Blank rows are no topic.
+    let blank = table("time_s,length_mm", |_, t| format!("{t:.2},"));
+    assert!(read_as(&blank, &options).is_err());
+}
+
+proptest! {
+    #[test]
+    fn spreading_keeps_the_order_and_every_stamp_within_its_tick(
+        rate_hz in 20.0..400.0_f64, tick_s in prop::sample::select(vec![0.01, 0.015625, 0.03125, 0.1, 1.0]),
+        begin_s in 0.0..10.0_f64, samples in 100..800_usize,
+    ) {
+        let stamp = |i: usize| ((begin_s + i as f64 / rate_hz) / tick_s).floor() * tick_s;
+        let rows = (0..samples).map(|i| format!("{},{i}\n", stamp(i)));
+        let text: String = std::iter::once("time_s,bridge_v\n".to_owned()).chain(rows).collect();
+        let Ok(Recording { trial, notes }) = read_as(&text, &ReadOptions::new()) else {
+            // a recording within one tick has no clock
+            prop_assert!(stamp(samples - 1) - stamp(0) < 2.5 * tick_s);
+            return Ok(());
+        };
+        prop_assert!(trial.time_s.windows(2).all(|t| t[1] > t[0]));
+        if trial.len() == samples {
+            let off = |(i, t): (usize, &f64)| (t - begin_s - i as f64 / rate_hz).abs();
+            let worst = trial.time_s.iter().enumerate().map(off).fold(0.0, f64::max);
+            prop_assert!(worst <= 2.0 * tick_s, "{} s: {:?}", worst, notes);
+        }
+    }
+
+    #[test]
+    fn a_counter_may_roll_over_anywhere(at in 1..400_usize, bits in prop::sample::select(vec![24, 32])) {
+        let modulus = 2_f64.powi(bits);
+        let begin = modulus - at as f64 * 20_000.0;
+        let text = table("time_us", |_, t| format!("{}", (begin + t * 1e6).round() % modulus));
+        let trial = read(&text).trial;
+        prop_assert_eq!(trial.len(), SAMPLES);
+        prop_assert!(trial.time_s.windows(2).all(|t| (t[1] - t[0] - 0.02).abs() < 1e-6));
+    }
+}

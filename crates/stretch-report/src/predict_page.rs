@@ -1,0 +1,94 @@
+//! The report of a prediction: new recordings, measured and simulated with a fix and without.
+
+use std::ops::Range;
+
+use stretch_problem::{PredictedOutput, Prediction};
+
+use super::{
+    canvas::Ink,
+    figure::{Figure, FigureSize, lines_figure},
+    gap_figures::{AFTER, BEFORE, worst_window},
+    markup::{labelled, number},
+    page::{Page, Table},
+    thin::curve,
+};
+
+/// The report as a page.
+pub fn predict_page(prediction: &Prediction) -> String {
+    let mut page = Page::new(&format!("Predicted: {}", prediction.name), &prediction.sentence());
+    page.facts(&[
+        ("Effects of the fix", prediction.effects.join(", ")),
+        ("Error, with over without", number(prediction.ratio, 3)),
+        ("Largest error", format!("{} times the noise", number(prediction.largest_times_noise, 3))),
+    ]);
+    page.list(&prediction.notes);
+    page.section(
+        "Errors of the prediction",
+        "Root mean square errors on recordings that were not fitted. Without: the simulator with its parameters re-tuned alone. The fix helps if the ratio is below 1.",
+    );
+    page.table(&predict_table(prediction));
+    for trial in &prediction.trials {
+        let intro = match trial.extrapolated.is_empty() {
+            true => "All of it lies within the ranges that were fitted.",
+            false => {
+                "Parts are outside the ranges that were fitted: do not trust the prediction there."
+            }
+        };
+        page.section(&trial.name, intro);
+        page.list(&trial.extrapolated);
+        for output in &trial.outputs {
+            let whole = 0.0..trial.seconds;
+            let caption = format!("{}: the whole recording.", output.stage);
+            page.figure(&traces(prediction, output, &whole), &caption);
+            let pairs = output.measured.iter().zip(&output.without);
+            let error: Vec<f64> = pairs.map(|(m, p)| m - p).collect();
+            let look = worst_window(&error, prediction.dt_s);
+            if let Some(look) = look.filter(|look| 2 * look.len() < error.len()) {
+                let [from, to] = [look.start, look.end].map(|i| i as f64 * prediction.dt_s);
+                let caption = format!(
+                    "{}: the largest error of the simulator without the fix.",
+                    output.stage
+                );
+                page.figure(&traces(prediction, output, &(from..to)), &caption);
+            }
+        }
+    }
+    page.finish()
+}
+
+/// Errors of every output of every recording.
+pub fn predict_table(prediction: &Prediction) -> Table {
+    let head = ["recording", "output", "unit", "with", "without", "ratio", "times noise"];
+    let rows = prediction.trials.iter().flat_map(|trial| {
+        trial.outputs.iter().map(|o| {
+            let numbers = [o.rmse, o.rmse_without, o.ratio, o.times_noise].map(|x| number(x, 3));
+            let texts = [trial.name.clone(), o.column.clone(), o.unit.clone()];
+            texts.into_iter().chain(numbers).collect::<Vec<String>>()
+        })
+    });
+    Table::new("Root mean square errors of the prediction", &head, rows)
+}
+
+fn traces(prediction: &Prediction, output: &PredictedOutput, window: &Range<f64>) -> Figure {
+    let time: Vec<f64> = (0..output.measured.len()).map(|i| i as f64 * prediction.dt_s).collect();
+    let lines = [
+        (Ink::Truth, 3.2, &output.measured),
+        (BEFORE, 1.5, &output.without),
+        (AFTER, 1.5, &output.with),
+    ];
+    let thin = |bins: usize| {
+        lines.iter().map(|(ink, w, y)| (*ink, *w, curve(&time, y, window, bins))).collect()
+    };
+    let frames = [
+        (FigureSize { width: 400, height: 250 }, thin(360)),
+        (FigureSize { width: 880, height: 280 }, thin(750)),
+    ];
+    let name = labelled(&output.column, &output.unit);
+    let axes = (window, 0.06, ["time in the recording, s", &*name]);
+    let description = format!("{name} over time, measured and predicted");
+    lines_figure(&description, axes, frames, "There is no number here.").legend(vec![
+        (Ink::Truth, "measured".to_owned()),
+        (BEFORE, "predicted without the fix".to_owned()),
+        (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
+    ])
+}

@@ -1,0 +1,304 @@
+//! The record of a calibration of several gauges that share a recorder.
+
+use serde::{Deserialize, Serialize};
+use stretch_core::{
+    DesignError, HistoryShape, Interval, Label, Provenance, SampleRate, Schema, Values,
+    sizes::{RATES_HZ, extent, size},
+};
+
+/// The most channels of an [`ArrayCalibration`].
+pub const MAX_CHANNELS: usize = 16;
+/// The most time constants of a channel of an [`ArrayCalibration`].
+pub const ARRAY_RELAXATIONS: usize = 4;
+/// The most states of a channel: its signal, and what it changed over each time constant.
+pub const ARRAY_STATES: usize = 1 + ARRAY_RELAXATIONS;
+/// The most terms of a channel.
+pub const ARRAY_TERMS: usize = 15;
+
+/// One channel of an [`ArrayCalibration`]: its states, and the limits at which it counts as lost.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArrayChannel<const N: usize> {
+    /// Column of the signal.
+    pub signal: Label,
+    /// Lower end of each state in the fit, in the signal's unit.
+    pub state_min: Values<ARRAY_STATES>,
+    /// Upper end of each state in the fit, in the signal's unit.
+    pub state_max: Values<ARRAY_STATES>,
+    /// A sample outside is impossible for this channel: the channel is cut off or at the end of its
+    /// converter.
+    pub possible: Interval,
+    /// A channel with so many repetitions of one value, counted while another channel changes,
+    /// sticks; 0: repetitions are usual.
+    pub still_samples: u16,
+    /// Coefficients that predict the movement of this channel from that of each other one; 0 for
+    /// itself.
+    pub follows: Values<N>,
+    /// The largest jump of the difference from what the others predict, in the signal's unit.
+    pub largest_jump: f64,
+}
+
+/// Gains of the terms of all channels, in the reference's unit; empty lists for channels that are not used.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArrayGains<const N: usize> {
+    /// The estimate if every term is zero.
+    pub constant: f64,
+    /// One gain per term except the constant, for each channel.
+    pub terms: heapless::Vec<Values<ARRAY_TERMS>, N>,
+    /// Standard deviation of the estimate.
+    pub sd: f64,
+}
+
+/// How far each channel deviates from what the other channels predict, in the calibration's own
+/// recordings. A shifted gauge is detected against these values.
+///
+/// The difference of a channel is its estimate alone minus that of all others; the criterion is its
+/// mean over blocks of `block_s`. The calibration has `n` blocks with mean `m` and standard
+/// deviation `s`, each estimated without its own part of the data. A further block exceeds `m ± t s
+/// sqrt(1 + 1/n)` with probability `p`, where `t` is the two-sided quantile of Student's t for `n -
+/// 1` degrees of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6). All channels
+/// share `p`: `p = false_alarms_an_hour block_s/(3600 s)/channels`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArrayShifts<const N: usize> {
+    /// Length of a block, in seconds.
+    pub block_s: f64,
+    /// The rate of false alarms for which the limits are derived, of all channels together, for
+    /// movements of the kind that the calibration saw.
+    pub false_alarms_an_hour: f64,
+    /// The usual mean of each channel's difference, in the reference's unit.
+    pub usual: Values<N>,
+    /// Largest deviation of a block's mean from it, in the reference's unit.
+    pub limits: Values<N>,
+}
+
+/// The parts of an [`ArrayCalibration`], all public; [`ArrayCalibration::new`] checks them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArraySpec<const N: usize> {
+    /// First in every record, so that a newer one is refused before the rest is read.
+    pub schema: Schema,
+    /// Column of the reference.
+    pub reference: Label,
+    /// Samples a second.
+    pub sample_rate_hz: SampleRate,
+    /// Time constants of every channel, rising, in seconds.
+    pub relaxations_s: Values<ARRAY_RELAXATIONS>,
+    /// The greatest sum of powers, 1 to 3.
+    pub degree: u8,
+    /// The greatest sum of the powers of states other than the signal.
+    pub memory_degree: u8,
+    /// The references that the fit saw.
+    pub estimate_domain: Interval,
+    /// The channels.
+    pub channels: heapless::Vec<ArrayChannel<N>, N>,
+    /// Gains of all channels together.
+    pub all: ArrayGains<N>,
+    /// Gains without each channel in turn.
+    pub without: heapless::Vec<ArrayGains<N>, N>,
+    /// Gains of each channel alone.
+    pub alone: heapless::Vec<ArrayGains<N>, N>,
+    /// Limits at which a channel is reported as shifted; `None` if the recordings are too short to
+    /// derive them.
+    #[serde(default)]
+    pub shifts: Option<ArrayShifts<N>>,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+/// A checked calibration of up to `N` gauges: `estimate = constant + sum over channels and terms of gain times term`.
+///
+/// The states of a channel `x` are `x` and, for each time constant `tau` in rising order, `l_before -
+/// l` with `l' = (x - l)/tau`, as those of a [`HistoryMap`](stretch_core::HistoryMap). Each is
+/// shifted into its domain and scaled to -1..1, and the terms are the products of [`HistoryShape`]
+/// except the constant. The estimate is clipped to `estimate_domain`.
+///
+/// For the loss of any single channel the record holds the gains of the remaining ones, and for the
+/// loss of more the gains of each channel alone. `N` is the capacity: a record of four channels
+/// loads into an `ArrayCalibration<4>` on a board and into an `ArrayCalibration<16>` on a computer.
+///
+/// ```
+/// # use stretch_core::*;
+/// # use stretch_sleeve::*;
+/// // two gauges of a knee, both in volts, of which each may be lost
+/// let channel = |name: &str, other: [f64; 2]| {
+///     Ok::<_, DesignError>(ArrayChannel {
+///         signal: Label::new(name)?,
+///         state_min: Values::new("state_min", &[1.0, -0.5])?,
+///         state_max: Values::new("state_max", &[2.0, 0.5])?,
+///         possible: Interval { min: 0.5, max: 2.5 },
+///         still_samples: 8,
+///         follows: Values::new("follows", &other)?,
+///         largest_jump: 0.1,
+///     })
+/// };
+/// let gains = |of: [&[f64]; 2]| {
+///     let terms = of.iter().map(|own| Values::new("terms", own)).collect::<Result<_, _>>()?;
+///     Ok::<_, DesignError>(ArrayGains { constant: 45.0, terms, sd: 2.0 })
+/// };
+/// let spec = ArraySpec::<2> {
+///     schema: Schema::CURRENT,
+///     reference: Label::new("angle_deg")?,
+///     sample_rate_hz: SampleRate::new(100.0)?,
+///     relaxations_s: Values::new("relaxations_s", &[0.3])?,
+///     degree: 1,
+///     memory_degree: 1,
+///     estimate_domain: Interval { min: 0.0, max: 90.0 },
+///     channels: [channel("a_v", [0.0, 1.0])?, channel("b_v", [1.0, 0.0])?].into_iter().collect(),
+///     all: gains([&[25.0, 2.0], &[20.0, 1.0]])?,
+///     without: [gains([&[], &[45.0, 1.0]])?, gains([&[45.0, 2.0], &[]])?].into_iter().collect(),
+///     alone: [gains([&[45.0, 2.0], &[]])?, gains([&[], &[45.0, 1.0]])?].into_iter().collect(),
+///     shifts: None,
+///     provenance: Provenance::new("", ["knee.csv"]),
+/// };
+/// let calibration = ArrayCalibration::new(spec)?;
+/// let mut spec = calibration.into_spec();
+/// spec.without.clear();
+/// let error = ArrayCalibration::new(spec).unwrap_err();
+/// assert!(error.to_string().contains("without"), "{error}");
+/// # Ok::<(), DesignError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ArraySpec<N>", into = "ArraySpec<N>")]
+pub struct ArrayCalibration<const N: usize>(ArraySpec<N>);
+
+impl<const N: usize> ArraySpec<N> {
+    /// Which products of a channel's states are its terms.
+    pub fn shape(&self) -> HistoryShape {
+        HistoryShape {
+            states: 1 + self.relaxations_s.len(),
+            degree: self.degree,
+            memory_degree: self.memory_degree,
+        }
+    }
+}
+
+impl<const N: usize> ArrayCalibration<N> {
+    /// Checks the parts: every number is finite and of a usable size, every list has its length.
+    ///
+    /// # Errors
+    /// [`DesignError`] that names the field.
+    pub fn new(mut spec: ArraySpec<N>) -> Result<Self, DesignError> {
+        spec.schema = Schema::CURRENT;
+        let channels = spec.channels.len();
+        let count = |field, got: usize, want: usize| {
+            DesignError::check(field, got as f64, got == want).map(|_| ())
+        };
+        DesignError::check(
+            "channels",
+            channels as f64,
+            (1..=N.min(MAX_CHANNELS)).contains(&channels),
+        )?;
+        DesignError::check("degree", f64::from(spec.degree), (1..=3).contains(&spec.degree))?;
+        let hz = spec.sample_rate_hz.hz();
+        DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;
+        let mut before = 0.0;
+        for &tau in spec.relaxations_s.iter() {
+            DesignError::check("relaxations_s", tau, tau > before)?;
+            extent("relaxations_s", tau)?;
+            before = tau;
+        }
+        let terms = spec.shape().terms() - 1;
+        DesignError::check("terms", terms as f64, terms <= ARRAY_TERMS)?;
+        let domain = spec.estimate_domain.validate("estimate_domain")?;
+        size("estimate_domain", domain.min)?;
+        size("estimate_domain", domain.max)?;
+        for channel in &spec.channels {
+            check_channel(channel, spec.shape().states, channels)?;
+        }
+        count("length of without", spec.without.len(), if channels > 1 { channels } else { 0 })?;
+        count("length of alone", spec.alone.len(), channels)?;
+        check_gains(&spec.all, terms, |_| true, channels)?;
+        for (lost, gains) in spec.without.iter().enumerate() {
+            check_gains(gains, terms, |channel| channel != lost, channels)?;
+        }
+        for (only, gains) in spec.alone.iter().enumerate() {
+            check_gains(gains, terms, |channel| channel == only, channels)?;
+        }
+        if let Some(shifts) = &spec.shifts {
+            check_shifts(shifts, channels)?;
+        }
+        Ok(Self(spec))
+    }
+
+    /// The parts.
+    pub fn spec(&self) -> &ArraySpec<N> {
+        &self.0
+    }
+
+    /// The parts, to change and check again.
+    pub fn into_spec(self) -> ArraySpec<N> {
+        self.0
+    }
+}
+
+fn check_channel<const N: usize>(
+    channel: &ArrayChannel<N>,
+    states: usize,
+    channels: usize,
+) -> Result<(), DesignError> {
+    let count = |field, got: usize, want: usize| {
+        DesignError::check(field, got as f64, got == want).map(|_| ())
+    };
+    count("length of state_min", channel.state_min.len(), states)?;
+    count("length of state_max", channel.state_max.len(), states)?;
+    for (&min, &max) in channel.state_min.iter().zip(channel.state_max.iter()) {
+        size("state_min", min)?;
+        size("state_max", max)?;
+        extent("state_max - state_min", max - min)?;
+    }
+    let possible = channel.possible.validate("possible")?;
+    size("possible", possible.min)?;
+    size("possible", possible.max)?;
+    count("length of follows", channel.follows.len(), channels)?;
+    channel.follows.iter().try_for_each(|&gain| size("follows", gain).map(|_| ()))?;
+    extent("largest_jump", channel.largest_jump).map(|_| ())
+}
+
+fn check_gains<const N: usize>(
+    gains: &ArrayGains<N>,
+    terms: usize,
+    uses: impl Fn(usize) -> bool,
+    channels: usize,
+) -> Result<(), DesignError> {
+    size("gains.constant", gains.constant)?;
+    size("gains.sd", gains.sd)?;
+    DesignError::check("gains.sd", gains.sd, gains.sd >= 0.0)?;
+    let got = gains.terms.len();
+    DesignError::check("length of gains.terms", got as f64, got == channels)?;
+    for (channel, own) in gains.terms.iter().enumerate() {
+        let want = if uses(channel) { terms } else { 0 };
+        DesignError::check("length of gains.terms", own.len() as f64, own.len() == want)?;
+        own.iter().try_for_each(|&gain| size("gains.terms", gain).map(|_| ()))?;
+    }
+    Ok(())
+}
+
+fn check_shifts<const N: usize>(
+    shifts: &ArrayShifts<N>,
+    channels: usize,
+) -> Result<(), DesignError> {
+    extent("shifts.block_s", shifts.block_s)?;
+    extent("shifts.false_alarms_an_hour", shifts.false_alarms_an_hour)?;
+    for (field, list) in
+        [("length of shifts.usual", &shifts.usual), ("length of shifts.limits", &shifts.limits)]
+    {
+        DesignError::check(field, list.len() as f64, list.len() == channels)?;
+    }
+    shifts.usual.iter().try_for_each(|&usual| size("shifts.usual", usual).map(|_| ()))?;
+    shifts.limits.iter().try_for_each(|&limit| extent("shifts.limits", limit).map(|_| ()))
+}
+
+impl<const N: usize> TryFrom<ArraySpec<N>> for ArrayCalibration<N> {
+    type Error = DesignError;
+    fn try_from(spec: ArraySpec<N>) -> Result<Self, DesignError> {
+        Self::new(spec)
+    }
+}
+
+impl<const N: usize> From<ArrayCalibration<N>> for ArraySpec<N> {
+    fn from(calibration: ArrayCalibration<N>) -> Self {
+        calibration.0
+    }
+}

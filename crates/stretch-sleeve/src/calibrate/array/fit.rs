@@ -1,0 +1,118 @@
+//! One model of many channels, with one ridge per channel, chosen on left-out data.
+
+use stretch_calibrate::{CalibrateError, toolkit::extent};
+use stretch_core::{Interval, Normalisation, Provenance, Range, RangeSpec, Target};
+use stretch_data::Trial;
+
+use crate::{
+    SleeveCalibration, SleeveError,
+    calibrate::{channels::Channels, linear::Linear},
+};
+
+use super::{
+    carried::{Carried, carried},
+    parted::parted,
+    shifts::shifts,
+    still::Still,
+    watch::watched,
+};
+
+/// A note on data that do not show which difference between channels is usual.
+const TOO_SHORT: &str = "too little was recorded to say when a gauge has shifted against the others: that takes a minute or more";
+
+/// Options of [`calibrate_array`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ArrayOptions {
+    /// Columns of the signals.
+    pub signals: Vec<String>,
+    /// Column of the reference.
+    pub reference: String,
+    /// Resting length, as [`Options::rest_length`](stretch_calibrate::Options::rest_length).
+    pub rest_length: Option<f64>,
+    /// Date of the calibration, as free text for the record.
+    pub date: String,
+}
+
+/// A calibration of several gauges with its errors.
+#[derive(Debug, Clone)]
+pub struct ArrayFit {
+    /// The record.
+    pub calibration: SleeveCalibration,
+    /// The contribution of each channel.
+    pub carried: Vec<Carried>,
+    /// Root mean square error on data left out, in the reference's unit.
+    pub rmse: f64,
+    /// Notes on the data.
+    pub notes: Vec<String>,
+}
+
+/// Fits one linear model of all channels and their memories.
+///
+/// Each channel has its own ridge penalty. Penalties are chosen by cross-validation, first one for
+/// all channels, then channel by channel. Each trial is left out in turn; with fewer than three
+/// trials each sixth of a trial is left out. Two seconds next to the part that is left out are
+/// excluded from the fit as well.
+///
+/// # Errors
+/// [`SleeveError`], which names the trial and column.
+pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<ArrayFit, SleeveError> {
+    let channels = Channels::new(trials, &options.signals, &options.reference)?;
+    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
+    let longest = extent(channels.reference()).max;
+    let target = match options.rest_length {
+        Some(rest_length) => Target::Contraction { rest_length },
+        None if options.reference.starts_with("length") => {
+            Target::Contraction { rest_length: longest }
+        }
+        None => Target::Direct,
+    };
+    let Interval { min, max } = extent(channels.reference().map(|x| target.from_reference(x)));
+    let spec = RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max };
+    let constant = || CalibrateError::Constant { column: options.reference.clone(), value: min };
+    let target_range = Range::new(spec).map_err(|_| constant())?;
+    let bank = channels.bank();
+    if bank.domains.iter().flatten().any(|d| d.min >= d.max) {
+        return Err(undetermined().into());
+    }
+    let normalised = |x: f64| target_range.normalise(target.from_reference(x));
+    let parted = parted(&channels, &bank, normalised, trials.len()).ok_or_else(undetermined)?;
+    let everything: Vec<usize> = (0..options.signals.len()).collect();
+    let held = parted.choose(&everything).ok_or_else(undetermined)?;
+    let weights = parted.fit(&parted.whole, &everything, &held.ridges).ok_or_else(undetermined)?;
+    let count: f64 = parted.parts.iter().map(|(rows, _)| rows).sum();
+    let triangle = &parted.whole.triangle;
+    let terms = parted.terms;
+    let gram = (triangle.tr_mul(triangle) / count).view((0, 0), (terms, terms)).into_owned();
+    let unit = target_range.span() * target.reference_per_target().abs();
+    let carried = carried(&parted, &options.signals, held.rmse, unit);
+    let linear = Linear {
+        signals: options.signals.clone(),
+        reference: options.reference.clone(),
+        sample_rate_hz: channels.sample_rate.hz(),
+        target,
+        target_range,
+        estimate: Interval { min: target_range.normalise(min), max: target_range.normalise(max) },
+        domains: bank.domains,
+        weights: weights.iter().copied().collect(),
+        gram,
+        variance: held.rmse * held.rmse,
+        samples: count as u64,
+        still: Still::of(&channels),
+    };
+    let shifts = shifts(&parted, &channels, &linear, &held.ridges)?;
+    let mut notes = channels.notes.clone();
+    if shifts.is_none() && options.signals.len() > 1 {
+        notes.push(TOO_SHORT.into());
+    }
+    let watched = watched(&linear, Some(&channels), shifts)?;
+    let mut columns: Vec<&str> = options.signals.iter().map(String::as_str).collect();
+    columns.push(&options.reference);
+    let provenance = Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str()))
+        .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
+    Ok(ArrayFit {
+        calibration: linear.record(&watched, Some(&channels), provenance)?,
+        carried,
+        rmse: held.rmse * unit,
+        notes,
+    })
+}

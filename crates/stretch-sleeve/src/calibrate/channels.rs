@@ -1,0 +1,199 @@
+//! Several signals and a reference on an even time grid. Calibrations of many channels and priors
+//! are fitted to these.
+
+use stretch_calibrate::{
+    CalibrateError,
+    toolkit::{SETTLE, SHORTEST, check_rows, extent, sample_rate_hz},
+};
+use stretch_core::SampleRate;
+use stretch_data::{EvenSpec, Trial};
+
+use crate::{MAX_CHANNELS, SleeveError};
+
+use super::bank::{Bank, States};
+
+/// Channels whose correlation differs from one by less than this are copies.
+const COPY: f64 = 1e-9;
+
+/// A stretch of time without gaps.
+pub(crate) struct Stretch {
+    pub(crate) trial: usize,
+    pub(crate) signals: Vec<Vec<f64>>,
+    pub(crate) states: Vec<States>,
+    pub(crate) reference: Vec<f64>,
+}
+
+impl Stretch {
+    pub(crate) fn len(&self) -> usize {
+        self.reference.len()
+    }
+
+    /// The states of each channel at a sample.
+    pub(crate) fn at(&self, sample: usize) -> impl Iterator<Item = &[f64]> {
+        self.states.iter().map(move |states| states[sample].as_slice())
+    }
+
+    /// The samples after the warm-up, in which the low-passes forget their initial values.
+    pub(crate) fn warmed_up(&self) -> std::ops::Range<usize> {
+        SETTLE.min(self.len())..self.len()
+    }
+}
+
+/// Trials with several signals.
+pub(crate) struct Channels {
+    pub(crate) sample_rate: SampleRate,
+    pub(crate) stretches: Vec<Stretch>,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Channels {
+    pub(crate) fn new(
+        trials: &[Trial],
+        signals: &[String],
+        reference: &str,
+    ) -> Result<Self, SleeveError> {
+        if signals.is_empty() || signals.len() > MAX_CHANNELS {
+            return Err(SleeveError::Channels { asked: signals.len(), most: MAX_CHANNELS });
+        }
+        let first = trials.first().ok_or(CalibrateError::NoTrials)?;
+        check_rows(trials)?;
+        let sample_rate = SampleRate::new(sample_rate_hz(first)?)?;
+        let mut all = Self { sample_rate, stretches: Vec::new(), notes: Vec::new() };
+        for (index, trial) in trials.iter().enumerate() {
+            all.take(index, trial, signals, reference, &first.name)?;
+        }
+        if all.stretches.is_empty() {
+            let (trial, samples) = (first.name.clone(), first.len());
+            return Err(CalibrateError::TooShort { trial, samples }.into());
+        }
+        all.check(signals)?;
+        Ok(all)
+    }
+
+    /// Signals without a reference; the first signal takes the reference's position.
+    pub(crate) fn without_reference(
+        trials: &[Trial],
+        signals: &[String],
+    ) -> Result<Self, SleeveError> {
+        Self::new(trials, signals, signals.first().map_or("", String::as_str))
+    }
+
+    fn take(
+        &mut self,
+        index: usize,
+        trial: &Trial,
+        signals: &[String],
+        reference: &str,
+        first: &str,
+    ) -> Result<(), SleeveError> {
+        let (rate_hz, first_hz) = (sample_rate_hz(trial)?, self.sample_rate.hz());
+        if (rate_hz / first_hz - 1.0).abs() > 0.05 {
+            let (trial, first) = (trial.name.clone(), first.to_owned());
+            return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz }.into());
+        }
+        let (trial, note) = without_an_open_end(trial, reference)?;
+        self.notes.extend(note);
+        let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();
+        columns.push(reference);
+        let spec =
+            EvenSpec { rate_hz: first_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
+        let even = trial.even(&columns, spec)?;
+        self.notes.extend(even.rows.note());
+        self.notes.extend(even.notes);
+        let period_s = self.sample_rate.period_s();
+        for mut part in even.parts {
+            let Some(reference) = part.columns.pop() else { continue };
+            let signals = part.columns;
+            let states = signals.iter().map(|signal| Bank::states(signal, period_s)).collect();
+            self.stretches.push(Stretch { trial: index, signals, states, reference });
+        }
+        Ok(())
+    }
+
+    /// Refuses channels that never change and channels that are copies.
+    fn check(&self, signals: &[String]) -> Result<(), SleeveError> {
+        for (k, column) in signals.iter().enumerate() {
+            let range = extent(self.signal(k));
+            if range.min >= range.max {
+                let (column, value) = (column.clone(), range.min);
+                return Err(CalibrateError::Constant { column, value }.into());
+            }
+        }
+        for a in 0..signals.len() {
+            for b in 0..a {
+                if 1.0 - correlation(self.signal(a), self.signal(b)).abs() < COPY {
+                    let (first, second) = (signals[b].clone(), signals[a].clone());
+                    return Err(SleeveError::Copies { first, second });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Each stretch, and the number of samples in the previous ones.
+    pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &Stretch)> {
+        let mut before = 0;
+        self.stretches.iter().map(move |stretch| {
+            let at = before;
+            before += stretch.len();
+            (at, stretch)
+        })
+    }
+
+    /// All samples of a channel.
+    pub(crate) fn signal(&self, channel: usize) -> impl Iterator<Item = f64> + Clone {
+        self.stretches.iter().flat_map(move |s| s.signals[channel].iter().copied())
+    }
+
+    /// All samples of the reference.
+    pub(crate) fn reference(&self) -> impl Iterator<Item = f64> + Clone {
+        self.stretches.iter().flat_map(|s| s.reference.iter().copied())
+    }
+
+    /// The bank over the states that were seen.
+    pub(crate) fn bank(&self) -> Bank {
+        let channels = self.stretches.first().map_or(0, |s| s.signals.len());
+        let domain = |k: usize| Bank::domain(self.stretches.iter().map(move |s| &s.states[k]));
+        Bank::new((0..channels).map(domain).collect())
+    }
+}
+
+/// A trial up to the last sample that has a reference, and a note if there are samples after it.
+fn without_an_open_end(
+    trial: &Trial,
+    reference: &str,
+) -> Result<(Trial, Option<String>), SleeveError> {
+    trial.check_lengths()?;
+    let values = trial.require(reference)?;
+    let last = values.iter().rposition(|x| x.is_finite()).map_or(0, |last| last + 1);
+    if last == values.len() || last == 0 {
+        return Ok((trial.clone(), None));
+    }
+    let mut cut = trial.clone();
+    cut.time_s.truncate(last);
+    cut.channels.iter_mut().for_each(|channel| channel.values.truncate(last));
+    let end_s = cut.time_s.last().copied().unwrap_or_default();
+    let note = format!(
+        "{}: {reference} ends at {end_s:.2} s; the {} samples behind it are not fitted",
+        trial.name,
+        values.len() - last
+    );
+    Ok((cut, Some(note)))
+}
+
+/// Pearson's correlation of two equally long records; zero if one of them is constant.
+pub(crate) fn correlation(
+    a: impl Iterator<Item = f64> + Clone,
+    b: impl Iterator<Item = f64> + Clone,
+) -> f64 {
+    let count = a.clone().count().max(1) as f64;
+    let mean = |x: f64| x / count;
+    let (mean_a, mean_b) = (mean(a.clone().sum()), mean(b.clone().sum()));
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in a.zip(b) {
+        ab += (x - mean_a) * (y - mean_b);
+        aa += (x - mean_a) * (x - mean_a);
+        bb += (y - mean_b) * (y - mean_b);
+    }
+    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
+}

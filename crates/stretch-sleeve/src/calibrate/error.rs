@@ -1,0 +1,61 @@
+//! Reasons why there is no calibration of a sleeve.
+
+use stretch_calibrate::CalibrateError;
+use stretch_core::DesignError;
+use stretch_data::DataError;
+use stretch_filter::FilterError;
+
+/// Why gauges could not be calibrated together, or a prior could not be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SleeveError {
+    /// More channels than a calibration can hold, or none.
+    #[error(
+        "{asked} signals were named; a calibration takes 1 to {most}: name the columns of the gauges with --signals s1,s2"
+    )]
+    Channels {
+        /// Number of named signals.
+        asked: usize,
+        /// The most that are possible.
+        most: usize,
+    },
+    /// Two channels are identical.
+    #[error(
+        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signals"
+    )]
+    Copies {
+        /// The first.
+        first: String,
+        /// The second.
+        second: String,
+    },
+    /// A prior, or a session for one, cannot be used for these data.
+    #[error("{file}: {problem}")]
+    Prior {
+        /// The file, or what it describes.
+        file: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+    /// Errors that calibrations of any kind can have.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+}
+
+impl From<DesignError> for SleeveError {
+    fn from(error: DesignError) -> Self {
+        CalibrateError::from(error).into()
+    }
+}
+
+impl From<DataError> for SleeveError {
+    fn from(error: DataError) -> Self {
+        CalibrateError::from(error).into()
+    }
+}
+
+impl From<FilterError> for SleeveError {
+    fn from(error: FilterError) -> Self {
+        CalibrateError::from(error).into()
+    }
+}

@@ -1,0 +1,135 @@
+//! A calibration of one gauge applied to time-stamped samples, live or from a file, with its zero watched.
+
+use stretch_calibrate::{Applied, CalibrateError, Faults, LiveReceptor, apply, pressure_column};
+use stretch_core::{Design, RateEstimator};
+use stretch_data::Trial;
+use stretch_receptor::{Reading, Withheld};
+
+use crate::{GaugeCalibration, Zero, ZeroMemory, ZeroWatch};
+
+use super::turns::follows_rest;
+
+/// A [`LiveReceptor`] that also watches the zero of its gauge, if the record holds the turning
+/// points of movements.
+#[derive(Debug, Clone)]
+pub struct LiveGauge {
+    receptor: LiveReceptor,
+    watch: Option<(ZeroWatch<f64>, ZeroMemory<f64>)>,
+    zero: Option<Zero<f64>>,
+    last_s: Option<f64>,
+}
+
+impl LiveGauge {
+    /// A receptor for a calibration whose estimator can run live.
+    ///
+    /// # Errors
+    /// As [`LiveReceptor::new`].
+    pub fn new(gauge: &GaugeCalibration) -> Result<Self, CalibrateError> {
+        let watch = gauge.turns().map(|turns| {
+            let watch = ZeroWatch::new(gauge.calibration().spec().polarity, turns);
+            (watch, watch.memory())
+        });
+        let receptor = LiveReceptor::new(gauge.calibration())?;
+        Ok(Self { receptor, watch, zero: None, last_s: None })
+    }
+
+    /// The same receptor, which follows a slow change of the signal's zero and subtracts it from
+    /// the answers.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Record`] for a record without turning points of movements, and for a model
+    /// that follows the rest of its signal itself.
+    pub fn following(self, gauge: &GaugeCalibration) -> Result<Self, CalibrateError> {
+        let refused = |problem: &str| {
+            Err(CalibrateError::Record { file: "the calibration".into(), problem: problem.into() })
+        };
+        let (Some((watch, memory)), Some(turns)) = (self.watch, gauge.turns()) else {
+            return refused(
+                "it does not hold where movements turn, so that its zero cannot be followed: calibrate on a minute or more of movements",
+            );
+        };
+        if follows_rest(gauge.calibration()) {
+            return refused("its model follows the zero at rest already");
+        }
+        Ok(Self { watch: Some((watch.following(turns), memory)), ..self })
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// [`Withheld`] if there is no reading for the sample.
+    pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
+        if time_s.is_finite() && self.last_s.replace(time_s).is_some_and(|last_s| time_s <= last_s)
+        {
+            // as the receptor does if a stamp repeats or runs backwards
+            self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
+        }
+        let mut corrected = signal;
+        if let Some((watch, memory)) = &mut self.watch {
+            self.zero = watch.step(memory, signal);
+            corrected = watch.corrected(memory, signal);
+        }
+        self.receptor.step(time_s, corrected)
+    }
+
+    /// Zero as seen by the movement that ended with the last sample; `None` during a movement, and
+    /// for a record without turning points of movements.
+    pub fn zero(&self) -> Option<Zero<f64>> {
+        self.zero
+    }
+
+    /// Sets the pressure of the following samples, for a calibration that [needs](pressure_column)
+    /// a pressure.
+    pub fn set_pressure(&mut self, pressure: f64) {
+        self.receptor.set_pressure(pressure);
+    }
+
+    /// Faults of the time stamps so far.
+    pub fn faults(&self) -> Faults {
+        self.receptor.faults()
+    }
+}
+
+/// A trial's readings, and the zero as seen by its movements.
+#[derive(Debug, Clone)]
+pub struct AppliedGauge {
+    /// Readings, and the faults of the time stamps.
+    pub applied: Applied,
+    /// For each movement with a result, the time of its end and how far the zero is off.
+    pub zeros: Vec<(f64, Zero<f64>)>,
+}
+
+/// Applies a calibration to a logged trial, sample by sample, as it would run live. With `follow` the receptor follows a
+/// slow change of the signal's zero ([`LiveGauge::following`]).
+///
+/// # Errors
+/// As [`apply`] and [`LiveGauge::following`].
+pub fn apply_gauge(
+    gauge: &GaugeCalibration,
+    trial: &Trial,
+    follow: bool,
+) -> Result<AppliedGauge, CalibrateError> {
+    let calibration = gauge.calibration();
+    // the paper's central difference looks ahead, which a live receptor cannot do
+    let is_live = calibration.spec().rate_estimator != RateEstimator::CentralDifference;
+    if !follow && (gauge.turns().is_none() || !is_live) {
+        return Ok(AppliedGauge { applied: apply(calibration, trial)?, zeros: Vec::new() });
+    }
+    trial.check_lengths()?;
+    let signal = trial.require(calibration.spec().signal.as_str())?;
+    let pressure = pressure_column(calibration).map(|column| trial.require(column)).transpose()?;
+    let mut live = LiveGauge::new(gauge)?;
+    if follow {
+        live = live.following(gauge)?;
+    }
+    let mut zeros = Vec::new();
+    let mut readings = Vec::with_capacity(trial.len());
+    for (i, (&time_s, &value)) in trial.time_s.iter().zip(signal).enumerate() {
+        if let Some(pressure) = pressure {
+            live.set_pressure(pressure[i]);
+        }
+        readings.push(live.step(time_s, value));
+        zeros.extend(live.zero().map(|zero| (time_s, zero)));
+    }
+    Ok(AppliedGauge { applied: Applied { readings, faults: live.faults() }, zeros })
+}

@@ -1,0 +1,29 @@
+//! Calibrations of sleeves from trials, and their files.
+//!
+//! [`calibrate_array`] fits one linear model of all channels and their memories. A [`Prior`], which
+//! is learnt from earlier sessions, gives the same [`Linear`](linear::Linear). [`find_turns`] finds
+//! the turning points of the movements of a single gauge.
+
+mod array;
+mod bank;
+mod channels;
+mod correlated;
+mod error;
+mod gauge;
+mod linear;
+mod matrices;
+mod prior;
+mod record;
+mod turns;
+
+pub use array::{AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array};
+pub use error::SleeveError;
+pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
+pub use prior::{
+    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
+    SessionOptions, UpdateOptions, UpdateSummary, Updated,
+};
+pub use record::{
+    RecordSummary, SleeveCalibration, array_bytes, array_seal, describe_record, seal_record,
+};
+pub use turns::{calibrate_gauge, find_turns};

@@ -1,0 +1,330 @@
+//! A prior: the distribution of a model's coefficients over sessions.
+
+use nalgebra::{DMatrix, DVector};
+use stretch_calibrate::{
+    CalibrateError,
+    toolkit::{LinearFactor, extent},
+};
+use stretch_core::{Interval, Normalisation, Range, RangeSpec, Target};
+use stretch_data::{listed, unit_of};
+
+use crate::{
+    SleeveError,
+    calibrate::{array::Still, bank::Bank},
+};
+
+use super::{
+    expected::{Expected, expected},
+    landmarks::LANDMARKS,
+    session::Session,
+    tree::{Leaf, Normal, Spread, Tree},
+};
+
+/// Errors of sleeves are correlated over about this time, in seconds: samples within it count as
+/// one.
+const CORRELATED_S: f64 = 1.0;
+/// The sign of correlations above this can be trusted.
+pub(crate) const CLEAR: f64 = 0.5;
+/// Fewest sessions from which a spread can be learnt.
+const LEAST_SESSIONS: usize = 3;
+
+/// Distribution of the coefficients of a future session, learnt from earlier ones.
+///
+/// The model is linear in its coefficients. For each channel it has a cubic and, for each of four
+/// time constants, the change of the channel over that time, also multiplied by the channel and by
+/// its square. All terms are defined over the prior's own domains. Sessions vary around their
+/// wearer and wearers around the population (with as many levels as the sessions' paths have), and
+/// each level has its own covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// Columns of the signals.
+    pub signals: Vec<String>,
+    /// Column of the reference.
+    pub reference: String,
+    /// Samples a second.
+    pub sample_rate_hz: f64,
+    /// Sessions that it was learnt from.
+    pub sessions: usize,
+    /// Its errors, by seconds of reference, on left-out sessions.
+    pub expected: Vec<Expected>,
+    pub(crate) target: Target,
+    pub(crate) target_range: Range,
+    pub(crate) estimate: Interval,
+    pub(crate) domains: Vec<Vec<Interval>>,
+    /// For every path that was seen, the empty one first.
+    pub(crate) known: Vec<(Vec<String>, Normal)>,
+    /// Covariance of each level below the root.
+    pub(crate) levels: Vec<DMatrix<f64>>,
+    /// Variance of a sample about its session's own coefficients, in normalised target.
+    pub(crate) noise: f64,
+    /// Mean of `X'X` over a sample.
+    pub(crate) gram: DMatrix<f64>,
+    /// The longest runs of equal samples that were seen.
+    pub(crate) still: Still,
+    /// For each session its path and landmarks, in normalised target.
+    pub(crate) landmarks: Vec<(Vec<String>, [f64; LANDMARKS])>,
+}
+
+impl Prior {
+    /// The reference's unit over normalised target, without its sign.
+    pub(super) fn unit_of_target(&self) -> f64 {
+        self.target_range.span() * self.target.reference_per_target().abs()
+    }
+
+    /// Learns a prior from sessions.
+    ///
+    /// # Errors
+    /// [`SleeveError::Prior`] if there are fewer than three sessions, or a session differs from the
+    /// first in its channels, unit, rate or polarity.
+    pub fn learn(sessions: &[Session]) -> Result<Self, SleeveError> {
+        let first = check_all(sessions)?;
+        let channels = first.signals.len();
+        let pooled = |channel: usize| -> Vec<Interval> {
+            let states = first.domains[channel].len();
+            let ends = |k: usize| {
+                let all = sessions.iter().map(move |s| s.domains[channel][k]);
+                extent(all.flat_map(|d| [d.min, d.max]))
+            };
+            (0..states).map(ends).collect()
+        };
+        let domains: Vec<_> = (0..channels).map(pooled).collect();
+        let ends = sessions.iter().flat_map(|s| [s.reference_range.min, s.reference_range.max]);
+        let ends = extent(ends);
+        let target = match first.reference.starts_with("length") && ends.max > 0.0 {
+            true => Target::Contraction { rest_length: ends.max },
+            false => Target::Direct,
+        };
+        let targets = extent([ends.min, ends.max].into_iter().map(|x| target.from_reference(x)));
+        let Interval { min, max } = targets;
+        let target_range =
+            Range::new(RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max })?;
+        let bank = Bank::new(domains.clone());
+        let undetermined = || CalibrateError::Undetermined { model: "prior".into() };
+        let parts: Option<Vec<Vec<Leaf>>> =
+            sessions.iter().map(|session| leaves(session, &bank, (target, target_range))).collect();
+        let parts = parts.ok_or_else(undetermined)?;
+        let leaves: Vec<Leaf> = parts.iter().map(|parts| whole(parts)).collect();
+        // Paths of equal depth: a session with a shorter path is its own group at the missing
+        // levels.
+        let depth = sessions.iter().map(|s| s.path.len()).max().unwrap_or(0);
+        let paths: Vec<Vec<String>> = sessions.iter().map(|s| filled(s, depth)).collect();
+        let paths = without_single_levels(paths);
+        let tree = Tree::new(&paths, &leaves);
+        let Spread { levels, noise } = tree.learn().ok_or_else(undetermined)?;
+        let spread = Spread { levels, noise };
+        let known = tree.known(&spread).ok_or_else(undetermined)?;
+        let left = tree.left_out(&spread).ok_or_else(undetermined)?;
+        let still = sessions.iter().map(Session::still).reduce(|all, one| all.and(&one));
+        let count: f64 = leaves.iter().map(|leaf| leaf.count).sum();
+        let gram = leaves
+            .iter()
+            .fold(DMatrix::zeros(bank.terms(), bank.terms()), |sum, leaf| sum + &leaf.gram / count);
+        let unit = target_range.span() * target.reference_per_target().abs();
+        Ok(Self {
+            signals: first.signals.clone(),
+            reference: first.reference.clone(),
+            sample_rate_hz: first.sample_rate_hz,
+            sessions: sessions.len(),
+            expected: expected(&parts, &left, (noise, &gram), unit),
+            target,
+            target_range,
+            estimate: Interval {
+                min: target_range.normalise(min),
+                max: target_range.normalise(max),
+            },
+            domains,
+            known,
+            levels: spread.levels,
+            noise,
+            gram,
+            still: still.ok_or_else(undetermined)?,
+            landmarks: normalised_landmarks(sessions, (target, target_range)),
+        })
+    }
+
+    /// The same spreads, with the information of these sessions about their wearers and the
+    /// population: for sessions after the prior was learnt. Sessions from which it was learnt count
+    /// only if they are given again.
+    ///
+    /// # Errors
+    /// As [`Prior::learn`].
+    pub fn knowing(&self, sessions: &[Session]) -> Result<Self, SleeveError> {
+        check_all(sessions)?;
+        let undetermined = || CalibrateError::Undetermined { model: "prior".into() };
+        let bank = Bank::new(self.domains.clone());
+        let parts: Option<Vec<Vec<Leaf>>> = sessions
+            .iter()
+            .map(|session| leaves(session, &bank, (self.target, self.target_range)))
+            .collect();
+        let leaves: Vec<Leaf> = parts.ok_or_else(undetermined)?.iter().map(|p| whole(p)).collect();
+        let depth = self.levels.len().saturating_sub(1);
+        let paths: Vec<Vec<String>> = sessions.iter().map(|s| filled(s, depth)).collect();
+        let spread = Spread { levels: self.levels.clone(), noise: self.noise };
+        let known = Tree::new(&paths, &leaves).known(&spread).ok_or_else(undetermined)?;
+        let landmarks = normalised_landmarks(sessions, (self.target, self.target_range));
+        Ok(Self { known, landmarks, sessions: sessions.len(), ..self.clone() })
+    }
+
+    /// The unit of the reference.
+    pub fn unit(&self) -> String {
+        unit_of(&self.reference)
+    }
+
+    /// The paths that were seen: sensors, their wearers, and activities.
+    pub fn paths(&self) -> impl Iterator<Item = &[String]> {
+        self.known.iter().skip(1).map(|(path, _)| path.as_slice())
+    }
+
+    /// The distribution of the coefficients of a new session of a path, and how much of the path was seen.
+    pub(crate) fn of(&self, path: &[String]) -> (Normal, usize) {
+        let fits = |seen: &[String]| {
+            seen.len() <= path.len() && seen.iter().zip(path).all(|(a, b)| a == b)
+        };
+        let best =
+            self.known.iter().filter(|(seen, _)| fits(seen)).max_by_key(|(seen, _)| seen.len());
+        let Some((seen, normal)) = best else {
+            // the empty path is always known
+            return (Normal { mean: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }, 0);
+        };
+        let below = &self.levels[seen.len().min(self.levels.len())..];
+        let covariance = below.iter().fold(normal.covariance.clone(), |sum, level| sum + level);
+        (Normal { mean: normal.mean.clone(), covariance }, seen.len())
+    }
+}
+
+/// Samples that count as one.
+pub(crate) fn correlated(sample_rate_hz: f64) -> f64 {
+    (CORRELATED_S * sample_rate_hz).max(1.0)
+}
+
+/// The sums of a session's parts in the terms and the target of a prior.
+fn leaves(session: &Session, bank: &Bank, (target, range): (Target, Range)) -> Option<Vec<Leaf>> {
+    let zero = range.normalise(target.from_reference(0.0));
+    let scale = range.normalise(target.from_reference(1.0)) - zero;
+    let share = 1.0 / correlated(session.sample_rate_hz);
+    let terms = bank.terms();
+    let one = |(rows, factor): (f64, LinearFactor)| {
+        let all = factor.triangle.tr_mul(&factor.triangle) * share;
+        Leaf {
+            gram: all.view((0, 0), (terms, terms)).into_owned(),
+            cross: all.view((0, terms), (terms, 1)).column(0).into_owned(),
+            power: all[(terms, terms)],
+            count: rows * share,
+        }
+    };
+    Some(session.factors(bank, (scale, zero))?.into_iter().map(one).collect())
+}
+
+/// The landmarks of sessions in normalised target.
+fn normalised_landmarks(
+    sessions: &[Session],
+    (target, range): (Target, Range),
+) -> Vec<(Vec<String>, [f64; LANDMARKS])> {
+    let normalised = |x: f64| range.normalise(target.from_reference(x));
+    let one = |s: &Session| {
+        let [low, high, rest] = s.landmarks.map(normalised);
+        // a target may fall where the reference rises
+        (s.path.clone(), [low.min(high), low.max(high), rest])
+    };
+    sessions.iter().map(one).collect()
+}
+
+/// The sums of all parts.
+pub(crate) fn whole(parts: &[Leaf]) -> Leaf {
+    let mut all = parts[0].clone();
+    for part in &parts[1..] {
+        all.gram += &part.gram;
+        all.cross += &part.cross;
+        all.power += part.power;
+        all.count += part.count;
+    }
+    all
+}
+
+/// The path of a session, filled up with its own name.
+fn filled(session: &Session, depth: usize) -> Vec<String> {
+    let mut path = session.path.clone();
+    path.resize(depth, format!("({})", session.name));
+    path
+}
+
+/// Removes levels with one node, or with a node for every session, because a covariance cannot be
+/// learnt from them.
+fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let depth = paths.first().map_or(0, Vec::len);
+    let distinct = |level: usize| {
+        let mut heads: Vec<&[String]> = paths.iter().map(|p| &p[..=level]).collect();
+        heads.sort_unstable();
+        heads.dedup();
+        heads.len()
+    };
+    // Below a level of single sessions there is only the session itself.
+    let keep = (0..depth).take_while(|&level| distinct(level) < paths.len()).count();
+    paths.into_iter().map(|path| path[..keep].to_vec()).collect()
+}
+
+/// Checks sessions against one another; returns the first.
+fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
+    let few = || SleeveError::Prior {
+        file: "prior".into(),
+        problem: format!(
+            "{} sessions do not tell how sessions vary; give at least {LEAST_SESSIONS}, each written by stretch \
+             calibrate --session",
+            sessions.len()
+        ),
+    };
+    let first = sessions.first().filter(|_| sessions.len() >= LEAST_SESSIONS).ok_or_else(few)?;
+    for session in sessions {
+        differs(session, first).map_or(Ok(()), |problem| {
+            Err(SleeveError::Prior { file: session.name.clone(), problem })
+        })?;
+    }
+    Ok(first)
+}
+
+/// How a session differs from another one with which it cannot share a prior.
+fn differs(session: &Session, first: &Session) -> Option<String> {
+    if session.signals.len() != first.signals.len() {
+        return Some(format!(
+            "it has {} channels ({}) and {} has {} ({}): a prior takes sessions of the same channels",
+            session.signals.len(),
+            listed(&session.signals),
+            first.name,
+            first.signals.len(),
+            listed(&first.signals)
+        ));
+    }
+    if unit_of(&session.reference) != unit_of(&first.reference) {
+        return Some(format!(
+            "its reference is {} and that of {} is {}: convert one of them (stretch convert), so that both are in one unit",
+            session.reference, first.name, first.reference
+        ));
+    }
+    if (session.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 0.05 {
+        return Some(format!(
+            "it was sampled at {:.4} Hz and {} at {:.4} Hz: bring it onto that rate (stretch convert --grid {})",
+            session.sample_rate_hz, first.name, first.sample_rate_hz, first.sample_rate_hz
+        ));
+    }
+    let (own, other) = (session.correlations(), first.correlations());
+    turned(own.into_iter().zip(other)).map(|opposite| {
+        format!(
+            "{opposite} of {} channels fall where those of {} rise: swap the wires of the bridge, or turn the signal's sign (leave one of the sessions out)",
+            session.signals.len(),
+            first.name
+        )
+    })
+}
+
+/// How many channels follow the reference in the opposite direction, if they are more than those
+/// that follow it in the expected one; from pairs of found and expected correlations.
+pub(crate) fn turned(pairs: impl Iterator<Item = (f64, f64)>) -> Option<usize> {
+    let clear = pairs.filter(|(a, b)| a.abs() > CLEAR && b.abs() > CLEAR);
+    let (same, opposite): (Vec<_>, Vec<_>) = clear.partition(|(a, b)| a * b > 0.0);
+    (opposite.len() > same.len()).then_some(opposite.len())
+}
+
+/// The names of paths in a sentence.
+pub(crate) fn paths_in_words(paths: impl Iterator<Item = Vec<String>>) -> String {
+    listed(&paths.map(|path| path.join("/")).collect::<Vec<_>>())
+}

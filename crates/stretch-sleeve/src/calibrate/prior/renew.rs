@@ -1,0 +1,291 @@
+//! Makes a calibration from a prior and a session without any reference.
+//!
+//! This assumes that the movement has the ends and the rest of earlier ones. The mean rows of the
+//! samples at these [landmarks](super::landmarks) are three more rows of the Bayesian least squares
+//! of [`Prior::update`](super::Prior::update), with the values of earlier sessions as targets and
+//! their spread as noise. Therefore a shift and a scale are believed only as far as earlier
+//! sessions differed.
+
+use std::collections::HashMap;
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use stretch_calibrate::{CalibrateError, toolkit::extent};
+use stretch_core::Provenance;
+use stretch_data::{Trial, unit_of};
+
+use crate::{
+    SleeveCalibration, SleeveError,
+    calibrate::{
+        array::watched,
+        bank::Bank,
+        channels::Channels,
+        linear::Linear,
+        matrices::{inverse, symmetric},
+    },
+};
+
+use super::{
+    landmarks::{LANDMARKS, Landmark, NAMES, Place, expected, landmarks, passes, warmed_up},
+    learnt::Prior,
+    session::parse_path,
+    tree::Normal,
+};
+
+/// The 0.999 quantile of chi-square with three degrees of freedom: a session of the prior's kind is refused once in a
+/// thousand.
+const UNSEEN: f64 = 16.266;
+/// Fewest passes from one end to the other in a movement.
+const LEAST_PASSES: usize = 2;
+
+/// Options of [`Prior::renew`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RenewOptions {
+    /// Sensor, wearer and so on, about whom the prior may know more than about others; empty: a new
+    /// one.
+    pub path: Vec<String>,
+    /// Columns of the signals, in the prior's order; empty: those of the prior.
+    pub signals: Vec<String>,
+    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None`:
+    /// the prior's knowledge of the path.
+    pub calibration: Option<SleeveCalibration>,
+    /// Date of the calibration, as free text for the record.
+    pub date: String,
+}
+
+impl RenewOptions {
+    /// Options for a session of a path such as `left/anna`.
+    pub fn of(path: &str) -> Self {
+        Self { path: parse_path(path), ..Self::default() }
+    }
+}
+
+/// A calibration that was renewed without a reference.
+#[derive(Debug, Clone)]
+pub struct Renewed {
+    /// The calibration.
+    pub calibration: SleeveCalibration,
+    /// What was assumed, and the result.
+    pub summary: RenewSummary,
+    /// Notes on the data.
+    pub notes: Vec<String>,
+}
+
+/// What a renewal assumed, and how far it went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RenewSummary {
+    /// The ends and the rest of the movement.
+    pub assumed: Vec<Assumed>,
+    /// Squared distance of the signals from what was seen, in standard deviations: chi-square with
+    /// three degrees of freedom.
+    pub distance: f64,
+    /// Shift of the estimate in the middle of the movement, in the reference's unit.
+    pub shift: f64,
+    /// Ratio of the movement's span to its previous span.
+    pub scale: f64,
+    /// Expected root mean square error, in the reference's unit, if the assumption holds.
+    pub expected_rmse: f64,
+}
+
+/// A value of the reference that was assumed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Assumed {
+    /// The landmark: low end, high end, rest.
+    pub landmark: String,
+    /// The reference there, in its unit.
+    pub reference: f64,
+    /// Standard deviation over sessions, in the same unit.
+    pub sd: f64,
+    /// Number of sessions that it was computed from.
+    pub sessions: usize,
+    /// The estimate before the renewal.
+    pub before: f64,
+    /// The estimate after the renewal.
+    pub after: f64,
+}
+
+/// Mean rows at the landmarks.
+type Rows = [DVector<f64>; LANDMARKS];
+
+impl Prior {
+    /// Renews a calibration by the ends and the rests of a movement, without any reference.
+    ///
+    /// `X` are the mean rows at the landmarks, `y` their values in earlier sessions and `V` the
+    /// variances of these. The coefficients `N(m, S)` become `m + K(y - X m)`, `S - K X S`, `K = S
+    /// X'(X S X' + V)^-1`. The landmarks are found with the estimates of `m`, then again with those
+    /// of the result. A session is refused if `(y - X m)'(X S X' + V)^-1(y - X m)` exceeds the
+    /// 0.999 quantile of chi-square.
+    ///
+    /// # Errors
+    /// [`SleeveError::Prior`] if the data have other channels, rate or unit than the prior, hold no
+    /// complete movement, or differ from all that the prior has seen, with what to do.
+    pub fn renew(&self, trials: &[Trial], options: &RenewOptions) -> Result<Renewed, SleeveError> {
+        let signals = if options.signals.is_empty() { &self.signals } else { &options.signals };
+        self.refuse_columns(signals, &self.reference)?;
+        let channels = Channels::without_reference(trials, signals)?;
+        self.refuse_signals(&channels)?;
+        let undetermined = || CalibrateError::Undetermined { model: "prior".into() };
+        let (normal, known) = self.before(options)?;
+        let values: Option<Vec<Landmark>> =
+            (0..LANDMARKS).map(|k| expected(&self.landmarks, &options.path, k)).collect();
+        let values = values.ok_or_else(undetermined)?;
+        let bank = Bank::new(self.domains.clone());
+        self.refuse_standing(&bank, &channels, &normal, &values)?;
+        let mut after = normal.clone();
+        let (mut rows, mut distance) = (self.rows(&bank, &channels, &normal.mean), 0.0);
+        for _ in 0..2 {
+            (after, distance) =
+                moved(&normal, &rows, &values, self.noise).ok_or_else(undetermined)?;
+            rows = self.rows(&bank, &channels, &after.mean);
+        }
+        self.refuse_unseen(distance, options)?;
+        let mut notes = channels.notes.clone();
+        notes.extend(self.whom(&options.path, known));
+        let predicted = after.covariance.component_mul(&self.gram).sum() + self.noise;
+        let variance = predicted * self.spread(0.0, known > 0).widening;
+        let linear = self.linear(&after.mean, self.gram.clone(), variance);
+        let linear = Linear { signals: signals.clone(), ..linear };
+        let watched = watched(&linear, Some(&channels), None)?;
+        let names = trials.iter().map(|trial| trial.name.as_str());
+        let columns: Vec<&str> = signals.iter().map(String::as_str).collect();
+        let provenance = Provenance::new(&options.date, names)
+            .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)));
+        Ok(Renewed {
+            calibration: linear.record(&watched, Some(&channels), provenance)?,
+            summary: self.summary(&normal.mean, &after.mean, &rows, &values, (distance, variance)),
+            notes,
+        })
+    }
+
+    /// The coefficients before the renewal, and the steps of the path that were seen.
+    fn before(&self, options: &RenewOptions) -> Result<(Normal, usize), SleeveError> {
+        let (normal, known) = self.of(&options.path);
+        let Some(calibration) = &options.calibration else { return Ok((normal, known)) };
+        let linear = self.linear(&normal.mean, self.gram.clone(), self.noise);
+        let weights = linear.weights_of(calibration).ok_or_else(|| SleeveError::Prior {
+            file: "the calibration".into(),
+            problem: "it was not made of this prior: make it with stretch calibrate --prior, or name the wearer with \
+                      --of in its place"
+                .into(),
+        })?;
+        // both sessions differ from their wearer, as sessions do
+        let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);
+        Ok((Normal { mean: DVector::from_vec(weights), covariance }, known))
+    }
+
+    /// The mean rows at the landmarks that some coefficients find.
+    fn rows(&self, bank: &Bank, channels: &Channels, weights: &DVector<f64>) -> Rows {
+        let mut row = rows_of(bank, channels);
+        let levels: HashMap<Place, f64> =
+            warmed_up(channels).iter().map(|place| (*place, row(place).dot(weights))).collect();
+        let sets = landmarks(channels, |place| levels.get(place).copied().unwrap_or(0.0));
+        sets.map(|set| {
+            let sum = set.iter().map(&mut row).fold(DVector::zeros(weights.len()), |a, b| a + b);
+            sum / f64::max(set.len() as f64, 1.0)
+        })
+    }
+
+    /// Refuses a session that is shorter than a movement, or has none.
+    fn refuse_standing(
+        &self,
+        bank: &Bank,
+        channels: &Channels,
+        normal: &Normal,
+        values: &[Landmark],
+    ) -> Result<(), SleeveError> {
+        let mut row = rows_of(bank, channels);
+        let levels: Vec<f64> =
+            warmed_up(channels).iter().map(|place| row(place).dot(&normal.mean)).collect();
+        let ends = extent(levels.iter().copied());
+        let span = ends.max - ends.min;
+        let usual = values[1].mean - values[0].mean;
+        let passes = passes(levels.iter().copied());
+        if span >= super::update::MOVEMENT * usual && passes >= LEAST_PASSES {
+            return Ok(());
+        }
+        let unit = self.unit_of_target();
+        Err(SleeveError::Prior {
+            file: "these data".into(),
+            problem: format!(
+                "they hold no whole movement: {:.3} {} from end to end, where earlier sessions had {:.3}, and {passes} ways between the ends; \
+                 move over the whole range, at least once up and down, or give some seconds of reference (stretch calibrate --prior)",
+                span * unit,
+                unit_of(&self.reference),
+                usual * unit
+            ),
+        })
+    }
+
+    fn refuse_unseen(&self, distance: f64, options: &RenewOptions) -> Result<(), SleeveError> {
+        if distance <= UNSEEN {
+            return Ok(());
+        }
+        let of = match options.path.is_empty() {
+            true => String::new(),
+            false => format!(" of {}", options.path.join("/")),
+        };
+        Err(SleeveError::Prior {
+            file: "these data".into(),
+            problem: format!(
+                "the ends and rests of their signals are further from those of the sessions{of} than one session in a thousand is (squared \
+                 distance {distance:.1}, at most {UNSEEN}): another movement, sensor or polarity; give ten seconds of reference or more \
+                 (stretch calibrate --prior)"
+            ),
+        })
+    }
+
+    fn summary(
+        &self,
+        before: &DVector<f64>,
+        after: &DVector<f64>,
+        rows: &Rows,
+        values: &[Landmark],
+        (distance, variance): (f64, f64),
+    ) -> RenewSummary {
+        let unit = self.unit_of_target();
+        let reference = |t: f64| self.target.to_reference(self.target_range.denormalise(t));
+        let one = |((row, value), name): ((&DVector<f64>, &Landmark), &str)| Assumed {
+            landmark: name.to_owned(),
+            reference: reference(value.mean),
+            sd: value.sd * unit,
+            sessions: value.sessions,
+            before: reference(row.dot(before)),
+            after: reference(row.dot(after)),
+        };
+        let assumed: Vec<Assumed> = rows.iter().zip(values).zip(NAMES).map(one).collect();
+        let middle = |of: fn(&Assumed) -> f64| 0.5 * (of(&assumed[0]) + of(&assumed[1]));
+        let span = |of: fn(&Assumed) -> f64| of(&assumed[1]) - of(&assumed[0]);
+        RenewSummary {
+            distance,
+            shift: middle(|a| a.after) - middle(|a| a.before),
+            scale: span(|a| a.after) / span(|a| a.before),
+            expected_rmse: variance.sqrt() * unit,
+            assumed,
+        }
+    }
+}
+
+/// The row of the bank at any sample.
+fn rows_of<'a>(bank: &'a Bank, channels: &'a Channels) -> impl FnMut(&Place) -> DVector<f64> + 'a {
+    let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
+    move |&(i, k)| {
+        bank.fill(channels.stretches[i].at(k), &mut row, &mut scratch);
+        DVector::from_column_slice(&row)
+    }
+}
+
+/// The coefficients after the landmarks, and the squared distance of these from what was expected.
+fn moved(normal: &Normal, rows: &Rows, values: &[Landmark], noise: f64) -> Option<(Normal, f64)> {
+    let x = DMatrix::from_fn(LANDMARKS, normal.mean.len(), |i, j| rows[i][j]);
+    let off = DVector::from_fn(LANDMARKS, |i, _| values[i].mean) - &x * &normal.mean;
+    let own = DMatrix::from_fn(LANDMARKS, LANDMARKS, |i, j| {
+        if i == j { values[i].sd.powi(2) + noise } else { 0.0 }
+    });
+    let cross = &normal.covariance * x.transpose();
+    let precision = inverse(&(&x * &cross + own))?;
+    let distance = off.dot(&(&precision * &off));
+    let gain = &cross * precision;
+    let mean = &normal.mean + &gain * off;
+    let covariance = symmetric(&normal.covariance - &gain * cross.transpose());
+    Some((Normal { mean, covariance }, distance))
+}

@@ -1,0 +1,268 @@
+//! Priors of simulated sleeves, whose wearers differ in gain and zero.
+
+use stretch_calibrate::{Options, apply, calibrate};
+use stretch_data::{Channel, Trial};
+
+use crate::{
+    ArrayOptions, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration, Turns,
+    UpdateOptions, apply_array, apply_gauge, calibrate_array, calibrate_gauge,
+};
+
+const HZ: f64 = 50.0;
+
+/// A session of one wearer: two gauges with gain, zero and a memory of 0.3 s, one angle.
+fn session(wearer: usize, number: usize, seconds: f64) -> Trial {
+    let gain = 1.0 + 0.2 * (wearer as f64 * 2.3).sin() + 0.02 * number as f64;
+    let zero = 0.1 * (wearer as f64 * 1.7).cos() + 0.01 * number as f64;
+    let count = (seconds * HZ) as usize;
+    let time_s: Vec<f64> = (0..count).map(|n| n as f64 / HZ).collect();
+    let phase = (3 * wearer + number) as f64;
+    let angle = |t: f64| 45.0 + 30.0 * (1.3 * t + phase).sin() + 10.0 * (0.37 * t * t.sqrt()).sin();
+    let mut slow = angle(0.0);
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    for (n, &t) in time_s.iter().enumerate() {
+        slow += (angle(t) - slow) / (0.3 * HZ);
+        let noise = 2e-3 * ((n * n % 977) as f64).sin();
+        first.push(gain * (angle(t) + 0.2 * (angle(t) - slow)) / 90.0 + zero + noise);
+        second.push(1.5 * gain * angle(t) / 90.0 - zero + 2.0 * noise);
+    }
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let angles = time_s.iter().map(|&t| angle(t)).collect();
+    Trial {
+        name: format!("w{wearer}_{number}"),
+        channels: vec![channel("s1", first), channel("s2", second), channel("angle_deg", angles)],
+        time_s,
+    }
+}
+
+fn summed(wearer: usize, number: usize, signals: &[&str]) -> Session {
+    let trial = session(wearer, number, 90.0);
+    let options = SessionOptions::new(signals.to_vec(), "angle_deg").of(&format!("w{wearer}"));
+    Session::new(&trial.name, std::slice::from_ref(&trial), &options).unwrap().0
+}
+
+fn prior(signals: &[&str]) -> Prior {
+    let sessions: Vec<Session> = (0..5)
+        .flat_map(|wearer| (0..3).map(move |number| (wearer, number)))
+        .map(|(wearer, number)| summed(wearer, number, signals))
+        .collect();
+    Prior::learn(&sessions).unwrap()
+}
+
+fn rmse(calibration: &SleeveCalibration, trial: &Trial) -> f64 {
+    let estimates: Vec<Option<f64>> = match calibration {
+        SleeveCalibration::One(one) => {
+            let readings = apply(one.calibration(), trial).unwrap().readings;
+            readings.iter().map(|r| r.ok().map(|r| r.estimate)).collect()
+        }
+        SleeveCalibration::Many(many) => {
+            let readings = apply_array(many, trial).unwrap().readings;
+            readings.iter().map(|r| r.ok().map(|r| r.estimate)).collect()
+        }
+    };
+    let truth = trial.require("angle_deg").unwrap();
+    let errors = estimates.iter().zip(truth).filter_map(|(e, t)| Some(((*e)? - t).powi(2)));
+    let errors: Vec<f64> = errors.collect();
+    (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[test]
+fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
+    let prior = prior(&["s1"]);
+    let test = session(9, 0, 60.0);
+    let of = |seconds: f64, wearer: usize, path: &str, test: &Trial| {
+        let short = session(wearer, 0, seconds.max(1.0));
+        let trials = if seconds > 0.0 { vec![short] } else { Vec::new() };
+        let updated = prior.update(&trials, &UpdateOptions::of(path)).unwrap();
+        (rmse(&updated.calibration, test), updated.summary)
+    };
+    let (alone, wide) = of(0.0, 9, "", &test);
+    let (updated, narrow) = of(10.0, 9, "", &test);
+    assert!(updated < 0.3 * alone, "{updated} of {alone}");
+    assert!(narrow.half_width_95 < 0.5 * wide.half_width_95);
+    // a wearer far from the mean, in a session that the prior has not seen
+    let again = session(2, 3, 60.0);
+    let (seen, told) = of(0.0, 2, "w2", &again);
+    let (new, _) = of(0.0, 2, "", &again);
+    assert!(seen < 0.5 * new && told.known == 1, "{seen} beside {new}");
+}
+
+/// A prior's calibration holds the levels of its own seconds, as any calibration does, and so
+/// detects a gauge that was put on again. Without seconds there are none.
+#[test]
+fn levels_are_those_of_the_seconds_of_reference() {
+    let prior = prior(&["s1"]);
+    let turns = |trials: &[Trial]| {
+        let updated = prior.update(trials, &UpdateOptions::default()).unwrap();
+        let SleeveCalibration::One(one) = updated.calibration else { panic!("one gauge") };
+        one
+    };
+    assert_eq!(turns(&[]).turns(), None);
+    for seconds in [60.0, 90.0, 120.0] {
+        let trials = [session(9, 0, seconds)];
+        let (signal, reference) = ("s1".into(), "angle_deg".into());
+        let options = Options { signal, reference, ..Options::default() };
+        let usual = calibrate(&trials, &options).unwrap().calibration;
+        let usual = calibrate_gauge(usual, &trials, &options).unwrap();
+        let usual = *usual.turns().unwrap();
+        let own = turns(&trials);
+        let (held, slope) = (*own.turns().unwrap(), usual.reference_per_signal);
+        assert_eq!(Turns { reference_per_signal: slope, ..held }, usual);
+        assert!((held.reference_per_signal / slope - 1.0).abs() < 0.2, "{held:?}, {slope}");
+        let renewed = prior.renew(&trials, &RenewOptions::default()).unwrap().calibration;
+        let SleeveCalibration::One(renewed) = renewed else { panic!("one gauge") };
+        let renewed = *renewed.turns().unwrap();
+        assert_eq!(Turns { reference_per_signal: slope, ..renewed }, usual);
+        let tells = |off: f64| {
+            let mut again = session(9, 0, 60.0);
+            again.channels[0].values.iter_mut().for_each(|x| *x += off);
+            apply_gauge(&own, &again, false).unwrap().zeros.iter().any(|(_, zero)| zero.has_shifted)
+        };
+        assert!(tells(2.0 * held.limit) && tells(-2.0 * held.limit) && !tells(0.0));
+    }
+}
+
+#[test]
+fn a_prior_and_a_session_are_what_they_were_after_writing_and_reading() {
+    let folder = tempfile::tempdir().unwrap();
+    let (own, path) = (prior(&["s1"]), folder.path().join("prior.json"));
+    let text = own.to_json().unwrap();
+    std::fs::write(&path, &text).unwrap();
+    let read = Prior::read(&path).unwrap();
+    let trials = [session(9, 0, 10.0)];
+    let update = |p: &Prior| p.update(&trials, &UpdateOptions::default()).unwrap().calibration;
+    assert_eq!(update(&own), update(&read));
+    std::fs::write(&path, text.replacen("\"noise\":", "\"noise\":1", 1)).unwrap();
+    let error = Prior::read(&path).unwrap_err().to_string();
+    assert!(error.contains("stretch sleeve learn") && error.contains("damaged"), "{error}");
+    let session = summed(0, 0, &["s1"]);
+    std::fs::write(&path, session.to_json().unwrap()).unwrap();
+    assert_eq!(Session::read(&path).unwrap(), session);
+}
+
+#[test]
+fn data_of_another_kind_are_refused_with_what_to_do() {
+    let prior = prior(&["s1"]);
+    let refused = |change: &dyn Fn(&mut Trial), options: UpdateOptions, says: &str| {
+        let mut trial = session(9, 0, 20.0);
+        change(&mut trial);
+        let error = prior.update(&[trial], &options).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    };
+    let usual = UpdateOptions::default;
+    let scaled = |k: usize, by: f64| {
+        move |t: &mut Trial| t.channels[k].values.iter_mut().for_each(|x| *x *= by)
+    };
+    refused(&scaled(0, 1000.0), usual(), "another unit");
+    refused(&scaled(2, 1000.0), usual(), "another unit");
+    let turned = |t: &mut Trial| t.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
+    refused(&turned, usual(), "swap the wires");
+    let slower = |t: &mut Trial| t.time_s.iter_mut().for_each(|t| *t *= 2.0);
+    refused(&slower, usual(), "--grid 50");
+    let two = UpdateOptions { signals: vec!["s1".into(), "s2".into()], ..usual() };
+    refused(&|_| {}, two, "1 channels (s1), and 2 were named");
+    let radian = UpdateOptions { reference: "angle_rad".into(), ..usual() };
+    refused(&|_| {}, radian, "stretch convert");
+    let few = Prior::learn(&[summed(0, 0, &["s1"])]).unwrap_err().to_string();
+    assert!(few.contains("at least 3"), "{few}");
+}
+
+#[test]
+fn a_reference_that_ends_early_and_one_that_hardly_moves_are_told() {
+    let prior = prior(&["s1"]);
+    let mut early = session(9, 0, 20.0);
+    early.channels[2].values[600..].iter_mut().for_each(|x| *x = f64::NAN);
+    let updated = prior.update(&[early], &UpdateOptions::default()).unwrap();
+    assert!(updated.notes.iter().any(|n| n.contains("ends at 11.98 s")), "{:?}", updated.notes);
+    assert_eq!(updated.summary.seconds, 12.0);
+    let still = session(9, 0, 0.4);
+    let updated = prior.update(&[still], &UpdateOptions::default()).unwrap();
+    assert!(updated.notes.iter().any(|n| n.contains("move over the whole range")));
+}
+
+#[test]
+fn channels_together_err_less_than_the_best_and_a_lost_one_is_bearable() {
+    let trials: Vec<Trial> = (0..3).map(|number| session(2, number, 60.0)).collect();
+    let options = ArrayOptions {
+        signals: vec!["s1".into(), "s2".into()],
+        reference: "angle_deg".into(),
+        ..ArrayOptions::default()
+    };
+    let fit = calibrate_array(&trials, &options).unwrap();
+    let best = fit.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
+    assert!(fit.rmse < 0.8 * best, "{} beside {best}", fit.rmse);
+    let mut lost = session(2, 1, 30.0);
+    let whole = rmse(&fit.calibration, &lost);
+    lost.channels[0].values.iter_mut().skip(500).for_each(|x| *x = f64::NAN);
+    let without = rmse(&fit.calibration, &lost);
+    let second = ArrayOptions { signals: vec!["s2".into()], ..options.clone() };
+    let alone = calibrate_array(&trials, &second).unwrap();
+    assert!(whole < without && without < 1.1 * rmse(&alone.calibration, &lost).max(whole));
+    let copied = {
+        let mut trial = trials[0].clone();
+        trial.channels[1].values = trial.channels[0].values.iter().map(|x| 2.0 * x).collect();
+        trial
+    };
+    let error = calibrate_array(&[copied], &options).unwrap_err().to_string();
+    assert!(error.contains("s1 and s2 are copies"), "{error}");
+}
+
+#[test]
+fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is_refused() {
+    let prior = prior(&["s1", "s2"]);
+    let without = |mut trial: Trial| {
+        trial.channels.truncate(2);
+        trial
+    };
+    let test = session(9, 0, 60.0);
+    let alone = prior.update(&[], &UpdateOptions::default()).unwrap().calibration;
+    let renewed = prior.renew(&[without(test.clone())], &RenewOptions::default()).unwrap();
+    let (before, after) = (rmse(&alone, &test), rmse(&renewed.calibration, &test));
+    assert!(after < 0.5 * before, "{after} beside {before}");
+    assert!(renewed.summary.assumed.len() == 3 && renewed.summary.distance < 16.0);
+    // from yesterday's calibration of the same wearer
+    let day = |number: usize| session(2, number, 30.0);
+    let yesterday = prior.update(&[day(0)], &UpdateOptions::of("w2")).unwrap().calibration;
+    let today = session(2, 3, 60.0);
+    let options = RenewOptions { calibration: Some(yesterday.clone()), ..RenewOptions::of("w2") };
+    let renewed = prior.renew(&[without(today.clone())], &options).unwrap();
+    let (before, after) = (rmse(&yesterday, &today), rmse(&renewed.calibration, &today));
+    assert!(after < 0.7 * before, "{after} beside {before}");
+    let refused = |trial: Trial, options: RenewOptions, says: &str| {
+        let error = prior.renew(&[without(trial)], &options).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    };
+    refused(session(9, 0, 1.0), RenewOptions::default(), "no whole movement");
+    refused(session(2, 9, 60.0), options, "one session in a thousand");
+    let fit = calibrate_array(
+        &[day(0), day(1), day(2)],
+        &ArrayOptions {
+            signals: vec!["s1".into(), "s2".into()],
+            reference: "angle_deg".into(),
+            ..ArrayOptions::default()
+        },
+    );
+    let foreign =
+        RenewOptions { calibration: Some(fit.unwrap().calibration), ..RenewOptions::of("w2") };
+    refused(today, foreign, "not made of this prior");
+}
+
+#[test]
+fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
+    let refused = |change: &dyn Fn(&mut Session), says: &str| {
+        let mut sessions: Vec<Session> = (0..3).map(|n| summed(1, n, &["s1"])).collect();
+        change(&mut sessions[2]);
+        let error = Prior::learn(&sessions).unwrap_err().to_string();
+        assert!(error.contains("w1_2") && error.contains(says), "{error}");
+    };
+    refused(&|s| *s = summed(1, 2, &["s1", "s2"]), "2 channels (s1 and s2)");
+    refused(&|s| s.reference = "angle_rad".into(), "stretch convert");
+    refused(&|s| s.sample_rate_hz = 100.0, "--grid 50");
+    let turned = |s: &mut Session| {
+        let mut trial = session(1, 2, 90.0);
+        trial.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
+        let options = SessionOptions::new(["s1"], "angle_deg").of("w1");
+        *s = Session::new("w1_2", &[trial], &options).unwrap().0;
+    };
+    refused(&turned, "swap the wires");
+}

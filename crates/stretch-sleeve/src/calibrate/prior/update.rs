@@ -1,0 +1,344 @@
+//! Makes a calibration from a prior and some seconds of reference.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use stretch_calibrate::{
+    CalibrateError,
+    toolkit::{RowAccumulator, extent},
+};
+use stretch_core::Provenance;
+use stretch_data::{Trial, unit_of};
+
+use crate::{
+    SleeveCalibration, SleeveError,
+    calibrate::{
+        array::{Still, watched},
+        bank::Bank,
+        channels::{Channels, correlation},
+        linear::Linear,
+        matrices::{cholesky, term_correlation},
+    },
+};
+
+use super::{
+    expected::{ErrorSpread, Expected, mixed_gram},
+    learnt::{Prior, correlated, paths_in_words, turned},
+    tree::Normal,
+};
+
+/// Share of the prior's range of the reference that a movement covers.
+pub(crate) const MOVEMENT: f64 = 0.2;
+
+/// Options of [`Prior::update`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct UpdateOptions {
+    /// Sensor, wearer and so on, about whom the prior may know more than about others; empty: a new
+    /// one.
+    pub path: Vec<String>,
+    /// Columns of the signals, in the prior's order; empty: those of the prior.
+    pub signals: Vec<String>,
+    /// Column of the reference; empty: that of the prior.
+    pub reference: String,
+    /// Date of the calibration, as free text for the record.
+    pub date: String,
+}
+
+impl UpdateOptions {
+    /// Options for a session of a path such as `left/anna`.
+    pub fn of(path: &str) -> Self {
+        Self { path: super::session::parse_path(path), ..Self::default() }
+    }
+}
+
+/// A calibration made from a prior and some reference.
+#[derive(Debug, Clone)]
+pub struct Updated {
+    /// The calibration.
+    pub calibration: SleeveCalibration,
+    /// Its expected errors.
+    pub summary: UpdateSummary,
+    /// Notes: what the data lack, what was seen of the path.
+    pub notes: Vec<String>,
+}
+
+/// Expected errors of an updated calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UpdateSummary {
+    /// Seconds of reference that were used.
+    pub seconds: f64,
+    /// Steps of the path that the prior had seen.
+    pub known: usize,
+    /// Expected root mean square error, in the reference's unit: the model's prediction, widened by
+    /// its errors on left-out sessions.
+    pub expected_rmse: f64,
+    /// Half of the interval that held 95 % of single estimates on left-out sessions, in the
+    /// reference's unit.
+    pub half_width_95: f64,
+}
+
+impl Prior {
+    /// Adds a reference of ten seconds to a minute to the prior, by Bayesian least squares. Without
+    /// trials the result is the prior.
+    ///
+    /// The prior `N(m, S)` of the coefficients becomes the rows `s L^-1` with values `s L^-1 m`,
+    /// above the rows of the data, where `S = L L'` and `s^2` is the variance of a sample. All rows
+    /// are folded into one triangle `R` by Householder reflections. The posterior is `N(R^-1 q, s^2
+    /// (R'R)^-1)`. A sample has weight 1/`n`, where `n` is the number of samples within which
+    /// errors are correlated.
+    ///
+    /// # Errors
+    /// [`SleeveError::Prior`] if the data have other channels, another unit, rate or polarity than
+    /// the prior, with what to do.
+    pub fn update(
+        &self,
+        trials: &[Trial],
+        options: &UpdateOptions,
+    ) -> Result<Updated, SleeveError> {
+        let signals = if options.signals.is_empty() { &self.signals } else { &options.signals };
+        let reference =
+            if options.reference.is_empty() { &self.reference } else { &options.reference };
+        self.refuse_columns(signals, reference)?;
+        let mut notes = Vec::new();
+        let channels = match trials {
+            [] => None,
+            trials => Some(Channels::new(trials, signals, reference)?),
+        };
+        if let Some(channels) = &channels {
+            notes.extend(channels.notes.iter().cloned());
+            self.refuse(channels)?;
+            notes.extend(self.too_little(channels));
+        }
+        let (normal, known) = self.of(&options.path);
+        notes.extend(self.whom(&options.path, known));
+        let bank = Bank::new(self.domains.clone());
+        let (posterior, gram) = self.posterior(&bank, &normal, channels.as_ref())?;
+        let seconds = channels
+            .as_ref()
+            .map_or(0.0, |channels| channels.reference().count() as f64 / self.sample_rate_hz);
+        let predicted = posterior.covariance.component_mul(&gram).sum() + self.noise;
+        let spread = self.spread(seconds, known > 0);
+        let variance = predicted * spread.widening;
+        let unit = self.unit_of_target();
+        let expected_rmse = variance.sqrt() * unit;
+        let names = trials.iter().map(|trial| trial.name.as_str());
+        let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();
+        columns.push(reference);
+        let provenance = Provenance::new(&options.date, names)
+            .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)));
+        let linear = Linear {
+            signals: signals.clone(),
+            reference: reference.clone(),
+            samples: channels.as_ref().map_or(0, |c| c.reference().count() as u64),
+            still: channels.iter().fold(self.still.clone(), |all, own| all.and(&Still::of(own))),
+            ..self.linear(&posterior.mean, gram, variance)
+        };
+        let watched = watched(&linear, channels.as_ref(), None)?;
+        Ok(Updated {
+            calibration: linear.record(&watched, channels.as_ref(), provenance)?,
+            summary: UpdateSummary {
+                seconds,
+                known,
+                expected_rmse,
+                half_width_95: spread.multiple_95 * predicted.sqrt() * unit,
+            },
+            notes,
+        })
+    }
+
+    /// The model of some coefficients.
+    pub(crate) fn linear(
+        &self,
+        weights: &DVector<f64>,
+        gram: DMatrix<f64>,
+        variance: f64,
+    ) -> Linear {
+        Linear {
+            signals: self.signals.clone(),
+            reference: self.reference.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            target: self.target,
+            target_range: self.target_range,
+            estimate: self.estimate,
+            domains: self.domains.clone(),
+            weights: weights.iter().copied().collect(),
+            gram,
+            variance,
+            still: self.still.clone(),
+            samples: 0,
+        }
+    }
+
+    /// The posterior of the coefficients, and the mean of `X'X` over a sample, of the prior's and the data.
+    fn posterior(
+        &self,
+        bank: &Bank,
+        normal: &Normal,
+        channels: Option<&Channels>,
+    ) -> Result<(Normal, DMatrix<f64>), SleeveError> {
+        let Some(channels) = channels else { return Ok((normal.clone(), self.gram.clone())) };
+        let undetermined = || CalibrateError::Undetermined { model: "prior".into() };
+        let terms = bank.terms();
+        let lower = cholesky(&normal.covariance).ok_or_else(undetermined)?.l();
+        let above = lower.clone().try_inverse().ok_or_else(undetermined)? * self.noise.sqrt();
+        let values: DVector<f64> = &above * &normal.mean;
+        let mut sums = RowAccumulator::new(terms);
+        for (row, value) in above.row_iter().zip(values.iter()) {
+            sums.push(&row.iter().copied().collect::<Vec<_>>(), *value);
+        }
+        let share = correlated(self.sample_rate_hz).sqrt().recip();
+        let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
+        let mut own = RowAccumulator::new(terms);
+        let mut count = 0.0;
+        for stretch in &channels.stretches {
+            for sample in stretch.warmed_up() {
+                bank.fill(stretch.at(sample), &mut row, &mut scratch);
+                let target = self.target.from_reference(stretch.reference[sample]);
+                let target = self.target_range.normalise(target);
+                own.push(&row, target);
+                row.iter_mut().for_each(|x| *x *= share);
+                sums.push(&row, share * target);
+                count += 1.0;
+            }
+        }
+        let solution = sums.factor().solve(|_, _| 0.0).ok_or_else(undetermined)?;
+        let inverse = solution.r.try_inverse().ok_or_else(undetermined)?;
+        let covariance = &inverse * inverse.transpose() * self.noise;
+        let mean = DVector::from_vec(solution.weights);
+        let triangle = own.factor().triangle;
+        let all = triangle.tr_mul(&triangle);
+        let own = all.view((0, 0), (terms, terms)) / f64::max(count, 1.0);
+        let mixed = mixed_gram(&self.gram, &own, count / self.sample_rate_hz);
+        Ok((Normal { mean, covariance }, mixed))
+    }
+
+    /// Spread of errors on left-out sessions after so many seconds.
+    pub(crate) fn spread(&self, seconds: f64, known: bool) -> ErrorSpread {
+        let of = |e: &Expected| if known { e.spread_known } else { e.spread_new };
+        // half a minute whose samples were counted at a measured rate is half a minute
+        let reached = self.expected.iter().rev().find(|e| e.seconds <= 1.01 * seconds);
+        reached.or(self.expected.first()).map_or(ErrorSpread::NORMAL, of)
+    }
+
+    pub(crate) fn refuse_columns(
+        &self,
+        signals: &[String],
+        reference: &str,
+    ) -> Result<(), SleeveError> {
+        let problem =
+            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
+        if signals.len() != self.signals.len() {
+            return problem(format!(
+                "it is of {} channels ({}), and {} were named: name as many with --signals, in its order, or learn a prior of these",
+                self.signals.len(),
+                self.signals.join(","),
+                signals.len()
+            ));
+        }
+        if unit_of(reference) != unit_of(&self.reference) {
+            return problem(format!(
+                "its reference is {} and that of these data is {reference}: convert the data (stretch convert), so that both are in one unit",
+                self.reference
+            ));
+        }
+        Ok(())
+    }
+
+    /// Refuses data of another rate, unit or polarity.
+    fn refuse(&self, channels: &Channels) -> Result<(), SleeveError> {
+        self.refuse_signals(channels)?;
+        let range = extent(
+            channels
+                .reference()
+                .map(|x| self.target_range.normalise(self.target.from_reference(x))),
+        );
+        if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
+            return Err(SleeveError::Prior {
+                file: "the prior".into(),
+                problem: format!(
+                    "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
+                    self.reference
+                ),
+            });
+        }
+        self.refuse_polarity(channels)
+    }
+
+    /// Refuses signals of another rate or unit.
+    pub(crate) fn refuse_signals(&self, channels: &Channels) -> Result<(), SleeveError> {
+        let problem =
+            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
+        let hz = channels.sample_rate.hz();
+        if (hz / self.sample_rate_hz - 1.0).abs() > 0.05 {
+            return problem(format!(
+                "it is of {:.4} samples a second and the data have {hz:.4}: bring them onto its rate (stretch convert --grid {})",
+                self.sample_rate_hz, self.sample_rate_hz
+            ));
+        }
+        for (k, name) in self.signals.iter().enumerate() {
+            let domain = self.domains[k][0];
+            let reach = domain.max - domain.min;
+            let far = |x: f64| x < domain.min - 2.0 * reach || x > domain.max + 2.0 * reach;
+            let (all, outside) = channels
+                .signal(k)
+                .fold((0usize, 0usize), |(n, far_off), x| (n + 1, far_off + usize::from(far(x))));
+            if 2 * outside > all {
+                return problem(format!(
+                    "{name} ran from {:.4} to {:.4} in its sessions, and most of these samples lie far outside: is the signal in another unit, or another gauge?",
+                    domain.min, domain.max
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses data in which most channels that clearly follow the reference follow it in the
+    /// opposite direction.
+    fn refuse_polarity(&self, channels: &Channels) -> Result<(), SleeveError> {
+        let mean = &self.known[0].1.mean;
+        let sign = self.target.reference_per_target().signum();
+        let pair = |k: usize| {
+            let prior = sign * term_correlation(&self.gram, mean, 1 + k * Bank::terms_a_channel());
+            (correlation(channels.signal(k), channels.reference()), prior)
+        };
+        if let Some(opposite) = turned((0..self.signals.len()).map(pair)) {
+            return Err(SleeveError::Prior {
+                file: "the prior".into(),
+                problem: format!(
+                    "{opposite} of {} channels fall where they rose in its sessions: swap the wires of the bridge, or turn the signal's sign",
+                    self.signals.len()
+                ),
+            });
+        }
+        Ok(())
+    }
+
+    /// A note if the reference hardly moves.
+    fn too_little(&self, channels: &Channels) -> Option<String> {
+        let moved = extent(channels.reference());
+        let all = self.unit_of_target();
+        let share = (moved.max - moved.min) / all;
+        (share < MOVEMENT).then(|| {
+            format!(
+                "the reference moved over {:.3} of the {all:.3} that the prior has seen: what follows is mostly the prior; move over the whole range, at least once up and down",
+                moved.max - moved.min
+            )
+        })
+    }
+
+    /// A note on the prior's knowledge of a path.
+    pub(crate) fn whom(&self, path: &[String], known: usize) -> Option<String> {
+        if path.is_empty() || known == path.len() {
+            return None;
+        }
+        let seen = paths_in_words(self.paths().filter(|p| p.len() == 1).map(<[String]>::to_vec));
+        Some(match known {
+            0 => format!(
+                "the prior has not seen {}: its spread over all is used (seen: {seen})",
+                path.join("/")
+            ),
+            known => {
+                format!("the prior has seen {}, not {}", path[..known].join("/"), path.join("/"))
+            }
+        })
+    }
+}

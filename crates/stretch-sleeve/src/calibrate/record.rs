@@ -1,0 +1,283 @@
+//! Records of one gauge or of several as files: in JSON under a digest, in postcard for a board.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use stretch_calibrate::{
+    BoardReceptor, CalibrateError, calibration_from_edited_json, calibration_from_json,
+    calibration_seal, digest, is_postcard, read_calibration,
+};
+use stretch_core::{Calibration, CalibrationSpec, record};
+use stretch_data::files::{read_whole, write_whole};
+
+use crate::{ArrayCalibration, GaugeCalibration, MAX_CHANNELS, Turns};
+
+/// Capacity for the largest record of several gauges in postcard: for the loss of each of sixteen
+/// gauges, fifteen gains of each remaining one.
+const POSTCARD_BYTES: usize = 1 << 16;
+
+/// The end of the name of a record in postcard that holds more than a calibration.
+const SLEEVE_ENDING: &str = ".sleeve.postcard";
+
+/// A record: of one gauge, or of several.
+///
+/// In JSON the record of one gauge is that of its calibration plus the field `turns`, which readers
+/// of a calibration skip. In postcard it is the calibration alone, for a board that does not watch
+/// the zero, unless the name ends in `.sleeve.postcard`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SleeveCalibration {
+    /// Of one gauge.
+    One(Box<GaugeCalibration>),
+    /// Of several gauges.
+    Many(Box<ArrayCalibration<MAX_CHANNELS>>),
+}
+
+/// The record of one gauge in text.
+#[derive(Serialize)]
+struct InText<'a> {
+    #[serde(flatten)]
+    calibration: &'a CalibrationSpec,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turns: Option<&'a Turns>,
+}
+
+/// What a record in text holds in addition to a calibration.
+#[derive(Deserialize)]
+struct Beside {
+    #[serde(default)]
+    turns: Option<Turns>,
+}
+
+/// The record of several gauges in postcard, with its seal. A board of `N` channels loads it as an
+/// `ArrayCalibration<N>`, for any `N` that has room for its channels.
+///
+/// # Errors
+/// Never, because the buffer has room for the largest record.
+///
+/// ```
+/// use stretch_core::record;
+/// use stretch_sleeve::{ArrayCalibration, array_bytes, example_array};
+/// let bytes = array_bytes(&example_array())?;
+/// assert_eq!(record::load::<ArrayCalibration<4>>(&bytes)?.spec().channels.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn array_bytes<const N: usize>(
+    calibration: &ArrayCalibration<N>,
+) -> Result<Vec<u8>, CalibrateError> {
+    stored(calibration)
+}
+
+/// The number under which the record of several gauges is sealed: CRC-32C of [`array_bytes`].
+///
+/// # Errors
+/// Never, as [`array_bytes`].
+pub fn array_seal<const N: usize>(
+    calibration: &ArrayCalibration<N>,
+) -> Result<u32, CalibrateError> {
+    Ok(record::seal(&array_bytes(calibration)?)?.unwrap_or_default())
+}
+
+fn stored(value: &impl Serialize) -> Result<Vec<u8>, CalibrateError> {
+    let mut buffer = vec![0; POSTCARD_BYTES];
+    Ok(record::store(value, &mut buffer)?.to_vec())
+}
+
+fn is_sleeve_postcard(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(SLEEVE_ENDING))
+}
+
+impl GaugeCalibration {
+    /// Reads the record of one gauge: postcard if the name ends in `.postcard`, otherwise JSON.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Record`] with the file, the field and its fault.
+    pub fn read(path: &Path) -> Result<Self, CalibrateError> {
+        let bytes = read_whole(path).unwrap_or_default();
+        if is_postcard(path)
+            && let Ok(gauge) = record::load(&bytes)
+        {
+            return Ok(gauge);
+        }
+        match String::from_utf8(bytes) {
+            Ok(text) if !is_postcard(path) && !text.is_empty() => {
+                Self::from_json(&text, &path.display().to_string())
+            }
+            // a calibration alone; a file that is no record at all gets the error of the most
+            // common kind
+            _ => Ok(Self::new(read_calibration(path)?, None)?),
+        }
+    }
+
+    /// The record in a JSON text; messages refer to it as `name`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn from_json(text: &str, name: &str) -> Result<Self, CalibrateError> {
+        Self::with_turns_of(text, name, calibration_from_json(text, name)?)
+    }
+
+    /// A calibration and the turns in its text.
+    fn with_turns_of(
+        text: &str,
+        name: &str,
+        calibration: Calibration,
+    ) -> Result<Self, CalibrateError> {
+        let (object, _) = digest::split(text);
+        let mut json = serde_json::Deserializer::from_str(&object);
+        let beside: Result<Beside, _> = serde_path_to_error::deserialize(&mut json);
+        let Beside { turns } = beside.map_err(|error| unusable(name, error))?;
+        Self::new(calibration, turns).map_err(|error| unusable(name, error))
+    }
+
+    /// The record in JSON, sealed.
+    ///
+    /// # Errors
+    /// Never, because all of its numbers are finite.
+    pub fn to_json(&self) -> Result<String, CalibrateError> {
+        digest::seal(&InText { calibration: self.calibration().spec(), turns: self.turns() })
+    }
+
+    /// The record as the bytes of a file with that name: the calibration alone if it ends in
+    /// `.postcard`, everything if it ends in `.sleeve.postcard`, otherwise JSON.
+    ///
+    /// # Errors
+    /// Never, because buffers have room for the largest record and all numbers are finite.
+    pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, CalibrateError> {
+        match path {
+            path if is_sleeve_postcard(path) => stored(self),
+            path if is_postcard(path) => stored(self.calibration()),
+            _ => Ok(self.to_json()?.into_bytes()),
+        }
+    }
+
+    /// Writes the record, whole or not at all.
+    ///
+    /// # Errors
+    /// [`CalibrateError::File`] with path and cause.
+    pub fn write(&self, path: &Path) -> Result<(), CalibrateError> {
+        let bytes = self.bytes(path)?;
+        Ok(write_whole(path, |out| out.write_all(&bytes))?)
+    }
+}
+
+impl SleeveCalibration {
+    /// The record as the bytes of a file with that name: postcard if the name ends in `.postcard`,
+    /// otherwise JSON.
+    ///
+    /// # Errors
+    /// Never, as [`GaugeCalibration::bytes`].
+    pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, CalibrateError> {
+        match self {
+            Self::One(gauge) => gauge.bytes(path),
+            Self::Many(several) if is_postcard(path) => array_bytes(several),
+            Self::Many(several) => Ok(digest::seal(&**several)?.into_bytes()),
+        }
+    }
+
+    /// The number under which the record is sealed: CRC-32C of its bytes in postcard; for one gauge
+    /// those of its calibration.
+    ///
+    /// # Errors
+    /// Never, as [`bytes`](Self::bytes).
+    pub fn seal(&self) -> Result<u32, CalibrateError> {
+        match self {
+            Self::One(gauge) => calibration_seal(gauge.calibration()),
+            Self::Many(several) => array_seal(several),
+        }
+    }
+
+    /// Reads a record of one gauge, or of several.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Record`] with the file, the field and its fault.
+    pub fn read(path: &Path) -> Result<Self, CalibrateError> {
+        let one = || GaugeCalibration::read(path).map(|gauge| Self::One(Box::new(gauge)));
+        let bytes = read_whole(path).unwrap_or_default();
+        if is_postcard(path) {
+            let several = record::load(&bytes).map(|several| Self::Many(Box::new(several)));
+            // If it is neither, report the error of the most common kind of record.
+            return several.or_else(|_| one());
+        }
+        let text = String::from_utf8(bytes).unwrap_or_default();
+        let (object, found) = digest::split(&text);
+        let value: Option<serde_json::Value> = serde_json::from_str(&object).ok();
+        if value.is_none_or(|value| value.get("channels").is_none()) {
+            return one();
+        }
+        let file = path.display().to_string();
+        if found != Some(digest::digest(&object).as_str()) {
+            return Err(unusable(
+                &file,
+                "its digest is not that of its text, so it was edited or damaged; calibrate again",
+            ));
+        }
+        let mut json = serde_json::Deserializer::from_str(&object);
+        let several = serde_path_to_error::deserialize(&mut json);
+        Ok(Self::Many(Box::new(several.map_err(|error| unusable(&file, error))?)))
+    }
+}
+
+fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
+    let problem = format!("this is no calibration that can be used: {cause}");
+    CalibrateError::Record { file: file.to_owned(), problem }
+}
+
+/// Checks a record of one gauge that was edited by hand or has an earlier schema, and writes the
+/// record again under a seal of the current schema. A damaged record in postcard is refused,
+/// because postcard cannot be edited by hand.
+///
+/// # Errors
+/// The errors of [`GaugeCalibration::read`] except that of the digest, and those of writing.
+pub fn seal_record(path: &Path) -> Result<GaugeCalibration, CalibrateError> {
+    let text = read_whole(path).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+    let gauge = match text.filter(|_| !is_postcard(path)) {
+        Some(text) => {
+            let file = path.display().to_string();
+            let calibration = calibration_from_edited_json(&text, &file)?;
+            GaugeCalibration::with_turns_of(&text, &file, calibration)?
+        }
+        None => GaugeCalibration::read(path)?,
+    };
+    gauge.write(path)?;
+    Ok(gauge)
+}
+
+/// The kind and the seal of a record.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RecordSummary {
+    /// The model, or the type that reads the record on a board.
+    pub kind: String,
+    /// CRC-32C of the record's bytes in postcard.
+    pub seal: u32,
+    /// Whether the file itself carries a seal. Files of schema 1 carry no seal.
+    pub is_sealed: bool,
+}
+
+/// Describes the record of a file: a calibration, or a record that `--fixed` wrote for a board.
+///
+/// # Errors
+/// As [`SleeveCalibration::read`].
+pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
+    let bytes = read_whole(path).unwrap_or_default();
+    if let Some(receptor) = BoardReceptor::new(&bytes)
+        && let Ok(found) = record::seal(&bytes)
+    {
+        let kind = format!("a receptor over codes of {} bits", receptor.adc_bits());
+        let seal = found.unwrap_or_else(|| record::checksum(&bytes));
+        return Ok(RecordSummary { kind, seal, is_sealed: found.is_some() });
+    }
+    let calibration = SleeveCalibration::read(path)?;
+    let is_sealed = match is_postcard(path) {
+        true => matches!(record::seal(&bytes), Ok(Some(_))),
+        false => digest::split(&String::from_utf8_lossy(&bytes)).1.is_some(),
+    };
+    let kind = match &calibration {
+        SleeveCalibration::One(one) => {
+            format!("a calibration, {}", one.calibration().spec().model.name())
+        }
+        SleeveCalibration::Many(many) => {
+            format!("a calibration of {} gauges", many.spec().channels.len())
+        }
+    };
+    Ok(RecordSummary { kind, seal: calibration.seal()?, is_sealed })
+}

@@ -1,0 +1,124 @@
+//! Statistics of one channel of several, sample by sample.
+
+use stretch_core::Real;
+
+/// Number of ticks in the window of a [`Jump`].
+pub const JUMP_SAMPLES: u8 = 8;
+const HALF: usize = JUMP_SAMPLES as usize / 2;
+
+/// Samples between two ticks of a [`Jump`]: about 10 ms, and at least one sample.
+///
+/// ```
+/// use stretch_sleeve::samples_a_tick;
+/// assert_eq!((samples_a_tick(50.0), samples_a_tick(100.0), samples_a_tick(1000.0)), (1, 1, 10));
+/// ```
+pub fn samples_a_tick(sample_rate_hz: f64) -> u16 {
+    (sample_rate_hz / 100.0 + 0.5).clamp(1.0, f64::from(u16::MAX)) as u16
+}
+
+/// How often one value was repeated recently: a repetition adds one, another value subtracts one,
+/// and at zero a new value is taken (the majority vote of Boyer and Moore 1991).
+///
+/// A channel at the end of its converter leaves it for a sample now and then, so a count of
+/// consecutive repetitions would restart each time.
+///
+/// ```
+/// use stretch_sleeve::Repeats;
+/// let mut repeats = Repeats::new();
+/// let counts = [1.2, 5.0, 5.0, 4.9, 5.0, 5.0].map(|x| repeats.step(x, true));
+/// assert_eq!(counts, [1, 1, 2, 1, 2, 3]);
+/// // a repetition while nothing else changes says nothing
+/// assert_eq!(repeats.step(5.0, false), 3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeats<T> {
+    held: T,
+    count: u16,
+}
+
+impl<T: Real> Repeats<T> {
+    /// Nothing repeated yet.
+    pub fn new() -> Self {
+        Self { held: T::nan(), count: 0 }
+    }
+
+    /// Takes a sample; returns the count of its value, 1 for a new one. `others_change`: whether
+    /// any channel changed.
+    #[inline(always)]
+    pub fn step(&mut self, sample: T, others_change: bool) -> u16 {
+        if sample == self.held {
+            if others_change {
+                self.count = self.count.saturating_add(1);
+            }
+        } else if self.count > 1 {
+            self.count -= 1;
+        } else {
+            self.held = sample;
+            self.count = 1;
+        }
+        self.count
+    }
+}
+
+impl<T: Real> Default for Repeats<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Lasting jump of a signal: the distance between all of its last four values and all of the
+/// previous four, with its sign; zero if they overlap.
+///
+/// An outlier does not separate them, and a ramp only by its rise in one tick.
+///
+/// ```
+/// use stretch_sleeve::Jump;
+/// let mut jump = Jump::new();
+/// let last = |jump: &mut Jump<f64>, x: [f64; 8]| x.map(|x| jump.step(x))[7];
+/// assert_eq!(last(&mut jump, [0.0, 0.1, 0.0, 0.1, 1.0, 1.1, 1.0, 1.1]), 1.0 - 0.1);
+/// assert_eq!(last(&mut jump, [0.0, 0.1, 0.0, 0.1, 9.0, 0.1, 0.0, 0.1]), 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump<T> {
+    values: [T; JUMP_SAMPLES as usize],
+}
+
+impl<T: Real> Jump<T> {
+    /// Only zeros so far.
+    pub fn new() -> Self {
+        Self { values: [T::zero(); JUMP_SAMPLES as usize] }
+    }
+
+    /// Takes a value; returns the jump of the last values.
+    #[inline(always)]
+    pub fn step(&mut self, value: T) -> T {
+        for i in 1..self.values.len() {
+            self.values[i - 1] = self.values[i];
+        }
+        self.values[2 * HALF - 1] = value;
+        let ends = |values: &[T]| {
+            let (mut least, mut most) = (values[0], values[0]);
+            for value in values {
+                least = least.min(*value);
+                most = most.max(*value);
+            }
+            (least, most)
+        };
+        let (before, after) = self.values.split_at(HALF);
+        let ((least, most), (least_after, most_after)) = (ends(before), ends(after));
+        let (up, down) = (least_after - most, most_after - least);
+        if up > T::zero() {
+            up
+        } else if down < T::zero() {
+            down
+        } else {
+            T::zero()
+        }
+    }
+}
+
+impl<T: Real> Default for Jump<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

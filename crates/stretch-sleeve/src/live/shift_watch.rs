@@ -1,0 +1,176 @@
+//! Checks whether a gauge of several still agrees with the others.
+
+use stretch_core::{Design, Real};
+
+use crate::ArrayCalibration;
+
+use super::receptor::{ArrayMemory, ArrayReceptor};
+
+/// Values per second in a block's mean; movements of a body or a muscle are slower.
+const VALUES_A_SECOND: f64 = 10.0;
+
+/// Reports how far each gauge of several deviates from what the others predict, and whether that is
+/// more than usual.
+///
+/// A gauge that was put on again, or whose zero has drifted, gives another estimate than the
+/// others. Its difference is `d = alone - without`, the estimate of this gauge alone minus that of
+/// all others ([`ArrayReceptor::differences`]), taken ten times a second. A block's mean of `d`
+/// minus the usual mean is the deviation of the gauge, in the reference's unit. The gauge has
+/// shifted if this exceeds the limit of the record ([`ArrayShifts`](crate::ArrayShifts)), which
+/// states the rate of false alarms.
+///
+/// A gauge that deviates from the first sample of a block on is reported at the block's end, so
+/// that a report takes at most two blocks. The signals alone cannot show a zero shift that all
+/// gauges share, nor which of two gauges has shifted. Cost: ten times a second, the products of an
+/// estimate for each channel.
+///
+/// ```
+/// use stretch_core::{Design, Stage};
+/// use stretch_sleeve::{ArrayReceptor, ShiftWatch, example_array};
+/// let calibration = example_array();
+/// let receptor = ArrayReceptor::<f32, 2>::new(&calibration);
+/// let watch = ShiftWatch::<f32, 2>::new(&calibration).expect("the record says what is usual");
+/// let (mut memory, mut blocks) = (receptor.memory(), watch.memory());
+/// let mut last = None;
+/// for n in 0..1000 {
+///     // both follow 1.5 V; the first was put on again 0.2 V higher, which is 18 degrees
+///     let volts = 1.5 + 0.1 * ((n % 100) as f32 / 50.0 - 1.0);
+///     let _ = receptor.step(&mut memory, [volts + 0.2, volts]);
+///     last = watch.step(&mut blocks, &receptor, &memory).or(last);
+/// }
+/// let shifts = last.expect("two blocks of 5 s have ended");
+/// assert!(shifts.has_shifted(0) && (shifts.off[0] - 18.0).abs() < 1.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftWatch<T, const N: usize> {
+    /// Gauges.
+    pub channels: usize,
+    /// Samples between two values.
+    pub samples_a_value: u32,
+    /// Values of a block.
+    pub values_a_block: u32,
+    /// The usual mean of each gauge's difference.
+    pub usual: [T; N],
+    /// Largest deviation of a block's mean from it.
+    pub limits: [T; N],
+    /// One over the values of a block.
+    pub per_block: T,
+}
+
+/// Memory of a [`ShiftWatch`]: the sums of the current block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftMemory<T, const N: usize> {
+    sums: [T; N],
+    values: u32,
+    samples: u32,
+}
+
+/// Result of a block of time for every gauge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shifts<T, const N: usize> {
+    /// Deviation of each gauge from what the others predict, in the reference's unit. It is a lower
+    /// bound, because states outside of their domains are clamped.
+    pub off: [T; N],
+    /// One bit for each gauge that is off by more than its limit, the first gauge's the lowest.
+    pub shifted: u16,
+    /// The gauge with the largest ratio of deviation to limit. This needs at least three gauges.
+    pub most: Option<usize>,
+}
+
+impl<T, const N: usize> Shifts<T, N> {
+    /// Whether a gauge is off by more than its limit.
+    pub fn has_shifted(&self, channel: usize) -> bool {
+        channel < 16 && self.shifted & (1 << channel) != 0
+    }
+}
+
+/// Samples between two values of a block, and the number of values of a block, at a rate and for a
+/// block of so many seconds.
+///
+/// ```
+/// assert_eq!(stretch_sleeve::block_of(100.0, 5.0), (10, 50));
+/// assert_eq!(stretch_sleeve::block_of(4.0, 5.0), (1, 20));
+/// ```
+pub fn block_of(sample_rate_hz: f64, block_s: f64) -> (u32, u32) {
+    // the cast saturates
+    let whole = |x: f64| (x + 0.5).max(1.0) as u32;
+    let samples = whole(sample_rate_hz / VALUES_A_SECOND);
+    (samples, whole(block_s * sample_rate_hz / f64::from(samples)))
+}
+
+impl<T: Real, const N: usize> Design for ShiftWatch<T, N> {
+    type Memory = ShiftMemory<T, N>;
+
+    fn memory(&self) -> Self::Memory {
+        ShiftMemory { sums: [T::zero(); N], values: 0, samples: 0 }
+    }
+}
+
+impl<T: Real, const N: usize> ShiftWatch<T, N> {
+    /// The watch of a record; `None` for a record without the usual differences.
+    pub fn new(calibration: &ArrayCalibration<N>) -> Option<Self> {
+        let of = calibration.spec().shifts.as_ref()?;
+        let (samples_a_value, values_a_block) =
+            block_of(calibration.spec().sample_rate_hz.hz(), of.block_s);
+        let rounded = |list: &[f64]| {
+            let mut all = [T::zero(); N];
+            all.iter_mut().zip(list).for_each(|(place, &x)| *place = T::from_f64(x));
+            all
+        };
+        Some(Self {
+            channels: calibration.spec().channels.len(),
+            samples_a_value,
+            values_a_block,
+            usual: rounded(&of.usual),
+            limits: rounded(&of.limits),
+            per_block: T::from_f64(1.0 / f64::from(values_a_block)),
+        })
+    }
+
+    /// Call after each step of the receptor; returns a result at the end of a block. A block
+    /// restarts if a channel is lost or has no sample.
+    pub fn step(
+        &self,
+        memory: &mut ShiftMemory<T, N>,
+        receptor: &ArrayReceptor<T, N>,
+        of: &ArrayMemory<T, N>,
+    ) -> Option<Shifts<T, N>> {
+        memory.samples += 1;
+        if memory.samples < self.samples_a_value {
+            return None;
+        }
+        memory.samples = 0;
+        let Some(differences) = receptor.differences(of) else {
+            *memory = self.memory();
+            return None;
+        };
+        for (sum, d) in memory.sums.iter_mut().zip(differences) {
+            *sum = *sum + d;
+        }
+        memory.values += 1;
+        if memory.values < self.values_a_block {
+            return None;
+        }
+        let sums = memory.sums;
+        *memory = self.memory();
+        Some(self.judged(&sums))
+    }
+
+    fn judged(&self, sums: &[T; N]) -> Shifts<T, N> {
+        let mut shifts = Shifts { off: [T::zero(); N], shifted: 0, most: None };
+        let mut most = T::one();
+        for (k, sum) in sums.iter().enumerate().take(self.channels) {
+            let off = *sum * self.per_block - self.usual[k];
+            shifts.off[k] = off;
+            let times = off.abs() / self.limits[k];
+            if times > T::one() {
+                shifts.shifted |= 1 << k;
+            }
+            if times > most && self.channels > 2 {
+                most = times;
+                shifts.most = Some(k);
+            }
+        }
+        shifts
+    }
+}

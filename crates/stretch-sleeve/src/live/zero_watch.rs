@@ -1,0 +1,293 @@
+//! Checks whether the zero of a single gauge is still that of its calibration.
+
+use stretch_core::{Design, Polarity, Real};
+
+use crate::Turns;
+
+use super::is_usable;
+
+const LEVELS: usize = Turns::MEDIAN_OF;
+
+/// Finds where a signal turns: a movement is a fall and a rise of at least a span, and ends where the signal has fallen
+/// from its high end by that span again.
+///
+/// The signal is the median of the last three samples, so that a spike is no turn. Samples before
+/// the first high end are not a movement, because its beginning is unknown.
+///
+/// ```
+/// use stretch_sleeve::TurnFinder;
+/// let finder = TurnFinder::new(0.5);
+/// let mut memory = finder.memory();
+/// let wave = (0..60).map(|n| (n % 20 - 10) as f64 / 10.0).map(f64::abs);
+/// let turns: Vec<_> = wave.filter_map(|x| finder.step(&mut memory, x)).collect();
+/// // medians of three cut the tips off
+/// assert_eq!(turns, [(0.1, 0.9), (0.1, 0.9)]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnFinder<T> {
+    /// Smallest change back that counts as a turn.
+    pub least_span: T,
+}
+
+/// Memory of a [`TurnFinder`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnMemory<T> {
+    before: [T; 2],
+    samples: u8,
+    rises: bool,
+    extreme: T,
+    low: Option<T>,
+}
+
+impl<T: Real> TurnFinder<T> {
+    /// A finder of movements of at least a span.
+    pub fn new(least_span: T) -> Self {
+        Self { least_span }
+    }
+
+    /// Nothing seen yet.
+    pub fn memory(&self) -> TurnMemory<T> {
+        let zero = T::zero();
+        TurnMemory { before: [zero; 2], samples: 0, rises: true, extreme: zero, low: None }
+    }
+
+    /// Takes a finite sample; returns the low and the high end at the end of a movement.
+    pub fn step(&self, memory: &mut TurnMemory<T>, sample: T) -> Option<(T, T)> {
+        let [first, second] = memory.before;
+        memory.before = [second, sample];
+        if memory.samples < 2 {
+            memory.samples += 1;
+            return None;
+        }
+        let middle = first.min(second).max(first.max(second).min(sample));
+        if memory.samples == 2 {
+            memory.samples = 3;
+            memory.extreme = middle;
+        }
+        if memory.rises {
+            memory.extreme = memory.extreme.max(middle);
+            if middle < memory.extreme - self.least_span {
+                let high = memory.extreme;
+                memory.rises = false;
+                memory.extreme = middle;
+                return memory.low.map(|low| (low, high));
+            }
+        } else {
+            memory.extreme = memory.extreme.min(middle);
+            if middle > memory.extreme + self.least_span {
+                memory.low = Some(memory.extreme);
+                memory.rises = true;
+                memory.extreme = middle;
+            }
+        }
+        None
+    }
+}
+
+/// Reports how far the zero of a single gauge deviates from that of its calibration, by the levels
+/// at which its signal turns, and follows a slow change on request.
+///
+/// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). At the end of
+/// each movement `off` is reported: the median of the last five levels minus the level of the
+/// record. The zero has shifted if `off` exceeds the record's limit, or if the running mean of
+/// levels exceeds its separate limit; the record states the rate of false alarms. A shift beyond
+/// the first limit needs three movements, one beyond the second ten to thirty. The shift is
+/// reported until both values are within half of their limits.
+///
+/// A zero `z` that is followed is the state of a scalar Kalman filter at its steady gain `k`: `z +=
+/// k clip(y - level - z)`, with innovations clipped at two standard deviations of levels and `z`
+/// clipped at the limit. A shift is reported if `off - z` exceeds the limit, or if `z` is at the
+/// limit, because the calibration has not seen larger shifts. A zero that has shifted is not
+/// followed.
+///
+/// This assumes that movements return to the ends that they had in the calibration; a movement that
+/// does not looks like a shift. Without movements nothing is reported.
+///
+/// ```
+/// use stretch_core::{Design, Polarity};
+/// use stretch_sleeve::{Turns, ZeroWatch};
+/// // a gauge that rests at 1.24 V, 0.03 mm a millivolt
+/// let turns = Turns {
+///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03, mean_limit: 0.012,
+///     false_alarms_an_hour: 0.25, movements_an_hour: 1800.0, follow: 0.025, reference_per_signal: -30.0,
+/// };
+/// let watch = ZeroWatch::<f32>::new(Polarity::Rising, &turns);
+/// let mut memory = watch.memory();
+/// let mut last = None;
+/// for n in 0..2000 {
+///     // two seconds a movement; put on again 0.25 V higher
+///     let volts = 1.49 + 0.6 * ((n % 200) as f32 / 100.0 - 1.0).abs();
+///     last = watch.step(&mut memory, volts).or(last);
+/// }
+/// let zero = last.expect("five movements have ended");
+/// assert!(zero.has_shifted && (zero.off_reference + 7.5).abs() < 0.3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroWatch<T> {
+    /// Finds movements in the signal times `sign`.
+    pub finder: TurnFinder<T>,
+    /// -1 where the signal falls as the target rises.
+    pub sign: T,
+    /// Weights of the low and the high end in a level.
+    pub shares: [T; 2],
+    /// The level of the calibration, times `sign`.
+    pub level: T,
+    /// Largest deviation of the median of levels.
+    pub limit: T,
+    /// Largest deviation of the running mean of levels.
+    pub mean_limit: T,
+    /// Weight of the newest level in it.
+    pub mean_share: T,
+    /// Limit at which an innovation is clipped.
+    pub most: T,
+    /// The share of an innovation by which the zero moves; 0 if it is not followed.
+    pub follow: T,
+    /// Change of the estimate per change of the signal, times `sign`.
+    pub reference: T,
+}
+
+/// Memory of a [`ZeroWatch`]: the current movement, the last levels, and the followed zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroMemory<T> {
+    turns: TurnMemory<T>,
+    levels: [T; LEVELS],
+    ends: [u32; LEVELS],
+    held: u8,
+    samples: u32,
+    mean: T,
+    turned: u32,
+    followed: T,
+    since: Option<u32>,
+}
+
+/// Result of a movement for the zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Zero<T> {
+    /// Deviation of the zero from that of the calibration, in the signal's unit.
+    pub off: T,
+    /// The resulting deviation of the estimate, in the reference's unit, by the slope of the curve
+    /// at the turning points.
+    pub off_reference: T,
+    /// How far the zero is followed, in the signal's unit; 0 if it is not.
+    pub followed: T,
+    /// Whether the calibration no longer describes the signal.
+    pub has_shifted: bool,
+    /// Samples since the end of the first movement that was off, or since the running mean is on
+    /// that side; 0 if there is none.
+    pub since_samples: u32,
+}
+
+impl<T: Real> Design for ZeroWatch<T> {
+    type Memory = ZeroMemory<T>;
+
+    fn memory(&self) -> ZeroMemory<T> {
+        ZeroMemory {
+            turns: self.finder.memory(),
+            levels: [T::zero(); LEVELS],
+            ends: [0; LEVELS],
+            held: 0,
+            samples: 0,
+            mean: T::zero(),
+            turned: 0,
+            followed: T::zero(),
+            since: None,
+        }
+    }
+}
+
+impl<T: Real> ZeroWatch<T> {
+    /// The watch of a gauge with these turning points, with the polarity of its calibration.
+    pub fn new(polarity: Polarity, turns: &Turns) -> Self {
+        let sign = polarity.sign();
+        Self {
+            finder: TurnFinder::new(T::from_f64(turns.least_span)),
+            sign: T::from_f64(sign),
+            shares: [T::from_f64(1.0 - turns.high_share), T::from_f64(turns.high_share)],
+            level: T::from_f64(sign * turns.level),
+            limit: T::from_f64(turns.limit),
+            mean_limit: T::from_f64(turns.mean_limit),
+            mean_share: T::from_f64(Turns::MEAN_SHARE),
+            most: T::from_f64(Turns::MOST_INNOVATION * turns.scatter),
+            follow: T::zero(),
+            reference: T::from_f64(sign * turns.reference_per_signal),
+        }
+    }
+
+    /// The same watch, which also follows a slow change of zero at the rate of `turns`.
+    #[must_use]
+    pub fn following(self, turns: &Turns) -> Self {
+        Self { follow: T::from_f64(turns.follow), ..self }
+    }
+
+    /// A sample minus the followed zero: the input for a receptor.
+    #[inline]
+    pub fn corrected(&self, memory: &ZeroMemory<T>, sample: T) -> T {
+        sample - self.sign * memory.followed
+    }
+
+    /// Takes a sample; returns a result at the end of a movement, from the fifth on. A missing
+    /// sample changes nothing.
+    pub fn step(&self, memory: &mut ZeroMemory<T>, sample: T) -> Option<Zero<T>> {
+        memory.samples = memory.samples.wrapping_add(1);
+        if !is_usable(sample) {
+            return None;
+        }
+        let (low, high) = self.finder.step(&mut memory.turns, self.sign * sample)?;
+        let level = self.shares[0] * low + self.shares[1] * high;
+        memory.levels.rotate_left(1);
+        memory.ends.rotate_left(1);
+        memory.levels[LEVELS - 1] = level;
+        memory.ends[LEVELS - 1] = memory.samples;
+        if usize::from(memory.held) < LEVELS {
+            memory.held += 1;
+        }
+        let whole = usize::from(memory.held) == LEVELS;
+        let off = if whole { median(memory.levels) - self.level } else { T::zero() };
+        let innovation = level - self.level - memory.followed;
+        let clipped = innovation.max(-self.most).min(self.most);
+        let before = memory.mean;
+        memory.mean = before + self.mean_share * (clipped - before);
+        if (memory.mean > T::zero()) != (before > T::zero()) {
+            memory.turned = memory.samples;
+        }
+        // one that has shifted is back within half of the limits
+        let share = if memory.since.is_some() { T::from_f64(0.5) } else { T::one() };
+        let jumped = whole && (off - memory.followed).abs() > share * self.limit;
+        let lasts = whole && memory.mean.abs() > share * self.mean_limit;
+        if !jumped && !lasts {
+            let moved = memory.followed + self.follow * clipped;
+            memory.followed = moved.max(-self.limit).min(self.limit);
+        }
+        let has_shifted = jumped || lasts || memory.followed.abs() >= share * self.limit;
+        let began = || if jumped { self.first(memory, off) } else { memory.turned };
+        memory.since = has_shifted.then(|| memory.since.unwrap_or_else(began));
+        whole.then(|| Zero {
+            off: self.sign * off,
+            off_reference: self.reference * off,
+            followed: self.sign * memory.followed,
+            has_shifted,
+            since_samples: memory.since.map_or(0, |since| memory.samples.wrapping_sub(since)),
+        })
+    }
+
+    /// The end of the first of the last movements whose level deviates by at least half of the
+    /// median.
+    fn first(&self, memory: &ZeroMemory<T>, off: T) -> u32 {
+        let half = T::from_f64(0.5) * off;
+        let is_off = |level: &T| (*level - self.level - half) * off >= T::zero();
+        let mut at = memory.levels.iter().zip(memory.ends).filter(|(level, _)| is_off(level));
+        at.next().map_or(memory.samples, |(_, end)| end)
+    }
+}
+
+/// The middle of five.
+fn median<T: Real>(mut levels: [T; LEVELS]) -> T {
+    for i in 1..LEVELS {
+        let mut k = i;
+        while k > 0 && levels[k] < levels[k - 1] {
+            levels.swap(k, k - 1);
+            k -= 1;
+        }
+    }
+    levels[LEVELS / 2]
+}

@@ -1,0 +1,194 @@
+//! Records of gauges: what they hold, who reads them, and that no flipped bit of them is accepted.
+
+use std::fs;
+
+use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
+use serde_json::{Value, json};
+use stretch_calibrate::{calibration_from_json, calibration_to_json, read_calibration};
+use stretch_core::{record, strategies};
+use stretch_receptor::example_calibration;
+use stretch_sleeve::{GaugeCalibration, SleeveCalibration, Turns, describe_record, seal_record};
+
+/// Levels at which movements turn.
+fn turns() -> impl Strategy<Value = Turns> {
+    let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 1e-6..1e3, 1e-3..1e3];
+    (sizes, 0.0..1.0, -100.0..100.0, any::<u32>(), 0.0..0.2, -1e3..1e3).prop_map(
+        |(sizes, high_share, level, movements, follow, reference_per_signal)| {
+            let [least_span, scatter, limit, mean_limit, movements_an_hour] = sizes;
+            Turns {
+                level,
+                high_share,
+                least_span,
+                scatter,
+                movements,
+                limit,
+                mean_limit,
+                false_alarms_an_hour: 0.25,
+                movements_an_hour,
+                follow,
+                reference_per_signal,
+            }
+        },
+    )
+}
+
+fn some_turns() -> Turns {
+    turns().new_tree(&mut TestRunner::deterministic()).unwrap().current()
+}
+
+fn with_turns() -> GaugeCalibration {
+    GaugeCalibration::new(example_calibration(), Some(some_turns())).unwrap()
+}
+
+/// How many of all single flipped bits are accepted.
+fn accepted(bytes: &[u8], accepts: impl Fn(&[u8]) -> bool) -> usize {
+    assert!(accepts(bytes), "the record itself");
+    let mut flipped = bytes.to_vec();
+    (0..8 * bytes.len())
+        .filter(|bit| {
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            let is_accepted = accepts(&flipped);
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            is_accepted
+        })
+        .count()
+}
+
+#[test]
+fn no_flipped_bit_of_a_record_with_turns_is_accepted() {
+    let mut buffer = [0; 4096];
+    let bytes = record::store(&with_turns(), &mut buffer).unwrap();
+    assert_eq!(accepted(bytes, |bytes| record::load::<GaugeCalibration>(bytes).is_ok()), 0);
+    let json = with_turns().to_json().unwrap();
+    let reads = |bytes: &[u8]| {
+        std::str::from_utf8(bytes).is_ok_and(|text| GaugeCalibration::from_json(text, "").is_ok())
+    };
+    assert_eq!(accepted(json.as_bytes(), reads), 0);
+}
+
+#[test]
+fn turns_stand_beside_a_calibration_in_text_and_are_checked() {
+    let gauge = with_turns();
+    let text = gauge.to_json().unwrap();
+    assert_eq!(GaugeCalibration::from_json(&text, "cal.json").unwrap(), gauge);
+    // who reads a calibration passes over them
+    assert_eq!(&calibration_from_json(&text, "cal.json").unwrap(), gauge.calibration());
+    // without them the record is that of the calibration
+    let without = GaugeCalibration::new(example_calibration(), None).unwrap();
+    assert_eq!(without.to_json().unwrap(), calibration_to_json(&example_calibration()).unwrap());
+    let spoilt = |change: &dyn Fn(&mut Value)| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cal.json");
+        let mut value: Value = serde_json::from_str(&text).unwrap();
+        change(&mut value);
+        value.as_object_mut().unwrap().remove("digest");
+        fs::write(&path, value.to_string()).unwrap();
+        seal_record(&path).unwrap_err().to_string()
+    };
+    let impossible = spoilt(&|value| value["turns"]["limit"] = json!(-0.1));
+    assert!(impossible.contains("turns.limit"), "{impossible}");
+    let unknown = spoilt(&|value| value["turns"]["limits"] = json!(0.1));
+    assert!(unknown.contains("limits"), "{unknown}");
+    let elsewhere = spoilt(&|value| value["turn"] = json!(0.1));
+    assert!(elsewhere.contains("turn"), "{elsewhere}");
+}
+
+proptest! {
+    #[test]
+    fn a_record_in_bytes_begins_with_that_of_its_calibration(
+        calibration in strategies::calibration(), turns in turns(),
+    ) {
+        let gauge = GaugeCalibration::new(calibration.clone(), Some(turns)).unwrap();
+        let mut buffers = [[0; 4096]; 2];
+        let [one, other] = &mut buffers;
+        let bytes = postcard::to_slice(&gauge, one).unwrap();
+        let alone = postcard::to_slice(&calibration, other).unwrap();
+        prop_assert_eq!(&bytes[..alone.len()], &alone[..]);
+        for length in 0..bytes.len() {
+            prop_assert!(postcard::from_bytes::<GaugeCalibration>(&bytes[..length]).is_err());
+        }
+        prop_assert_eq!(postcard::from_bytes::<GaugeCalibration>(bytes).unwrap(), gauge);
+    }
+}
+
+#[test]
+fn files_hold_what_their_names_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let gauge = with_turns();
+    for (name, has_turns) in
+        [("cal.json", true), ("cal.postcard", false), ("cal.sleeve.postcard", true)]
+    {
+        let path = folder.path().join(name);
+        gauge.write(&path).unwrap();
+        let SleeveCalibration::One(read) = SleeveCalibration::read(&path).unwrap() else {
+            panic!("one gauge")
+        };
+        assert_eq!(read.calibration(), gauge.calibration(), "{name}");
+        assert_eq!(read.turns().is_some(), has_turns, "{name}");
+        assert!(describe_record(&path).unwrap().is_sealed);
+        if !name.contains("sleeve") {
+            assert_eq!(&read_calibration(&path).unwrap(), gauge.calibration());
+        }
+    }
+}
+
+#[test]
+fn records_of_schema_1_are_sealed_when_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = example_calibration();
+    let mut value = serde_json::to_value(&calibration).unwrap();
+    value["schema"] = 1.into();
+    let mut bytes = record::store(&calibration, &mut [0; 4096]).unwrap().to_vec();
+    bytes.truncate(bytes.len() - 4);
+    bytes[0] = 1;
+    let json = serde_json::to_string_pretty(&value).unwrap();
+    for (name, content) in [("cal.json", json.as_bytes()), ("cal.postcard", &bytes)] {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        assert!(!describe_record(&path).unwrap().is_sealed);
+        assert_eq!(seal_record(&path).unwrap().calibration(), &calibration);
+        assert!(describe_record(&path).unwrap().is_sealed);
+        assert_eq!(read_calibration(&path).unwrap(), calibration);
+    }
+}
+
+#[test]
+fn a_hand_edit_is_told_apart_and_sealed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cal.json");
+    with_turns().write(&path).unwrap();
+    let edit = |from: &str, to: &str| {
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{from} in {text}");
+        fs::write(&path, text.replacen(from, to, 1)).unwrap();
+    };
+    let refused = || read_calibration(&path).unwrap_err().to_string();
+    let dead_band = format!("\"dead_band\": {:?}", example_calibration().spec().dead_band);
+    edit(&dead_band, "\"dead_band\": 0.125");
+    let message = refused();
+    assert!(message.contains("edited or damaged") && message.contains("--seal"), "{message}");
+    let sealed = seal_record(&path).unwrap();
+    assert_eq!(read_calibration(&path).unwrap().spec().dead_band, 0.125);
+    assert_eq!(sealed.turns(), Some(&some_turns()));
+    // a digest that went with the edit
+    edit("\"digest\"", "\"digesd\"");
+    assert!(refused().contains("digesd"));
+    edit(",\n  \"digesd\"", ",\n  \"digest\"");
+    edit("0.125", "-1.0");
+    // a seal is no pardon
+    let message = seal_record(&path).unwrap_err().to_string();
+    assert!(message.contains("dead_band"), "{message}");
+}
+
+#[test]
+fn damage_in_postcard_says_what_to_do_and_cannot_be_sealed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cal.postcard");
+    let mut bytes = record::store(&example_calibration(), &mut [0; 4096]).unwrap().to_vec();
+    bytes[40] ^= 4;
+    fs::write(&path, &bytes).unwrap();
+    for message in [read_calibration(&path).unwrap_err(), seal_record(&path).unwrap_err()] {
+        let message = message.to_string();
+        assert!(message.contains("damaged") && message.contains("calibrate again"), "{message}");
+    }
+}

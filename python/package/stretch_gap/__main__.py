@@ -1,0 +1,34 @@
+"""`python -m stretch_gap convert run.mcap out.npz`: recordings of other programs in a file that `stretch` reads."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from ._stretch import StretchError
+from .arrays import listed
+from .reading import convert
+
+
+def main() -> int:
+    """Runs one command; the status of the process."""
+    parser = argparse.ArgumentParser(prog="python -m stretch_gap")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    told = "write a recording (MCAP, ROS bag, MAT, HDF5, Parquet, ...) as an NPZ file that `stretch` reads, with all its clocks"
+    command = commands.add_parser("convert", help=told, description=told[0].upper() + told[1:] + ".")
+    command.add_argument("recording", help="the file; of a ROS 2 bag its folder does, too")
+    command.add_argument("out", help="the file to write, FILE.npz")
+    asked = parser.parse_args()
+    try:
+        found = convert(asked.recording, asked.out)
+    except StretchError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    for note in found.notes:
+        print(f"note: {asked.recording}: {note}", file=sys.stderr)
+    print(f"wrote {asked.out}: {len(found.numbers)} arrays: {listed(list(found.numbers))}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

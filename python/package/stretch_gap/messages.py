@@ -1,0 +1,187 @@
+"""Messages of topics, from MCAP files and ROS bags: each topic is a clock, each number of its messages a column."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .arrays import Array, Arrays, library, listed
+
+LONGEST = 64
+"""Longest array whose numbers become columns; images and scans are longer."""
+STAMPS = (
+    ("header.stamp.sec", "header.stamp.nanosec"),
+    ("header.stamp.sec", "header.stamp.nsec"),
+    ("stamp.sec", "stamp.nanosec"),
+    ("timestamp.sec", "timestamp.nsec"),
+    ("header.stamp.seconds", "header.stamp.nanos"),
+    ("stamp.seconds", "stamp.nanos"),
+    ("timestamp.seconds", "timestamp.nanos"),
+    ("time.seconds", "time.nanos"),
+)
+"""Where messages say themselves when they were measured: seconds, and the nanoseconds of the same stamp."""
+
+Decode = Callable[[], Any]
+
+
+class Topic:
+    """Columns that grow by a message; a message that lacks a number has NaN there."""
+
+    def __init__(self) -> None:
+        self.logged_ns: list[int] = []
+        self.columns: dict[str, list[float]] = {}
+        self.texts: dict[str, str] = {}
+
+    def take(self, logged_ns: int, message: Any) -> None:
+        row = len(self.logged_ns)
+        for path, value in leaves(message):
+            if isinstance(value, str):
+                if row == 0:
+                    self.texts[path] = value
+                continue
+            column = self.columns.setdefault(path, [])
+            column += [float("nan")] * (row - len(column)) + [value]
+        self.logged_ns.append(logged_ns)
+
+    def arrays(self) -> dict[str, Array]:
+        """The columns, of one length; items of arrays by the names that the first message has for them, as joints have."""
+        rows, named = len(self.logged_ns), {}
+        for path, values in self.columns.items():
+            array, _, item = path.rpartition(".")
+            group, dot, _ = array.rpartition(".")
+            name = self.texts.get(f"{group}{dot}name.{item}") if array and item.isdigit() else None
+            named[f"{array}.{name}" if name else path] = np.array(values + [float("nan")] * (rows - len(values)))
+        return named
+
+
+def leaves(value: Any, path: str = "") -> Iterator[tuple[str, float | str]]:
+    """The numbers and texts of a message, each with its path."""
+    if isinstance(value, (bool, int, float, np.number, np.bool_)):
+        yield path, float(value)
+    elif isinstance(value, str):
+        yield path, value
+    elif value is not None and not isinstance(value, (bytes, bytearray, memoryview)):
+        for name, part in _parts(value):
+            yield from leaves(part, f"{path}.{name}" if path else str(name))
+
+
+def _parts(value: Any) -> Iterator[tuple[Any, Any]]:
+    if isinstance(value, Mapping):
+        yield from value.items()
+    elif isinstance(value, (Sequence, np.ndarray)):
+        if len(value) <= LONGEST:
+            yield from enumerate(value)
+    elif hasattr(value, "DESCRIPTOR"):  # protobuf; a message that is not there has no numbers
+        for field in value.DESCRIPTOR.fields:
+            if not (field.message_type and field.has_presence) or value.HasField(field.name):
+                yield field.name, getattr(value, field.name)
+    else:
+        fields: Sequence[str] = tuple(getattr(value, "__dataclass_fields__", ())) or getattr(value, "__slots__", ())
+        for name in fields:
+            yield name, getattr(value, name)
+
+
+def read_mcap(path: Path, found: Arrays) -> None:
+    """Messages in JSON, in protobuf, and in ROS 2's CDR with `ros2msg` schemas."""
+    reader = library("mcap.reader", "ros")
+    factories = [library(f"mcap_{kind}.decoder", "ros").DecoderFactory() for kind in ("ros2", "protobuf")]
+    decoders: dict[int, Callable[[bytes], Any]] = {}
+
+    def decoded(schema: Any, channel: Any, message: Any) -> Any:
+        if channel.id not in decoders:
+            ways = [json.loads] if channel.message_encoding == "json" else []
+            ways += filter(None, (one.decoder_for(channel.message_encoding, schema) for one in factories))
+            if not ways:
+                raise ValueError(f"{channel.message_encoding} with a schema in {schema.encoding if schema else 'nothing'}")
+            decoders[channel.id] = ways[0]
+        return decoders[channel.id](message.data)
+
+    with path.open("rb") as stream:
+        rows = reader.NonSeekingReader(stream).iter_messages(log_time_order=False)
+        every = ((row[1].topic, row[2].log_time, partial(decoded, *row)) for row in rows)
+        take(every, found, "MCAP file", "record it again, or try `mcap recover`")
+
+
+def read_bag(path: Path, found: Arrays) -> None:
+    """ROS 2 bags, a file or a folder, and ROS 1 bags. A bag that does not say what its messages are is read as ROS 2 Humble's."""
+    typesys, reader = library("rosbags.typesys", "ros"), library("rosbags.highlevel", "ros")
+
+    def rows() -> Iterator[tuple[str, int, Decode]]:
+        with reader.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)) as bag:
+            for connection, logged_ns, raw in bag.messages():
+                yield connection.topic, logged_ns, partial(bag.deserialize, raw, connection.msgtype)
+
+    take(rows(), found, "ROS bag", "copy it again, or try `ros2 bag reindex`")
+
+
+def take(rows: Iterator[tuple[str, int, Decode]], found: Arrays, what: str, todo: str) -> None:
+    """Takes all messages. A topic with a message that cannot be read is left out; a file that breaks off is read up to there."""
+    topics: dict[str, Topic] = {}
+    unread: dict[str, str] = {}
+    count = 0
+    while True:
+        try:
+            topic, logged_ns, decode = next(rows)
+        except StopIteration:
+            break
+        # each library has errors of its own, and of those that it stands on
+        except Exception as error:
+            if not count:
+                raise found.cannot(what, error or type(error).__name__, todo) from error
+            found.notes.append(f"it breaks off after {count} messages ({error or type(error).__name__}); those are read")
+            break
+        count += 1
+        if topic in unread:
+            continue
+        try:
+            topics.setdefault(topic, Topic()).take(logged_ns, decode())
+        except Exception as error:
+            unread[topic] = " ".join(str(error).split()) or type(error).__name__
+            topics.pop(topic, None)
+    for topic, why in sorted(unread.items()):
+        found.leave(topic, why)
+    if not topics:
+        why = listed([f"{topic} ({why})" for topic, why in sorted(unread.items())])
+        raise found.cannot(what, f"no topic can be read: {why}" if why else "there is no message in it", todo)
+    _as_arrays(topics, found)
+
+
+def _as_arrays(topics: dict[str, Topic], found: Arrays) -> None:
+    stamped, doubled = [], []
+    for name, topic in sorted(topics.items()):
+        columns, stamps_ns = topic.arrays(), np.array(topic.logged_ns, dtype=np.int64)
+        own_ns = _own_stamps(columns)
+        if own_ns is not None:
+            stamped.append(name)
+            stamps_ns = own_ns
+        rising, first = np.unique(stamps_ns, return_index=True)
+        if rising.size < stamps_ns.size:
+            doubled.append(f"{name} ({stamps_ns.size - rising.size})")
+        path = name.strip("/") or "messages"
+        found.take_stamps(f"{path}.time_s", rising)
+        for column, values in columns.items():
+            # the clock has that name
+            column = "time_s.value" if column == "time_s" else column
+            found.take(f"{path}.{column}" if column else path, values[first])
+    if stamped:
+        found.notes.append(f"time is what the messages' own stamps say: {listed(stamped)}")
+    if doubled:
+        found.notes.append(f"messages with the stamp of another are left out: {listed(doubled)}")
+
+
+def _own_stamps(columns: dict[str, Array]) -> np.ndarray[Any, np.dtype[np.int64]] | None:
+    """Stamps in the messages, ns, where they go on from message to message; they are then no columns."""
+    for pair in STAMPS:
+        if all(name in columns and np.isfinite(columns[name]).all() for name in pair):
+            seconds, nanoseconds = (columns[name].astype(np.int64) for name in pair)
+            stamps = seconds * 1_000_000_000 + nanoseconds
+            if 2 * np.count_nonzero(np.diff(stamps) > 0) > stamps.size:
+                for name in pair:
+                    del columns[name]
+                return stamps
+    return None

@@ -1,0 +1,92 @@
+//! `stretch predict`: what a fixed simulator predicts of recordings that were not fitted.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::ensure;
+use stretch_data::files::Outputs;
+use stretch_problem::{Prediction, Reading, predict};
+use stretch_report::{predict_page, predict_table};
+
+use super::{
+    diagnose::announce,
+    diagnosis_text::table_text,
+    json::Json,
+    shared::{say, say_first, spinner, stage_text, tell},
+};
+use crate::display::is_quiet;
+
+/// Status if the error is above `--fail-above`.
+const FAILED_ABOVE: u8 = 3;
+
+/// Predict recordings that were not fitted, with a fix and without
+///
+///   stretch diagnose problem.toml --fix fixed.toml
+///   stretch predict fixed.toml friday.csv saturday.csv --report predicted.html
+///
+/// The simulator runs on the measured inputs of each new recording, once with the effects of the fix
+/// and once without, its parameters re-tuned alone. Errors are root mean squares, in the unit of the
+/// output and in multiples of its noise. Columns and rates that leave the fitted ranges are listed,
+/// because the prediction cannot be trusted there.
+///
+/// In continuous integration (exit status 3 if an error is above 5 times the noise of its output):
+///
+///   stretch predict fixed.toml today.csv --quiet --fail-above 5
+///
+/// A problem file is a program: its simulator runs with your rights, and is announced before it runs.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// The problem's file that stretch diagnose --fix wrote
+    #[arg(value_name = "fixed.toml")]
+    fixed: PathBuf,
+    /// New recordings, in any format, at the rate of the old ones
+    #[arg(value_name = "NEW", required = true)]
+    new: Vec<PathBuf>,
+    #[command(flatten)]
+    json: Json,
+    /// Write a report that opens in any browser
+    #[arg(long, value_name = "f.html")]
+    report: Option<PathBuf>,
+    /// Exit with status 3 if the error of an output is above so many times its noise
+    #[arg(long, value_name = "X")]
+    fail_above: Option<f64>,
+}
+
+/// Predicts, and returns the status with which the program ends.
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let is_number = args.fail_above.is_none_or(|most| most.is_finite() && most > 0.0);
+    ensure!(is_number, "--fail-above: give a number above 0, in multiples of the noise");
+    args.json.share_stdout([args.report.as_deref()])?;
+    let bar = spinner();
+    bar.set_message("the new recordings are predicted");
+    let reading = Reading { announce: Some(announce), ..Reading::default() };
+    let prediction = predict(&args.fixed, &args.new, &reading)?;
+    bar.finish_and_clear();
+    let mut outputs = Outputs::default();
+    args.json.stage(&mut outputs, &prediction)?;
+    if let Some(path) = &args.report {
+        stage_text(&mut outputs, path, &predict_page(&prediction))?;
+    }
+    outputs.keep()?;
+    args.json.say(&prediction, || {
+        print(&prediction)?;
+        args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
+    })?;
+    let is_above = args.fail_above.is_some_and(|most| prediction.largest_times_noise > most);
+    Ok(if is_above { ExitCode::from(FAILED_ABOVE) } else { ExitCode::SUCCESS })
+}
+
+/// The sentence, and everything behind it unless the program is to be quiet.
+fn print(prediction: &Prediction) -> anyhow::Result<()> {
+    say_first(prediction.sentence())?;
+    if is_quiet() {
+        return Ok(());
+    }
+    say(table_text(&predict_table(prediction)))?;
+    for trial in &prediction.trials {
+        for outside in &trial.extrapolated {
+            say(format!("{}: {outside}", trial.name))?;
+        }
+    }
+    prediction.notes.iter().try_for_each(|note| say(format!("note: {note}")))
+}

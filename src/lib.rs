@@ -1,0 +1,192 @@
+//! The program `stretch`: parses its arguments and runs a command. It is no library for other programs; what they need is in the
+//! crates that it is made of.
+
+// these panic where nobody reads: `display` has what is said
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod commands;
+mod display;
+mod old_names;
+mod paper;
+mod table;
+mod terminal;
+
+use std::{io::ErrorKind, process::ExitCode};
+
+use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
+
+use commands::{
+    apply, calibrate, convert, demo, diagnose, effects, evaluate, export, init, json, listen, page,
+    predict, simulate, sleeve,
+};
+use display::Volume;
+
+/// From the voltage of a stretch sensor to length, live.
+///
+/// A first session with logged trials (CSV, a header line, a time_s column):
+///
+///   stretch calibrate ramp_1.csv ramp_2.csv --out cal.json --report cal.html
+///   stretch evaluate --calibration cal.json another.csv
+///   stretch apply --calibration cal.json another.csv --out estimate.csv
+///
+/// and live, a line a sample:  logger | stretch apply --calibration cal.json -
+///
+/// No data at hand? `stretch demo` simulates the paper's experiment, calibrates,
+/// judges, says why simulator and rig disagree, and writes one report;
+/// `stretch demo --data DIR` does the same on measured sessions.
+#[derive(Parser)]
+#[command(name = "stretch", version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
+struct Cli {
+    /// Say nothing but results and errors
+    ///
+    /// Of a diagnosis say the verdict alone.
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
+    quiet: bool,
+    /// Say also what is read and chosen
+    ///
+    /// And how long it takes, on standard error; say every detail of a diagnosis.
+    #[arg(short, long, global = true, display_order = 901)]
+    verbose: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// The part of the help that holds for all commands.
+const STATUSES: &str = "\
+Where a file is read or written, - is standard input or output.
+
+Exit status:
+  0    done
+  1    not done: standard error says why, and nothing is half-written
+  2    the arguments are not understood
+  3    done, and the verdict of `stretch diagnose` is one that --fail-on names, or an error of
+       `stretch predict` is above --fail-above
+  4    done as far as the budget of a problem's file lasted: what was found until then is the answer
+  130  ended by Ctrl-C";
+
+#[derive(Subcommand)]
+enum Command {
+    Calibrate(Box<calibrate::Args>),
+    Sleeve(sleeve::Args),
+    Apply(apply::Args),
+    Evaluate(evaluate::Args),
+    Convert(convert::Args),
+    Demo(demo::Args),
+    Simulate(simulate::Args),
+    Diagnose(diagnose::Args),
+    Predict(predict::Args),
+    Init(init::Args),
+    Effects(effects::Args),
+    Listen(listen::Args),
+    Export(export::Args),
+    Page(page::Args),
+}
+
+/// Exit status after Ctrl-C.
+const INTERRUPTED: u8 = 130;
+
+/// The commands and options, for man pages and shells.
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// Runs the program with the arguments of the process.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse_from(old_names::with_todays_names(std::env::args_os())) {
+        Ok(cli) => cli,
+        Err(answer) => return explain(&answer),
+    };
+    // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
+    let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
+    display::begin(match (cli.quiet, cli.verbose) {
+        (true, _) => Volume::Quiet,
+        (_, true) => Volume::Verbose,
+        _ => Volume::Usual,
+    });
+    let mut done = ExitCode::SUCCESS;
+    let result = match cli.command {
+        Command::Calibrate(args) => calibrate::run(*args),
+        Command::Sleeve(args) => sleeve::run(args),
+        Command::Apply(args) => apply::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Convert(args) => convert::run(args),
+        Command::Demo(args) => demo::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
+        Command::Predict(args) => predict::run(args).map(|status| done = status),
+        Command::Init(args) => init::run(args),
+        Command::Effects(args) => effects::run(args),
+        Command::Listen(args) => listen::run(args),
+        Command::Export(args) => export::run(args),
+        Command::Page(args) => page::run(args),
+    };
+    display::detail("the end");
+    // whoever read our output has gone: nothing is wrong
+    let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
+    match (result, display::lost()) {
+        (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
+        (Err(error), _) => {
+            display::fail(message(&error));
+            ExitCode::FAILURE
+        }
+        (Ok(()), Some(kind)) if !is_unread => {
+            let files = "what was to be written into files is";
+            display::fail(format!("standard output took not all: {kind}; {files}"));
+            ExitCode::FAILURE
+        }
+        (Ok(()), _) => done,
+    }
+}
+
+/// Help that was asked for, or what is wrong with the arguments.
+fn explain(answer: &clap::Error) -> ExitCode {
+    let is_surplus =
+        matches!(answer.kind(), ArgumentError::UnknownArgument | ArgumentError::TooManyValues);
+    let arguments: Vec<String> =
+        std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect();
+    if let Some(meant) = json::meant_a_file(&arguments).filter(|_| is_surplus) {
+        display::fail(meant);
+        return ExitCode::from(2);
+    }
+    if let Some(instead) = old_names::instead(answer) {
+        display::fail(instead);
+        return ExitCode::from(2);
+    }
+    match answer.print() {
+        _ if answer.use_stderr() => ExitCode::from(2),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+/// The error and its causes as one sentence; a cause that the sentence
+/// already contains is left out.
+fn message(error: &anyhow::Error) -> String {
+    let mut text = without_numbers(&error.to_string());
+    for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
+        if cause.starts_with(&format!("{text}:")) {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    stretch_data::files::without_temporary_names(&text)
+}
+
+/// A text without Rust's `(os error 28)`, which says what stands before it again.
+fn without_numbers(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text += part.split_once(')').map_or(part, |(_, rest)| rest);
+    }
+    text
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}

@@ -1,0 +1,162 @@
+//! Commands and options of earlier releases, and what to write instead.
+
+use std::ffi::OsString;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+/// A command, and what to write instead.
+const COMMANDS: [(&str, &str); 9] = [
+    (
+        "blind",
+        "the blind check is a program of its own: cargo run --release -p stretch-challenge -- --cases 100",
+    ),
+    (
+        "completions",
+        "what shells complete comes with a release, in the folder completions; cargo run --example manual -- FOLDER writes it",
+    ),
+    (
+        "fleet",
+        "lakes of trials have a program of their own, stretch-fleet: cargo build --release -p stretch-fleet-program",
+    ),
+    ("foretell", "this command is called predict now: stretch predict fixed.toml NEW"),
+    (
+        "man",
+        "man pages come with a release, in the folder man1; cargo run --example manual -- FOLDER writes them",
+    ),
+    ("prior", "write stretch sleeve learn"),
+    (
+        "record",
+        "write stretch export --calibration cal.json to check a record, and --seal behind it to renew its seal",
+    ),
+    ("renew", "write stretch sleeve renew"),
+    ("rig", "write stretch simulate --print-rig"),
+];
+
+/// An option, and what to write instead.
+const OPTIONS: [(&str, &str); 16] = [
+    ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
+    ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
+    ("--adc-full-scale-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
+    ("--allow-commands", "name the problem.toml in the folder, which allows it to run"),
+    ("--branch-by", "--paper asks for the published method as a whole"),
+    ("--budget", "write budget = N into the problem's file"),
+    ("--commands", "write --protocol TRIAL.csv"),
+    ("--dead-band", "it is three standard deviations of the rate's noise"),
+    ("--depth", "a diagnosis names up to four effects"),
+    ("--figure", "the table that is printed says the same"),
+    ("--fixed", "write stretch export --calibration cal.json --fixed FILE"),
+    ("--grid", "resample first: stretch convert LOG --grid HZ --out TRIAL.csv"),
+    ("--jobs", "write jobs = N below [simulator] in the problem's file"),
+    ("--normalise", "channels are divided by their range"),
+    ("--rate-source", "--paper asks for the published method as a whole"),
+    ("--sessions", "write --data FOLDER/GROUP"),
+];
+
+/// An option that has the same meaning under another name, and that name: scripts that use the old spelling go on working. The value
+/// stands where the braces are.
+const RENAMED: [(&str, &str); 4] = [
+    ("--json-out", "--json={}"),
+    ("--preset", "--rig={}"),
+    ("--sample-rate", "--time={}hz"),
+    ("--time-unit", "--time=:{}"),
+];
+
+/// The arguments with today's names of renamed options.
+pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut arguments = arguments.peekable();
+    let mut renamed = Vec::new();
+    while let Some(argument) = arguments.next() {
+        if argument == "--" {
+            renamed.push(argument);
+            break;
+        }
+        let text = argument.to_string_lossy();
+        let (name, value) = text.split_once('=').map_or((&*text, None), |(n, v)| (n, Some(v)));
+        let Some((_, new)) = RENAMED.iter().find(|(old, _)| *old == name) else {
+            renamed.push(argument);
+            continue;
+        };
+        let value = value.map(OsString::from).or_else(|| arguments.next()).unwrap_or_default();
+        let (before, after) = new.split_once("{}").unwrap_or((new, ""));
+        let mut spelled = OsString::from(before);
+        spelled.push(value);
+        spelled.push(after);
+        renamed.push(spelled);
+    }
+    renamed.extend(arguments);
+    with_unit_behind_column(renamed)
+}
+
+/// The arguments with a unit of the time behind the column that another argument names.
+fn with_unit_behind_column(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let find =
+        |prefix: &str| arguments.iter().position(|a| a.to_string_lossy().starts_with(prefix));
+    let (Some(unit), Some(column)) = (
+        find("--time=:"),
+        arguments.iter().position(|a| {
+            let text = a.to_string_lossy();
+            text == "--time" || (text.starts_with("--time=") && !text.starts_with("--time=:"))
+        }),
+    ) else {
+        return arguments;
+    };
+    let text = arguments.remove(unit).to_string_lossy().replace("--time=", "");
+    let column = column - usize::from(unit < column);
+    let value = if arguments[column] == "--time" { column + 1 } else { column };
+    if let Some(value) = arguments.get_mut(value) {
+        value.push(text);
+    }
+    arguments
+}
+
+/// What to write in place of a command or an option that is not there any more.
+pub(crate) fn instead(error: &clap::Error) -> Option<String> {
+    let (kind, table) = match error.kind() {
+        ErrorKind::InvalidSubcommand => (ContextKind::InvalidSubcommand, &COMMANDS[..]),
+        ErrorKind::UnknownArgument => (ContextKind::InvalidArg, &OPTIONS[..]),
+        _ => return None,
+    };
+    let Some(ContextValue::String(name)) = error.get(kind) else { return None };
+    let name = name.split(['=', ' ']).next()?;
+    let (_, instead) = table.iter().find(|(old, _)| *old == name)?;
+    Some(format!("{name}: {instead}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{COMMANDS, OPTIONS, instead, with_todays_names};
+    use crate::command;
+
+    #[test]
+    fn what_is_gone_is_not_there_and_says_what_to_write() {
+        let now = command();
+        let names: Vec<&str> = now.get_subcommands().map(clap::Command::get_name).collect();
+        for (name, text) in COMMANDS {
+            assert!(!names.contains(&name), "{name}");
+            let error = command().try_get_matches_from(["stretch", name]).unwrap_err();
+            assert_eq!(instead(&error), Some(format!("{name}: {text}")));
+        }
+        for (name, text) in OPTIONS {
+            let asked = ["stretch", "evaluate", name, "1"];
+            let error = command().try_get_matches_from(asked).unwrap_err();
+            assert_eq!(instead(&error), Some(format!("{name}: {text}")));
+        }
+    }
+
+    #[test]
+    fn renamed_options_keep_their_meaning() {
+        let new = |line: &str| {
+            let words = with_todays_names(line.split(' ').map(Into::into)).into_iter();
+            let words: Vec<String> = words.map(|word| word.into_string().unwrap()).collect();
+            words.join(" ")
+        };
+        let asked = "stretch diagnose rig --json-out d.json --quiet";
+        assert_eq!(new(asked), "stretch diagnose rig --json=d.json --quiet");
+        assert_eq!(new("stretch apply --sample-rate=50 a.csv"), "stretch apply --time=50hz a.csv");
+        let unit = "stretch convert a.csv --time-unit us --time stamp --out b.csv";
+        assert_eq!(new(unit), "stretch convert a.csv --time stamp:us --out b.csv");
+        assert_eq!(new("stretch convert a.csv --time-unit ms"), "stretch convert a.csv --time=:ms");
+        assert_eq!(new("stretch simulate --preset paper"), "stretch simulate --rig=paper");
+        assert_eq!(new("stretch apply -- --preset paper"), "stretch apply -- --preset paper");
+    }
+}

@@ -4,8 +4,9 @@ use stretch_core::{Design, Stage};
 use stretch_sleeve::{ArrayCalibration, ArrayReceptor, ArrayWithheld};
 
 use crate::{
+    ExportError,
     part::kept,
-    self_test::{NO_VOLTS, Rows, SAMPLES, differs, share},
+    self_test::{NO_VOLTS, Rounding, Rows, SAMPLES, differs, share},
 };
 
 /// Up and down through the calibrated range and beyond it. The recorder is silent for one sample and for five, the
@@ -34,12 +35,23 @@ fn samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32;
 }
 
 /// The self-test.
-pub(crate) fn array<const N: usize>(calibration: &ArrayCalibration<N>) -> String {
+pub(crate) fn array<const N: usize>(
+    calibration: &ArrayCalibration<N>,
+) -> Result<String, ExportError> {
     let receptor = ArrayReceptor::<f32, N>::new(calibration);
+    let exact = ArrayReceptor::<f64, N>::new(calibration);
     let (mut memory, mut rows) = (receptor.memory(), Rows::default());
+    let (mut exact_memory, mut rounding, mut errors) = (exact.memory(), Rounding::default(), 0.0);
     for n in 0..SAMPLES {
         let volts = samples(calibration, n);
         let answer = receptor.step(&mut memory, volts);
+        let double = exact.step(&mut exact_memory, volts.map(f64::from));
+        if let (Ok(single), Ok(double)) = (&answer, double)
+            && single.lost == double.lost
+        {
+            rounding.add(single.estimate, double.estimate);
+            errors += double.sd;
+        }
         let status = match answer {
             Ok(_) => 0,
             Err(ArrayWithheld::Warming) => 1,
@@ -53,6 +65,7 @@ pub(crate) fn array<const N: usize>(calibration: &ArrayCalibration<N>) -> String
         let volts = volts.collect::<Vec<_>>().join(", ");
         rows.push(&format!("{{{{{volts}}}, {estimate:?}f, {sd:?}f, {lost}u, {flags}}}"));
     }
+    rounding.check(errors / SAMPLES as f64, &calibration.spec().reference)?;
     let fields =
         "float volts[STRETCH_CHANNELS];\n    float estimate;\n    float sd;\n    uint16_t lost;";
     let unlike = format!(
@@ -60,5 +73,5 @@ pub(crate) fn array<const N: usize>(calibration: &ArrayCalibration<N>) -> String
         differs("estimate"),
         differs("sd")
     );
-    kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[])
+    Ok(kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[]))
 }

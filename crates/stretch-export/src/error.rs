@@ -1,6 +1,7 @@
 //! Why there is no C.
 
 use stretch_calibrate::CalibrateError;
+use stretch_core::Label;
 use stretch_receptor::ReceptorError;
 
 use crate::Form;
@@ -34,6 +35,20 @@ pub enum ExportError {
     /// A calibration that gives no receptor.
     #[error("the calibration gives no receptor: {0}")]
     Receptor(#[from] ReceptorError),
+    /// Single precision, in which a board computes, changes the estimate by more than a tenth of the fit's error.
+    #[error(
+        "in 32 bits, which the board computes in, the estimate of {reference} differs from that in 64 bits by {rms:.3} (root mean square), \
+         but the calibration itself is off by {error:.3}: calibrate the recordings again, because this release keeps surfaces about the \
+         middle of the signal's range, or subtract the signal's constant offset before"
+    )]
+    Rounding {
+        /// Root mean square difference, in the unit of the reference.
+        rms: f64,
+        /// Error of the fit, in the unit of the reference.
+        error: f64,
+        /// Column of the reference.
+        reference: Label,
+    },
     /// A calibration that is no record.
     #[error(transparent)]
     NoRecord(CalibrateError),

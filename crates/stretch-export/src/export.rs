@@ -42,7 +42,7 @@ pub struct Header {
 ///
 /// # Errors
 /// [`ExportError`] for a model or a rate that has no form in C, integers asked of a model
-/// that has none, and what [`fixed_record`] says of a converter that does not fit.
+/// that has none, floats that change the estimate by more than a tenth of the fit's error, and what [`fixed_record`] says of a converter that does not fit.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;
@@ -159,7 +159,7 @@ pub fn array_header<const N: usize>(
         options,
         Form::Float,
         array_float(calibration),
-        &array_test::array(calibration),
+        &array_test::array(calibration)?,
     );
     Ok(Header { array: Some(names.len()), ..made })
 }

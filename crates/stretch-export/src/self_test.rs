@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use stretch_calibrate::{BoardReceptor, FixedRecord};
-use stretch_core::{Branch, Calibration, Crosstalk, Design, Model, Stage, Volts};
+use stretch_core::{Branch, Calibration, Crosstalk, Design, Label, Model, Stage, Volts};
 use stretch_receptor::{
     Receptor, Withheld,
     code::{Adc, AdcCode},
@@ -36,6 +36,50 @@ pub(crate) fn share(n: usize) -> f64 {
     let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
     let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
     1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1
+}
+
+/// How far the estimates in 32 bits, which a board gives, are from those in 64 bits.
+#[derive(Default)]
+pub(crate) struct Rounding {
+    squares: f64,
+    count: usize,
+}
+
+impl Rounding {
+    /// Root mean square difference, as a share of the error of the fit, beyond which there is no header.
+    const MOST: f64 = 0.1;
+
+    pub(crate) fn add(&mut self, single: f32, double: f64) {
+        self.squares += (f64::from(single) - double).powi(2);
+        self.count += 1;
+    }
+
+    /// Refuses a calibration that loses more than a tenth of `error`, in the unit of `reference`, in 32 bits.
+    pub(crate) fn check(&self, error: f64, reference: &Label) -> Result<(), ExportError> {
+        let rms = (self.squares / self.count.max(1) as f64).sqrt();
+        if rms <= Self::MOST * error {
+            return Ok(());
+        }
+        Err(ExportError::Rounding { rms, error, reference: reference.clone() })
+    }
+}
+
+/// RMSE of a calibration's fit in the unit of its reference, at least a thousandth of the range: a fit can be exact.
+fn fit_error(calibration: &Calibration) -> f64 {
+    let spec = calibration.spec();
+    let rmse = match &spec.model {
+        Model::Linear(line) => line.fit.rmse,
+        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
+            inflation.fit.rmse.max(deflation.fit.rmse)
+        }
+        Model::History(map) => map.fit.rmse,
+        Model::Observer(map) => map.fit.rmse,
+        Model::Diagnosed(map) => map.fit.rmse,
+        _ => 0.0,
+    };
+    let [low, high] = [spec.target_range.min(), spec.target_range.max()];
+    let span = (spec.target.to_reference(high) - spec.target.to_reference(low)).abs();
+    rmse.max(1e-3) * span
 }
 
 /// Status, branch and domain as the C packs them. Of a sample without a reading the branch is the last one.
@@ -72,8 +116,10 @@ pub(crate) fn fixed(
 
 /// The self-test of a form in `float`.
 pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
-    let receptor = Receptor::<f32>::new(calibration)?;
-    let mut memory = receptor.memory();
+    let (receptor, exact) =
+        (Receptor::<f32>::new(calibration)?, Receptor::<f64>::new(calibration)?);
+    let (mut memory, mut exact_memory) = (receptor.memory(), exact.memory());
+    let mut rounding = Rounding::default();
     let (mut rows, mut branch) = (Rows::default(), Branch::Inflation);
     let map = match &calibration.spec().model {
         Model::Diagnosed(map) => Some(map),
@@ -86,10 +132,18 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
             // nothing to its scale, out of step with the signal
             let pressure = (scale * (n % 90) as f64 / 90.0) as f32;
             memory.set_pressure(pressure);
+            exact_memory.set_pressure(pressure.into());
             row.push(pressure);
         }
         let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
         let answer = receptor.step(&mut memory, Volts(volts));
+        // at the edge of the dead band the two may choose different branches, which is no error of either
+        match (answer, exact.step(&mut exact_memory, Volts(signal.unwrap_or(f64::NAN)))) {
+            (Ok(single), Ok(double)) if single.branch == double.branch => {
+                rounding.add(single.estimate, double.estimate);
+            }
+            _ => {}
+        }
         let numbers = answer.map_or([0.0; 3], |r| [r.estimate, r.rate, r.sd.unwrap_or(0.0)]);
         let flags = flags(&answer.map(|r| ((), r.branch, r.domain as u8)), &mut branch);
         row.push(volts);
@@ -97,6 +151,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         let row: Vec<String> = row.iter().map(|number| format!("{number:?}f")).collect();
         rows.push(&format!("{{{}, {flags}}}", row.join(", ")));
     }
+    rounding.check(fit_error(calibration), &calibration.spec().reference)?;
     let answers = &["estimate", "rate", "sd"][..if map.is_some() { 3 } else { 2 }];
     let inputs = if crosstalk.is_some() { &["pressure", "volts"][..] } else { &["volts"] };
     let fields: Vec<String> =
@@ -147,5 +202,38 @@ impl Rows {
             .replace("@FLAGS@", flags)
             .replace("@DIFFERS@", differs);
         sample + &test
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_core::{Interval, LinearMap, Normalisation, Range, RangeSpec};
+    use stretch_receptor::example_calibration;
+
+    use super::*;
+
+    /// A line over a signal of range 1 on an offset.
+    fn line(offset: f64) -> Calibration {
+        let mut spec = example_calibration().into_spec();
+        let (min, max) = (offset, offset + 1.0);
+        let Model::Surfaces { inflation, .. } = spec.model else { unreachable!("the example") };
+        let range = RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max };
+        spec.signal_range = Range::new(range).unwrap();
+        let signal_domain = Interval { min, max };
+        let fit = inflation.fit;
+        spec.model = Model::Linear(LinearMap { slope: 1.0, intercept: 0.0, signal_domain, fit });
+        Calibration::new(spec).unwrap()
+    }
+
+    #[test]
+    fn a_calibration_that_32_bits_spoil_is_refused() {
+        for offset in [0.0, -300.0, 1e4] {
+            assert!(float(&line(offset)).is_ok(), "{offset}");
+        }
+        for offset in [1e6, -1e6, 8_388_608.0] {
+            let refused = float(&line(offset)).unwrap_err();
+            assert!(matches!(refused, ExportError::Rounding { .. }), "{refused}");
+            assert!(refused.to_string().contains("subtract the signal's constant offset"));
+        }
     }
 }

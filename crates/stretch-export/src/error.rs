@@ -12,7 +12,7 @@ use crate::Form;
 pub enum ExportError {
     /// A model that nobody has written in C.
     #[error(
-        "{model} has no form in C; those that have are linear, poly13, observer, observer+rest and diagnosed: calibrate with one of them as --model"
+        "{model} has no form in C; those that have are linear, poly13, curve, observer, observer+rest and diagnosed: calibrate with one of them as --model"
     )]
     NoForm {
         /// The model.

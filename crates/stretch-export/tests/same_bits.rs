@@ -8,8 +8,8 @@ use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
 
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
-    Calibration, CalibrationSpec, Crosstalk, Design, DiagnosedMap, Interval, Knee, Model,
-    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Values, Volts, Worn,
+    Calibration, CalibrationSpec, Crosstalk, Degree, Design, DiagnosedMap, Interval, Knee, Model,
+    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Surface, Values, Volts, Worn,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, gauge_header, header};
 use stretch_receptor::{
@@ -287,6 +287,13 @@ fn shapes_and_signs_give_the_same_bits() {
         spec.rate_estimator = RateEstimator::SavitzkyGolay { window: 12, degree: 3, delay: 5 };
     });
     holds("a delay", &late, Form::Float, &compilers);
+    let curve = changed(&poly13, |spec| {
+        let Model::Surfaces { inflation, deflation } = &mut spec.model else { unreachable!() };
+        let coefficients = [0.02, 0.8, 0.3, -0.1, 0.05, -0.04];
+        inflation.surface = Surface::new(Degree::new(0, 5).unwrap(), &coefficients).unwrap();
+        *deflation = *inflation;
+    });
+    holds("a curve of degree 5", &curve, Form::Float, &compilers);
 }
 
 /// A zero that is told and followed: within a limit that the samples stay in now and then, and one that they reach.

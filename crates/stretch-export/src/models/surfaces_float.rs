@@ -1,4 +1,4 @@
-//! `linear` and `poly13` in `float`.
+//! `linear`, `poly13` and `curve` in `float`.
 
 use stretch_core::{Branch, Calibration, Poly13, RateEstimator};
 use stretch_filter::{SgFilter, SgShape};
@@ -17,7 +17,7 @@ use crate::{
 const RATE: &str = include_str!("../c/surfaces_float.h");
 const STEP: &str = include_str!("../c/surfaces_float_step.h");
 
-/// The constants and the step of a line, or of surfaces without a term beyond poly13.
+/// The constants and the step of a line, of surfaces without a term beyond poly13, or of a curve.
 pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = StretchReceptor::<f32>::new(calibration)?;
     let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.spec().rate_estimator
@@ -57,6 +57,19 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         Map::Poly13([inflation, deflation]) => {
             constants.surfaces(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_float.h"))
+        }
+        Map::Surface([curve, _]) if calibration.spec().model.needs_signal_only() => {
+            let degree = curve.surface.degree();
+            let coefficients = curve.surface.coefficients();
+            constants
+                .define("SIGNAL_MIN", curve.signal.min, "the signal that the fit saw")
+                .define("SIGNAL_MAX", curve.signal.max, "")
+                .define("RATE_MIN", curve.rate.min, "its rate")
+                .define("RATE_MAX", curve.rate.max, "")
+                .define("OFFSET", curve.offset, "")
+                .define("DEGREE", i32::from(degree.volts()), "")
+                .array("float", "curve", &coefficients[..degree.terms()]);
+            ("curve", include_str!("../c/curve_float.h"))
         }
         Map::Surface([ranged, _]) => {
             return Err(ExportError::NoForm { model: ranged.surface.degree().to_string() });

@@ -184,6 +184,7 @@ impl ReadOptions {
     }
 
     /// Samples a second of a recording without any time where nothing else states them; 1 makes the time the number of the row.
+    /// They also place the samples of a stream whose clock has not ticked yet.
     pub fn untimed_hz(mut self, rate_hz: f64) -> Self {
         self.untimed_hz = Some(rate_hz);
         self

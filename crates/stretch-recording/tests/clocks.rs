@@ -185,7 +185,11 @@ fn a_rate_replaces_a_column_of_time() {
 
 /// Times of a stream, and its notes.
 fn live(text: &str) -> (Vec<f64>, Vec<String>) {
-    let options = ReadOptions::new().require("bridge_v");
+    live_as(text, ReadOptions::new())
+}
+
+fn live_as(text: &str, options: ReadOptions) -> (Vec<f64>, Vec<String>) {
+    let options = options.require("bridge_v");
     let mut rows = RowReader::new(text.as_bytes(), "live", &options).unwrap();
     let (mut times, mut notes) = (Vec::new(), Vec::new());
     while let Some(row) = rows.next_row() {
@@ -211,6 +215,15 @@ fn a_stream_has_the_same_clock() {
         times.iter().enumerate().skip(50).all(|(i, t)| (t - 0.02 * (i + 1) as f64).abs() < 0.032)
     );
     assert!(notes.iter().any(|note| note.contains("stamps repeat")), "{notes:?}");
+    // where a usual rate is known, as that of a calibration, it places the samples before the first tick
+    let whole = table("time_s", |_, t| format!("{:.0}", t.floor()));
+    for (usual_hz, near_s) in [(RATE_HZ, 1e-9), (1.1 * RATE_HZ, 0.1), (0.5 * RATE_HZ, 1.1)] {
+        let (times, _) = live_as(&whole, ReadOptions::new().untimed_hz(usual_hz));
+        assert_eq!(times.len(), SAMPLES);
+        assert!(times.windows(2).all(|t| t[1] > t[0]), "{usual_hz} Hz: {times:?}");
+        let first = times.iter().take(50).enumerate();
+        assert!(first.clone().all(|(i, t)| (t - 0.02 * i as f64).abs() < near_s), "{times:?}");
+    }
     let (times, _) =
         live(&table("timestamp", |_, t| format!("{:.0}", 1_714_564_800_000.0 + t * 1e3)));
     assert!((times[1] - times[0] - 0.02).abs() < 1e-6);

@@ -12,6 +12,10 @@ pub(crate) struct LiveClock {
     per_second: Option<f64>,
     /// Samples a second, if samples are counted.
     rate_hz: Option<f64>,
+    /// Samples a second that are usual: they place the samples of the first stamp, before it has risen.
+    usual_hz: Option<f64>,
+    /// The end of what the samples of the first stamp take, in counts.
+    first_end: f64,
     /// The newest stamp, as it was recorded.
     last: Option<f64>,
     /// What roll-overs add to it.
@@ -38,7 +42,7 @@ impl LiveClock {
     pub(crate) fn new(column: Option<&str>, rate_hz: Option<f64>, options: &ReadOptions) -> Self {
         let named = || TimeUnit::of(column?);
         let per_second = options.time_unit.or_else(named).map(TimeUnit::per_second);
-        Self { per_second, rate_hz, ..Self::default() }
+        Self { per_second, rate_hz, usual_hz: options.untimed_hz, ..Self::default() }
     }
 
     /// Counts a row that is lost.
@@ -63,7 +67,10 @@ impl LiveClock {
         }
         let usual = || unit::epoch(origin + count).unwrap_or(TimeUnit::Seconds).per_second();
         let per_second = *self.per_second.get_or_insert_with(usual);
-        let Some(last) = self.last.replace(count) else { return Ok(count / per_second) };
+        let Some(last) = self.last.replace(count) else {
+            self.first_end = count;
+            return Ok(count / per_second);
+        };
         let mut step = count - last;
         if let Some(tick) = self.tick.filter(|_| step < 0.0)
             && let Some(modulus) = order::roll_over(step, tick, per_second)
@@ -74,28 +81,41 @@ impl LiveClock {
         let stamp = count + self.added;
         if step > 0.0 {
             (self.tick, self.ticks, self.run) = (Some(step), self.ticks + 1, 0);
-            return Ok(stamp / per_second);
+            return Ok(stamp.max(self.after_first(step)) / per_second);
         }
-        if let Some(tick) = self.tick.filter(|_| step == 0.0) {
+        let period = self.usual_hz.map(|hz| per_second / hz);
+        if let Some(tick) = self.tick.or(period).filter(|_| step == 0.0) {
             if self.run == 0 && self.ticks + 1 == sample {
                 self.notes.push(format!(
                     "stamps repeat, first in row {row}; such samples are spread evenly"
                 ));
             }
             self.run += 1;
+            if self.ticks == 0 {
+                self.first_end = stamp + self.run as f64 * tick;
+                return Ok(self.first_end / per_second);
+            }
             let share = self.run as f64 * self.ticks as f64 / sample as f64;
             // whatever comes, before the next tick
             let share = share.min((self.run + 1) as f64 / (self.run + 2) as f64);
-            return Ok((stamp + share * tick) / per_second);
+            return Ok((stamp + share * tick).max(self.after_first(tick)) / per_second);
         }
         let previous_s = (last + self.added) / per_second;
         *self = Self {
             per_second: self.per_second,
+            usual_hz: self.usual_hz,
+            first_end: count,
             last: Some(count),
             samples: 1,
             notes: std::mem::take(&mut self.notes),
             ..Self::default()
         };
         Err(NotRising { time_s: count / per_second, previous_s })
+    }
+
+    /// The least count after the samples of the first stamp, which reach into the next where the usual rate is too low.
+    fn after_first(&mut self, tick: f64) -> f64 {
+        self.first_end += 1e-6 * tick;
+        self.first_end
     }
 }

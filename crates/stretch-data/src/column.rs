@@ -1,68 +1,290 @@
-//! What the name of a column says of its unit.
+//! What the name of a column says of its unit, and of what it measures.
 
-/// The unit in a column's name as columns spell it: its last part, after an underscore.
+use Quantity::{Angle, Current, Force, Length, Other, Pressure, Speed, Time, Torque, Voltage};
+
+/// What a column measures, as far as its unit and its name say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// A length or a position.
+    Length,
+    /// An angle.
+    Angle,
+    /// A length or an angle per time.
+    Speed,
+    /// A force.
+    Force,
+    /// A torque.
+    Torque,
+    /// A voltage.
+    Voltage,
+    /// A current.
+    Current,
+    /// A pressure.
+    Pressure,
+    /// A time.
+    Time,
+    /// Anything else that has a unit; its unit in columns.
+    Other(&'static str),
+}
+
+impl Quantity {
+    /// Whether it is a force or a torque.
+    pub fn is_force(self) -> bool {
+        matches!(self, Force | Torque)
+    }
+
+    /// Whether it is a length or an angle.
+    pub fn is_position(self) -> bool {
+        matches!(self, Length | Angle)
+    }
+
+    /// What a column measures: by the unit that is stated of it, or else by its name. The last part of the name is its unit; where that is
+    /// none, or a single letter that may as well count motors, a word in the name decides.
+    ///
+    /// ```
+    /// use stretch_data::Quantity;
+    /// for torque in ["torque_nm", "torque_Nm", "torque_n_m", "load_N_m", "u_nm", "tau", "torque_a"] {
+    ///     assert_eq!(Quantity::of(torque, ""), Some(Quantity::Torque), "{torque}");
+    /// }
+    /// assert_eq!(Quantity::of("position_nm", ""), Some(Quantity::Length));
+    /// assert_eq!(Quantity::of("speed_rad_per_s", ""), Some(Quantity::Speed));
+    /// assert_eq!(Quantity::of("u", "N m"), Some(Quantity::Torque));
+    /// assert_eq!(Quantity::of("u", ""), None);
+    /// ```
+    pub fn of(column: &str, stated: &str) -> Option<Self> {
+        if !stated.is_empty() {
+            return Self::of_unit(resolved(column, stated));
+        }
+        let unit = unit(column).map(|unit| resolved(column, unit));
+        let by_name = || words(column).find_map(|word| named(&word));
+        match unit.and_then(Self::of_unit) {
+            Some(known) if unit.is_some_and(|unit| unit.len() > 1) => Some(known),
+            known => by_name().or(known),
+        }
+    }
+
+    /// What a unit measures, as columns or as people spell it; none for an unknown unit.
+    fn of_unit(unit: &str) -> Option<Self> {
+        let mut factors = unit.split('/').flat_map(|part| part.split("_per_"));
+        let known = |text: &str| {
+            let text = text.trim();
+            let low = text.to_lowercase();
+            let row = UNITS.iter().find(|row| row.0 == text).or_else(|| row_of(text));
+            row.or_else(|| UNITS.iter().find(|row| row.0 == low)).map(|row| row.2)
+        };
+        match (known(factors.next()?)?, factors.next().map(known), factors.next()) {
+            (one, None, _) => Some(one),
+            (Length | Angle, Some(Some(Time)), None) => Some(Speed),
+            _ => None,
+        }
+    }
+}
+
+/// A unit: as columns spell it, as it is written, what it measures, how people spell it, and its names in small letters.
+type Unit =
+    (&'static str, &'static str, Quantity, &'static [&'static str], &'static [&'static str]);
+
+/// All units. Letters keep their meaning by the whole word: mPa is not among them, MPa is.
+static UNITS: [Unit; 51] = [
+    (
+        "s",
+        "s",
+        Time,
+        &["s", "S"],
+        &["sec", "secs", "second", "seconds", "sekunden", "segundos", "secondes"],
+    ),
+    (
+        "ms",
+        "ms",
+        Time,
+        &["ms"],
+        &["msec", "millis", "millisecond", "milliseconds", "millisekunden"],
+    ),
+    ("us", "us", Time, &["us", "µs", "μs"], &["usec", "micros", "microsecond", "microseconds"]),
+    ("ns", "ns", Time, &["ns"], &["nsec", "nanos", "nanosecond", "nanoseconds"]),
+    ("min", "min", Time, &["min"], &["mins", "minute", "minutes", "minuten"]),
+    ("h", "h", Time, &[], &["hr", "hrs", "hour", "hours", "stunden"]),
+    ("d", "d", Time, &[], &["day", "days", "tage", "datenum"]),
+    ("s2", "s^2", Other("s2"), &["s^2", "s²", "s2", "s**2"], &[]),
+    ("m", "m", Length, &["m", "M"], &[]),
+    ("cm", "cm", Length, &["cm"], &[]),
+    (
+        "mm",
+        "mm",
+        Length,
+        &["mm"],
+        &["mm", "millimeter", "millimeters", "millimetre", "millimetres"],
+    ),
+    ("um", "um", Length, &["um", "µm", "μm"], &[]),
+    ("nanom", "nm", Length, &["nm"], &[]),
+    ("in", "in", Length, &["in"], &["inch", "inches"]),
+    ("m2", "m^2", Other("m2"), &["m^2", "m²"], &[]),
+    ("n", "N", Force, &["N"], &["newton", "newtons"]),
+    ("kn", "kN", Force, &["kN"], &[]),
+    ("mn", "mN", Force, &["mN"], &[]),
+    ("nm", "N m", Torque, &["Nm", "N·m", "N m", "N*m", "N.m", "N_m", "n_m"], &[]),
+    ("mnm", "mN m", Torque, &["mNm", "mN·m", "mN m", "mN*m", "mN_m"], &[]),
+    ("knm", "kN m", Torque, &["kNm", "kN·m", "kN m", "kN*m", "kN_m"], &[]),
+    ("v", "V", Voltage, &["V"], &["volt", "volts"]),
+    ("mv", "mV", Voltage, &["mV"], &["millivolt", "millivolts"]),
+    ("uv", "uV", Voltage, &["uV", "µV", "μV"], &[]),
+    ("a", "A", Current, &["A"], &[]),
+    ("ma", "mA", Current, &["mA"], &[]),
+    ("w", "W", Other("w"), &["W"], &[]),
+    ("pa", "Pa", Pressure, &["Pa"], &[]),
+    ("hpa", "hPa", Pressure, &["hPa"], &[]),
+    ("kpa", "kPa", Pressure, &["kPa"], &["kpa"]),
+    ("mpa", "MPa", Pressure, &["MPa"], &[]),
+    ("bar", "bar", Pressure, &[], &["bar"]),
+    ("mbar", "mbar", Pressure, &[], &["mbar"]),
+    ("psi", "psi", Pressure, &[], &["psi"]),
+    ("rad", "rad", Angle, &[], &["rad", "radian", "radians"]),
+    ("mrad", "mrad", Angle, &[], &["mrad"]),
+    ("deg", "deg", Angle, &["°"], &["deg", "degree", "degrees"]),
+    ("rpm", "rpm", Speed, &[], &["rpm"]),
+    ("hz", "Hz", Other("hz"), &["Hz"], &["hz", "hertz"]),
+    ("khz", "kHz", Other("hz"), &["kHz"], &[]),
+    ("k", "K", Other("degc"), &["K"], &[]),
+    ("degc", "\u{b0}C", Other("degc"), &["°C", "degC", "C"], &[]),
+    ("kg", "kg", Other("kg"), &["kg"], &[]),
+    ("g", "g", Other("kg"), &["g"], &[]),
+    ("percent", "%", Other("percent"), &["%"], &["percent"]),
+    ("ohm", "Ohm", Other("ohm"), &["Ω"], &["ohm", "ohms"]),
+    ("kohm", "kOhm", Other("ohm"), &["kOhm", "kΩ"], &[]),
+    ("t", "T", Other("t"), &["T"], &[]),
+    ("mt", "mT", Other("t"), &["mT"], &[]),
+    ("counts", "counts", Other("counts"), &[], &["lsb", "count", "counts"]),
+    ("ticks", "ticks", Other("ticks"), &[], &["tick", "ticks"]),
+];
+
+/// Words of a name that say what is measured where no unit does.
+static NAMED: [(Quantity, &[&str]); 5] = [
+    (Torque, &["torque", "torques", "moment", "tau"]),
+    (Force, &["force", "forces"]),
+    (Speed, &["speed", "velocity", "vel", "omega", "qvel", "dq"]),
+    (
+        Angle,
+        &[
+            "angle", "angles", "theta", "phi", "heading", "yaw", "pitch", "roll", "azimuth", "q",
+            "qpos",
+        ],
+    ),
+    (
+        Length,
+        &[
+            "position",
+            "positions",
+            "pos",
+            "displacement",
+            "length",
+            "distance",
+            "height",
+            "stroke",
+            "travel",
+            "deflection",
+            "thickness",
+            "gap",
+            "x",
+            "y",
+            "z",
+        ],
+    ),
+];
+
+fn named(word: &str) -> Option<Quantity> {
+    NAMED.iter().find(|(_, words)| words.contains(&word)).map(|(quantity, _)| *quantity)
+}
+
+/// The words of a name, in small letters and without the numbers behind them: `joint`, `angle` for `jointAngle_2`.
+fn words(column: &str) -> impl Iterator<Item = String> {
+    let mut parted = String::new();
+    for c in column.chars() {
+        if c.is_uppercase() && parted.ends_with(char::is_lowercase) {
+            parted.push('_');
+        }
+        parted.extend(c.to_lowercase());
+    }
+    let all: Vec<String> = parted.split(|c: char| !c.is_alphabetic()).map(str::to_owned).collect();
+    all.into_iter().filter(|word| !word.is_empty())
+}
+
+fn is_named(column: &str, is_one: impl Fn(Quantity) -> bool) -> bool {
+    words(column).filter_map(|word| named(&word)).any(is_one)
+}
+
+/// `nm` in the name of a column is newton metres, as the reader spells them, unless the name speaks of a length alone.
+fn resolved<'a>(column: &str, unit: &'a str) -> &'a str {
+    let is_length = || is_named(column, |q| q == Length) && !is_named(column, Quantity::is_force);
+    if unit == "nm" && is_length() { "nanom" } else { unit }
+}
+
+/// The row of a unit without a stroke as people spell it.
+fn row_of(text: &str) -> Option<&'static Unit> {
+    let low = text.to_lowercase();
+    let exact = UNITS.iter().find(|row| row.3.contains(&text));
+    exact.or_else(|| UNITS.iter().find(|row| row.4.contains(&&*low)))
+}
+
+/// The unit in a column's name as columns spell it: its last part, after an underscore. Newton metres may have one in between.
 ///
 /// ```
 /// use stretch_data::unit;
 /// assert_eq!(unit("length_mm"), Some("mm"));
 /// assert_eq!(unit("speed_m_per_s"), Some("m_per_s"));
+/// assert_eq!(unit("torque_n_m"), Some("n_m"));
 /// assert_eq!(unit("s2"), None);
 /// ```
 pub fn unit(column: &str) -> Option<&str> {
-    let (_, mut unit) = column.rsplit_once('_')?;
+    let (base, mut unit) = column.rsplit_once('_')?;
     while let Some(head) = column[..column.len() - unit.len()].strip_suffix("_per_") {
         let Some((name, _)) = head.rsplit_once('_') else { break };
         unit = &column[name.len() + 1..];
+    }
+    let before = base.rsplit_once('_').filter(|_| unit == "m");
+    if let Some((name, newton)) = before
+        && (matches!(newton, "N" | "kN" | "mN")
+            || newton == "n" && is_named(name, Quantity::is_force))
+    {
+        return Some(&column[name.len() + 1..]);
     }
     Some(unit).filter(|unit| !unit.is_empty())
 }
 
 /// The unit of a column as it is written: `N` for `force_n`, `m/s` for `speed_m_per_s`.
 ///
+/// `nm` is newton metres, as the reader of recordings spells them, unless the name speaks of a length; `nanom` is always nanometres.
+///
 /// ```
 /// use stretch_data::unit_of;
 /// assert_eq!(unit_of("length_mm"), "mm");
 /// assert_eq!(unit_of("force_n"), "N");
 /// assert_eq!(unit_of("acc_m_per_s2"), "m/s^2");
+/// assert_eq!([unit_of("torque_nm"), unit_of("torque_Nm"), unit_of("load_N_m")], ["N m"; 3]);
+/// assert_eq!(unit_of("height_nm"), "nm");
 /// ```
 pub fn unit_of(column: &str) -> String {
-    let factors: Vec<&str> = unit(column).unwrap_or("").split("_per_").map(written_unit).collect();
+    let unit = resolved(column, unit(column).unwrap_or(""));
+    let factors: Vec<&str> = unit.split("_per_").map(written_unit).collect();
     factors.join("/")
 }
 
-/// A unit without a stroke as people write it, from how columns spell it; any other as it is.
+/// A unit without a stroke as people write it, from how columns or people spell it; any other as it is.
 ///
 /// ```
 /// assert_eq!(stretch_data::written_unit("kpa"), "kPa");
+/// assert_eq!(stretch_data::written_unit("degrees"), "deg");
 /// ```
 pub fn written_unit(spelt: &str) -> &str {
-    match spelt {
-        "n" => "N",
-        "kn" => "kN",
-        "mn" => "mN",
-        "nm" => "N m",
-        "nanom" => "nm",
-        "m2" => "m^2",
-        "s2" => "s^2",
-        "v" => "V",
-        "mv" => "mV",
-        "uv" => "uV",
-        "a" => "A",
-        "ma" => "mA",
-        "w" => "W",
-        "pa" => "Pa",
-        "hpa" => "hPa",
-        "kpa" => "kPa",
-        "mpa" => "MPa",
-        "hz" => "Hz",
-        "khz" => "kHz",
-        "k" => "K",
-        "degc" => "\u{b0}C",
-        "percent" => "%",
-        "ohm" => "Ohm",
-        "kohm" => "kOhm",
-        "t" => "T",
-        "mt" => "mT",
-        other => other,
-    }
+    UNITS.iter().find(|row| row.0 == spelt).or_else(|| row_of(spelt)).map_or(spelt, |row| row.1)
+}
+
+/// A unit without a stroke as columns spell it, from how people spell it; none for what is no unit.
+///
+/// ```
+/// use stretch_data::spelt_unit;
+/// assert_eq!([spelt_unit("N·m"), spelt_unit("Seconds"), spelt_unit("nm")], [Some("nm"), Some("s"), Some("nanom")]);
+/// assert_eq!(spelt_unit("raw"), None);
+/// ```
+pub fn spelt_unit(text: &str) -> Option<&'static str> {
+    row_of(text.trim()).map(|row| row.0)
 }

@@ -19,7 +19,7 @@ mod toml_text;
 mod trial;
 mod write;
 
-pub use column::{unit, unit_of, written_unit};
+pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
 pub use digest::{digest_of, is_digest};
 pub use error::{DataError, Place, shown};

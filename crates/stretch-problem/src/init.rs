@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_data::{Trial, ends, unit};
+use stretch_data::{Quantity, Trial, ends, unit};
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
@@ -196,7 +196,13 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
         return NO_OUTPUT.to_owned();
     };
     let commands = moving().filter(|c| c.is_command() && c.name != own);
-    let commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
+    let mut commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
+    if commands.is_empty() {
+        // A force that was measured drives what moves.
+        let is_force = |name: &&str| Quantity::of(name, "").is_some_and(Quantity::is_force);
+        let others = moving().map(|c| c.name.as_str()).filter(|name| *name != own);
+        commands = others.filter(|name| is_force(name) && !is_force(&own)).collect();
+    }
     let inputs: Vec<String> = commands.iter().map(|name| quoted(name)).collect();
     let mut out = "\n# Guessed: the last column that is no command is the output, and commands drive the stage.\n"
         .to_owned();
@@ -213,7 +219,35 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
         ),
         None => "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings\n".to_owned(),
     };
-    out + "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs\n"
+    let guessed = rubbing(own, &commands, moving().filter(|c| !c.is_called).map(|c| &*c.name));
+    out + &match guessed {
+        Some((key, column)) => {
+            format!("{key} = {}  # guessed: at which a force or torque rubs\n", quoted(column))
+        }
+        None => {
+            "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs\n"
+                .to_owned()
+        }
+    }
+}
+
+/// The column at which a stage rubs, and the key that it is: the output where it is a position, an angle or a speed, else another column
+/// that was measured. None where commands are known and none may be a force or a torque.
+fn rubbing<'a>(
+    output: &'a str,
+    commands: &[&str],
+    measured: impl DoubleEndedIterator<Item = &'a str>,
+) -> Option<(&'static str, &'a str)> {
+    let of = |column: &str| Quantity::of(column, "");
+    let may_push = |c: &&str| of(c).is_none_or(Quantity::is_force);
+    if !commands.is_empty() && !commands.iter().any(may_push) {
+        return None;
+    }
+    let mut all = std::iter::once(output).chain(measured.rev());
+    all.find_map(|column| match of(column)? {
+        Quantity::Speed => Some(("velocity", column)),
+        quantity => quantity.is_position().then_some(("position", column)),
+    })
 }
 
 /// The noise of an output while its commands stand still, in all recordings but those that are tested on.
@@ -294,6 +328,20 @@ mod tests {
         let coarse = of(&[column("angle_deg", true), column("command_V", false)]);
         assert!(coarse.contains("output = \"angle_deg\"\n"), "{coarse}");
         assert!(coarse.contains("inputs = [\"command_V\"]"), "{coarse}");
+        // A force or torque rubs at the output where that moves, else at what else was measured.
+        for (columns, line) in [
+            (["torque_nm", "q_rad"], "\nposition = \"q_rad\"  #"),
+            (["u", "heading"], "\nposition = \"heading\"  #"),
+            (["force_n", "speed_m_per_s"], "\nvelocity = \"speed_m_per_s\"  #"),
+            (["duty_percent", "angle_deg"], "\n# velocity = \"COLUMN\""),
+            (["torque_nm", "temperature"], "\n# velocity = \"COLUMN\""),
+        ] {
+            let text = of(&[column(columns[0], true), column(columns[1], false)]);
+            assert!(text.contains(line), "{text}");
+        }
+        let measured = of(&[column("torque_nm", false), column("angle_rad", false)]);
+        assert!(measured.contains("inputs = [\"torque_nm\"]"), "{measured}");
+        assert!(measured.contains("\nposition = \"angle_rad\"  #"), "{measured}");
         let none = of(&[column("target_deg", false), column("goal_deg", true)]);
         assert!(!none.contains("\noutput =") && none.contains("No output is proposed"), "{none}");
     }

@@ -7,6 +7,7 @@ mod coupled;
 mod effects;
 mod experiments;
 mod flow;
+mod friction;
 mod gauge;
 mod golden;
 mod gross;

@@ -1,5 +1,7 @@
 //! Names of columns as people write them: units in brackets or in a row of their own, and what may be the time.
 
+use stretch_data::spelt_unit;
+
 use crate::TimeUnit;
 
 /// Names that a time column has elsewhere, the likeliest first.
@@ -66,90 +68,17 @@ pub(crate) fn unit(text: &str) -> Option<String> {
         return Some(String::new());
     }
     let mut parts = text.split('/');
-    let spell = |part: &str| factor(part).or_else(|| word(&part.trim().to_lowercase()));
+    // A scope calls numbers of samples a sequence.
+    let spell = |part: &str| {
+        let is_number = part.trim().eq_ignore_ascii_case("sequence");
+        if is_number { Some("") } else { spelt_unit(part) }
+    };
     let mut spelt = spell(parts.next()?)?.to_owned();
     for part in parts {
         spelt.push_str("_per_");
         spelt.push_str(spell(part)?);
     }
     Some(spelt)
-}
-
-/// Units without a stroke. Letters keep their meaning by the whole word: mPa is not among them, MPa is.
-fn factor(text: &str) -> Option<&'static str> {
-    Some(match text.trim() {
-        "s" | "S" => "s",
-        "ms" => "ms",
-        "us" | "µs" | "μs" => "us",
-        "ns" => "ns",
-        "min" => "min",
-        "s^2" | "s²" | "s2" | "s**2" => "s2",
-        "m" | "M" => "m",
-        "cm" => "cm",
-        "mm" => "mm",
-        "um" | "µm" | "μm" => "um",
-        "nm" => "nanom",
-        "in" => "in",
-        "m^2" | "m²" => "m2",
-        "N" => "n",
-        "kN" => "kn",
-        "mN" => "mn",
-        "Nm" | "N·m" | "N m" | "N*m" | "N.m" => "nm",
-        "V" => "v",
-        "mV" => "mv",
-        "uV" | "µV" | "μV" => "uv",
-        "A" => "a",
-        "mA" => "ma",
-        "W" => "w",
-        "Pa" => "pa",
-        "hPa" => "hpa",
-        "kPa" => "kpa",
-        "MPa" => "mpa",
-        "°" => "deg",
-        "Hz" => "hz",
-        "kHz" => "khz",
-        "K" => "k",
-        "°C" | "degC" | "C" => "degc",
-        "kg" => "kg",
-        "g" => "g",
-        "%" => "percent",
-        "Ω" => "ohm",
-        "kOhm" | "kΩ" => "kohm",
-        "T" => "t",
-        "mT" => "mt",
-        _ => return None,
-    })
-}
-
-/// Units written as words, in small letters; a scope calls numbers of samples a sequence.
-fn word(text: &str) -> Option<&'static str> {
-    Some(match text {
-        "sec" | "secs" | "second" | "seconds" | "sekunden" | "segundos" | "secondes" => "s",
-        "msec" | "millis" | "millisecond" | "milliseconds" | "millisekunden" => "ms",
-        "usec" | "micros" | "microsecond" | "microseconds" => "us",
-        "nsec" | "nanos" | "nanosecond" | "nanoseconds" => "ns",
-        "mins" | "minute" | "minutes" | "minuten" => "min",
-        "hr" | "hrs" | "hour" | "hours" | "stunden" => "h",
-        "day" | "days" | "tage" | "datenum" => "d",
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm",
-        "inch" | "inches" => "in",
-        "newton" | "newtons" => "n",
-        "volt" | "volts" => "v",
-        "millivolt" | "millivolts" => "mv",
-        "kpa" => "kpa",
-        "bar" => "bar",
-        "mbar" => "mbar",
-        "psi" => "psi",
-        "rad" | "radian" | "radians" => "rad",
-        "deg" | "degree" | "degrees" => "deg",
-        "rpm" => "rpm",
-        "hz" | "hertz" => "hz",
-        "ohm" | "ohms" => "ohm",
-        "lsb" | "count" | "counts" => "counts",
-        "tick" | "ticks" => "ticks",
-        "sequence" => "",
-        _ => return None,
-    })
 }
 
 /// Small letters, digits and underscores.
@@ -287,6 +216,10 @@ mod tests {
             ("Pos (mm)", None, Some("pos_mm")),
             ("force[N]", None, Some("force_n")),
             ("Knee Angle [°]", None, Some("knee_angle_deg")),
+            ("Torque (N·m)", None, Some("torque_nm")),
+            ("Torque [Nm]", None, Some("torque_nm")),
+            ("Torque (mNm)", None, Some("torque_mnm")),
+            ("Height (nm)", None, Some("height_nanom")),
             ("Acc X (m/s^2)", None, Some("acc_x_m_per_s2")),
             ("Weg / mm", None, Some("weg_mm")),
             ("Pos", Some("mm"), Some("pos_mm")),

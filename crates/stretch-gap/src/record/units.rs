@@ -3,6 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use stretch_data::written_unit;
+
 /// Largest relative deviation of a factor from that of two units.
 const WITHIN: f64 = 0.01;
 
@@ -28,21 +30,10 @@ const PAIRS: [(&str, &str, f64); 24] = [
     ("%", "1", 100.0),
     ("N", "kgf", 9.806_65),
     ("N", "lbf", 4.448_222),
-    ("mNm", "Nm", 1e3),
+    ("mN m", "N m", 1e3),
     ("kPa", "bar", 100.0),
     ("kPa", "psi", 6.894_757),
     ("Pa", "kPa", 1e3),
-];
-
-/// Other names of units.
-const NAMES: [(&str, &str); 7] = [
-    ("degrees", "deg"),
-    ("degree", "deg"),
-    ("\u{b0}", "deg"),
-    ("percent", "%"),
-    ("inch", "in"),
-    ("radians", "rad"),
-    ("", "1"),
 ];
 
 /// The units of a simulator whose output is `ratio` times a record in `unit`: "rpm for rad/s".
@@ -50,7 +41,7 @@ const NAMES: [(&str, &str); 7] = [
 /// such pair. `sd` is the relative standard deviation of the ratio. The only pair of the record's
 /// unit within two of them is also accepted.
 pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
-    let unit = NAMES.iter().find(|(name, _)| *name == unit).map_or(unit, |(_, own)| own);
+    let unit = if unit.is_empty() { "1" } else { written_unit(unit) };
     let all = PAIRS.iter().flat_map(|&(a, b, factor)| [(a, b, factor), (b, a, 1.0 / factor)]);
     let apart = |factor: f64| (ratio / factor).ln().abs();
     let own = all.filter(|(_, of, _)| *of == unit);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use stretch_data::{ends, unit};
+use stretch_data::{Quantity, ends, unit, unit_of};
 use stretch_effects::{Grid, Kind, Side, Sketch, kind_named};
 use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec};
 
@@ -56,9 +56,10 @@ impl Checked {
     /// Names that are unknown, values that are not allowed, and recordings that cannot be read.
     pub fn new(mut spec: ProblemSpec) -> Result<Self, ProblemError> {
         let trials = std::mem::take(&mut spec.trials);
-        let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
+        let ProblemSpec { inputs, parameters, effects, .. } = &spec;
+        let stages = &spec.stages.iter().map(|s| rubbing(s, &spec)).collect::<Vec<_>>();
         check_known(stages, parameters, effects)?;
-        let names = used(&spec);
+        let names = used(stages, &spec);
         let apart = spec.by.clone().filter(|by| !names.contains(by));
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
         let by = apart.and_then(|_| columns.take_last());
@@ -68,11 +69,10 @@ impl Checked {
         let mut notes = columns.notes.clone();
         let grid = Grid::samples(columns.dt_s)
             .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time"))?;
-        let unit_of = |column: &str| {
-            let input = inputs.iter().find(|i| i.column == column && !i.unit.is_empty());
-            let stage = stages.iter().find(|s| s.output == column && !s.unit.is_empty());
-            let known = input.map(|i| &i.unit).or(stage.map(|s| &s.unit));
-            known.cloned().unwrap_or_else(|| unit(column).unwrap_or("").to_owned())
+        let stated = |column: &str| stated_unit(stages, inputs, column);
+        let unit_of = |column: &str| match stated(column) {
+            "" => unit_of(column),
+            stated => stated.to_owned(),
         };
         let velocities: Vec<Option<Vec<f64>>> =
             stages.iter().map(|stage| velocity(stage, &columns)).collect();
@@ -83,6 +83,7 @@ impl Checked {
             stages: stages.iter().map(|s| s.name.as_str()).collect(),
             velocities: &velocities,
             positions: &positions,
+            names_motion: spec.stages.iter().map(names_motion).collect(),
             moving: stages
                 .iter()
                 .flat_map(|s| s.velocity.iter().chain(&s.position))
@@ -92,7 +93,7 @@ impl Checked {
             others: columns.names.clone(),
             kinds: &spec.kinds,
         };
-        let around = Around::of(&spec, &sites(stages, &unit_of), &among, &mut notes)?;
+        let around = Around::of(&spec, &sites(stages, inputs, &unit_of), &among, &mut notes)?;
         let (mut looked_for, off) = own_effects(effects, stages)?;
         looked_for.extend(around.looked_for(stages));
         check_twins(effects, looked_for.iter().map(|(_, spec)| spec.name.as_str()))?;
@@ -240,12 +241,12 @@ fn parts(columns: &Columns) -> Vec<(Range<usize>, f64)> {
 }
 
 /// Names of the columns that are used, each once.
-fn used(spec: &ProblemSpec) -> Vec<String> {
+fn used(stages: &[StageEntry], spec: &ProblemSpec) -> Vec<String> {
     let of_stage = |s: &StageEntry| {
         let more = s.velocity.iter().chain(&s.position).cloned();
         std::iter::once(s.output.clone()).chain(s.inputs.clone()).chain(more).collect::<Vec<_>>()
     };
-    let all = spec.stages.iter().flat_map(of_stage);
+    let all = stages.iter().flat_map(of_stage);
     let all = all.chain(spec.inputs.iter().map(|i| i.column.clone()));
     let all = all.chain(spec.beside.iter().cloned());
     let all = all.chain(spec.reference.clone());
@@ -285,17 +286,48 @@ fn position(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
 }
 
 /// Every channel of every stage, inputs first.
-fn sites(stages: &[StageEntry], unit_of: &impl Fn(&str) -> String) -> Vec<Site> {
+fn sites(stages: &[StageEntry], inputs: &[Input], unit_of: &impl Fn(&str) -> String) -> Vec<Site> {
+    let site = |stage, side, input, column: &String| {
+        let quantity = Quantity::of(column, stated_unit(stages, inputs, column));
+        Site { stage, side, input, column: column.clone(), unit: unit_of(column), quantity }
+    };
     let mut out = Vec::new();
     for (stage, s) in stages.iter().enumerate() {
-        for (input, column) in s.inputs.iter().enumerate() {
-            let (column, unit) = (column.clone(), unit_of(column));
-            out.push(Site { stage, side: Side::Input, input, column, unit });
-        }
-        let (column, unit) = (s.output.clone(), unit_of(&s.output));
-        out.push(Site { stage, side: Side::Output, input: 0, column, unit });
+        let driving = s.inputs.iter().enumerate();
+        out.extend(driving.map(|(input, column)| site(stage, Side::Input, input, column)));
+        out.push(site(stage, Side::Output, 0, &s.output));
     }
     out
+}
+
+/// The unit that a problem states of a column; empty where it states none.
+fn stated_unit<'a>(stages: &'a [StageEntry], inputs: &'a [Input], column: &str) -> &'a str {
+    let inputs = inputs.iter().filter(|i| i.column == column).map(|i| &i.unit);
+    let outputs = stages.iter().filter(|s| s.output == column).map(|s| &s.unit);
+    inputs.chain(outputs).find(|unit| !unit.is_empty()).map_or("", String::as_str)
+}
+
+/// Whether a stage says at which velocity or position it rubs.
+fn names_motion(stage: &StageEntry) -> bool {
+    stage.velocity.is_some() || stage.position.is_some()
+}
+
+/// A stage with its output as the position or the velocity at which it rubs, where it names none, a force or a torque drives it, and the
+/// output is one.
+fn rubbing(stage: &StageEntry, spec: &ProblemSpec) -> StageEntry {
+    let mut stage = stage.clone();
+    let of = |column: &str| Quantity::of(column, stated_unit(&spec.stages, &spec.inputs, column));
+    let is_pushed = stage.inputs.iter().any(|c| of(c).is_some_and(Quantity::is_force));
+    if !is_pushed || names_motion(&stage) {
+        return stage;
+    }
+    let output = || Some(stage.output.clone());
+    match of(&stage.output) {
+        Some(Quantity::Speed) => stage.velocity = output(),
+        Some(moved) if moved.is_position() => stage.position = output(),
+        _ => {}
+    }
+    stage
 }
 
 fn stage_spec(
@@ -402,14 +434,12 @@ fn check_stated(
     let driving = inputs.iter().map(|i| ("input", &i.column, &i.column, &i.unit, Some(i.noise)));
     for (what, name, column, stated, noise) in outputs.chain(driving) {
         let owner = || format!("{what} {name}");
-        // a single letter at the end of a name may as well be that of the second motor
-        let named = unit(column).filter(|named| named.len() > 1);
-        let kind = |unit: &str| {
-            let known = KNOWN_UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
-            known.map(|(_, kind)| *kind)
-        };
-        if let Some(named) = named.filter(|_| !stated.is_empty())
-            && let (Some(own), Some(other)) = (kind(named), kind(stated))
+        // a single letter at the end of a name may as well be that of the second motor, and `in` and `min` are words
+        let is_unit = |named: &&str| named.len() > 1 && !matches!(*named, "in" | "min");
+        let named = unit(column).filter(|named| !stated.is_empty() && is_unit(named));
+        let measured = |stated: &str| Quantity::of(column, stated);
+        if let Some(named) = named
+            && let (Some(own), Some(other)) = (measured(named), measured(stated))
             && own != other
         {
             let found = format!("its unit is {stated}, and its column {column} is in {named}");
@@ -426,39 +456,6 @@ fn check_stated(
     }
     Ok(())
 }
-
-/// Units as columns and people spell them, and what they measure.
-const KNOWN_UNITS: [(&str, &str); 29] = [
-    ("m", "length"),
-    ("cm", "length"),
-    ("mm", "length"),
-    ("um", "length"),
-    ("deg", "angle"),
-    ("degree", "angle"),
-    ("degrees", "angle"),
-    ("\u{b0}", "angle"),
-    ("rad", "angle"),
-    ("mrad", "angle"),
-    ("kg", "mass"),
-    ("g", "mass"),
-    ("n", "force"),
-    ("kn", "force"),
-    ("v", "voltage"),
-    ("mv", "voltage"),
-    ("uv", "voltage"),
-    ("a", "current"),
-    ("ma", "current"),
-    ("pa", "pressure"),
-    ("hpa", "pressure"),
-    ("kpa", "pressure"),
-    ("mpa", "pressure"),
-    ("bar", "pressure"),
-    ("s", "time"),
-    ("ms", "time"),
-    ("w", "power"),
-    ("hz", "frequency"),
-    ("ohm", "resistance"),
-];
 
 /// Checks that the twins of the user's own effects are effects.
 fn check_twins<'a>(

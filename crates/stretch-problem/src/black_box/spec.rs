@@ -148,6 +148,7 @@ pub struct StageEntry {
     #[serde(default, deserialize_with = "from_zero")]
     pub noise: Option<f64>,
     /// Column of the velocity of the rubbing parts; friction needs it, or the position.
+    /// Without both it is the output where a force or a torque drives the stage and the output is a speed, a position or an angle.
     pub velocity: Option<String>,
     /// Column of the position whose change is that velocity.
     pub position: Option<String>,

@@ -2,17 +2,14 @@
 
 use std::{ops::Range, sync::Arc};
 
-use stretch_data::ends;
+use stretch_data::{Quantity as Measured, ends};
 use stretch_effects::{
     Beside, EffectParameter, Extent, Grid, KINDS, Kind, Quantity, Search, Side, Signals, Sketch,
-    Span, Start,
+    Span, Start, kinds::VISCOUS_FRICTION,
 };
 use stretch_gap::EffectSpec;
 
 use crate::{black_box::columns::Columns, error::ProblemError};
-
-/// Units that forces and torques have.
-const FORCES: [&str; 8] = ["N", "kN", "mN", "Nm", "mNm", "N m", "N·m", "kNm"];
 
 /// A channel of a stage that wrappers can stand on.
 #[derive(Debug, Clone)]
@@ -23,6 +20,14 @@ pub(crate) struct Site {
     pub(crate) input: usize,
     pub(crate) column: String,
     pub(crate) unit: String,
+    /// What the column measures, where its unit or its name say.
+    pub(crate) quantity: Option<Measured>,
+}
+
+impl Site {
+    fn is_force(&self) -> bool {
+        self.quantity.is_some_and(Measured::is_force)
+    }
 }
 
 /// A kind of wrapper on a channel.
@@ -52,6 +57,8 @@ pub(crate) struct Among<'a> {
     pub(crate) velocities: &'a [Option<Vec<f64>>],
     /// By stage, the position of its rubbing parts.
     pub(crate) positions: &'a [Option<Vec<f64>>],
+    /// By stage, whether it names the velocity or the position of its rubbing parts; else its output is taken.
+    pub(crate) names_motion: Vec<bool>,
     /// Columns of velocities and positions, which load nothing.
     pub(crate) moving: Vec<&'a str>,
     /// By stage, the number of its inputs.
@@ -72,11 +79,29 @@ pub(crate) fn placed(
     if patterns.is_empty() {
         return Ok(Vec::new());
     }
-    let mut all = Vec::new();
+    let (mut all, mut lacking) = (Vec::new(), Vec::new());
     for site in sites {
         let extent = extent_of(among, &site.column)?;
         for kind in KINDS.iter().chain(among.kinds) {
-            all.extend(at(kind, site, extent, among));
+            let own = at(kind, site, extent, among);
+            let is_asked = |usual| {
+                let all = aliases((kind, usual), site, among, kind.name);
+                all.iter().any(|alias| patterns.contains(alias))
+            };
+            let usual = kind.usual.contains(&site.side);
+            let why = match own.is_empty() {
+                _ if !is_asked(usual) => None,
+                true => lack(kind, site, sites, among),
+                false => (!is_asked(is_usual(kind, site, among))).then(|| {
+                    let stage = among.stages[site.stage];
+                    format!(
+                        "{} is not looked for at {}: a lag of the output does the same; name velocity or position in stage {stage}",
+                        kind.title, site.column
+                    )
+                }),
+            };
+            lacking.extend(why.filter(|why| !lacking.contains(why)));
+            all.extend(own);
         }
     }
     let known = || all.iter().flat_map(|p| p.aliases.iter().map(String::as_str));
@@ -86,6 +111,7 @@ pub(crate) fn placed(
         }
     }
     let rate_hz = 1.0 / among.columns.dt_s;
+    notes.append(&mut lacking);
     all.retain(|p| p.aliases.iter().any(|a| patterns.contains(a)));
     all.retain_mut(|p| {
         let needed = p.shown_at(rate_hz);
@@ -160,7 +186,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
             starts,
             beside: beside.map(|b| Arc::new(b.to_vec())),
             load: load.map(|(load, name)| (Arc::new(load.to_vec()), name.to_owned())),
-            aliases: aliases(kind, site, among, &label),
+            aliases: aliases((kind, is_usual(kind, site, among)), site, among, &label),
         }
     };
     let others = || among.others.iter().filter(|other| *other != own);
@@ -179,14 +205,58 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
         Beside::Velocity | Beside::VelocityAndLoad => &among.velocities[site.stage],
         Beside::Position | Beside::PositionAndLoad => &among.positions[site.stage],
     };
-    let is_force = FORCES.iter().any(|unit| *unit == site.unit);
-    let Some(rubs) = rubs.as_deref().filter(|x| is_force && moves(x)) else { return Vec::new() };
+    let is_rubbed = |x: &&[f64]| site.is_force() && moves(x);
+    let Some(rubs) = rubs.as_deref().filter(is_rubbed) else { return Vec::new() };
     if matches!(kind.beside, Beside::Velocity | Beside::Position) {
         return vec![with(Some(rubs), None)];
     }
     let loads = others().filter(|name| among.moving.iter().all(|moving| *moving != *name));
     let loads = loads.filter_map(|name| Some((among.columns.of(name)?, name.as_str())));
     loads.filter(|(x, _)| moves(x)).map(|load| with(Some(rubs), Some(load))).collect()
+}
+
+/// Why a kind is not looked for on a channel, in a sentence; none where it has nothing to do there.
+fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<String> {
+    let stage = among.stages[site.stage];
+    let own = || sites.iter().filter(|other| other.stage == site.stage);
+    let rubs = among.velocities[site.stage].as_ref();
+    let moves = |s: &Site| {
+        s.side == Side::Output
+            && s.quantity.is_some_and(|q| q.is_position() || q == Measured::Speed)
+    };
+    Some(match kind.beside {
+        Beside::Nothing | Beside::Itself => return None,
+        Beside::Another => {
+            format!(
+                "{} is not looked for at {}: name another column in beside",
+                kind.name, site.column
+            )
+        }
+        Beside::VelocityAndLoad | Beside::PositionAndLoad => {
+            rubs.filter(|_| site.is_force())?;
+            format!(
+                "friction that grows with a load is not looked for at {}: name the column of the load in beside",
+                site.column
+            )
+        }
+        Beside::Velocity | Beside::Position if site.is_force() => match rubs {
+            Some(_) => return None,
+            None => format!(
+                "friction is not looked for at {}: name velocity or position in stage {stage}",
+                site.column
+            ),
+        },
+        Beside::Velocity | Beside::Position => {
+            let may_rub = || rubs.is_some() || site.quantity.is_none() && own().any(moves);
+            if site.side == Side::Output || own().any(Site::is_force) || !may_rub() {
+                return None;
+            }
+            format!(
+                "friction is not looked for at {}: it does not say that it is a force or a torque; give its unit in [[input]], and velocity or position in stage {stage}",
+                site.column
+            )
+        }
+    })
 }
 
 /// The name of a channel's side: `output`, or `input`, or the column where the stage has several inputs.
@@ -206,9 +276,20 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
     }
 }
 
-/// All names by which a user may ask for a wrapper.
-fn aliases(kind: &Kind, site: &Site, among: &Among<'_>, label: &str) -> Vec<String> {
-    let is_usual = kind.usual.contains(&site.side);
+/// Whether a kind is among all that is looked for on a channel. A drag by the speed of the output is what a lag of the output is, so that
+/// nothing distinguishes them unless the stage names what rubs.
+fn is_usual(kind: &Kind, site: &Site, among: &Among<'_>) -> bool {
+    let is_lag = kind.name == VISCOUS_FRICTION.name && !among.names_motion[site.stage];
+    kind.usual.contains(&site.side) && !is_lag
+}
+
+/// All names by which a user may ask for a wrapper of a kind; `all` stands for a usual one.
+fn aliases(
+    (kind, is_usual): (&Kind, bool),
+    site: &Site,
+    among: &Among<'_>,
+    label: &str,
+) -> Vec<String> {
     let word = if site.side == Side::Input { "input" } else { "output" };
     let mut kinds = vec![label.to_owned(), kind.name.to_owned()];
     if is_usual {

@@ -4,6 +4,7 @@ mod diagnosed;
 mod offset;
 mod remembering;
 mod seal;
+mod wrapped;
 
 use stretch_core::Calibration;
 

@@ -218,6 +218,12 @@ fn resolved<'a>(column: &str, unit: &'a str) -> &'a str {
     if unit == "nm" && is_length() { "nanom" } else { unit }
 }
 
+/// Whether nothing in a column's name says that it measures anything but what `is_one` accepts.
+pub(crate) fn measures_nothing_else(column: &str, is_one: impl Fn(Quantity) -> bool) -> bool {
+    let is_unknown = unit(column).and_then(Quantity::of_unit).is_none_or(|unit| unit == Angle);
+    Quantity::of(column, "").is_none_or(|q| q == Angle || is_unknown && is_one(q))
+}
+
 /// The row of a unit without a stroke as people spell it.
 fn row_of(text: &str) -> Option<&'static Unit> {
     let low = text.to_lowercase();

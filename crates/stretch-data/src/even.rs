@@ -1,6 +1,6 @@
 //! A trial on an even grid of time: lost samples bridged, long gaps cut.
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 use crate::{DataError, Trial};
 
@@ -93,13 +93,15 @@ impl EvenPart {
 }
 
 /// A trial on an even grid, and what had to be done for it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Even {
     /// The trial, or its parts between gaps.
     pub parts: Vec<EvenPart>,
     /// What became of its rows.
     pub rows: Rows,
-    /// Sentences: gaps, parts left out, uneven time stamps. None where the trial was even.
+    /// By column, the turn by which it wrapped, in its unit: its values are unwrapped.
+    pub turns: Vec<Option<f64>>,
+    /// Sentences: gaps, parts left out, uneven time stamps, angles that wrapped. None where the trial was even.
     pub notes: Vec<String>,
 }
 
@@ -114,6 +116,7 @@ impl Trial {
     ///   overshoot.
     /// - So is a longer gap up to [`EvenSpec::bridged_s`] where the commands behind it are those before it.
     /// - More lost samples cut the trial; parts with fewer than [`EvenSpec::shortest`] samples are left out.
+    /// - A column that jumps by a turn where the motion goes on is an angle that wraps ([`Wrap`](crate::Wrap)); it is unwrapped.
     /// - Uneven stamps are resampled: measured channels by straight lines, of the commands the one that holds in the middle
     ///   of each period.
     ///
@@ -137,8 +140,9 @@ impl Trial {
     /// ```
     pub fn even(&self, columns: &[&str], spec: EvenSpec) -> Result<Even, DataError> {
         self.check_samples()?;
-        let values =
-            columns.iter().map(|name| self.require(name)).collect::<Result<Vec<_>, _>>()?;
+        let unwrapped = columns.iter().map(|name| self.unwrapped(name));
+        let (values, wraps): (Vec<_>, Vec<_>) =
+            unwrapped.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let is_held: Vec<bool> = columns.iter().map(|name| HELD.contains(name)).collect();
         let own_hz = self.rate_hz().unwrap_or(spec.rate_hz);
         let ratio = own_hz / spec.rate_hz;
@@ -154,8 +158,12 @@ impl Trial {
             period_s: 1.0 / if is_own { own_hz } else { spec.rate_hz },
             own_s: 1.0 / own_hz,
         };
-        let mut even = Even { parts: Vec::new(), rows: Rows::default(), notes: Vec::new() };
+        let mut even = Even::default();
         even.rows.read = self.len();
+        let noted =
+            columns.iter().zip(&wraps).filter_map(|(name, wrap)| Some(wrap.as_ref()?.note(name)));
+        even.notes.extend(noted.map(|note| format!("{}: {note}", self.name)));
+        even.turns = wraps.iter().map(|wrap| wrap.map(|wrap| wrap.turn)).collect();
         let changed = |i: usize| {
             let held = values.iter().zip(&is_held).filter(|(_, held)| **held);
             held.map(|(column, _)| (column[i] - column[i - 1]).abs()).fold(0.0, f64::max)
@@ -184,7 +192,7 @@ impl Trial {
             let points = clock.points(time_s);
             is_uneven |= points.is_none();
             let points = points.unwrap_or_else(|| clock.grid(time_s));
-            let filled = |(all, held): (&&[f64], &bool)| {
+            let filled = |(all, held): (&Cow<'_, [f64]>, &bool)| {
                 let own = &all[stretch.clone()];
                 points.iter().map(|point| point.value(own, *held)).collect()
             };

@@ -123,6 +123,7 @@ pub struct EvenSession {
     trials: Vec<EvenTrial>,
     dt_s: f64,
     rows: Rows,
+    turns: Vec<Option<f64>>,
     notes: Vec<String>,
 }
 
@@ -148,7 +149,8 @@ impl EvenSession {
         let is_whole = whole > 0.0 && (rate_hz / whole - 1.0).abs() < STAMPED;
         let rate_hz = if is_whole { whole } else { rate_hz };
         let (dt_s, rows) = (1.0 / rate_hz, Rows::default());
-        let mut session = Self { trials: Vec::new(), dt_s, rows, notes: Vec::new() };
+        let (turns, notes) = (vec![None; columns.len()], Vec::new());
+        let mut session = Self { trials: Vec::new(), dt_s, rows, turns, notes };
         for (one, start_s) in session.in_order(trials) {
             let spec = EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S, over_switches: false };
             let even = one.trial.even(columns, spec)?;
@@ -157,6 +159,8 @@ impl EvenSession {
             session.notes.extend(notes);
             session.rows.add(even.rows);
             session.notes.extend(even.notes);
+            let turns = session.turns.iter_mut().zip(even.turns);
+            turns.for_each(|(known, turn)| *known = known.or(turn));
             session.trials.extend(even.parts.into_iter().enumerate().map(|(i, part)| EvenTrial {
                 name: match count {
                     1 => one.trial.name.clone(),
@@ -214,6 +218,11 @@ impl EvenSession {
     /// What became of the rows.
     pub fn rows(&self) -> Rows {
         self.rows
+    }
+
+    /// By column, the turn by which it wrapped in some trial, in its unit; its values are unwrapped.
+    pub fn turns(&self) -> &[Option<f64>] {
+        &self.turns
     }
 
     /// What had to be done to them, in sentences; none for even trials that say when they began.

@@ -17,6 +17,7 @@ mod toml_file;
 mod toml_node;
 mod toml_text;
 mod trial;
+mod wrap;
 mod write;
 
 pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
@@ -32,4 +33,5 @@ pub use time::tidy_time;
 pub use toml_file::TomlFile;
 pub use toml_text::Remarks;
 pub use trial::{Channel, Trial, ends, rate_of};
+pub use wrap::{Wrap, follow_turns};
 pub use write::{can_name, push_number};

@@ -27,3 +27,4 @@ mod states;
 mod support;
 mod units;
 mod workers;
+mod wrapped;

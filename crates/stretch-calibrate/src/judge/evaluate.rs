@@ -133,7 +133,7 @@ pub fn evaluate(
     let mut rows = Vec::new();
     for trial in trials {
         trial.check_lengths()?;
-        let reference = trial.require(first.spec().reference.as_str())?;
+        let (reference, _) = trial.unwrapped(first.spec().reference.as_str())?;
         let mut methods = vec![raw(first, trial)?];
         for (_, calibration) in calibrations {
             methods.push(estimates(calibration, trial)?);
@@ -142,7 +142,7 @@ pub fn evaluate(
         let period_s = 1.0 / rate_hz;
         let mut errors = Vec::new();
         for ((name, method), all) in names.iter().zip(&methods).zip(&mut pooled) {
-            let tally = Tally::of(reference, method, period_s);
+            let tally = Tally::of(&reference, method, period_s);
             all.merge(&tally);
             let nothing = || CalibrateError::NothingEstimated {
                 trial: trial.name.clone(),
@@ -151,12 +151,12 @@ pub fn evaluate(
             };
             errors.push(tally.errors(name).ok_or_else(nothing)?);
         }
-        tests.push(reference, &methods);
+        tests.push(&reference, &methods);
         rows.push(TrialErrors {
             trial: trial.name.clone(),
             methods: errors,
             time_s: trial.time_s.clone(),
-            reference: reference.to_vec(),
+            reference: reference.into_owned(),
             rates: methods.iter().map(|m| m.rates.clone()).collect(),
             estimates: methods.into_iter().map(|m| m.values).collect(),
         });

@@ -62,6 +62,7 @@ impl Checked {
         let names = used(stages, &spec);
         let apart = spec.by.clone().filter(|by| !names.contains(by));
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
+        columns.choose_turns(stages);
         let by = apart.and_then(|_| columns.take_last());
         check_stated(stages, inputs, &columns)?;
         let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());

@@ -5,6 +5,7 @@ use std::ops::Range;
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split};
 use stretch_gap::{SampleRoles, TrialSpec};
 
+use super::spec::StageEntry;
 use crate::error::ProblemError;
 
 /// Parts of a trial with fewer samples are left out: those of five seconds, and no more than the second nor fewer than the first.
@@ -22,6 +23,8 @@ fn shortest(trials: &[SessionTrial]) -> usize {
 pub(crate) struct Columns {
     pub(crate) names: Vec<String>,
     pub(crate) values: Vec<Vec<f64>>,
+    /// By column, the turn by which it wrapped; its values are unwrapped.
+    turns: Vec<Option<f64>>,
     pub(crate) trials: Vec<TrialSpec>,
     /// Which recording each trial is, or is a part of.
     sources: Vec<usize>,
@@ -60,6 +63,7 @@ impl Columns {
         Ok(Self {
             values: (0..names.len()).map(all).collect(),
             names,
+            turns: session.turns().to_vec(),
             trials: session.trials().iter().map(spec).collect(),
             sources: session.trials().iter().map(EvenTrial::source).collect(),
             is_lost: if is_lost.iter().any(|lost| *lost) { is_lost } else { Vec::new() },
@@ -72,6 +76,37 @@ impl Columns {
     pub(crate) fn of(&self, name: &str) -> Option<&[f64]> {
         let at = self.names.iter().position(|n| n == name)?;
         Some(&self.values[at])
+    }
+
+    /// The turn by which a column wrapped.
+    pub(crate) fn turn_of(&self, name: &str) -> Option<f64> {
+        self.turns[self.names.iter().position(|n| n == name)?]
+    }
+
+    /// Chooses the turn in which columns that wrapped begin, in each trial: the one nearest to 0, where simulators begin, and for what drives a
+    /// stage the one nearest to its output, because at the seam noise decides which side each is on.
+    pub(crate) fn choose_turns(&mut self, stages: &[StageEntry]) {
+        let shift = |values: &mut [f64], to: f64, turn: f64| {
+            let turns = turn * values.first().map_or(0.0, |x| ((x - to) / turn).round());
+            values.iter_mut().for_each(|x| *x -= turns);
+        };
+        let index = |names: &[String], name: &String| names.iter().position(|n| n == name);
+        for range in self.ranges() {
+            for (values, turn) in self.values.iter_mut().zip(&self.turns) {
+                turn.iter().for_each(|turn| shift(&mut values[range.clone()], 0.0, *turn));
+            }
+            for stage in stages {
+                let Some(output) = index(&self.names, &stage.output) else { continue };
+                let Some(turn) = self.turns[output] else { continue };
+                let begin = self.values[output][range.start];
+                let beside = stage.inputs.iter().chain(&stage.position);
+                for at in beside.filter_map(|name| index(&self.names, name)) {
+                    if self.turns[at] == Some(turn) {
+                        shift(&mut self.values[at][range.clone()], begin, turn);
+                    }
+                }
+            }
+        }
     }
 
     /// Takes the last column away: its name and values.

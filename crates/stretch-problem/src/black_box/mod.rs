@@ -117,7 +117,8 @@ impl BlackBox {
             problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
         let stages = if source.answers_all() { problem.stages.len() } else { 1 };
         let probes = probes(&problem, &*source);
-        let runs = Runs::new(source, budget, stages * samples);
+        let turns = problem.stages.iter().map(|s| problem.columns.turn_of(&s.output)).collect();
+        let runs = Runs::new(source, budget, stages * samples, turns);
         let lines = RwLock::new(vec![None; problem.stages.len()]);
         let (coupled, undeclared) = (OnceLock::new(), Undeclared::default());
         Self { problem, runs, lines, probes, coupled, undeclared }

@@ -8,6 +8,7 @@ use std::{
 };
 
 use lru::LruCache;
+use stretch_data::follow_turns;
 
 use crate::black_box::{
     repeated::{self, LONG},
@@ -73,6 +74,8 @@ pub(crate) struct Runs {
     made: Mutex<Made>,
     done: Condvar,
     answers_all: bool,
+    /// By stage, the turn by which its recorded output wrapped.
+    turns: Vec<Option<f64>>,
 }
 
 impl std::fmt::Debug for Runs {
@@ -82,7 +85,12 @@ impl std::fmt::Debug for Runs {
 }
 
 impl Runs {
-    pub(crate) fn new(source: Arc<dyn Source>, budget: Option<usize>, samples: usize) -> Self {
+    pub(crate) fn new(
+        source: Arc<dyn Source>,
+        budget: Option<usize>,
+        samples: usize,
+        turns: Vec<Option<f64>>,
+    ) -> Self {
         let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
         let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
         let made = Made {
@@ -93,7 +101,7 @@ impl Runs {
             is_repeated: false,
         };
         let answers_all = source.answers_all();
-        Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all }
+        Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all, turns }
     }
 
     /// Number of runs that were made.
@@ -292,7 +300,9 @@ impl Runs {
             let stage = stage(run.stage);
             return Err(SourceError::Length { stage, found, needed, trials: run.trials });
         }
-        let Some(at) = values.iter().position(|x| !x.is_finite()) else { return Ok(values) };
+        let Some(at) = values.iter().position(|x| !x.is_finite()) else {
+            return Ok(self.followed(session, run, values));
+        };
         let sample = at % samples;
         let trial = session.trials.iter().find(|t| t.samples.contains(&sample));
         Err(SourceError::NotFinite {
@@ -301,6 +311,22 @@ impl Runs {
             trial: trial.map_or(String::new(), |t| t.name.clone()),
             time_s: trial.map_or(0.0, |t| (sample - t.samples.start) as f64 * session.dt_s),
         })
+    }
+
+    /// An answer without its jumps by a turn where the recorded output has had such jumps; each trial begins in the turn of the record.
+    fn followed(&self, session: &RecordedSession, run: &Inner, mut values: Vec<f64>) -> Vec<f64> {
+        let samples = session.samples(run.trials).max(1);
+        for (at, answer) in values.chunks_mut(samples).enumerate() {
+            let stage = if self.answers_all { at } else { run.stage };
+            let output = &session.stages[stage].output;
+            let Some((turn, record)) = self.turns[stage].zip(session.column(output)) else {
+                continue;
+            };
+            for trial in &session.trials[..run.trials] {
+                follow_turns(&mut answer[trial.samples.clone()], record[trial.samples.start], turn);
+            }
+        }
+        values
     }
 }
 

@@ -1,0 +1,57 @@
+//! An angle that wraps calibrates, and is judged, as if it did not.
+
+use stretch_calibrate::{Calibrated, Options, calibrate, evaluate};
+use stretch_data::{Channel, Trial};
+
+/// An angle about 170 deg, from 110 to 230 deg, beside a sensor that follows it.
+fn trial(scale: f64, turn: f64, names: [&str; 2]) -> Trial {
+    let time_s: Vec<f64> = (0..3000).map(|n| 0.01 * f64::from(n)).collect();
+    let angle: Vec<f64> = time_s.iter().map(|t| 170.0 + 60.0 * (0.7 * t).sin()).collect();
+    let other = angle.iter().zip(&time_s).map(|(a, t)| 1.0 + 0.01 * a + 1e-3 * (91.0 * t).sin());
+    let other = other.collect();
+    let low = -0.5 * turn;
+    let shown = angle.iter().map(|a| (scale * a - low).rem_euclid(turn) + low).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let channels = vec![channel(names[0], shown), channel(names[1], other)];
+    Trial { name: "a.csv".into(), time_s, channels }
+}
+
+fn fitted(trial: &Trial, [reference, signal]: [&str; 2]) -> (Calibrated, f64) {
+    let options =
+        Options { reference: reference.into(), signal: signal.into(), ..Options::default() };
+    let made = calibrate(std::slice::from_ref(trial), &options).expect("a calibration");
+    let judged = evaluate(&[("own", &made.calibration)], std::slice::from_ref(trial));
+    let rmse = judged.expect("errors").pooled[1].rmse;
+    (made, rmse)
+}
+
+#[test]
+fn a_reference_that_wraps_is_calibrated_and_judged_unwrapped() {
+    let radian = std::f64::consts::PI / 180.0;
+    for (scale, column, says) in [(1.0, "angle_deg", "360 deg"), (radian, "shaft_rad", "2 pi rad")]
+    {
+        let names = [column, "bridge_v"];
+        let (plain, usual) = fitted(&trial(scale, 1e6, names), names);
+        let (made, rmse) = fitted(&trial(scale, 360.0 * scale, names), names);
+        assert!(usual < 0.2 * scale && (rmse / usual - 1.0).abs() < 1e-6, "{usual}, {rmse}");
+        let note = format!("a.csv: {column} jumps by {says} ");
+        assert!(made.notes.iter().any(|n| n.starts_with(&note)), "{:?}", made.notes);
+        assert!(plain.notes.is_empty(), "{:?}", plain.notes);
+    }
+}
+
+#[test]
+fn a_signal_that_wraps_is_calibrated_unwrapped() {
+    let names = ["shaft_deg", "length_mm"];
+    let of = |turn| {
+        let trial = trial(1.0, turn, names);
+        let options =
+            Options { signal: names[0].into(), reference: names[1].into(), ..Options::default() };
+        calibrate(&[trial], &options).expect("a calibration")
+    };
+    let (plain, made) = (of(1e6), of(360.0));
+    for (one, other) in plain.fits.iter().zip(&made.fits) {
+        assert!((one.rmse / other.rmse - 1.0).abs() < 1e-6, "{} {}", one.rmse, other.rmse);
+    }
+    assert!(made.notes.iter().any(|n| n.contains("shaft_deg jumps by 360 deg")));
+}

@@ -41,7 +41,7 @@ use crate::{
         coverage::{TooLittle, is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
-        notes::{detection_limit_note, extrapolation_notes, swing_notes},
+        notes::{detection_limit_note, extrapolation_notes, gross_error_notes, swing_notes},
         sentence::{Answer, cut_short, tell},
     },
 };
@@ -388,6 +388,7 @@ fn report(
     };
     let naming = judged.naming();
     let mut text = tell(answer, simulator, &evidence);
+    text.notes.extend(gross_error_notes(cause.problem));
     text.notes.extend(searched.problem.starts.note());
     text.notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // What another form of an effect leaves may look like a swing.

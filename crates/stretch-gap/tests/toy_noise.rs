@@ -165,3 +165,57 @@ fn stated_noise_that_is_wrong_names_nothing() {
         approx::assert_abs_diff_eq!(small.gap.retuned, 1.04, epsilon = 0.28);
     }
 }
+
+/// A few gross errors are no noise, alone or in a row, however large, and leave a hum of the mains to be taken out.
+#[test]
+fn gross_errors_are_no_noise() {
+    for (size, row, hum) in
+        [(5.0, 1, 0.0), (-40.0, 3, 0.0), (1e6, 1, 0.0), (40.0, 1, 1.0), (1e6, 3, 1.0)]
+    {
+        let wave = |i: usize| hum * (std::f64::consts::TAU * 60.0 * 0.01 * i as f64 + 0.7).cos();
+        let gross = |i: usize| if i % 2000 < row { size } else { 0.0 };
+        let record: Vec<f64> =
+            white(0.1, 8).iter().enumerate().map(|(i, x)| x + wave(i) + gross(i)).collect();
+        approx::assert_relative_eq!(deviation(&record, 0.01), 0.1, max_relative = 1.5 * TOLD);
+    }
+}
+
+/// A coarse converter that repeats most values: what it flips by is its noise, and a few gross errors are not.
+#[test]
+fn gross_errors_are_no_noise_of_a_coarse_converter() {
+    let flips = |step: f64, gross: f64| -> Vec<f64> {
+        let coarse = |(i, x): (usize, &f64)| {
+            let far = if i % 5000 == 7 { gross } else { 0.0 };
+            0.3 + step * f64::from(x.abs() > 2.5) + far
+        };
+        white(1.0, 9).iter().enumerate().map(coarse).collect()
+    };
+    // A thousand samples a second, at which the mains are too slow to be taken out.
+    let plain = deviation(&flips(0.7, 0.0), 0.001);
+    // One value in 80 is a step off: a variance of 0.012 of its square.
+    approx::assert_relative_eq!(plain, 0.7 * 0.0124_f64.sqrt(), max_relative = 0.1);
+    for gross in [30.0, -1e5] {
+        // Three differences of each of four errors are left out, one in 60 of those that are not 0.
+        let found = deviation(&flips(0.7, gross), 0.001);
+        approx::assert_relative_eq!(found, plain, max_relative = 0.02);
+    }
+}
+
+/// What is missing is named beside gross errors as without them, and they are counted.
+#[test]
+fn gross_errors_hide_no_effect() {
+    for (size, row) in [(5.0, 1), (-40.0, 1), (5.0, 3)] {
+        for stated in [Some(1.0), None] {
+            let toy = Toy { stated, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL) };
+            let mut record = toy.hiding(&[(Effect::Play, &[0.1])]).measured(7);
+            for from in [500, 3500] {
+                record.outputs[0][from..from + row].fill(size);
+            }
+            let told = record.diagnosed().0;
+            assert_eq!(told.named, [Effect::Play.name()], "{}", told.sentence);
+            let note =
+                format!("{} of 4000 values of y0 are gross errors and do not count", 2 * row);
+            assert!(told.notes.contains(&note), "{:?}", told.notes);
+        }
+    }
+}

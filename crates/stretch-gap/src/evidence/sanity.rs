@@ -14,8 +14,7 @@ use crate::{
         hypothesis::Hypothesis, levenberg_marquardt::FINE, prepared::PreparedProblem, score::gap,
     },
     problem::{
-        altered_parameters::Altered, error::GapError, sample_roles::Role, simulator::Simulator,
-        spec::ParameterSpec,
+        altered_parameters::Altered, error::GapError, sample_roles::Role, spec::ParameterSpec,
     },
 };
 
@@ -60,7 +59,7 @@ impl Sanity {
         evidence: &Evidence,
     ) -> Result<Self, GapError> {
         let simulator = problem.simulator();
-        let left = (0..evidence.stages.len()).map(|stage| left(simulator, evidence, stage));
+        let left = (0..evidence.stages.len()).map(|stage| left(problem, evidence, stage));
         Ok(Self {
             left: left.collect(),
             allowed: simulator.record().gross_misfit_share,
@@ -69,13 +68,14 @@ impl Sanity {
     }
 }
 
-fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
+fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64 {
+    let simulator = problem.simulator();
     let (traces, measured) = (&evidence.stages[stage], simulator.measured(stage));
+    let sd = &problem.compare.metrics[stage].noise.sd;
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
     for segment in evidence.roles.of_role(Role::Test) {
-        // What was not measured counts for nothing, whatever stands in its place.
-        let is_lost = |i: &usize| simulator.record().is_lost.get(*i) == Some(&true);
-        for i in (segment.from..segment.to).filter(|i| !is_lost(i)) {
+        // What was not measured counts for nothing, whatever stands in its place, and neither does a gross error.
+        for i in (segment.from..segment.to).filter(|i| sd[*i].is_finite()) {
             count += 1.0;
             sum += measured[i];
             squares += measured[i] * measured[i];

@@ -161,8 +161,13 @@ mod tests {
     fn size_and_time_of_a_slow_drift_are_found_again() {
         let samples = 20_000;
         let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
-        let noise =
-            NoiseLevel { sd: vec![1.0; samples], rms: 1.0, source: String::new(), known_to: 0.0 };
+        let noise = NoiseLevel {
+            sd: vec![1.0; samples],
+            rms: 1.0,
+            source: String::new(),
+            known_to: 0.0,
+            isolated: 0,
+        };
         let roles = SampleRoles {
             segments: vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }],
             block: 50,

@@ -1,4 +1,4 @@
-//! Isolated outliers: what one sample says and none of its neighbours is the recorder's, not the rig's.
+//! Isolated outliers: what one sample or a few in a row say and none of their neighbours is the recorder's, not the rig's.
 //!
 //! In the residual r, in multiples of the noise, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the motion stands out.
 //! A sample is isolated where it is off both neighbours to the same side,
@@ -7,10 +7,14 @@
 //! min(|r_i - r_(i-1)|, |r_i - r_(i+1)|) > 8 max(1, s),     s = median of |steps| within half a second / 0.954
 //! ```
 //!
-//! with the deviation s of the noise that the steps beside it show, so that a hum is not isolated. A step or a kink of a gap is off one neighbour
-//! only. Such a sample counts for nothing, as one that was lost. Where more than one of [`RARE`] are isolated they are no exceptions, and count.
+//! with the deviation s of the noise that the steps beside it show, so that a hum is not isolated. A step or a kink of a gap is off
+//! one neighbour only. So are all of [`RUN`] samples in a row or fewer (an encoder's glitch) that are that far off both samples beside
+//! the run, where these two differ by a quarter of that at most, and where the simulator moves by a quarter of it at most on either
+//! side: what follows a command late or not at all also leaves a few samples in a row, but there the simulator has a step. What is
+//! isolated counts for nothing, as what was lost. Where more than one of [`RARE`] are isolated they are no exceptions, and count; runs
+//! do where there are too many beside single ones.
 
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 
 /// Deviations beyond which a sample is isolated: of normal noise one in 10^9.
 const ALONE: f64 = 8.0;
@@ -21,21 +25,55 @@ const NEAR: usize = 25;
 /// Samples among which an isolated one is an exception.
 const RARE: usize = 200;
 
-/// Samples of a residual in multiples of the noise that are isolated within their trials.
-pub(crate) fn isolated(residual: &[f64], trials: impl Iterator<Item = Range<usize>>) -> Vec<usize> {
-    let mut out = Vec::new();
+/// Most samples of a run.
+const RUN: usize = 5;
+/// Share of its height by which what a run stands on may move.
+const LEVEL: f64 = 0.25;
+
+/// Samples of a residual in multiples of the noise that are isolated within their trials, in order; `moves` are the simulator's own
+/// steps to each sample, in multiples of the noise.
+pub(crate) fn isolated(
+    residual: &[f64],
+    moves: &[f64],
+    trials: impl Iterator<Item = Range<usize>>,
+) -> Vec<usize> {
+    let (mut single, mut all) = (Vec::new(), BTreeSet::new());
     for trial in trials {
-        let r = &residual[trial.clone()];
+        let (r, moves) = (&residual[trial.clone()], &moves[trial.clone()]);
         let steps: Vec<f64> = r.windows(2).map(|pair| pair[1] - pair[0]).collect();
         for (i, pair) in steps.windows(2).enumerate() {
             let least = pair[0].abs().min(pair[1].abs());
             let is_peak = pair[0] * pair[1] < 0.0;
             if is_peak && least > ALONE && least > ALONE * deviation(&steps, i) {
-                out.push(trial.start + i + 1);
+                single.push(trial.start + i + 1);
             }
         }
+        for before in 0..r.len() {
+            let is_run = |count: &usize| is_run(r, moves, &steps, before..before + count + 1);
+            let count = (2..=RUN).find(is_run).unwrap_or(0);
+            all.extend((1..=count).map(|i| trial.start + before + i));
+        }
     }
-    if out.len() * RARE > residual.len() { Vec::new() } else { out }
+    all.extend(&single);
+    let is_rare = |count: usize| count * RARE <= residual.len();
+    match (is_rare(single.len()), is_rare(all.len())) {
+        (false, _) => Vec::new(),
+        (true, false) => single,
+        (true, true) => all.into_iter().collect(),
+    }
+}
+
+/// Whether the samples between the first of a span and the one at its end are a run that stands alone.
+fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
+    let (before, after) = (span.start, span.end);
+    if after >= r.len() {
+        return false;
+    }
+    let (low, high) = (r[before].min(r[after]), r[before].max(r[after]));
+    let above = |x: &f64| if r[before + 1] > high { x - high } else { low - x };
+    let height = r[before + 1..after].iter().map(above).fold(f64::INFINITY, f64::min);
+    let beside = (high - low).max(moves[before + 1].abs()).max(moves[after].abs());
+    height > ALONE && beside <= LEVEL * height && height > ALONE * deviation(steps, before)
 }
 
 /// Deviation of the noise that the steps around one show.
@@ -56,31 +94,77 @@ mod tests {
         (0..count).map(|_| random.gauss()).collect()
     }
 
-    #[test]
-    fn noise_steps_kinks_and_hums_are_left_and_single_values_found() {
-        let count = 6000;
-        let whole = || std::iter::once(0..count);
+    fn none_of(residual: &[f64]) -> Vec<usize> {
+        isolated(residual, &vec![0.0; residual.len()], std::iter::once(0..residual.len()))
+    }
+
+    fn with_gap(count: usize) -> Vec<f64> {
         let gap = |i: usize| match i {
             1000..1500 => 40.0,
             2000..2400 => 0.5 * (i - 2000) as f64,
             3000..4000 => 30.0 * (2.6 * i as f64).sin(),
             _ => 0.0,
         };
-        let with_gap: Vec<f64> = noise(count).iter().enumerate().map(|(i, x)| x + gap(i)).collect();
-        assert!(isolated(&noise(count), whole()).is_empty());
-        assert!(isolated(&with_gap, whole()).is_empty());
-        let mut record = with_gap;
+        noise(count).iter().enumerate().map(|(i, x)| x + gap(i)).collect()
+    }
+
+    #[test]
+    fn noise_steps_kinks_and_hums_are_left_and_single_values_found() {
+        let count = 6000;
+        assert!(none_of(&noise(count)).is_empty());
+        assert!(none_of(&with_gap(count)).is_empty());
+        let mut record = with_gap(count);
         let places = [7, 1200, 2200, 5000];
         for place in places {
             record[place] += 20.0;
         }
-        assert_eq!(isolated(&record, whole()), places);
+        assert_eq!(none_of(&record), places);
         // One in a hundred is no exception.
         let often: Vec<f64> = noise(count)
             .iter()
             .enumerate()
             .map(|(i, x)| x + 20.0 * f64::from(i % 100 == 50))
             .collect();
-        assert!(isolated(&often, whole()).is_empty());
+        assert!(none_of(&often).is_empty());
+    }
+
+    /// Two to five samples in a row, on whatever they stand; six are an event of the rig, and so is what does not come back.
+    #[test]
+    fn a_few_values_in_a_row_are_found_and_what_lasts_longer_is_left() {
+        for (length, height) in [(2, 30.0), (3, -25.0), (4, 1e6), (5, 40.0)] {
+            let mut record = with_gap(6000);
+            let places = [7, 1200, 2200, 5000].map(|from| from..from + length);
+            for place in places.iter().cloned().flatten() {
+                record[place] += height * (1.0 + 0.1 * (place % 3) as f64);
+            }
+            assert_eq!(none_of(&record), places.into_iter().flatten().collect::<Vec<_>>());
+        }
+        let added = |shape: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            noise(6000).iter().enumerate().map(|(i, x)| x + shape(i)).collect()
+        };
+        let long = added(&|i| 40.0 * f64::from((700..706).contains(&i)));
+        assert!(none_of(&long).is_empty());
+        let no_return = added(&|i| match i {
+            700..703 => 40.0,
+            703.. => 15.0,
+            _ => 0.0,
+        });
+        assert!(none_of(&no_return).is_empty());
+        // Jumps of a worn contact: three samples in every 150.
+        let jumps = added(&|i| 40.0 * f64::from(i % 150 < 3));
+        assert!(none_of(&jumps).is_empty());
+        // Too many runs take none of the single values with them.
+        let both = added(&|i| 40.0 * f64::from(i % 150 < 3) + 40.0 * f64::from(i == 1000));
+        assert_eq!(none_of(&both), [1000]);
+    }
+
+    /// A step that comes three samples late leaves three samples, too, and is the rig's.
+    #[test]
+    fn a_step_that_comes_late_is_left() {
+        let step = |i: usize| 40.0 * f64::from((700..3000).contains(&i));
+        let moves: Vec<f64> = (0..6000).map(|i| step(i) - step(i.max(1) - 1)).collect();
+        let late: Vec<f64> =
+            noise(6000).iter().enumerate().map(|(i, x)| x + step(i.max(3) - 3) - step(i)).collect();
+        assert!(isolated(&late, &moves, std::iter::once(0..6000)).is_empty());
     }
 }

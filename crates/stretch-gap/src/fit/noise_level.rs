@@ -33,6 +33,8 @@ pub(crate) struct NoiseLevel {
     pub(crate) source: String,
     /// Relative standard deviation with which the variance of the output's own noise is known.
     pub(crate) known_to: f64,
+    /// Number of samples that [are isolated](crate::fit::isolated_outliers).
+    pub(crate) isolated: usize,
 }
 
 /// Draws of the inputs' noise.
@@ -104,12 +106,13 @@ fn noise_level(
     }
     let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);
     let residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-    let isolated = isolated(&residual, trials.into_iter());
-    isolated.iter().for_each(|&i| sd[i] = f64::INFINITY);
-    if !isolated.is_empty() {
-        source += &format!("; samples that stand alone and do not count: {}", isolated.len());
-    }
-    Ok(NoiseLevel { sd, rms: (own + mean).sqrt().max(1e-12), source, known_to })
+    let pairs = output.iter().zip(output.iter().skip(1)).zip(&sd[1.min(samples)..]);
+    let moves: Vec<f64> =
+        std::iter::once(0.0).chain(pairs.map(|((a, b), sd)| (b - a) / sd)).collect();
+    let alone = isolated(&residual, &moves, trials.into_iter());
+    alone.iter().for_each(|&i| sd[i] = f64::INFINITY);
+    let (rms, isolated) = ((own + mean).sqrt().max(1e-12), alone.len());
+    Ok(NoiseLevel { sd, rms, source, known_to, isolated })
 }
 
 /// Variance that the measured input's noise causes at every sample of the output, which is `undisturbed` without it.

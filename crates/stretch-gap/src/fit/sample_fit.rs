@@ -100,7 +100,7 @@ pub fn fit_samples(
     let metric = |(stage, &rms): (usize, &f64)| {
         let sd = |i| if is_lost.get(i).is_some_and(|lost| *lost) { f64::INFINITY } else { rms };
         let sd = (0..all).map(sd).collect();
-        let level = NoiseLevel { sd, rms, source: String::new(), known_to: 0.0 };
+        let level = NoiseLevel { sd, rms, source: String::new(), known_to: 0.0, isolated: 0 };
         Metric::of(&runs, &roles, stage, level, start, None)
     };
     let metrics: Result<Vec<Metric>, GapError> = noise.iter().enumerate().map(metric).collect();

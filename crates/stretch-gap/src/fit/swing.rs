@@ -242,8 +242,13 @@ mod tests {
             let swing = amplitude * (phase + TAU * 0.7 * 0.01 * i as f64).sin();
             residual.push(drive * (drift + swing) + random.gauss());
         }
-        let noise =
-            NoiseLevel { sd: vec![1.0; samples], rms: 1.0, source: String::new(), known_to: 0.0 };
+        let noise = NoiseLevel {
+            sd: vec![1.0; samples],
+            rms: 1.0,
+            source: String::new(),
+            known_to: 0.0,
+            isolated: 0,
+        };
         let segment = |trial: usize| Segment {
             trial,
             from: trial * TRIAL,

@@ -32,6 +32,13 @@ const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
 /// Shares of the slow part that are tried.
 const SHARES: usize = 19;
 
+/// Medians of the sizes of differences beyond which one is a gross error: 8 standard deviations of normal noise.
+const GROSS: f64 = 12.0;
+/// Fits of the waves of the mains beside gross errors, each with what the last one left.
+const ROUNDS: usize = 4;
+/// Relative rounding of a second difference: four operations, and the values' own.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// Noise of a channel, in its unit: white noise, and an Ornstein-Uhlenbeck process beside it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Noise {
@@ -281,12 +288,13 @@ fn mains(dt_s: f64) -> [f64; 2] {
 }
 
 /// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
-/// normal variable's square; robust against what the motion adds. What the mains add is not noise: in every second
-/// the waves of 50 and 60 Hz are taken out before.
+/// normal variable's square; robust against what the motion adds and against gross errors. What the mains add is not noise: in every
+/// second the waves of 50 and 60 Hz are taken out before.
 ///
 /// Second differences d_i = x_(i-1) - 2 x_i + x_(i+1) of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared
 /// normal variable is 0.4549 of its mean: sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the sample time, s; the answer has the unit of the
-/// record squared.
+/// record squared. A coarse converter, which repeats most values, makes the median 0: its noise is the mean square, without sizes
+/// beyond 12 medians of those that are not 0.
 ///
 /// ```
 /// use stretch_gap::{RandomGenerator, noise_variance};
@@ -297,44 +305,87 @@ fn mains(dt_s: f64) -> [f64; 2] {
 /// ```
 pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> f64 {
     let window = ((1.0 / dt_s).round() as usize).max(30);
-    let mut squares: Vec<f64> = Vec::new();
+    let (mut squares, mut moved) = (Vec::new(), Vec::new());
     for stretch in stretches {
-        let mut bends: Vec<f64> = second_differences(stretch).collect();
-        for part in bends.chunks_mut(window) {
+        let bends = bends(stretch);
+        let mut left = bends.clone();
+        for (part, bends) in left.chunks_mut(window).zip(bends.chunks(window)) {
             let taken = take_waves_out(part, dt_s, (2, 6.0)) / part.len() as f64;
-            squares.extend(part.iter().map(|x| x * x / (1.0 - taken.min(0.5))));
+            let own = part.iter().map(|x| x * x / (1.0 - taken.min(0.5)));
+            squares.extend(own.clone());
+            moved.extend(own.zip(bends).filter(|(_, bend)| **bend != 0.0).map(|(x, _)| x));
         }
     }
     if squares.is_empty() {
         return 1e-12;
     }
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64 / 6.0;
-    let middle = squares.len() / 2;
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1 / 6.0 / 0.4549;
+    let most = GROSS.powi(2) * median(moved).unwrap_or(0.0);
+    let count = squares.len() as f64;
+    let mean = squares.iter().filter(|x: &&f64| **x <= most).sum::<f64>() / count / 6.0;
+    let median = median(squares).unwrap_or(0.0) / 6.0 / 0.4549;
     // A coarse converter makes the median 0.
     if median > 1e-3 * mean { median } else { mean.max(1e-18) }
 }
 
+/// Second differences; 0 where there is nothing but the rounding of the values.
+fn bends(stretch: &[f64]) -> Vec<f64> {
+    let rounding = |x: &[f64]| ROUNDING * x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let pairs = second_differences(stretch).zip(stretch.windows(3));
+    pairs.map(|(bend, x)| if bend.abs() > rounding(x) { bend } else { 0.0 }).collect()
+}
+
+/// The upper median; none of nothing.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// Takes the waves of the mains out of a stretch of differences of an order with the squares of their weights summed, one after the
 /// other; how many samples' worth of white noise went with them.
+///
+/// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; where one stands in
+/// what is left, the waves are fitted to that again. It makes differences of either sign one behind the other, where a kink of the
+/// motion makes one alone.
 pub(crate) fn take_waves_out(values: &mut [f64], dt_s: f64, (order, power): (usize, f64)) -> f64 {
-    let mut taken = 0.0;
-    for shown in mains(dt_s) {
-        // What shows as a slow wave cannot be told from motion.
-        if shown < 0.15 || values.len() < 20 {
-            continue;
-        }
-        for phase in [0.0, 0.25] {
-            let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
-            let own: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
-            // At half the sample rate there is one wave only.
-            if own < 1e-6 * values.len() as f64 {
+    let moved: Vec<usize> = (0..values.len()).filter(|i| values[*i] != 0.0).collect();
+    let most_of = |values: &[f64]| {
+        let sizes = moved.iter().map(|i| values[*i].abs()).collect();
+        median(sizes).map_or(f64::INFINITY, |median| GROSS * median)
+    };
+    let is_gross = |values: &[f64], i: usize, most: f64| {
+        let is_opposite =
+            |j: usize| values.get(j).is_some_and(|x| x.abs() > most && x * values[i] < 0.0);
+        values[i].abs() > most && (is_opposite(i + 1) || is_opposite(i.wrapping_sub(1)))
+    };
+    let (mut taken, mut most) = (0.0, most_of(values));
+    for _ in 0..ROUNDS {
+        taken = 0.0;
+        let gross: Vec<usize> = (0..values.len()).filter(|i| is_gross(values, *i, most)).collect();
+        for shown in mains(dt_s) {
+            // What shows as a slow wave cannot be told from motion.
+            if shown < 0.15 || values.len() < 20 {
                 continue;
             }
-            let size = values.iter().enumerate().map(|(i, x)| x * wave(i)).sum::<f64>() / own;
-            values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
-            // Of white noise, differences of order n hold (2 - 2 cos)^n of each wave; second ones hold 6 on the average.
-            taken += (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(order as i32) / power;
+            for phase in [0.0, 0.25] {
+                let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
+                let own: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
+                // At half the sample rate there is one wave only.
+                if own < 1e-6 * values.len() as f64 {
+                    continue;
+                }
+                let mut clipped = values.to_vec();
+                gross.iter().for_each(|i| clipped[*i] = clipped[*i].clamp(-most, most));
+                let clipped = clipped.iter().enumerate();
+                let size = clipped.map(|(i, x)| x * wave(i)).sum::<f64>() / own;
+                values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
+                // Of white noise, differences of order n hold (2 - 2 cos)^n of each wave; second ones hold 6 on the average.
+                taken +=
+                    (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(order as i32) / power;
+            }
+        }
+        most = most_of(values);
+        if taken == 0.0 || !(0..values.len()).any(|i| is_gross(values, i, most)) {
+            break;
         }
     }
     taken

@@ -1,14 +1,34 @@
-//! Notes that a verdict carries: parameters that swing, laws of session time that were extrapolated, and effects that would have been named.
+//! Notes that a verdict carries: gross errors, a noise that is none, parameters that swing, laws of session time that were
+//! extrapolated, and effects that would have been named.
 
 use crate::{
     evidence::{detection_limit::DetectionLimit, gathered::Evidence},
-    fit::{prepared::PreparedProblem, swing::Swing},
+    fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
     problem::{
         sample_roles::{Role, SampleRoles},
         simulator::Simulator,
-        spec::EffectSpec,
+        spec::{EffectSpec, StageSpec},
     },
 };
+
+/// A note for each output of which some samples [are isolated](crate::fit::isolated_outliers).
+pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
+    let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
+    let note = |(metric, stage): (&Metric, &StageSpec)| {
+        let isolated = metric.noise.isolated;
+        let counted = metric.noise.sd.iter().filter(|sd| sd.is_finite()).count();
+        let (are, do_not) =
+            if isolated == 1 { ("is a gross error", "does") } else { ("are gross errors", "do") };
+        (isolated > 0).then(|| {
+            format!(
+                "{isolated} of {} values of {} {are} and {do_not} not count",
+                isolated + counted,
+                stage.channel
+            )
+        })
+    };
+    stages.filter_map(note).collect()
+}
 
 /// Probability from which a swing is noted.
 const SWINGS: f64 = 0.95;

@@ -129,8 +129,8 @@ pub(crate) struct Args {
     ///
     /// Several with commas: effect (one is named, wholly or in part),
     /// unknown (a gap, or a part of one, that nothing explains), record (a column or the rig file is wrong), faint (more
-    /// than noise, too little to name), parameters (they agree once re-tuned), gap (effect, unknown or record), any (all
-    /// but plain agreement).
+    /// than noise, too little to name), parameters (they agree once re-tuned), gap (effect, unknown or record, or agreement with
+    /// reservations), any (all but plain agreement).
     #[arg(
         long,
         value_name = "VERDICT",

@@ -26,8 +26,9 @@ impl FailOn {
             Self::Record => verdict == Record,
             Self::Faint => diagnosis.is_faint(),
             Self::Parameters => verdict == Parameters,
-            Self::Gap => matches!(verdict, Effect | Partial | Unknown | Record),
-            Self::Any => verdict != NoGap || diagnosis.is_faint(),
+            // what hides a gap is no agreement
+            Self::Gap => !diagnosis.is_agreement(),
+            Self::Any => verdict != NoGap || diagnosis.is_faint() || !diagnosis.is_agreement(),
         }
     }
 }

@@ -41,7 +41,10 @@ use crate::{
         coverage::{TooLittle, is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
-        notes::{detection_limit_note, extrapolation_notes, gross_error_notes, swing_notes},
+        notes::{
+            detection_limit_note, extrapolation_notes, gross_error_notes, implausible_noise_notes,
+            swing_notes,
+        },
         sentence::{Answer, cut_short, tell},
     },
 };
@@ -389,6 +392,8 @@ fn report(
     let naming = judged.naming();
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(gross_error_notes(cause.problem));
+    let reservations = implausible_noise_notes(cause.problem, &sanity);
+    text.notes.extend(reservations.iter().cloned());
     text.notes.extend(searched.problem.starts.note());
     text.notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // What another form of an effect leaves may look like a swing.
@@ -439,6 +444,7 @@ fn report(
             false => None,
         },
         notes: text.notes,
+        reservations,
         rows_used: simulator.description().rows_used(),
         simulations,
         model_runs,

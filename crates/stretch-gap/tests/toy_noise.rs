@@ -219,3 +219,18 @@ fn gross_errors_hide_no_effect() {
         }
     }
 }
+
+/// Of a noise that is stated so large that no record could be so quiet nothing is taken for agreement.
+#[test]
+fn noise_that_no_record_has_is_told() {
+    let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
+    let told = |times| Toy { stated: Some(times), ..toy.clone() }.measured(3).diagnosed().0;
+    for times in [3.0, 40.0] {
+        let far = told(times);
+        assert_eq!(far.verdict, VerdictKind::NoGap);
+        assert!(!far.is_agreement());
+        assert!(far.reservations[0].starts_with("the noise of y0 is implausible, "));
+        assert!(far.notes.contains(&far.reservations[0]));
+    }
+    assert!(told(1.0).is_agreement() && told(1.5).is_agreement());
+}

@@ -1,4 +1,4 @@
-//! Is it the right simulator at all? The two signs that the judge looks at.
+//! Is it the right simulator at all, and is the noise one? Two signs that the judge looks at, and one that is told.
 //!
 //! Two signs that data come from something else than the simulator is of:
 //!
@@ -7,11 +7,17 @@
 //!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
 //! * *at bounds*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
+//!
+//! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise. No noise does that, so it was estimated or stated
+//! too large, and a gap of that size would not be seen.
 
 use crate::{
     evidence::gathered::Evidence,
     fit::{
-        hypothesis::Hypothesis, levenberg_marquardt::FINE, prepared::PreparedProblem, score::gap,
+        hypothesis::Hypothesis,
+        levenberg_marquardt::FINE,
+        prepared::PreparedProblem,
+        score::{gap, mean_square},
     },
     problem::{
         altered_parameters::Altered, error::GapError, sample_roles::Role, spec::ParameterSpec,
@@ -28,6 +34,9 @@ const LOOSE: f64 = 5.0;
 /// Share of its nominal value that a parameter keeps then.
 const KEPT: f64 = 0.02;
 
+/// Share of the noise that noise leaves at least, as a root mean square: a simulator without effects cannot follow noise.
+const LEAST_NOISE: f64 = 0.5;
+
 /// Whether the data can come from the simulator at all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sanity {
@@ -37,6 +46,8 @@ pub(crate) struct Sanity {
     pub(crate) allowed: f64,
     /// The stage with parameters at their bounds that leaves most, if any.
     pub(crate) at_bounds: Option<AtBounds>,
+    /// Stages whose noise is implausible, with the share of it that is left.
+    pub(crate) implausible: Vec<(usize, f64)>,
 }
 
 /// A stage with two or more parameters at the end of their tolerances.
@@ -59,11 +70,14 @@ impl Sanity {
         evidence: &Evidence,
     ) -> Result<Self, GapError> {
         let simulator = problem.simulator();
-        let left = (0..evidence.stages.len()).map(|stage| left(problem, evidence, stage));
+        let stages = || 0..evidence.stages.len();
+        let left = stages().map(|stage| left(problem, evidence, stage));
+        let of_noise = stages().map(|stage| (stage, of_noise(problem, evidence, stage)));
         Ok(Self {
             left: left.collect(),
             allowed: simulator.record().gross_misfit_share,
             at_bounds: at_bounds(problem, best, evidence)?,
+            implausible: of_noise.filter(|(_, share)| *share < LEAST_NOISE).collect(),
         })
     }
 }
@@ -86,6 +100,18 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
     // What is noise is nobody's fault.
     let noise = count * traces.noise * traces.noise;
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
+}
+
+/// Root mean square of what the simulator leaves of a stage as shipped or re-tuned, whichever is less, in multiples of the noise.
+fn of_noise(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64 {
+    let (traces, measured) = (&evidence.stages[stage], problem.simulator().measured(stage));
+    let sd = &problem.compare.metrics[stage].noise.sd;
+    let left = |output: &[f64]| {
+        let all = measured.iter().zip(output).zip(sd).filter(|(_, sd)| sd.is_finite());
+        let squares: Vec<f64> = all.map(|((m, s), sd)| ((m - s) / sd).powi(2)).collect();
+        mean_square(&squares).sqrt()
+    };
+    left(&traces.raw).min(left(&traces.retuned))
 }
 
 fn at_bounds(

@@ -151,6 +151,9 @@ pub struct Diagnosis {
     pub baselines: Option<Baselines>,
     /// Sentences about what was noticed and assumed.
     pub notes: Vec<String>,
+    /// Those of the notes that say why a gap may be there although none was found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reservations: Vec<String>,
     /// Rows that it stands on, of those that were read.
     #[serde(default)]
     pub rows_used: RowsUsed,
@@ -183,6 +186,22 @@ impl Diagnosis {
     pub fn is_faint(&self) -> bool {
         let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
         agrees && self.gap.retuned > self.null_band
+    }
+
+    /// Whether simulator and rig agree, and nothing says that a gap may be there although none was found.
+    ///
+    /// ```
+    /// use stretch_gap::{Diagnosis, VerdictKind};
+    /// fn check(diagnosis: &Diagnosis) {
+    ///     let agrees = Diagnosis { verdict: VerdictKind::NoGap, reservations: Vec::new(), ..diagnosis.clone() };
+    ///     assert!(agrees.is_agreement());
+    ///     let implausible = vec!["the noise of speed_mps is implausible".to_owned()];
+    ///     assert!(!Diagnosis { reservations: implausible, ..agrees }.is_agreement());
+    /// }
+    /// ```
+    pub fn is_agreement(&self) -> bool {
+        let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+        agrees && self.reservations.is_empty()
     }
 
     /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The

@@ -161,7 +161,8 @@ mod tests {
     use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
     use std::collections::BTreeMap;
 
-    static SOUND: Sanity = Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None };
+    static SOUND: Sanity =
+        Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None, implausible: Vec::new() };
 
     fn candidate(effects: &[&str], probability: f64) -> Candidate {
         Candidate {

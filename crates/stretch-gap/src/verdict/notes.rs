@@ -2,7 +2,7 @@
 //! extrapolated, and effects that would have been named.
 
 use crate::{
-    evidence::{detection_limit::DetectionLimit, gathered::Evidence},
+    evidence::{detection_limit::DetectionLimit, gathered::Evidence, sanity::Sanity},
     fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
     problem::{
         sample_roles::{Role, SampleRoles},
@@ -28,6 +28,23 @@ pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
         })
     };
     stages.filter_map(note).collect()
+}
+
+/// A note for each output whose noise is [implausible](crate::evidence::sanity): it hides gaps.
+pub(crate) fn implausible_noise_notes(
+    problem: &PreparedProblem<'_>,
+    sanity: &Sanity,
+) -> Vec<String> {
+    let note = |(stage, share): &(usize, f64)| {
+        let spec = &problem.simulator().stages()[*stage];
+        let noise = &problem.compare.metrics[*stage].noise;
+        format!(
+            "the noise of {} is implausible, {:.2e} {} ({}): without any effect the simulator leaves {share:.2} of it, which no \
+             noise does, and it hides every gap of its size; state the noise of the stage as it is",
+            spec.channel, noise.rms, spec.unit, noise.source
+        )
+    };
+    sanity.implausible.iter().map(note).collect()
 }
 
 /// Probability from which a swing is noted.

@@ -57,7 +57,12 @@ impl Default for Case {
             gap: [0.004; 3],
             first: candidate(0.97, 0.002),
             shares: Vec::new(),
-            sanity: Sanity { left: vec![0.001, 0.002], allowed: 0.1, at_bounds: None },
+            sanity: Sanity {
+                left: vec![0.001, 0.002],
+                allowed: 0.1,
+                at_bounds: None,
+                implausible: Vec::new(),
+            },
             unexplained: None,
             gross: Vec::new(),
             borrowed_test: false,
@@ -307,7 +312,12 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
         (
             "a channel that is not simulated",
             Case {
-                sanity: Sanity { left: vec![0.02, 0.64], allowed: 0.1, at_bounds: None },
+                sanity: Sanity {
+                    left: vec![0.02, 0.64],
+                    allowed: 0.1,
+                    at_bounds: None,
+                    implausible: Vec::new(),
+                },
                 ..unknown()
             },
         ),

@@ -22,7 +22,7 @@ use crate::{
     options::Options,
     problem::{
         altered_parameters::Altered,
-        error::{GapError, unless_spent},
+        error::{GapError, if_possible},
         simulator::Simulator,
     },
     record::{
@@ -45,7 +45,7 @@ use crate::{
             detection_limit_note, extrapolation_notes, gross_error_notes, implausible_noise_notes,
             swing_notes,
         },
-        sentence::{Answer, cut_short, tell},
+        sentence::{Answer, cut_short, listed, tell},
     },
 };
 
@@ -92,13 +92,14 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
     let is_limited = simulator.costly().is_some_and(|costly| costly.model_runs().budget.is_some());
-    let spare = is_limited.then(|| Searched::without(problem.clone()));
+    let spare = simulator.costly().map(|_| Searched::without(problem.clone()));
     // What an answer without effects needs is run first: whatever a search spends, there is an answer.
-    if let Some(spare) = &spare {
+    if let Some(spare) = spare.as_ref().filter(|_| is_limited) {
         gather(task, spare.cause(&columns), 0.0)?;
     }
     match (answered(task, problem, &from, &columns, &begun), spare) {
-        (Err(GapError::Spent { .. }), Some(spare)) => {
+        (Err(error), Some(spare)) if error.is_of_runs() => {
+            let spare = Searched { is_lost: error.is_lost(), ..spare };
             concluded(task, &spare, spare.cause(&columns), &begun)
         }
         (answer, _) => answer,
@@ -162,13 +163,16 @@ struct Searched<'a> {
     tried: BTreeMap<Vec<usize>, Hypothesis>,
     /// The screen around the re-tuned nominal, where it is kept.
     looked: Option<Arc<Looked>>,
+    /// Whether the search ended because a run of it could not be simulated.
+    is_lost: bool,
 }
 
 impl<'a> Searched<'a> {
     /// What is there before a search: the re-tuned nominal.
     fn without(problem: PreparedProblem<'a>) -> Self {
         let found = Found { best: problem.nominal.clone(), rivals: Vec::new() };
-        Self { problem, found, eliminated: Vec::new(), tried: BTreeMap::new(), looked: None }
+        let (eliminated, tried) = Default::default();
+        Self { problem, found, eliminated, tried, looked: None, is_lost: false }
     }
 
     /// The best set as the cause, or what the columns alone say is wrong with the record.
@@ -185,6 +189,22 @@ impl<'a> Searched<'a> {
         let effects = self.problem.simulator().effects().iter().enumerate();
         let is_new = |e: &usize| self.tried.keys().all(|set| !set.contains(e));
         effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.as_str()).collect()
+    }
+
+    /// Those of them whose runs could not be simulated, and the effects of sets that were fitted and could not be judged.
+    fn lost(&self, weighed: &[Candidate]) -> Vec<&str> {
+        let not_looked_at = self.not_looked_at();
+        if self.is_lost {
+            return not_looked_at;
+        }
+        let [not_fitted, not_judged] = self.problem.compare.runs.lost_effects();
+        let is_weighed = |name: &String| weighed.iter().any(|c| c.effects.contains(name));
+        let is_lost = |name: &String| match not_looked_at.contains(&name.as_str()) {
+            true => not_fitted.contains(name),
+            false => not_judged.contains(name) && !is_weighed(name),
+        };
+        let effects = self.problem.simulator().effects().iter().map(|spec| &spec.name);
+        effects.filter(|name| is_lost(name)).map(String::as_str).collect()
     }
 }
 
@@ -223,7 +243,7 @@ fn search<'a>(
             (problem, rest)
         }
     };
-    Ok(Searched { problem, found, eliminated, tried, looked })
+    Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })
 }
 
 /// The errors of the record or of the rig file that stand above the best set of effects, and what was found with the first of them in its
@@ -240,7 +260,7 @@ fn doubt(
     }
     let doubts = Doubts::of(doubted, suspect, thresholds)
         .and_then(|doubts| doubts.closer_if(doubted, suspect, found, thresholds));
-    let Some(doubts) = unless_spent(doubts)? else { return Ok(None) };
+    let Some(doubts) = if_possible(doubts)? else { return Ok(None) };
     Ok(weigh_errors(doubted, suspect, doubts.errors, found, thresholds))
 }
 
@@ -257,7 +277,7 @@ fn limits(
     (task.progress)("detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
     let inputs = LimitInputs { problem, best, thresholds, null_band, seed: task.options.seed };
-    Ok(unless_spent(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
+    Ok(if_possible(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
 /// What the gap is put down to: the best set of effects, or an error.
@@ -293,13 +313,13 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     (task.progress)("test trials");
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
-    let held = candidates(problem, &evidence, &all, seed)?;
+    let (all, held) = candidates(problem, &evidence, all, seed)?;
     let mut proposal = None;
     let lacks = |evidence: &Evidence, best: &Hypothesis| {
         (task.progress)("what the catalogue lacks");
-        proposal = unless_spent(propose(problem, &problem.nominal))?.flatten();
+        proposal = if_possible(propose(problem, &problem.nominal))?.flatten();
         let Some(proposal) = &proposal else { return Ok(None) };
-        Ok(unless_spent(weigh_term_sum(problem, evidence, (proposal, best), thresholds))?.flatten())
+        Ok(if_possible(weigh_term_sum(problem, evidence, (proposal, best), thresholds))?.flatten())
     };
     let (posterior, held) =
         posterior(problem, thresholds, (&mut evidence, null_band), (all, held), lacks)?;
@@ -312,7 +332,8 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let location = Where {
         stages: stage_gaps(problem, &evidence),
         slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),
-        end_to_end: localise::end_to_end(&problem.compare.runs, &evidence)?,
+        end_to_end: if_possible(localise::end_to_end(&problem.compare.runs, &evidence))?
+            .unwrap_or_default(),
     };
     let about = problem.simulator().description();
     let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
@@ -347,7 +368,7 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
     let lacking = |names| {
         let found =
             propose_for(cause.problem, best, (names, gathered.proposed.as_ref()), task.progress);
-        Ok(unless_spent(found)?.flatten())
+        Ok(if_possible(found)?.flatten())
     };
     judge(&case, &task.options.thresholds, lacking)
 }
@@ -392,7 +413,14 @@ fn report(
     let naming = judged.naming();
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(gross_error_notes(cause.problem));
-    let reservations = implausible_noise_notes(cause.problem, &sanity);
+    text.notes.extend(runs.lost_note());
+    let lost = searched.lost(&candidates);
+    let mut reservations = implausible_noise_notes(cause.problem, &sanity);
+    if !lost.is_empty() {
+        text.sentence = format!("Not looked at, because their runs failed: {}. ", listed(&lost))
+            + &text.sentence;
+        reservations.push(format!("not looked at, because their runs failed: {}", lost.join(", ")));
+    }
     text.notes.extend(reservations.iter().cloned());
     text.notes.extend(searched.problem.starts.note());
     text.notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
@@ -414,7 +442,7 @@ fn report(
     // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
-        evidence.responses = unless_spent(responses)?.unwrap_or_default();
+        evidence.responses = if_possible(responses)?.unwrap_or_default();
     }
     let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
     let diagnosis = Diagnosis {
@@ -440,7 +468,7 @@ fn report(
         transfer: None,
         next_experiment: None,
         baselines: match options.baselines {
-            true => unless_spent(simpler())?,
+            true => if_possible(simpler())?,
             false => None,
         },
         notes: text.notes,

@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use stretch_gap::{Diagnosis, GapError, Options, diagnose};
+use stretch_gap::{Diagnosis, GapError, Options, VerdictKind, diagnose};
 
 use crate::toys::{Effect, Fails, Law, Measured, Toy};
 
@@ -74,12 +74,15 @@ fn a_simulation_that_fails_from_the_start_is_refused_and_one_that_is_gone_ends_a
         |fails| Toy { fails: Some(fails), ..Toy::of(&[Law::Line]) }.may_lack(&Effect::ALL);
     let not_finite = refused(&failing(Fails::NotFinite).measured(1));
     assert!(
-        matches!(not_finite, GapError::NotFinite { ref stage } if stage == "line"),
+        matches!(not_finite, GapError::NotFinite { ref stage, ref asked } if stage == "line" && asked.starts_with("asked for ")),
         "{not_finite}"
     );
     // 1 is the gain as shipped.
     let refusing = refused(&failing(Fails::Above(0, 0.5)).measured(1));
-    assert_eq!(refusing.to_string(), "a value that it refuses");
+    assert_eq!(
+        refusing.to_string(),
+        "a value that it refuses (asked for line.gain = 1 u/v, line.zero = 0.2 u)"
+    );
     // At any time, in whatever part of a diagnosis: nothing that it says later is asked for.
     let whole = failing(Fails::GoneAfter(usize::MAX)).measured(1);
     whole.diagnosed();
@@ -112,6 +115,39 @@ fn a_bench_beyond_what_can_be_simulated_is_fitted_up_to_there() {
     toy.fails = Some(Fails::Above(0, 1.06));
     let told = toy.measured(1).diagnosed().0;
     assert!((1.0..=1.06).contains(&told.parameters[0].fitted), "{:?}", told.parameters[0]);
+}
+
+/// An effect that cannot be simulated is out, and all others are looked at; without it nothing may be missing, and that is not said.
+#[test]
+fn an_effect_that_cannot_be_simulated_is_told_and_ends_nothing() {
+    let toy = |fails, hidden: &[(Effect, &[f64])]| {
+        let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden);
+        Toy { fails: Some(fails), ..toy }.measured(1).diagnosed().0
+    };
+    let name = Effect::Quadratic.name();
+    let is_told = |told: &Diagnosis| {
+        told.reservations == [format!("not looked at, because their runs failed: {name}")]
+            && told.notes.contains(&told.reservations[0])
+            && told
+                .sentence
+                .starts_with(&format!("Not looked at, because their runs failed: {name}. "))
+            && told
+                .notes
+                .iter()
+                .any(|note| note.contains(&format!(" with {name}; the first: line: ")))
+    };
+    // Never, or only on the trials that are not fitted.
+    let play = toy(Fails::With(Effect::Quadratic, 0), &[(Effect::Play, &[0.1])]);
+    assert_eq!(play.named, [Effect::Play.name()]);
+    assert!(is_told(&play), "{} {:?}", play.sentence, play.notes);
+    let none = toy(Fails::With(Effect::Quadratic, 0), &[]);
+    assert!(matches!(none.verdict, VerdictKind::NoGap | VerdictKind::Parameters));
+    assert!(is_told(&none) && !none.is_agreement(), "{} {:?}", none.sentence, none.notes);
+    let tested = toy(Fails::With(Effect::Quadratic, 4), &[(Effect::Quadratic, &[0.1])]);
+    assert!(!tested.named.contains(&name.to_owned()), "{}", tested.sentence);
+    assert!(is_told(&tested), "{} {:?}", tested.sentence, tested.notes);
+    let sound = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).measured(1).diagnosed().0;
+    assert!(sound.is_agreement() && sound.reservations.is_empty());
 }
 
 /// The largest batch of runs: a creep is screened at two sizes of either sign and at three times.

@@ -87,9 +87,9 @@ impl Problem {
             report("what the gap costs a calibration");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
-            // where no more runs may be made, what was found is told without it
+            // where runs fail, or may not be made any more, what was found is told without it
             diagnosis.transfer = match transfer(self.simulator(), &evidence, asked) {
-                Err(GapError::Spent { .. }) => None,
+                Err(error) if error.is_of_runs() => None,
                 found => found?,
             };
             diagnosis.simulations += simulations.into_inner();

@@ -115,7 +115,8 @@ impl Chain<'_> {
         match out.iter().all(|x| x.is_finite()) {
             true => Ok(Some(out)),
             false => {
-                Err(GapError::NotFinite { stage: self.simulator.stages()[stage].name.clone() })
+                let stage = self.simulator.stages()[stage].name.clone();
+                Err(GapError::NotFinite { stage, asked: String::new() })
             }
         }
     }

@@ -4,6 +4,7 @@ mod budget;
 mod by_trial;
 mod contacts;
 mod coupled;
+mod diverging;
 mod effects;
 mod experiments;
 mod flow;

@@ -19,7 +19,11 @@ use crate::{
         probability::{Function, Gap, Posterior, Standing, Weighed, allowed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
+    problem::{
+        error::{GapError, unless_lost},
+        simulator::Simulator,
+        thresholds::Thresholds,
+    },
 };
 
 /// A set of effects that was held against the data.
@@ -115,14 +119,23 @@ const UNKNOWN: &str = "unknown";
 /// A candidate, with what it leaves by stage and block.
 pub(crate) type Held = (Candidate, Vec<Blocks>);
 
-/// Every hypothesis on the test trials, with what it leaves by stage and block; its probability is that of the others' sum later.
+/// Every hypothesis that can be simulated on the test trials, with what it leaves by stage and block; its probability is that of the
+/// others' sum later.
 pub(crate) fn candidates(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
-    hypotheses: &[Hypothesis],
+    hypotheses: Vec<Hypothesis>,
     seed: u64,
-) -> Result<Vec<Held>, GapError> {
-    hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
+) -> Result<(Vec<Hypothesis>, Vec<Held>), GapError> {
+    let held = hypotheses.into_par_iter().map(|one| {
+        let held = unless_lost(candidate(problem, evidence, &one, seed))?;
+        if held.is_none() {
+            problem.compare.runs.not_judged(&one.effects);
+        }
+        Ok(held.map(|held| (one, held)))
+    });
+    let held: Result<Vec<_>, GapError> = held.collect();
+    Ok(held?.into_iter().flatten().unzip())
 }
 
 /// Share of the gap that a set of effects closes at least to be a cause of it, as a `partial` answer promises: of the gap of the fitted and of the

@@ -17,7 +17,7 @@ use crate::{
     fit::{prepared::PreparedProblem, score::gap},
     numerics::random::RandomGenerator,
     problem::{
-        error::{GapError, unless_spent},
+        error::{GapError, if_possible},
         sample_roles::Role,
         simulator::Run,
     },
@@ -33,7 +33,7 @@ pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64,
     let stages = 0..problem.compare.metrics.len();
     let arrives: Result<Vec<Vec<f64>>, GapError> =
         stages.map(|stage| arrives(problem, stage)).collect();
-    let arrives = unless_spent(arrives)?;
+    let arrives = if_possible(arrives)?;
     let one = |record| {
         let random = RandomGenerator::new(seed, record as u64);
         excess(problem, arrives.as_deref(), record, random)

@@ -8,8 +8,8 @@
 //! * *at bounds*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
 //!
-//! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise. No noise does that, so it was estimated or stated
-//! too large, and a gap of that size would not be seen.
+//! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise. No noise does that, so it was
+//! estimated or stated too large, and a gap of that size would not be seen.
 
 use crate::{
     evidence::gathered::Evidence,
@@ -20,7 +20,10 @@ use crate::{
         score::{gap, mean_square},
     },
     problem::{
-        altered_parameters::Altered, error::GapError, sample_roles::Role, spec::ParameterSpec,
+        altered_parameters::Altered,
+        error::{GapError, unless_lost},
+        sample_roles::Role,
+        spec::ParameterSpec,
     },
 };
 
@@ -137,8 +140,8 @@ fn at_bounds(
     let rivals = match best.effects.is_empty() {
         true => None,
         false => {
-            let loose = loosened(problem, evidence, worst.stage, &worst.ended)?;
-            Some((problem.gap_in(best, worst.stage), loose))
+            let loose = unless_lost(loosened(problem, evidence, worst.stage, &worst.ended))?;
+            loose.map(|loose| (problem.gap_in(best, worst.stage), loose))
         }
     };
     Ok(Some(AtBounds { rivals, ..worst }))

@@ -17,7 +17,7 @@ use crate::{
         prepared::PreparedProblem,
         score::{excess, mean_square},
     },
-    problem::error::GapError,
+    problem::error::{GapError, unless_lost},
     search::sets::Sets,
 };
 
@@ -83,9 +83,11 @@ pub(crate) fn shares(
         let without: Vec<f64> = match less.effects.is_empty() {
             // The nominal was run already.
             true => nominal.clone(),
-            false => stages
-                .map(|s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?.test)))
-                .collect::<Result<_, GapError>>()?,
+            false => {
+                let left = |s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?.test));
+                let left = unless_lost(stages.map(left).collect::<Result<_, GapError>>())?;
+                left.unwrap_or_else(|| nominal.clone())
+            }
         };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);
         let fitted =

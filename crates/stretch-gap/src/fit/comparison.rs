@@ -260,7 +260,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one
-    /// batch; `None` for a coordinate that does not act.
+    /// batch; `None` for a coordinate that does not act, or on either side of which nothing can be simulated.
     ///
     /// The moved runs may be taken from a run at the parameters `near`.
     pub(crate) fn sensitivities(
@@ -298,18 +298,21 @@ impl<'a> Comparison<'a> {
                     let mut other = model.clone();
                     coordinate.write(&mut other, coordinate.read(model) - step);
                     let mut back = self.residuals_of(&[(stages[s], &other)], Some(near));
-                    (-step, back.remove(0)?)
+                    match back.remove(0) {
+                        Err(error) if !error.ends_all() => return Ok((c, s, None)),
+                        back => (-step, back?),
+                    }
                 }
                 there => (*step, there?),
             };
             let here = &residuals[s].values;
             let values = here.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
-            Ok((c, s, self.metrics[stages[s]].column(&self.roles, values)))
+            Ok((c, s, Some(self.metrics[stages[s]].column(&self.roles, values))))
         });
         let columns: Result<Vec<_>, GapError> = columns.collect();
         let mut out = vec![vec![None; stages.len()]; coordinates.len()];
         for (c, s, column) in columns? {
-            out[c][s] = Some(column);
+            out[c][s] = column;
         }
         Ok(out)
     }

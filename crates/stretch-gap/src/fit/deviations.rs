@@ -36,7 +36,10 @@ use crate::{
         prepared::PreparedProblem, score::Misfit,
     },
     numerics::linear::{Cholesky, boxed, dot},
-    problem::{error::GapError, simulator::Model},
+    problem::{
+        error::{GapError, unless_lost},
+        simulator::Model,
+    },
 };
 
 /// Time constants of further poles, samples.
@@ -92,7 +95,9 @@ impl PreparedProblem<'_> {
         for effect in acting {
             let mut less = Model::clone(&set.model);
             less.effects.retain(|(e, _)| *e != effect);
-            let without = compare.residual_values(stage, &less)?;
+            // Where an effect cannot be left out, nothing shows what it does.
+            let without = unless_lost(compare.residual_values(stage, &less))?;
+            let Some(without) = without else { continue };
             let doing: Vec<f64> =
                 without.iter().zip(&residual.values).map(|(a, b)| a - b).collect();
             bound.extend(self.shapes(&doing, &level).into_iter().map(column));

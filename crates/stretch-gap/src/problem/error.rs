@@ -43,10 +43,12 @@ pub enum GapError {
         moved: f64,
     },
     /// A simulated output was not finite.
-    #[error("{stage}: the simulation gave a number that is not finite")]
+    #[error("{stage}: the simulation gave a number that is not finite ({asked})")]
     NotFinite {
         /// The stage.
         stage: String,
+        /// The values that it was asked for.
+        asked: String,
     },
     /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
     #[error(transparent)]
@@ -66,11 +68,38 @@ pub enum GapError {
     Stopped,
 }
 
-/// What an answer can do without: none where no more runs may be made for it.
-pub(crate) fn unless_spent<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
+/// What an answer can do without: none where a run for it failed, or may not be made any more.
+pub(crate) fn if_possible<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
     match found {
-        Err(GapError::Spent { .. }) => Ok(None),
+        Err(error) if error.is_of_runs() => Ok(None),
         found => found.map(Some),
+    }
+}
+
+/// What a search can do without: none where a run for it failed.
+pub(crate) fn unless_lost<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
+    match found {
+        Err(error) if error.is_lost() => Ok(None),
+        found => found.map(Some),
+    }
+}
+
+/// An error of the simulator, with the values that it was asked for.
+#[derive(Debug)]
+struct Asked {
+    error: Box<dyn std::error::Error + Send + Sync>,
+    asked: String,
+}
+
+impl std::fmt::Display for Asked {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({})", self.error, self.asked)
+    }
+}
+
+impl std::error::Error for Asked {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.error.source()
     }
 }
 
@@ -78,6 +107,31 @@ impl GapError {
     /// Whether all ends: other errors take the candidate out whose values could not be simulated.
     pub(crate) fn ends_all(&self) -> bool {
         matches!(self, Self::Stopped | Self::Broken(_))
+    }
+
+    /// Whether runs failed, or may not be made any more: an answer may go on without what they were for.
+    ///
+    /// ```
+    /// use stretch_gap::GapError;
+    /// assert!(GapError::simulator("the solver did not converge").is_of_runs());
+    /// assert!(!GapError::Stopped.is_of_runs());
+    /// ```
+    pub fn is_of_runs(&self) -> bool {
+        self.is_lost() || matches!(self, Self::Spent { .. })
+    }
+
+    /// Whether the simulator could not simulate what it was asked for.
+    pub(crate) fn is_lost(&self) -> bool {
+        matches!(self, Self::Simulator(_) | Self::NotFinite { .. })
+    }
+
+    /// The same error of a run, with the values that were asked for.
+    pub(crate) fn asked(self, asked: String) -> Self {
+        match self {
+            Self::Simulator(error) => Self::Simulator(Box::new(Asked { error, asked })),
+            Self::NotFinite { stage, .. } => Self::NotFinite { stage, asked },
+            other => other,
+        }
     }
 
     /// An error of the simulator itself.

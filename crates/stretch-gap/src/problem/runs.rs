@@ -1,14 +1,34 @@
 //! The one door to the simulator: every run is counted, may be stopped before it begins, and ends in finite numbers.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, AtomicUsize, Ordering},
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
 };
 
 use crate::problem::{
     error::GapError,
     simulator::{Model, ModelRuns, Run, Simulator, simulate_many},
+    spec::EffectSpec,
 };
+
+/// Size of an output from which it is as good as infinite: sums of its square would be.
+const MOST: f64 = 1e100;
+
+/// Runs that failed or gave numbers that are not finite.
+#[derive(Default)]
+struct Lost {
+    /// Models that could not be simulated, bit by bit, by the names of their effects.
+    models: BTreeMap<Vec<String>, BTreeSet<Vec<u64>>>,
+    /// What the first of them said.
+    first: Option<String>,
+    /// Effects that could not be screened or fitted somewhere because of such runs.
+    not_fitted: BTreeSet<String>,
+    /// Effects of fitted sets that could not be judged because of them.
+    not_judged: BTreeSet<String>,
+}
 
 /// A simulator, how often it was run, and whether to go on. Clones share the count.
 #[derive(Clone)]
@@ -17,6 +37,7 @@ pub(crate) struct Runs<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
     count: Arc<AtomicUsize>,
     was_cut: Arc<AtomicBool>,
+    lost: Arc<Mutex<Lost>>,
     /// What steps of integration are multiplied by.
     step: f64,
 }
@@ -30,8 +51,8 @@ impl<'a> Runs<'a> {
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Self, GapError> {
-        let (count, was_cut) = (Arc::default(), Arc::default());
-        let runs = Self { simulator, stop, count, was_cut, step: 1.0 };
+        let (count, was_cut, lost) = Default::default();
+        let runs = Self { simulator, stop, count, was_cut, lost, step: 1.0 };
         let needed = runs.samples(simulator.trials().len());
         for (stage, spec) in simulator.stages().iter().enumerate() {
             let finite = simulator.measured(stage).iter().take_while(|x| x.is_finite());
@@ -49,7 +70,8 @@ impl<'a> Runs<'a> {
         'a: 'b,
     {
         let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
-        Runs { simulator, stop: self.stop, count, was_cut, step: self.step }
+        let lost = Arc::clone(&self.lost);
+        Runs { simulator, stop: self.stop, count, was_cut, lost, step: self.step }
     }
 
     /// Runs with steps of integration so many times as long.
@@ -72,6 +94,49 @@ impl<'a> Runs<'a> {
     pub(crate) fn counted(&self) -> Option<ModelRuns> {
         let is_spent = self.was_cut.load(Ordering::Relaxed);
         self.simulator.costly().map(|costly| ModelRuns { is_spent, ..costly.model_runs() })
+    }
+
+    fn lost(&self) -> MutexGuard<'_, Lost> {
+        // What was noted before a panic is as true as after it.
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes that these effects could not be screened or fitted because runs of theirs were lost.
+    pub(crate) fn not_fitted(&self, effects: &[usize]) {
+        self.lost().not_fitted.extend(self.names(effects.iter().copied()));
+    }
+
+    /// Notes that the fitted set of these effects could not be judged on the trials that were not fitted.
+    pub(crate) fn not_judged(&self, effects: &[usize]) {
+        self.lost().not_judged.extend(self.names(effects.iter().copied()));
+    }
+
+    /// Names of the effects that could somewhere not be fitted, and of those that could not be judged.
+    pub(crate) fn lost_effects(&self) -> [BTreeSet<String>; 2] {
+        let lost = self.lost();
+        [lost.not_fitted.clone(), lost.not_judged.clone()]
+    }
+
+    /// How many runs were lost, of which sets of effects, and why the first was.
+    pub(crate) fn lost_note(&self) -> Option<String> {
+        let lost = self.lost();
+        let first = lost.first.as_ref()?;
+        let name = |set: &Vec<String>| match set.is_empty() {
+            true => "without effects".to_owned(),
+            false => format!("with {}", set.join(" + ")),
+        };
+        let sets = lost.models.iter().map(|(set, own)| format!("{} {}", own.len(), name(set)));
+        let count = lost.models.values().map(BTreeSet::len).sum::<usize>();
+        Some(format!(
+            "{count} model{} could not be simulated, and what asked for {} went on without: {}; the first: {first}",
+            if count == 1 { "" } else { "s" },
+            if count == 1 { "it" } else { "them" },
+            sets.collect::<Vec<_>>().join(", ")
+        ))
+    }
+
+    fn names(&self, effects: impl Iterator<Item = usize>) -> impl Iterator<Item = String> {
+        effects.filter_map(|e| Some(self.simulator.effects().get(e)?.name.clone()))
     }
 
     /// Multiple of the usual step of integration of every run.
@@ -106,8 +171,8 @@ impl<'a> Runs<'a> {
     /// One run of one stage on its measured input.
     pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
         let mut out = self.begin(run)?;
-        self.heard(self.simulator.simulate(self.stepped(run), &mut out))?;
-        self.finite(run.stage, out)
+        let done = self.simulator.simulate(self.stepped(run), &mut out);
+        self.heard(run, done.and_then(|()| self.finite(run.stage, out)))
     }
 
     /// Some runs at once, in one batch; each ends as [`Runs::run`] would.
@@ -120,26 +185,63 @@ impl<'a> Runs<'a> {
         let stepped: Vec<Run<'_>> = runs.iter().map(|run| self.stepped(*run)).collect();
         let done = simulate_many(self.simulator, &stepped, &mut outs);
         let each = runs.iter().zip(done).zip(outs);
-        each.map(|((run, done), out)| self.heard(done).and_then(|()| self.finite(run.stage, out)))
-            .collect()
+        each.map(|((run, done), out)| {
+            self.heard(*run, done.and_then(|()| self.finite(run.stage, out)))
+        })
+        .collect()
     }
 
     /// One run on an input that was not measured; none where the stage cannot.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
         let Some(driven) = self.simulator.driven() else { return Ok(None) };
-        match self.heard(driven.simulate_on(self.stepped(run), input, &mut out))? {
+        let done = driven.simulate_on(self.stepped(run), input, &mut out);
+        let done = done.and_then(|is_there| match is_there {
             true => self.finite(run.stage, out).map(Some),
             false => Ok(None),
-        }
+        });
+        self.heard(run, done)
     }
 
-    /// Notes a run that could not be made because none may be any more: what it was for is missing in the answer.
-    fn heard<T>(&self, done: Result<T, GapError>) -> Result<T, GapError> {
-        if matches!(done, Err(GapError::Spent { .. })) {
-            self.was_cut.store(true, Ordering::Relaxed);
+    /// Notes a run that could not be made because none may be any more, or that was lost: what it was for is missing in the answer.
+    fn heard<T>(&self, run: Run<'_>, done: Result<T, GapError>) -> Result<T, GapError> {
+        match done {
+            Err(GapError::Spent { .. }) => self.was_cut.store(true, Ordering::Relaxed),
+            Err(error) if error.is_lost() => {
+                let error = error.asked(self.asked(run));
+                let Model { parameters, effects } = run.model;
+                let values = parameters.iter().chain(effects.iter().flat_map(|(_, values)| values));
+                let mut set: Vec<String> = self.names(effects.iter().map(|(e, _)| *e)).collect();
+                set.sort_unstable();
+                let mut lost = self.lost();
+                lost.first.get_or_insert_with(|| error.to_string());
+                lost.models.entry(set).or_default().insert(values.map(|x| x.to_bits()).collect());
+                return Err(error);
+            }
+            _ => {}
         }
         done
+    }
+
+    /// The values that a run is asked for, in words.
+    fn asked(&self, run: Run<'_>) -> String {
+        let (specs, effects) = (self.simulator.parameters(), self.simulator.effects());
+        let one = |name: &str, value: f64, unit: &str| {
+            let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+            format!("{name} = {rounded} {}", if unit == "1" { "" } else { unit })
+                .trim_end()
+                .to_owned()
+        };
+        let own = self.simulator.stages()[run.stage].parameters.iter();
+        let nominal = own.map(|&p| one(&specs[p].name, run.model.parameters[p], &specs[p].unit));
+        let acting =
+            run.model.effects.iter().filter(|(e, _)| effects[*e].touches.contains(&run.stage));
+        let of_effects = acting.flat_map(|(e, values)| {
+            let EffectSpec { name, parameters, .. } = &effects[*e];
+            let named = parameters.iter().zip(values);
+            named.map(move |(p, value)| one(&format!("{name}.{}", p.name), *value, &p.unit))
+        });
+        format!("asked for {}", nominal.chain(of_effects).collect::<Vec<_>>().join(", "))
     }
 
     fn stepped<'m>(&self, run: Run<'m>) -> Run<'m> {
@@ -156,10 +258,11 @@ impl<'a> Runs<'a> {
     }
 
     fn finite(&self, stage: usize, out: Vec<f64>) -> Result<Vec<f64>, GapError> {
-        match out.iter().all(|x| x.is_finite()) {
+        match out.iter().all(|x| x.abs() < MOST) {
             true => Ok(out),
             false => {
-                Err(GapError::NotFinite { stage: self.simulator.stages()[stage].name.clone() })
+                let stage = self.simulator.stages()[stage].name.clone();
+                Err(GapError::NotFinite { stage, asked: String::new() })
             }
         }
     }

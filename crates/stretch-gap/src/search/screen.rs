@@ -148,6 +148,9 @@ impl Comparison<'_> {
         let models: Vec<Model> = starts.iter().map(|v| ground.model.with(effect, v)).collect();
         let touches = &self.simulator().effects()[effect].touches;
         let there = self.possible_residuals(touches, &models)?;
+        if !there.is_empty() && there.iter().all(Option::is_none) {
+            self.runs.not_fitted(&[effect]);
+        }
         Ok(there.into_iter().map(|own| self.change(ground, touches, own?)).collect())
     }
 

@@ -10,7 +10,11 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, simulator::Model, thresholds::Thresholds},
+    problem::{
+        error::{GapError, unless_lost},
+        simulator::Model,
+        thresholds::Thresholds,
+    },
     search::{
         acceptance::Acceptance,
         screen::{Ground, Screened},
@@ -125,10 +129,36 @@ impl<'a> Search<'a> {
             let first = rivals.iter().map(|(_, r)| r).max_by(|a, b| a.score.total_cmp(&b.score));
             match first.filter(|r| exchanges < EXCHANGES && r.score > best.score) {
                 Some(first) => best = self.grow(first.clone(), progress)?,
-                None => return Ok(Found { best: self.strongest_first(best)?, rivals }),
+                None => {
+                    let best = self.of_all_trials(best, &rivals)?;
+                    return Ok(Found { best: self.strongest_first(best)?, rivals });
+                }
             }
             exchanges += 1;
         }
+    }
+
+    /// The best set that can be simulated over all trials, of which only some were fitted, or the best such rival of it; the nominal
+    /// where none can be.
+    fn of_all_trials(
+        &self,
+        best: Hypothesis,
+        rivals: &[(usize, Hypothesis)],
+    ) -> Result<Hypothesis, GapError> {
+        let compare = &self.problem.compare;
+        let trials = compare.simulator().trials().len();
+        let mut sets: Vec<&Hypothesis> = rivals.iter().map(|(_, rival)| rival).collect();
+        sets.sort_by(|a, b| b.score.total_cmp(&a.score));
+        for set in std::iter::once(&best).chain(sets) {
+            let mut stages = 0..compare.metrics.len();
+            let all = stages
+                .try_for_each(|stage| compare.runs.output(stage, &set.model, trials).map(drop));
+            if unless_lost(all)?.is_some() {
+                return Ok(set.clone());
+            }
+            compare.runs.not_judged(&set.effects);
+        }
+        Ok(self.problem.nominal.clone())
     }
 
     /// The screen around a model, where it is kept.

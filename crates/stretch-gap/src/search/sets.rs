@@ -12,12 +12,17 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{
+        comparison::Sensitivities,
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, Fitted, GLANCE, possible},
         metric::Column,
         prepared::PreparedProblem,
     },
-    problem::{error::GapError, linked_stages::linked, simulator::Model},
+    problem::{
+        error::{GapError, unless_lost},
+        linked_stages::linked,
+        simulator::Model,
+    },
     search::screen::{Ground, Screened},
 };
 
@@ -91,19 +96,41 @@ impl<'a> Sets<'a> {
             return Ok(self.problem.nominal.clone());
         }
         let stages: Vec<usize> = (0..self.problem.simulator().stages().len()).collect();
-        let fitted = self.problem.fit(&stages, set.model.clone(), &[], FINE)?;
+        let fitted = unless_lost(self.problem.fit(&stages, set.model.clone(), &[], FINE))?;
+        let Some(fitted) = fitted else { return Ok(self.problem.nominal.clone()) };
         let own = self.join(&self.problem.nominal, set.effects.clone(), &stages, fitted);
         self.tried.insert(key(&own.effects, None), own.clone());
         Ok(own)
     }
 
     /// Fits the newest effect's part of a set until nothing is gained.
-    fn polish(&self, set: &Hypothesis, effect: usize) -> Result<Hypothesis, GapError> {
+    fn polish(
+        &self,
+        base: &Hypothesis,
+        set: &Hypothesis,
+        effect: usize,
+    ) -> Result<Hypothesis, GapError> {
         let (stages, own) = self.component(&set.effects, effect);
         let mut model = set.model.clone();
         model.effects.retain(|(e, _)| own.contains(e));
-        let fitted = self.problem.fit(&stages, model, &[], FINE)?;
+        let fitted = self.fit(base, &stages, model, (&[], FINE))?;
         Ok(self.join(set, set.effects.clone(), &stages, fitted))
+    }
+
+    /// Fits from a model, or where that cannot be simulated from the same effects beside the parameters of `base`: a rough fit takes
+    /// its steps on a linearisation, which leads to where a simulator cannot follow.
+    fn fit(
+        &self,
+        base: &Hypothesis,
+        stages: &[usize],
+        model: Model,
+        (known, effort): (&[Option<Sensitivities>], Effort),
+    ) -> Result<Fitted, GapError> {
+        let beside_base = Model { parameters: base.model.parameters.clone(), ..model.clone() };
+        match unless_lost(self.problem.fit(stages, model, known, effort))? {
+            Some(fitted) => Ok(fitted),
+            None => self.problem.fit(stages, beside_base, known, effort),
+        }
     }
 
     /// The stages that a new effect of `base` hangs together with, and that part of a model.
@@ -123,7 +150,7 @@ impl<'a> Sets<'a> {
         (model, effort): (Model, Effort),
     ) -> Result<Extended, GapError> {
         let (stages, model) = self.part(base, effect, model);
-        let fitted = self.problem.fit(&stages, model, &ground.known, effort)?;
+        let fitted = self.fit(base, &stages, model, (&ground.known, effort))?;
         let effects = base.effects.iter().copied().chain([effect]).collect();
         let is_settled = fitted.is_settled;
         Ok(Extended { set: self.join(base, effects, &stages, fitted), is_settled })
@@ -178,8 +205,13 @@ impl<'a> Sets<'a> {
         let key = |effect: usize| key(&base.effects, Some(effect));
         let is_fresh = |s: &&Screened| !self.tried.contains_key(&key(s.effect));
         let fresh: Vec<&Screened> = screened.iter().filter(is_fresh).collect();
-        let coarse = self.coarse(base, ground, &fresh)?;
+        let mut coarse = self.coarse(base, ground, &fresh)?;
         let fine = self.fine(base, &coarse, aim)?;
+        // What was fitted on a linearisation alone, and cannot be simulated, is no fit.
+        let (fine, lost): (Vec<_>, Vec<_>) = fine.into_iter().partition(|(_, set)| set.is_some());
+        coarse.retain(|effect, _| lost.iter().all(|(lost, _)| lost != effect));
+        self.take_out(&lost.iter().map(|(effect, _)| *effect).collect::<Vec<_>>(), |_| false);
+        let fine = fine.into_iter().filter_map(|(effect, set)| Some((effect, set?)));
         let coarse = coarse.into_iter().map(|(effect, extended)| (effect, extended.set));
         let best = coarse.chain(fine).map(|(effect, set)| (key(effect), set));
         self.tried.extend(best);
@@ -200,6 +232,7 @@ impl<'a> Sets<'a> {
         let before = |s: &Screened| self.before.get(&key(&base.effects, Some(s.effect)));
         let again: Vec<(usize, &Model)> =
             screened.iter().filter_map(|s| Some((s.effect, before(s)?))).collect();
+        let again_of: Vec<usize> = again.iter().map(|(effect, _)| *effect).collect();
         let again = possible(again.into_par_iter().map(|(effect, model)| {
             Ok((effect, self.extend(base, ground, effect, (model.clone(), GLANCE))?))
         }))?;
@@ -211,10 +244,13 @@ impl<'a> Sets<'a> {
         let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
         let begun: Vec<(usize, Model)> =
             begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
+        let asked: Vec<usize> = begun.iter().map(|(effect, _)| *effect).chain(again_of).collect();
         let fits = begun.into_par_iter().map(|(effect, model)| {
             Ok((effect, self.extend(base, ground, effect, (model, COARSE))?))
         });
-        Ok(possible(fits)?.into_iter().chain(again).collect())
+        let fitted: BTreeMap<usize, Extended> = possible(fits)?.into_iter().chain(again).collect();
+        self.take_out(&asked, |effect| fitted.contains_key(&effect));
+        Ok(fitted)
     }
 
     /// Models from which a fit of each effect on top of `base` may begin.
@@ -242,6 +278,7 @@ impl<'a> Sets<'a> {
     ) -> Result<BTreeMap<usize, Fitted>, GapError> {
         let each = |(e, models): (usize, Vec<Model>)| models.into_iter().map(move |m| (e, m));
         let glances: Vec<(usize, Model)> = starts.into_iter().flat_map(each).collect();
+        let asked: Vec<usize> = glances.iter().map(|(effect, _)| *effect).collect();
         let looked = glances.into_par_iter().map(|(effect, model)| {
             let (stages, model) = self.part(base, effect, model);
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
@@ -253,7 +290,14 @@ impl<'a> Sets<'a> {
                 best.insert(effect, fitted);
             }
         }
+        self.take_out(&asked, |effect| best.contains_key(&effect));
         Ok(best)
+    }
+
+    /// Notes the effects of which no fit was possible.
+    fn take_out(&self, asked: &[usize], is_fitted: impl Fn(usize) -> bool) {
+        let lost: Vec<usize> = asked.iter().copied().filter(|effect| !is_fitted(*effect)).collect();
+        self.problem.compare.runs.not_fitted(&lost);
     }
 
     /// Those of some effects of which a glance at a fit lowers the cost by what `least` asks of it, or still goes down by as much at its end, whatever
@@ -277,13 +321,13 @@ impl<'a> Sets<'a> {
         Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
-    /// Fits to the end of what may still win.
+    /// Fits to the end of what may still win; none where it cannot be simulated.
     fn fine(
         &self,
         base: &Hypothesis,
         coarse: &BTreeMap<usize, Extended>,
         aim: f64,
-    ) -> Result<Vec<(usize, Hypothesis)>, GapError> {
+    ) -> Result<Vec<(usize, Option<Hypothesis>)>, GapError> {
         let score = |e: &Extended| e.set.score;
         let top = coarse.values().map(score).fold(aim, f64::max);
         let near = top - (NEAR * (top - base.score) + NEAR_NATS);
@@ -295,10 +339,14 @@ impl<'a> Sets<'a> {
         };
         let close = coarse.iter().filter(|(e, extended)| is_open(e, extended));
         let close: Vec<(usize, &Hypothesis)> = close.map(|(e, s)| (*e, &s.set)).collect();
-        possible(close.par_iter().map(|&(effect, set)| Ok((effect, self.polish(set, effect)?))))
+        possible(
+            close
+                .par_iter()
+                .map(|&(effect, set)| Ok((effect, unless_lost(self.polish(base, set, effect))?))),
+        )
     }
 
-    /// The set without one of its effects, fitted again.
+    /// The set without one of its effects, fitted again; the best that is known of it, at worst the nominal, where that fit cannot be made.
     pub(crate) fn without(
         &mut self,
         set: &Hypothesis,
@@ -315,7 +363,9 @@ impl<'a> Sets<'a> {
         let (stages, own) = self.component(&set.effects, effect);
         let mut model = set.model.clone();
         model.effects.retain(|(e, _)| own.contains(e) && *e != effect);
-        let fitted = self.problem.fit(&stages, model, &[], FINE)?;
+        let Some(fitted) = unless_lost(self.problem.fit(&stages, model, &[], FINE))? else {
+            return Ok(self.tried.get(&key).unwrap_or(&self.problem.nominal).clone());
+        };
         let refitted = self.join(set, rest, &stages, fitted);
         // What the whole set has found of the others must not count for the one that is left out.
         let better = match self.tried.remove(&key) {

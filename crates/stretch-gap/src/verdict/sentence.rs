@@ -76,16 +76,22 @@ pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evi
 /// Effects that are listed of those that were not looked at.
 const LISTED: usize = 6;
 
+/// Effects that were not looked at, the first of them by name.
+pub(crate) fn listed(not_looked_at: &[&str]) -> String {
+    let names = not_looked_at[..not_looked_at.len().min(LISTED)].join(", ");
+    match not_looked_at.len().saturating_sub(LISTED) {
+        0 => names,
+        more => format!("{names} and {more} more"),
+    }
+}
+
 /// Said first where the budget of runs was spent: an answer that stands on part of the catalogue is no answer about the rest.
 pub(crate) fn cut_short(not_looked_at: &[&str]) -> String {
-    let names = not_looked_at[..not_looked_at.len().min(LISTED)].join(", ");
-    let others = match not_looked_at.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
     match not_looked_at.is_empty() {
         true => "The budget of runs was spent before the search was over. ".to_owned(),
-        false => format!("The budget of runs was spent; not looked at: {names}{others}. "),
+        false => {
+            format!("The budget of runs was spent; not looked at: {}. ", listed(not_looked_at))
+        }
     }
 }
 

@@ -70,6 +70,8 @@ pub(crate) enum Fails {
     Above(usize, f64),
     /// Its output is no number.
     NotFinite,
+    /// It is no number with an effect, on the first so many trials or more.
+    With(Effect, usize),
     /// It is gone after so many runs.
     GoneAfter(usize),
 }

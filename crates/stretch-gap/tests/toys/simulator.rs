@@ -156,6 +156,13 @@ impl Simulator for Measured {
                 out.fill(f64::NAN);
                 return Ok(());
             }
+            Some(Fails::With(effect, trials))
+                if run.trials >= trials
+                    && run.model.effects.iter().any(|(e, _)| toy.catalogue[*e].1 == effect) =>
+            {
+                out.fill(f64::INFINITY);
+                return Ok(());
+            }
             _ => {}
         }
         let input = self.input_of(run.stage, run.input_noise);

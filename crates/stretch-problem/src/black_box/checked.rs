@@ -344,6 +344,9 @@ fn stage_spec(
     StageSpec { noise: Some(noise.clone()), ..spec }
 }
 
+/// Share of its value that a parameter keeps which does not change its sign.
+const KEPT: f64 = 0.02;
+
 fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
     if let Tolerance::Relative(share) = p.tolerance
         && p.value == 0.0
@@ -355,9 +358,17 @@ fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
         ));
     }
     let spec = ParameterSpec::new(&p.name, &p.unit, p.value).within(p.tolerance.sd(p.value));
+    // A value whose tolerance is a share of it, or less than it, keeps its sign.
+    let is_relative = matches!(p.tolerance, Tolerance::Relative(_));
+    let keeps_sign = is_relative || spec.sd < p.value.abs();
+    let [least, greatest] = match keeps_sign {
+        true if p.value > 0.0 => [KEPT * p.value, f64::INFINITY],
+        true => [f64::NEG_INFINITY, KEPT * p.value],
+        false => [f64::NEG_INFINITY, f64::INFINITY],
+    };
     Ok(ParameterSpec {
-        least: p.least.unwrap_or(f64::NEG_INFINITY),
-        greatest: p.greatest.unwrap_or(f64::INFINITY),
+        least: p.least.unwrap_or(least),
+        greatest: p.greatest.unwrap_or(greatest),
         ..spec
     })
 }

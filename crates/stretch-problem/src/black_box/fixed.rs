@@ -54,19 +54,11 @@ impl Diagnosable for BlackBox {
         apart.or_else(|| self.problem.columns.of(name).map(<[f64]>::to_vec))
     }
 
-    /// The notes of the source on its runs, and the number of runs that it refused.
+    /// The notes of the source on its runs.
     fn afterwards(&self) -> Vec<String> {
         let mut notes = self.runs.notes();
         notes.extend(self.coupled.get().and_then(|coupled| coupled.note.clone()));
         notes.extend(self.undeclared.notes(&self.problem));
-        let refused = self.runs.refused();
-        if let Some(first) = refused.first() {
-            notes.push(format!(
-                "{} of {} model runs gave no output and took their candidate out; the first: {first}",
-                refused.len(),
-                self.runs.count()
-            ));
-        }
         notes
     }
 

@@ -62,7 +62,6 @@ struct Made {
     kept: LruCache<Key, (usize, Answer)>,
     under_way: HashSet<Key>,
     count: usize,
-    refused: Vec<String>,
     /// Whether a run has been asked for twice.
     is_repeated: bool,
 }
@@ -93,13 +92,7 @@ impl Runs {
     ) -> Self {
         let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
         let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
-        let made = Made {
-            kept,
-            under_way: HashSet::new(),
-            count: 0,
-            refused: Vec::new(),
-            is_repeated: false,
-        };
+        let made = Made { kept, under_way: HashSet::new(), count: 0, is_repeated: false };
         let answers_all = source.answers_all();
         Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all, turns }
     }
@@ -119,11 +112,6 @@ impl Runs {
 
     pub(crate) fn notes(&self) -> Vec<String> {
         self.source.notes()
-    }
-
-    /// Why runs were refused, one text for each.
-    pub(crate) fn refused(&self) -> Vec<String> {
-        self.lock().refused.clone()
     }
 
     fn lock(&self) -> MutexGuard<'_, Made> {
@@ -233,9 +221,6 @@ impl Runs {
                 || Err(SourceError::Gone("the simulator gave fewer answers than asks".into()));
             let answer = answers.next().unwrap_or_else(nothing);
             let answer = answer.and_then(|values| self.checked(session, run, values)).map(Arc::new);
-            if let Err(error) = &answer {
-                made.refused.push(error.to_string());
-            }
             let kept = (run.trials, answer);
             out[i] = self.part(session, run, &kept);
             made.under_way.remove(&keys[i]);

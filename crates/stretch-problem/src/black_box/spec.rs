@@ -183,7 +183,7 @@ pub struct Parameter {
     #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
     #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
-    /// Least value that makes sense.
+    /// Least value that makes sense; where none is given, a value whose tolerance is a share of it, or less than it, keeps its sign.
     pub least: Option<f64>,
     /// Greatest value that makes sense.
     pub greatest: Option<f64>,

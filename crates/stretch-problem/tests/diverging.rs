@@ -1,0 +1,114 @@
+//! A simulator that diverges: what cannot be simulated takes out what asked for it, and nothing else.
+
+use std::sync::{Arc, Mutex};
+
+use stretch_data::{Channel, SessionTrial, Split, Trial};
+use stretch_gap::{Diagnosis, GapError, Options, RandomGenerator, diagnose};
+use stretch_problem::{
+    Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
+};
+
+const DT_S: f64 = 0.05;
+const SAMPLES: usize = 1500;
+
+/// First order by explicit Euler, which diverges with a time constant below half a sample.
+fn first_order(tau_s: f64, u: &[f64]) -> Vec<f64> {
+    let mut y = 0.0;
+    let step = |u: &f64| {
+        let before = y;
+        y += DT_S / tau_s * (2.0 * u - y);
+        before
+    };
+    u.iter().map(step).collect()
+}
+
+/// Steps, and a response within a sample that is stamped 0.15 s early.
+fn recorded() -> Vec<SessionTrial> {
+    let one = |trial: usize| {
+        let mut random = RandomGenerator::new(5, trial as u64);
+        let mut held = 0.0;
+        let mut command = |i: usize| {
+            if i % 23 == 0 {
+                held = random.unit();
+            }
+            held
+        };
+        let u: Vec<f64> = (0..SAMPLES + 3).map(&mut command).collect();
+        let y =
+            first_order(1.2 * DT_S, &u)[3..].iter().map(|y| y + 0.01 * random.gauss()).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let channels = vec![channel("command_bar", u[..SAMPLES].to_vec()), channel("angle_deg", y)];
+        let time_s = (0..SAMPLES).map(|i| DT_S * i as f64).collect();
+        let own = Trial { name: format!("t{trial}.csv"), time_s, channels };
+        let split = if trial == 1 { Split::Test } else { Split::Fit };
+        SessionTrial { start_s: 200.0 * trial as f64, split, ..SessionTrial::new(own) }
+    };
+    (0..2).map(one).collect()
+}
+
+/// Diagnoses with the time constant as it ships; with the least one that was asked for.
+fn diagnosed(tau: Parameter) -> (Result<Diagnosis, GapError>, f64) {
+    let problem = Checked::new(ProblemSpec {
+        stages: vec![StageEntry {
+            name: "plant".into(),
+            output: "angle_deg".into(),
+            inputs: vec!["command_bar".into()],
+            noise: Some(0.01),
+            ..StageEntry::default()
+        }],
+        parameters: vec![Parameter { name: "tau".into(), unit: "s".into(), ..tau }],
+        wrap: ["output.skew", "output.lag", "output.curve", "output.backlash"]
+            .map(String::from)
+            .into(),
+        trials: recorded(),
+        ..ProblemSpec::default()
+    });
+    let problem = problem.expect("a problem");
+    let session = problem.session().clone();
+    let u = session.column("command_bar").expect("the input").to_vec();
+    let least = Arc::new(Mutex::new(f64::INFINITY));
+    let asked = Arc::clone(&least);
+    let source = closure(move |ask: &Ask<'_>| {
+        let mut least = asked.lock().expect("not poisoned");
+        *least = least.min(ask.parameters[0]);
+        let parts = session.trials[..ask.trials].iter();
+        Ok(parts.flat_map(|t| first_order(ask.parameters[0], &u[t.samples.clone()])).collect())
+    });
+    let bench = BlackBox::new(problem, Arc::new(source));
+    let told = diagnose(&bench, &Options::default(), &|_| (), &|| false);
+    let least = *least.lock().expect("not poisoned");
+    (told.map(|(told, _)| told), least)
+}
+
+#[test]
+fn what_diverges_ends_nothing_and_a_share_of_a_value_keeps_its_sign() {
+    let tau = |tolerance| Parameter { value: 0.5, tolerance, ..Parameter::default() };
+    let share = tau(Tolerance::Relative(0.5));
+    let allowed = Parameter { least: Some(-1.0), ..share.clone() };
+    let cases = [
+        (share, 0.01),
+        (tau(Tolerance::Absolute(0.3)), 0.01),
+        (allowed, -1.0),
+        (tau(Tolerance::Absolute(0.6)), -2.0),
+    ];
+    for (tau, bound) in cases {
+        let (told, least) = diagnosed(tau);
+        let told = told.expect("an answer");
+        assert_eq!(told.named, ["output.skew"], "{}", told.sentence);
+        let note = told.notes.iter().find(|note| note.contains(" could not be simulated, "));
+        let note = note.expect("a note on lost runs");
+        assert!(note.contains("(asked for tau = "), "{note}");
+        assert!(least >= bound && (bound > 0.0 || least < 0.0), "{least} {bound}");
+    }
+}
+
+#[test]
+fn a_simulator_that_diverges_as_shipped_is_refused_with_its_values() {
+    // To infinity, and to numbers whose squares are.
+    for tau in [0.01, 0.02] {
+        let (told, _) = diagnosed(Parameter { value: tau, ..Parameter::default() });
+        let said = told.expect_err("it diverges").to_string();
+        assert!(said.contains("plant: the simulat"), "{said}");
+        assert!(said.ends_with(&format!("(asked for tau = {tau} s)")), "{said}");
+    }
+}

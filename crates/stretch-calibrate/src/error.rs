@@ -103,6 +103,19 @@ pub enum CalibrateError {
         /// The column that was looked for.
         column: String,
     },
+    /// A signal is an angle that wraps. A calibration reads it sample by sample, and cannot know the turn.
+    #[error(
+        "{trial}: the signal {column} jumps by {turn} between neighbours: it is an angle that wraps; unwrap it before you calibrate \
+         and before you apply, or move its zero so that the motion stays within one turn"
+    )]
+    WrappedSignal {
+        /// The trial.
+        trial: String,
+        /// The column.
+        column: String,
+        /// The turn, in the unit of the column.
+        turn: f64,
+    },
     /// An estimator cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),

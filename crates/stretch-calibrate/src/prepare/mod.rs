@@ -8,7 +8,7 @@ mod trials;
 pub use gross_errors::without_gross_errors;
 pub use rated::{Rated, RatedPart, rated};
 pub use series::{extent, noise, sample_rate_hz};
-pub use trials::{MOST_ROWS, SHORTEST, check_rows, even_signals};
+pub use trials::{MOST_ROWS, SHORTEST, check_rows, check_turns, even_signals};
 
 pub(crate) use gross_errors::rows;
 pub(crate) use series::{branches, polarity, rates_at_use};

@@ -7,7 +7,7 @@ use crate::CalibrateError;
 
 use super::{
     series::{noise, rates_at_use, sample_rate_hz},
-    trials::{SHORTEST, noise_gain},
+    trials::{SHORTEST, check_turns, noise_gain},
 };
 
 /// A trial on its own even grid, with the rate of its signal at each sample.
@@ -75,6 +75,7 @@ pub fn rated(
     let rate_hz = sample_rate.hz();
     let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
     let even = trial.even(&columns, spec)?;
+    check_turns(&even, &trial.name, &[signal])?;
     if even.parts.is_empty() {
         let (trial, samples) = (trial.name.clone(), trial.len());
         return Err(CalibrateError::TooShort { trial, samples });

@@ -4,7 +4,7 @@ use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
     Polarity, Provenance, Range, RangeSpec, RateEstimator, SampleRate, Schema, Target,
 };
-use stretch_data::{EvenSpec, Rows, Trial};
+use stretch_data::{Even, EvenSpec, Rows, Trial};
 use stretch_filter::RateFilter;
 
 use crate::{CalibrateError, Options};
@@ -178,6 +178,7 @@ impl Evened {
         let rate_hz = first_hz;
         let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
         let even = trial.even(&columns, spec)?;
+        check_turns(&even, &trial.name, &columns[..1])?;
         self.rows.add(even.rows);
         self.notes.extend(even.notes);
         self.pieces.extend(even.parts.into_iter().filter_map(|part| {
@@ -186,6 +187,19 @@ impl Evened {
         }));
         Ok(())
     }
+}
+
+/// Refuses signals that wrap; they come first among the columns of `even`.
+///
+/// # Errors
+/// [`CalibrateError::WrappedSignal`].
+pub fn check_turns(even: &Even, trial: &str, signals: &[&str]) -> Result<(), CalibrateError> {
+    let wrapped =
+        signals.iter().zip(&even.turns).find_map(|(column, turn)| Some((column, (*turn)?)));
+    wrapped.map_or(Ok(()), |(column, turn)| {
+        let (trial, column) = (trial.to_owned(), (*column).to_owned());
+        Err(CalibrateError::WrappedSignal { trial, column, turn })
+    })
 }
 
 /// The signals of trials, brought onto an even grid as [`calibrate`](crate::calibrate()) does before a fit: a list for

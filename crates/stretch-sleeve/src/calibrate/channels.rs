@@ -3,7 +3,7 @@
 
 use stretch_calibrate::{
     CalibrateError,
-    toolkit::{SETTLE, SHORTEST, check_rows, extent, sample_rate_hz},
+    toolkit::{SETTLE, SHORTEST, check_rows, check_turns, extent, sample_rate_hz},
 };
 use stretch_core::SampleRate;
 use stretch_data::{EvenSpec, Trial};
@@ -98,6 +98,7 @@ impl Channels {
         let spec =
             EvenSpec { rate_hz: first_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
         let even = trial.even(&columns, spec)?;
+        check_turns(&even, &trial.name, &columns[..signals.len()])?;
         self.notes.extend(even.rows.note());
         self.notes.extend(even.notes);
         let period_s = self.sample_rate.period_s();

@@ -28,7 +28,7 @@ fn recorded() -> Vec<SessionTrial> {
         let mut random = RandomGenerator::new(5, trial as u64);
         let mut held = 0.0;
         let mut command = |i: usize| {
-            if i % 23 == 0 {
+            if i.is_multiple_of(23) {
                 held = random.unit();
             }
             held

@@ -309,11 +309,13 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
     for stretch in stretches {
         let bends = bends(stretch);
         let mut left = bends.clone();
-        for (part, bends) in left.chunks_mut(window).zip(bends.chunks(window)) {
-            let taken = take_waves_out(part, dt_s, (2, 6.0)) / part.len() as f64;
+        for (part, from) in left.chunks_mut(window).zip((0_usize..).step_by(window)) {
+            let at = |i: usize| bends.get(i).copied().unwrap_or(0.0);
+            let beside = [at(from.wrapping_sub(1)), at(from + part.len())];
+            let taken = take_waves_out(part, beside, dt_s, (2, 6.0)) / part.len() as f64;
             let own = part.iter().map(|x| x * x / (1.0 - taken.min(0.5)));
             squares.extend(own.clone());
-            moved.extend(own.zip(bends).filter(|(_, bend)| **bend != 0.0).map(|(x, _)| x));
+            moved.extend(own.zip(&bends[from..]).filter(|(_, b)| **b != 0.0).map(|(x, _)| x));
         }
     }
     if squares.is_empty() {
@@ -341,21 +343,28 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// Takes the waves of the mains out of a stretch of differences of an order with the squares of their weights summed, one after the
-/// other; how many samples' worth of white noise went with them.
+/// other; how many samples' worth of white noise went with them. `beside` are the differences before and behind the stretch, 0 where there
+/// are none.
 ///
 /// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; where one stands in
 /// what is left, the waves are fitted to that again. It makes differences of either sign one behind the other, where a kink of the
 /// motion makes one alone.
-pub(crate) fn take_waves_out(values: &mut [f64], dt_s: f64, (order, power): (usize, f64)) -> f64 {
+pub(crate) fn take_waves_out(
+    values: &mut [f64],
+    beside: [f64; 2],
+    dt_s: f64,
+    (order, power): (usize, f64),
+) -> f64 {
     let moved: Vec<usize> = (0..values.len()).filter(|i| values[*i] != 0.0).collect();
     let most_of = |values: &[f64]| {
         let sizes = moved.iter().map(|i| values[*i].abs()).collect();
         median(sizes).map_or(f64::INFINITY, |median| GROSS * median)
     };
     let is_gross = |values: &[f64], i: usize, most: f64| {
-        let is_opposite =
-            |j: usize| values.get(j).is_some_and(|x| x.abs() > most && x * values[i] < 0.0);
-        values[i].abs() > most && (is_opposite(i + 1) || is_opposite(i.wrapping_sub(1)))
+        let is_opposite = |x: &f64| x.abs() > most && x * values[i] < 0.0;
+        let before = if i == 0 { &beside[0] } else { &values[i - 1] };
+        values[i].abs() > most
+            && (is_opposite(before) || is_opposite(values.get(i + 1).unwrap_or(&beside[1])))
     };
     let (mut taken, mut most) = (0.0, most_of(values));
     for _ in 0..ROUNDS {

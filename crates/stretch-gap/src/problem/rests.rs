@@ -92,7 +92,7 @@ fn power(part: &[f64], dt_s: f64) -> f64 {
     for _ in 0..ORDER.0 {
         values = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
     }
-    let taken = take_waves_out(&mut values, dt_s, ORDER) / values.len() as f64;
+    let taken = take_waves_out(&mut values, [0.0; 2], dt_s, ORDER) / values.len() as f64;
     let mean = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
     mean / ORDER.1 / (1.0 - taken.min(0.5))
 }

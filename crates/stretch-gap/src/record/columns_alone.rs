@@ -210,7 +210,7 @@ fn dead(
 fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let mut apart: Vec<f64> = values.iter().map(|x| x - mean).collect();
-    take_waves_out(&mut apart, dt_s, (0, 1.0));
+    take_waves_out(&mut apart, [0.0; 2], dt_s, (0, 1.0));
     let all: f64 = apart.iter().map(|x| x * x).sum();
     let product =
         |lag: usize| -> f64 { apart.iter().skip(lag).zip(&apart).map(|(a, b)| a * b).sum() };

@@ -182,7 +182,7 @@ if [ "${STRETCH_SKIP_FLEET:-0}" = 1 ]; then
     skip "the fleet: STRETCH_SKIP_FLEET=1"
     FLEET=""
 elif [ "$free_mb" -lt "$FLEET_MB" ]; then
-    skip "the fleet: it takes up to $FLEET_MB MB of disk to build DataFusion, and $free_mb MB are free"
+    skip "the fleet: $free_mb MB of disk are free, and what is built from here on takes up to $FLEET_MB MB with DataFusion"
     FLEET=""
 fi
 # shellcheck disable=SC2046

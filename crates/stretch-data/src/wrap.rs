@@ -70,13 +70,15 @@ impl Wrap {
     }
 
     fn by((turn, unit): (f64, &'static str), values: &[f64], time_s: &[f64]) -> Option<Self> {
+        // most columns have not one step that is nearly a turn
+        if !values.windows(2).any(|w| (w[1] - w[0]).abs() > turn * (1.0 - STEP)) {
+            return None;
+        }
         let is_next = is_next(time_s);
         let steps = || {
             let all = values.windows(2).enumerate().filter(|(i, w)| w[0] != w[1] && is_next(*i));
             all.map(|(_, w)| (w[0], w[1]))
         };
-        // most columns have not one step that is nearly a turn
-        steps().find(|(a, b)| (b - a).abs() > turn * (1.0 - STEP))?;
         let mut small: Vec<f64> =
             steps().map(|(a, b)| (b - a).abs()).filter(|step| *step < STEP * turn).collect();
         let at = (USUAL * small.len() as f64) as usize;

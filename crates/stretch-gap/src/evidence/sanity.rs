@@ -1,4 +1,4 @@
-//! Is it the right simulator at all, and is the noise one? Two signs that the judge looks at, and one that is told.
+//! Whether the data can come from the simulator at all, which the judge asks, and whether the noise level is plausible, which a note says.
 //!
 //! Two signs that data come from something else than the simulator is of:
 //!

@@ -43,11 +43,11 @@ pub enum GapError {
         moved: f64,
     },
     /// A simulated output was not finite.
-    #[error("{stage}: the simulation gave a number that is not finite ({asked})")]
+    #[error("{stage}: the simulation gave a number that is not finite{}", in_parentheses(.asked))]
     NotFinite {
         /// The stage.
         stage: String,
-        /// The values that it was asked for.
+        /// The values that it was asked for; empty where they are not known.
         asked: String,
     },
     /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
@@ -84,6 +84,11 @@ pub(crate) fn unless_lost<T>(found: Result<T, GapError>) -> Result<Option<T>, Ga
     }
 }
 
+/// A text in parentheses behind a space; nothing of an empty one.
+fn in_parentheses(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!(" ({text})") }
+}
+
 /// An error of the simulator, with the values that it was asked for.
 #[derive(Debug)]
 struct Asked {
@@ -115,6 +120,9 @@ impl GapError {
     /// use stretch_gap::GapError;
     /// assert!(GapError::simulator("the solver did not converge").is_of_runs());
     /// assert!(!GapError::Stopped.is_of_runs());
+    /// let not_finite = GapError::NotFinite { stage: "arm".into(), asked: String::new() };
+    /// assert!(not_finite.is_of_runs());
+    /// assert_eq!(not_finite.to_string(), "arm: the simulation gave a number that is not finite");
     /// ```
     pub fn is_of_runs(&self) -> bool {
         self.is_lost() || matches!(self, Self::Spent { .. })

@@ -1,4 +1,4 @@
-//! Notes that a verdict carries: gross errors, a noise that is none, parameters that swing, laws of session time that were
+//! Notes that a verdict carries: gross errors, an implausible noise level, parameters that swing, laws of session time that were
 //! extrapolated, and effects that would have been named.
 
 use crate::{

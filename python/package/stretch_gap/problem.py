@@ -26,7 +26,7 @@ class Parameter:
     """The same as a share of the value."""
     unit: str = ""
     least: float | None = None
-    """Least value that makes sense; where none is given, a value whose tolerance is a share of it, or less than it, keeps its sign."""
+    """Least value that makes sense. Without one, a value keeps its sign where its tolerance is a share of it, or less than it."""
     greatest: float | None = None
     """Greatest value that makes sense."""
     stages: Sequence[str] = ()

@@ -33,7 +33,7 @@ const COMMANDS: [(&str, &str); 9] = [
 ];
 
 /// An option, and what to write instead.
-const OPTIONS: [(&str, &str); 16] = [
+const OPTIONS: [(&str, &str); 17] = [
     ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-full-scale-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
@@ -50,6 +50,7 @@ const OPTIONS: [(&str, &str); 16] = [
     ("--normalise", "channels are divided by their range"),
     ("--rate-source", "--paper asks for the published method as a whole"),
     ("--sessions", "write --data FOLDER/GROUP"),
+    ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same"),
 ];
 
 /// An option that has the same meaning under another name, and that name: scripts that use the old spelling go on working. The value

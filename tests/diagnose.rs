@@ -88,7 +88,7 @@ fn a_simulated_effect_is_named_and_reported() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let run = |threads: &str, json: &Path| {
         let mut command = diagnose(&folder);
-        command.arg(json_to(json)).args(["--threads", threads, "--baselines"]);
+        command.arg(json_to(json)).arg("--baselines").env("RAYON_NUM_THREADS", threads);
         command
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));
@@ -324,7 +324,8 @@ fn ctrl_c_leaves_nothing_half_written() {
     let out = scratch.path("out");
     fs::create_dir(&out).unwrap();
     let mut child = std::process::Command::new(program())
-        .args(["diagnose", "--threads", "1"])
+        .arg("diagnose")
+        .env("RAYON_NUM_THREADS", "1")
         .arg(&folder)
         .arg(json_to(&out.join("d.json")))
         .arg("--report")

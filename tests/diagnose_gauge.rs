@@ -103,6 +103,8 @@ fn records_that_cannot_be_used_are_refused_by_name() {
         &mut run(&good, "angle_deg", "s3"),
         &["joint.csv", "s3", "the columns are time_s, angle_deg, s2"],
     );
+    let mut with_footer = run(&(good.clone() + "End of test\n"), "angle_deg", "s2");
+    fails(with_footer.arg("--strict"), &["joint.csv", "--strict leaves no row out"]);
     let cell = |line: &str, column: usize, value: &str| {
         let mut cells: Vec<&str> = line.split(',').collect();
         cells[column] = value;

@@ -3,6 +3,7 @@
 runs `stretch diagnose`, as it ships, on every problem.toml.
 """
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -28,8 +29,9 @@ def answer(case, program, places):
     """Runs one diagnosis; hands back the answer in the layout of a submission."""
     with tempfile.TemporaryDirectory() as folder:
         out, began = Path(folder) / "d.json", used_s()
-        command = [program, "diagnose", str(case / "problem.toml"), f"--json={out}", "--quiet", "--threads", "1"]
-        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        command = [program, "diagnose", str(case / "problem.toml"), f"--json={out}", "--quiet"]
+        alone = {**os.environ, "RAYON_NUM_THREADS": "1"}
+        run = subprocess.run(command, env=alone, capture_output=True, text=True, check=False)
         seconds = used_s() - began
         if not out.is_file():
             raise SystemExit(f"{case}: {run.stderr}")

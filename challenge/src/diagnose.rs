@@ -12,8 +12,6 @@ use stretch_sim::Catalogue;
 pub struct Asked {
     /// Effects that the catalogue must do without.
     pub without: Vec<String>,
-    /// Threads, 0 for all; the result is the same.
-    pub threads: usize,
     /// Whether simpler methods are asked, too.
     pub baselines: bool,
 }
@@ -25,8 +23,7 @@ pub struct Asked {
 pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Result<()> {
     let problem =
         Problem::read(folder, &Reading { without: &asked.without, ..Reading::default() })?;
-    let Asked { threads, baselines, .. } = *asked;
-    let options = Options { threads, baselines, ..Options::default() };
+    let options = Options { baselines: asked.baselines, ..Options::default() };
     let examined = problem.examine(&options, false, &|_| (), &|| false)?;
     let text = serde_json::to_string_pretty(&examined.to_json())? + "\n";
     Ok(write_whole(file, |out| out.write_all(text.as_bytes()))?)

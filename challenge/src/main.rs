@@ -127,8 +127,6 @@ struct Diagnose {
     json: PathBuf,
     #[arg(long)]
     without: Vec<String>,
-    #[arg(long, default_value_t = 0)]
-    threads: usize,
     #[arg(long)]
     baselines: bool,
     /// No further experiment is ever looked for; `stretch diagnose` asks for that with this
@@ -188,8 +186,8 @@ fn run(args: Args) -> anyhow::Result<()> {
             Ok(())
         }
         (Some(Step::Diagnose(asked)), _) => {
-            let Diagnose { without, threads, baselines, .. } = asked;
-            write_diagnosis(&asked.folder, &Asked { without, threads, baselines }, &asked.json)
+            let Diagnose { without, baselines, .. } = asked;
+            write_diagnosis(&asked.folder, &Asked { without, baselines }, &asked.json)
         }
         (None, Some(make)) => {
             made(&make)?;

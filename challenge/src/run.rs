@@ -34,7 +34,7 @@ pub struct RunOptions {
     #[arg(long)]
     pub no_baselines: bool,
     /// Program that is asked in place of this one, as `PROGRAM diagnose . --json=diagnosis.json --no-next`,
-    /// with --without EFFECT, --threads 1 and --baselines behind it; `stretch` is one
+    /// with --without EFFECT and --baselines behind it; `stretch` is one
     #[arg(long, value_name = "PROGRAM")]
     pub program: Option<PathBuf>,
 }
@@ -97,7 +97,7 @@ fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> 
         command.args(["--without", &name]);
     }
     if is_alone {
-        command.args(["--threads", "1"]);
+        command.env("RAYON_NUM_THREADS", "1");
     }
     if !options.no_baselines {
         command.arg("--baselines");

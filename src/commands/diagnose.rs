@@ -19,7 +19,7 @@ use super::{
     diagnosis_text::text,
     fail_on::FailOn,
     json::Json,
-    reading::{TimeColumn, column, columns},
+    reading::{Rows, TimeColumn, column, columns},
     shared::{detail, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
@@ -97,9 +97,8 @@ pub(crate) struct Args {
     /// Leave an effect out of the catalogue; several times
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Threads, 0 for all; the result is the same
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    threads: usize,
+    #[command(flatten)]
+    rows: Rows,
     /// Reference column of a gauge alone
     ///
     /// Or what an output of your own simulator senses.
@@ -164,7 +163,6 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
     }
     let options = Options {
-        threads: args.threads,
         baselines: args.baselines,
         responses: args.report.is_some(),
         ..Options::default()
@@ -175,6 +173,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let recorded = args.time.as_ref().map(TimeColumn::options);
     let reading = Reading {
         recorded: recorded.as_ref(),
+        strict: args.rows.strict,
         rig: args.rig.as_deref(),
         columns: args.reference.as_deref().zip(args.signal.as_deref()),
         by: args.by.as_ref().and_then(By::column),

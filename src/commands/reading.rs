@@ -24,6 +24,13 @@ pub(crate) struct Recorded {
     /// Names of the columns if it has none: time_s,bridge_v
     #[arg(long = "columns", value_name = "NAMES", value_delimiter = ',')]
     named: Option<Vec<String>>,
+    #[command(flatten)]
+    pub(crate) rows: Rows,
+}
+
+/// What becomes of a row that cannot be read.
+#[derive(clap::Args)]
+pub(crate) struct Rows {
     /// Refuse a recording with a row that cannot be read
     ///
     /// Otherwise such rows are left out with a note, up to one in five.
@@ -108,7 +115,7 @@ impl Recorded {
 
     /// What is asked of each recording.
     pub(crate) fn options(&self) -> ReadOptions {
-        let options = self.time.options().strict(self.strict);
+        let options = self.time.options().strict(self.rows.strict);
         match &self.named {
             Some(names) => options.columns(names.iter().map(|name| name.trim())),
             None => options,

@@ -96,6 +96,8 @@ pub struct Reading<'a> {
     pub by: Option<&'a str>,
     /// How recordings are read, in place of what the data say.
     pub recorded: Option<&'a ReadOptions>,
+    /// Whether a recording with a row that cannot be read is refused ([`ReadOptions::strict`]).
+    pub strict: bool,
     /// Effects that are not looked for.
     pub without: &'a [String],
     /// Hears in one line which program is going to run, before it runs.
@@ -130,7 +132,7 @@ impl Problem {
     /// Reads a built-in simulator's problem from a data set's folder, or from a trial.
     fn built_in(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
         let Reading { rig, columns, .. } = *reading;
-        let recorded = reading.recorded.cloned().unwrap_or_default();
+        let recorded = reading.recorded.cloned().unwrap_or_default().strict(reading.strict);
         if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
             if rig.is_some() {
                 let hint = "diagnose one signal at a time beside it";
@@ -173,8 +175,8 @@ impl Problem {
         }
         file.by = reading.by.map(str::to_owned);
         file.without.extend(reading.without.iter().cloned());
-        let own = file.reading();
-        let recorded = reading.recorded.unwrap_or(&own);
+        let recorded = reading.recorded.cloned().unwrap_or_else(|| file.reading());
+        let recorded = recorded.strict(reading.strict);
         let workers = file.workers(1)?;
         let workers = workers.ok_or_else(|| ProblemError::Simulator("it is built in".into()))?;
         let program = workers.shown();
@@ -189,7 +191,7 @@ impl Problem {
             let folder = workers.folder.display();
             announce(&format!("{} runs, in the folder {folder}: {program}", path.display()));
         }
-        let (checked, source) = Workers::bound(file.load_as(recorded)?, workers)?;
+        let (checked, source) = Workers::bound(file.load_as(&recorded)?, workers)?;
         let name = file.shown_name().to_owned();
         let own = BlackBox::within(checked, Arc::new(source), file.budget.map(NonZeroUsize::get));
         Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })

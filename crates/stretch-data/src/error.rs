@@ -1,8 +1,8 @@
-//! What can be wrong with a file, with the evidence.
+//! What can be wrong with a file, with the evidence, and words for it: names in a row, and the name that was meant.
 
 use std::{fmt, fs, io, path::Path};
 
-use crate::{files::FileError, nearest::nearest};
+use crate::files::FileError;
 
 /// Where in a file something stands.
 ///
@@ -208,5 +208,38 @@ pub fn shown(content: &[u8]) -> String {
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text,
+    }
+}
+
+/// The candidate nearest to `name` by edit distance, when it is near enough to be meant:
+/// at most two edits and less than half of the name, letter case apart.
+///
+/// ```
+/// let names = ["time_s", "length_mm", "bridge_v"];
+/// assert_eq!(stretch_data::nearest("lenght_mm", names), Some("length_mm"));
+/// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
+/// ```
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // a longer name is nobody's, and the distance takes the product of two lengths
+    let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
+    let name = short(name);
+    let near = candidates.into_iter().map(|one| (strsim::levenshtein(&name, &short(one)), one));
+    near.filter(|(edits, _)| *edits <= 2 && 2 * edits < name.chars().count().max(1))
+        .min_by_key(|(edits, _)| *edits)
+        .map(|(_, one)| one)
+}
+
+/// Names joined into a phrase: `a, b and c`, and `nothing` for no name.
+///
+/// ```
+/// assert_eq!(stretch_data::listed(&["a", "b", "c"]), "a, b and c");
+/// assert_eq!(stretch_data::listed::<&str>(&[]), "nothing");
+/// ```
+pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    let [all @ .., last] = names else { return "nothing".to_owned() };
+    let all: Vec<&str> = all.iter().map(AsRef::as_ref).collect();
+    match all[..] {
+        [] => last.as_ref().to_owned(),
+        _ => format!("{} and {}", all.join(", "), last.as_ref()),
     }
 }

@@ -2,36 +2,27 @@
 
 mod column;
 mod data_set;
-mod digest;
 mod error;
 mod even;
 mod even_session;
 pub mod files;
-mod listed;
-mod nearest;
 mod rig_file;
 #[cfg(feature = "proptest")]
 pub mod strategies;
-mod time;
 mod toml_file;
-mod toml_node;
 mod toml_text;
 mod trial;
 mod wrap;
 mod write;
 
 pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
-pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
-pub use digest::{digest_of, is_digest};
-pub use error::{DataError, Place, shown};
+pub use data_set::{DataSet, Split, TrialEntry, TrialKind, digest_of, is_digest};
+pub use error::{DataError, Place, listed, nearest, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};
-pub use listed::listed;
-pub use nearest::nearest;
 pub use rig_file::{EffectEntry, Parameter, RigFile, from_zero};
-pub use time::tidy_time;
 pub use toml_file::TomlFile;
 pub use toml_text::Remarks;
-pub use trial::{Channel, Trial, ends, rate_of};
+pub use trial::{Channel, Trial, ends, rate_of, tidy_time};
 pub use wrap::{Wrap, follow_turns};
 pub use write::{can_name, push_number};

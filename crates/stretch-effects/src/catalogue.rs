@@ -5,41 +5,39 @@ use crate::{
     crosstalk::PRESSURE_CROSSTALK,
     drift::THERMAL_DRIFT,
     effect::Effect,
-    fading::GAUGE_RELAXATION,
+    fading::{GAUGE_RELAXATION, SELF_HEATING},
     hum::MAINS_HUM,
+    hysteresis::GAUGE_HYSTERESIS,
     kind::Kind,
     knees::{AMPLIFIER_SATURATION, SLEEVE_SLACK},
     lowpass::AMPLIFIER_LOWPASS,
     play::{POT_BACKLASH, SLEEVE_SLIP},
-    prandtl_ishlinskii::GAUGE_HYSTERESIS,
     skew::CHANNEL_SKEW,
     softening::GAUGE_SOFTENING,
-    warming::SELF_HEATING,
 };
 
 /// Every kind by its own name.
 pub mod kinds {
     pub use crate::{
-        bouc_wen::BOUC_WEN,
         bow::{CURVE, GAIN_CURVE},
         crosstalk::CROSSTALK,
         dahl::{DAHL_FRICTION, LOAD_DAHL_FRICTION, PLAY_FRICTION},
-        dead_zone::{DEAD_ZONE, FIRMWARE_DEAD_BAND},
+        dead_zone::{DEAD_ZONE, FIRMWARE_DEAD_BAND, QUANTISATION},
         drift::{DRIFT, GAIN_DRIFT, OFFSET},
-        fading::RELAXATION,
-        friction::{COULOMB_FRICTION, LOAD_FRICTION, STRIBECK_FRICTION, VISCOUS_FRICTION},
+        fading::{RELAXATION, WARMING},
+        friction::{
+            COULOMB_FRICTION, LOAD_FRICTION, STRIBECK_FRICTION, TORQUE_SPEED_LIMIT,
+            VISCOUS_FRICTION,
+        },
         hum::HUM,
+        hysteresis::{BOUC_WEN, HYSTERESIS},
         knees::SATURATION,
         lowpass::LAG,
         oscillator::{FLEXIBLE_JOINT, SECOND_ORDER_LAG},
         play::BACKLASH,
-        prandtl_ishlinskii::HYSTERESIS,
         profile::{PROFILE, SLEW_LIMIT},
-        quantiser::QUANTISATION,
         skew::{CLOCK_DRIFT, DELAY, SKEW},
         softening::SOFTENING,
-        torque_speed::TORQUE_SPEED_LIMIT,
-        warming::WARMING,
     };
 }
 

@@ -7,7 +7,7 @@ use crate::{
     kind::{Beside, Kind, Side},
     operator::{Operator, Span},
     parameter::{EffectParameter, Form},
-    place::Action,
+    place::{Action, Place},
     sketch::{Quantity, Sketch},
 };
 
@@ -87,7 +87,7 @@ pub(crate) static PRESSURE_CROSSTALK: Effect = Effect {
         action: |v, around| {
             let scale_kpa = around.pressure_scale_kpa;
             let per_kpa = v[0] / scale_kpa;
-            Action::Strain(Box::new(Pressed { per_kpa, bend: v[1], scale_kpa }))
+            Action::At(Place::Strain, Box::new(Pressed { per_kpa, bend: v[1], scale_kpa }))
         },
         sketch: Some(|v, around| {
             let x = around.strain();

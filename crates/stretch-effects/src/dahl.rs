@@ -6,7 +6,7 @@ use stretch_core::arithmetic::play;
 
 use crate::{
     extent::Extent,
-    friction::FORCES,
+    friction::FRICTION,
     kind::{Beside, Kind, Signals},
     operator::{Operator, Span, Start},
     parameter::EffectParameter,
@@ -114,15 +114,13 @@ pub static DAHL_FRICTION: Kind = Kind {
     title: "friction that builds up over a way",
     words: "it rubs by position: the force builds up over a presliding length, whatever the speed (Dahl)",
     equation: "y = x + f u behind the stage, x - f u in front of it; du = dp/s (1 - u sign(dp)), p the position",
-    usual: FORCES,
     beside: Beside::Position,
-    opposes: true,
     parameters: |e, unit| [force(e, unit), shape(e), back()].into(),
     starts: Some(|e| starts(e, |f, s| vec![f, s, 1.0])),
     operator: |v, _, _| Box::new(alone(v)),
     sketch: Some(|v, _, signals| alone(v).sketch(signals)),
     twins: &["coulomb_friction", "play_friction", "load_dahl_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 /// Friction driven by position that another channel scales.
@@ -131,15 +129,13 @@ pub static LOAD_DAHL_FRICTION: Kind = Kind {
     title: "friction over a way that a load scales",
     words: "it rubs by position, in proportion to another channel (a load, a voltage)",
     equation: "y = x + f u |load|/max|load| behind the stage, x - the same in front of it; du = dp/s (1 - u sign(dp)), p the position",
-    usual: FORCES,
     beside: Beside::PositionAndLoad,
-    opposes: true,
     parameters: |e, unit| [force(e, unit), shape(e), back()].into(),
     starts: Some(|e| starts(e, |f, s| vec![f, s, 1.0])),
     operator: |v, e, _| Box::new(loaded(v, e)),
     sketch: Some(|v, e, signals| loaded(v, e).sketch(signals)),
     twins: &["dahl_friction", "load_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 /// Play, and friction behind it.
@@ -148,9 +144,7 @@ pub static PLAY_FRICTION: Kind = Kind {
     title: "friction behind a play",
     words: "it rubs by position once a gap is taken up: play and friction in series",
     equation: "y = x + f u behind the stage, x - f u in front of it; du = dz/s (1 - u sign(dz)), z = play(p, w), p the position",
-    usual: FORCES,
     beside: Beside::Position,
-    opposes: true,
     parameters: |e, unit| {
         let size = e.beside[1] - e.beside[0];
         let w = EffectParameter::shaped("w", "position", 1e-3 * size..=0.5 * size);
@@ -165,7 +159,7 @@ pub static PLAY_FRICTION: Kind = Kind {
     operator: |v, _, _| Box::new(behind_play(v)),
     sketch: Some(|v, _, signals| behind_play(v).sketch(signals)),
     twins: &["dahl_friction", "coulomb_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 fn force(e: &Extent, unit: &str) -> EffectParameter {

@@ -1,4 +1,4 @@
-//! Friction by direction, speed and load.
+//! Forces by the velocity: friction by direction, speed and load, and a greatest torque that falls with the speed.
 
 use alloc::{boxed::Box, format, vec};
 
@@ -66,8 +66,13 @@ impl Operator for Friction {
     }
 }
 
-/// Where friction is looked for: on forces and torques only, whichever side they are on.
-pub(crate) const FORCES: &[Side] = &[Side::Input, Side::Output];
+/// What acts on forces and torques by the velocity: whichever side they are on, it is looked for, and it opposes the motion.
+pub(crate) const FRICTION: Kind = Kind {
+    usual: &[Side::Input, Side::Output],
+    beside: Beside::Velocity,
+    opposes: true,
+    ..Kind::PLAIN
+};
 
 /// Friction by direction.
 pub static COULOMB_FRICTION: Kind = Kind {
@@ -75,9 +80,6 @@ pub static COULOMB_FRICTION: Kind = Kind {
     title: "dry friction",
     words: "it rubs by direction, whatever the speed",
     equation: "y = x + f tanh(v/width)(1 + lopsided sign(v)) behind the stage, x - the same in front of it",
-    usual: FORCES,
-    beside: Beside::Velocity,
-    opposes: true,
     parameters: |e, unit| {
         vec![
             EffectParameter::sized("f", unit, 0.0..=0.5 * e.span()),
@@ -88,7 +90,7 @@ pub static COULOMB_FRICTION: Kind = Kind {
     operator: |v, _, _| Box::new(coulomb(v)),
     sketch: Some(|v, _, signals| coulomb(v).sketch(signals)),
     twins: &["stribeck_friction", "viscous_friction", "dahl_friction", "load_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 /// Friction by speed.
@@ -97,9 +99,6 @@ pub static VISCOUS_FRICTION: Kind = Kind {
     title: "viscous friction",
     words: "it rubs in proportion to the speed",
     equation: "y = x + b v behind the stage, x - b v in front of it",
-    usual: FORCES,
-    beside: Beside::Velocity,
-    opposes: true,
     parameters: |e, unit| {
         let most = 0.5 * e.span() / e.beside_size().max(1e-300);
         vec![EffectParameter::sized("b", &format!("{unit}/velocity"), -0.2 * most..=most)]
@@ -107,7 +106,7 @@ pub static VISCOUS_FRICTION: Kind = Kind {
     operator: |v, _, _| Box::new(Friction { viscous: v[0], ..Friction::default() }),
     sketch: Some(|v, _, signals| Friction { viscous: v[0], ..Friction::default() }.sketch(signals)),
     twins: &["coulomb_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 /// Friction that is larger while it is slow.
@@ -116,9 +115,6 @@ pub static STRIBECK_FRICTION: Kind = Kind {
     title: "stick-slip friction",
     words: "it rubs more while it is slow",
     equation: "y = x + tanh(v/width) more exp(-(v/slow)^2) behind the stage, x - the same in front of it",
-    usual: FORCES,
-    beside: Beside::Velocity,
-    opposes: true,
     parameters: |e, unit| {
         let v = e.beside_size();
         vec![
@@ -130,7 +126,7 @@ pub static STRIBECK_FRICTION: Kind = Kind {
     operator: |v, _, _| Box::new(stribeck(v)),
     sketch: Some(|v, _, signals| stribeck(v).sketch(signals)),
     twins: &["coulomb_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
 
 /// Velocity at which the direction is told.
@@ -207,9 +203,7 @@ pub static LOAD_FRICTION: Kind = Kind {
     title: "friction that grows with the load",
     words: "it rubs by direction, in proportion to a load",
     equation: "y = x + mu |load| tanh(v/width) behind the stage, x - the same in front of it",
-    usual: FORCES,
     beside: Beside::VelocityAndLoad,
-    opposes: true,
     parameters: |e, unit| {
         let most = 0.5 * e.span() / e.load_size();
         vec![
@@ -228,5 +222,78 @@ pub static LOAD_FRICTION: Kind = Kind {
             .with_all(&[("MU", v[0], &*units[0]), ("WIDTH", v[1], &*units[1])])
     }),
     twins: &["coulomb_friction", "load_dahl_friction"],
-    ..Kind::PLAIN
+    ..FRICTION
 };
+
+/// The limit of a motor: y = x within -l(-v) and l(v), with l(v) = max(0, min(stall, stall - slope v)) and the velocity v where the
+/// [`Span`] holds the strain. Driving gets weaker with the speed, braking does not.
+///
+/// ```
+/// use stretch_effects::{Grid, Operator, Span, TorqueSpeed};
+/// let motor = TorqueSpeed { stall: 10.0, slope: 2.0 };
+/// let (grid, mut torque) = (Grid::samples(0.01)?, [9.0, 9.0, -9.0, 9.0]);
+/// motor.run(&Span { strain: &[0.0, 3.0, 3.0, 8.0], ..Span::whole(&grid) }, &mut [], &mut torque);
+/// assert_eq!(torque, [9.0, 4.0, -9.0, 0.0]);
+/// # Ok::<(), stretch_effects::GridError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueSpeed {
+    /// Greatest torque at rest.
+    pub stall: f64,
+    /// What it loses per speed.
+    pub slope: f64,
+}
+
+impl TorqueSpeed {
+    /// The greatest torque in the direction of a velocity.
+    fn limit(&self, v: f64) -> f64 {
+        (self.stall - self.slope * v).min(self.stall).max(0.0)
+    }
+}
+
+impl Operator for TorqueSpeed {
+    fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
+        for (x, v) in signal.iter_mut().zip(span.strain) {
+            *x = x.min(self.limit(*v)).max(-self.limit(-*v));
+        }
+    }
+}
+
+/// A limit of the torque that falls with the speed.
+pub static TORQUE_SPEED_LIMIT: Kind = Kind {
+    name: "torque_speed_limit",
+    title: "a limit of the torque that falls with the speed",
+    words: "it pushes less the faster it goes",
+    equation: "y = x within -l(-v) and l(v), l(v) = max(0, min(stall, stall - slope v))",
+    opposes: false,
+    parameters: |e, unit| {
+        let (size, fastest) = (e.low.abs().max(e.high.abs()), e.beside_size().max(1e-300));
+        // At rest it reaches what was asked for: a limit below that is a saturation.
+        let most = LARGEST * size;
+        vec![
+            EffectParameter::sized("slope", &format!("{unit}/velocity"), 0.0..=most / fastest),
+            EffectParameter::shaped("stall", unit, size..=most),
+        ]
+    },
+    starts: Some(|e| {
+        let (size, fastest) = (e.low.abs().max(e.high.abs()), e.beside_size().max(1e-300));
+        let all = [(1.1, 0.3), (1.1, 0.8), (1.6, 1.0), (2.5, 2.0)];
+        all.map(|(stall, loses)| vec![loses * size / fastest, stall * size]).into()
+    }),
+    operator: |v, _, _| Box::new(TorqueSpeed { slope: v[0], stall: v[1] }),
+    sketch: Some(|v, _, signals| {
+        let body = "let ahead = max(0, min(STALL, STALL - SLOPE * v))
+            let back = max(0, min(STALL, STALL + SLOPE * v))
+            let y = max(-back, min(ahead, x))";
+        let speed = signals.beside.clone().named("v");
+        let slope = format!("{}/({})", signals.x.unit, speed.unit);
+        Sketch::of(signals.x.clone(), body)
+            .beside(speed)
+            .with_all(&[("SLOPE", v[0], &*slope), ("STALL", v[1], &*signals.x.unit)])
+    }),
+    twins: &["saturation", "viscous_friction"],
+    ..FRICTION
+};
+
+/// Greatest torque at rest, in what was seen of it.
+const LARGEST: f64 = 4.0;

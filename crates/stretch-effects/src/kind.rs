@@ -3,9 +3,10 @@
 use alloc::{boxed::Box, vec::Vec};
 
 use crate::{
+    drift::Offset,
     extent::Extent,
     grid::Grid,
-    operator::{Operator, Span},
+    operator::Operator,
     parameter::EffectParameter,
     sketch::{Quantity, Sketch},
 };
@@ -154,14 +155,6 @@ pub struct Kind {
     pub shown_from_hz: Option<fn(&[f64]) -> f64>,
 }
 
-/// A signal that stays as it is.
-#[derive(Debug)]
-struct Same;
-
-impl Operator for Same {
-    fn run(&self, _span: &Span<'_>, _cells: &mut [f64], _signal: &mut [f64]) {}
-}
-
 /// Kinds of one name are the same.
 impl PartialEq for Kind {
     fn eq(&self, other: &Self) -> bool {
@@ -181,7 +174,7 @@ impl Kind {
         opposes: false,
         parameters: |_, _| Vec::new(),
         starts: None,
-        operator: |_, _, _| Box::new(Same),
+        operator: |_, _, _| Box::new(Offset::default()),
         sketch: None,
         twins: &[],
         family: None,

@@ -3,7 +3,6 @@
 
 extern crate alloc;
 
-mod bouc_wen;
 mod bow;
 mod catalogue;
 mod code;
@@ -17,6 +16,7 @@ mod fading;
 mod friction;
 mod grid;
 mod hum;
+mod hysteresis;
 mod kind;
 mod knees;
 mod lowpass;
@@ -26,29 +26,25 @@ mod oscillator;
 mod parameter;
 mod place;
 mod play;
-mod prandtl_ishlinskii;
 mod profile;
-mod quantiser;
 mod sketch;
 mod skew;
 mod softening;
-mod torque_speed;
-mod warming;
 
-pub use bouc_wen::BoucWen;
 pub use bow::{Bow, BowedGain, bow};
 pub use catalogue::{GAUGE, KINDS, gauge_effect, kind_named, kinds};
 pub use code::Language;
 pub use crosstalk::Crosstalk;
 pub use dahl::Dahl;
-pub use dead_zone::{DeadBand, DeadZone, HoldBand};
+pub use dead_zone::{DeadBand, DeadZone, HoldBand, Quantiser};
 pub use drift::{Drift, Offset};
 pub use effect::{Acts, Alone, Effect, Live, Need, Search, Target, Values, each, pairs};
 pub use extent::Extent;
-pub use fading::{FadingMemory, Times};
-pub use friction::{Friction, LoadFriction};
+pub use fading::{FadingMemory, Times, Warming};
+pub use friction::{Friction, LoadFriction, TorqueSpeed};
 pub use grid::{DEFAULT_STEP_S, Grid, GridError};
 pub use hum::{Hum, WanderingLine};
+pub use hysteresis::{BoucWen, Loops, PrandtlIshlinskii};
 pub use kind::{
     Beside, Family, Find, Kind, Line, Measure, Measured, Side, Signals, Sketched, Starts,
 };
@@ -60,12 +56,8 @@ pub use oscillator::{FlexibleJoint, Oscillator, Swing};
 pub use parameter::{EffectParameter, Form, Role, Scale};
 pub use place::{Action, Droop, Law, Place, RigStage, Surroundings};
 pub use play::Backlash;
-pub use prandtl_ishlinskii::{Loops, PrandtlIshlinskii};
 pub use profile::{Profile, SProfile, SlewLimit};
-pub use quantiser::Quantiser;
 pub use sketch::{Cell, Constant, Quantity, Sketch};
 pub use skew::{ClockDrift, Skew, SkewSpec};
 pub use softening::Softening;
 pub use stretch_core::arithmetic::play;
-pub use torque_speed::TorqueSpeed;
-pub use warming::Warming;

@@ -4,7 +4,7 @@ use alloc::{vec, vec::Vec};
 
 use crate::{
     grid::Grid,
-    operator::{Operator, Span, Start},
+    operator::{Operator, Span},
 };
 
 /// The moving mean y(t) = (1/T) integral of x from t - T to t, of a signal that is linear between nodes: what drives call an S-curve or
@@ -67,10 +67,6 @@ impl Operator for MovingMean {
         self.reach
     }
 
-    fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
-        cells.fill(first);
-    }
-
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
         // What came before, the earliest first, and the signal behind it.
         let mut all = vec![0.0; self.reach + signal.len()];
@@ -92,6 +88,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::Start;
 
     /// Rounding of some hundred products of values up to 10.
     const ROUNDING: f64 = 1e-12;

@@ -119,8 +119,10 @@ pub trait Operator: fmt::Debug + Send + Sync {
         0
     }
 
-    /// Prepares the memory for a trial whose first input is `first`.
-    fn begin(&self, _start: Start, _first: f64, _cells: &mut [f64]) {}
+    /// Prepares the memory for a trial whose first input is `first`; by default every number is that.
+    fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
+        cells.fill(first);
+    }
 
     /// Replaces every value of `signal` by what the operator makes of it.
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]);

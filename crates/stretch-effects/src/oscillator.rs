@@ -74,19 +74,22 @@ pub(crate) fn turn(m: f64, damping: f64, h: f64) -> [f64; 4] {
     [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin].map(|x| decay * x)
 }
 
+/// Position, velocity and last input at the begin of a trial: at rest, or still swinging.
+fn begin_swing(m: f64, start: Start, first: f64, cells: &mut [f64]) {
+    // A rest of 20 m leaves less than 1 % of a swing of damping 0.25; trials are further apart than that.
+    if !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * m) {
+        cells[..2].copy_from_slice(&[first, 0.0]);
+    }
+    cells[2] = first;
+}
+
 impl Operator for Oscillator {
     fn cells(&self) -> usize {
         3
     }
 
     fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
-        // A rest of 20 m leaves less than 1 % of a swing of damping 0.25; trials are further apart than that.
-        let at_rest = !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * self.swing.m);
-        if at_rest {
-            cells[0] = first;
-            cells[1] = 0.0;
-        }
-        cells[2] = first;
+        begin_swing(self.swing.m, start, first, cells);
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
@@ -205,11 +208,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             part("(s.last + x) / 2", "x", 2)
         );
         let sketch = Sketch::of(signals.x.clone(), body).remembering(["at", "last"]);
-        let unit = match &*signals.x.unit {
-            "1" => "1/s".into(),
-            unit => format!("{unit}/s"),
-        };
-        let speed = unit.clone();
+        let speed = format!("{}/s", signals.x.unit);
         let numbers = [
             ("M", v[0], "s"),
             ("DAMPING", v[1], "1"),
@@ -220,7 +219,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             ("SLOW", (SLOW * v[3] / v[0].max(1e-9)).max(1e-150), &*speed),
             ("DT", signals.dt_s, "s"),
         ];
-        sketch.cells(["speed"], unit, "0").with_all(&numbers)
+        sketch.with_all(&numbers).cells(["speed"], speed, "0")
     }),
     twins: &["lag", "delay", "skew", "flexible_joint", "profile"],
     family: Some((Family::Late, |v| 2.0 * v[1] * v[0])),
@@ -271,11 +270,7 @@ impl Operator for FlexibleJoint {
     }
 
     fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
-        // After 20 m little of a swing is left.
-        if !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * self.m) {
-            cells[..2].copy_from_slice(&[first, 0.0]);
-        }
-        cells[2] = first;
+        begin_swing(self.m, start, first, cells);
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
@@ -322,13 +317,9 @@ pub static FLEXIBLE_JOINT: Kind = Kind {
             s.speed = slope - sn / (M * M) * bent + (cs - DAMPING / M * sn) * rate
             s.last = x
             let y = s.at";
-        let unit = match &*signals.x.unit {
-            "1" => "1/s".into(),
-            unit => alloc::format!("{unit}/s"),
-        };
         Sketch::of(signals.x.clone(), body)
             .remembering(["at", "last"])
-            .cells(["speed"], unit, "0")
+            .cells(["speed"], format!("{}/s", signals.x.unit), "0")
             .with_all(&[("M", v[0], "s"), ("DAMPING", v[1], "1"), ("DT", signals.dt_s, "s")])
     }),
     twins: &["second_order_lag", "lag", "delay", "skew"],

@@ -254,16 +254,12 @@ impl EffectParameter {
             Scale::Linear => self.min + (self.max - self.min) * k / 6.0,
             Scale::Log => self.min * libm::pow(self.max / self.min, k / 6.0),
         };
-        let Some(off) = self.off() else {
-            return match self.usual_form() {
-                Some(usual) => vec![usual],
-                None => [1.0, 3.0, 5.0].map(between).into(),
-            };
+        let off = match self.role {
+            Role::Form { usual } => return vec![usual],
+            // What is searched in equal ratios never gets to 0.
+            Role::Strength { off } if off != 0.0 || !self.is_log() || self.min <= 0.0 => off,
+            _ => return [1.0, 3.0, 5.0].map(between).into(),
         };
-        // What is searched in equal ratios never gets to 0.
-        if off == 0.0 && self.is_log() && self.min > 0.0 {
-            return [1.0, 3.0, 5.0].map(between).into();
-        }
         let shares: &[f64] = if off == 0.0 { &[0.02, 0.2] } else { &[0.05, 0.2, 0.6, 0.9] };
         let ends = [self.min, self.max].into_iter().filter(|end| *end != off);
         ends.flat_map(|end| shares.iter().map(move |s| off + s * (end - off))).collect()

@@ -87,15 +87,7 @@ impl Place {
             return Action::Skew(SkewSpec { skew_s: values[0], rate: values[1], empty: 0.0 });
         }
         let operator = (kind.operator)(values, &self.extent(around), around.grid);
-        match self {
-            Self::StaticContraction => Action::StaticContraction(operator),
-            Self::MovingContraction => Action::MovingContraction(operator),
-            Self::Strain => Action::Strain(operator),
-            Self::Resistance => Action::Resistance(operator),
-            Self::Volts => Action::Volts(operator),
-            Self::Sampling | Self::Record => Action::Record(operator),
-            Self::Length => Action::Length(operator),
-        }
+        Action::At(self, operator)
     }
 
     /// How far the signal goes here.
@@ -252,22 +244,10 @@ pub enum Action {
     Leak(Box<dyn Law>),
     /// k/k_max to V/V0.
     Volume(Box<dyn Law>),
-    /// Static contraction k_s, before the lag.
-    StaticContraction(Box<dyn Operator>),
-    /// Moving contraction, behind the lag.
-    MovingContraction(Box<dyn Operator>),
-    /// Gauge strain.
-    Strain(Box<dyn Operator>),
-    /// Resistance; the span holds the strain.
-    Resistance(Box<dyn Operator>),
-    /// Amplified voltage.
-    Volts(Box<dyn Operator>),
+    /// On the signal at a place: of a resistance the span holds the strain.
+    At(Place, Box<dyn Operator>),
     /// Samples of the bridge show the voltage of some time earlier.
     Skew(SkewSpec),
-    /// Recorded samples of the bridge, after a skew.
-    Record(Box<dyn Operator>),
-    /// Length as the reference sees it, mm.
-    Length(Box<dyn Operator>),
 }
 
 /// A memoryless law y = f(x).

@@ -6,11 +6,11 @@ use stretch_core::{Plays, arithmetic::play};
 
 use crate::{
     effect::{Acts, Effect, Live, each},
+    hysteresis::PrandtlIshlinskii,
     kind::{Family, Kind, Side},
     operator::{Operator, Span, Start},
     parameter::{EffectParameter, Form},
     place::{Place, RigStage},
-    prandtl_ishlinskii::PrandtlIshlinskii,
     sketch::Sketch,
 };
 

@@ -33,10 +33,6 @@ impl Operator for SlewLimit {
         1
     }
 
-    fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
-        cells[0] = first;
-    }
-
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
         let mut y = cells[0];
         span.each(signal.len(), |step, i| {

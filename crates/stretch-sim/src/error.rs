@@ -1,6 +1,6 @@
 //! Errors of a rig, its effects or its inputs.
 
-use crate::nearest::suggestion;
+use stretch_effects::Effect;
 
 /// Why a rig, an effect or an input was refused, with the offending values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -148,7 +148,26 @@ pub enum SimError {
     },
 }
 
+/// The words that offer a suggestion, empty when there is none.
+fn suggestion(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
+}
+
+/// The candidate that was probably meant.
+pub(crate) fn nearest<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    stretch_data::nearest(name, candidates).map(str::to_string)
+}
+
 impl SimError {
+    /// That none of these effects has that name.
+    pub(crate) fn unknown_effect(name: &str, known: &[&Effect]) -> Self {
+        let nearest = nearest(name, known.iter().map(|e| e.name));
+        Self::UnknownEffect { name: name.to_owned(), nearest }
+    }
+
     /// A name that its owner does not know.
     pub(crate) fn unknown_parameter(owner: &str, name: &str, nearest: Option<String>) -> Self {
         Self::UnknownParameter { owner: owner.to_owned(), name: name.to_owned(), nearest }

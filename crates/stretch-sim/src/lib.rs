@@ -3,11 +3,7 @@
 mod effects;
 mod error;
 mod gauge;
-mod gauge_file;
-mod memory;
-mod nearest;
 mod params;
-mod preset;
 mod protocol;
 mod random;
 mod rig;
@@ -17,17 +13,14 @@ mod static_law;
 
 pub use effects::{ActiveEffect, CATALOGUE, Catalogue, EffectSet, effect_named};
 pub use error::SimError;
-pub use gauge::{Gauge, GaugeSpec};
-pub use gauge_file::GaugeRig;
-pub use memory::Memory;
+pub use gauge::{Gauge, GaugeRig, GaugeSpec};
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
-pub use preset::{demo_preset, paper_preset};
 pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
-pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text};
+pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text, demo_preset, paper_preset};
 pub use session::Session;
 pub use stages::{
-    Actuation, Bridge, Chain, ChainMemory, Held, Muscle, Openings, Pneumatics, Recorded, Reference,
-    Sensing, Setting,
+    Actuation, Bridge, Chain, ChainMemory, Held, Memory, Muscle, Openings, Pneumatics, Recorded,
+    Reference, Sensing, Setting,
 };
 pub use static_law::StaticLaw;
 pub use stretch_effects::{

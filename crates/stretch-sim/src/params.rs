@@ -171,12 +171,6 @@ impl RigParams {
     pub fn values(&self) -> &[f64; Key::COUNT] {
         &self.0
     }
-
-    /// All values, mutable.
-    pub fn values_mut(&mut self) -> &mut [f64; Key::COUNT] {
-        &mut self.0
-    }
-
     /// The surroundings of an effect in a rig with these values.
     pub fn surroundings<'a>(&self, grid: &'a Grid) -> Surroundings<'a> {
         let (stretch, k_max) = (1.0 + self[Key::E0], self[Key::KMax]);

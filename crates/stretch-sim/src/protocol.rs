@@ -220,12 +220,7 @@ impl TrialPlan {
         };
         let file =
             if trial.name.is_empty() { "commands.csv".to_string() } else { trial.name.clone() };
-        let kind = TrialKind::Other;
         Ok(Self {
-            file,
-            kind,
-            opening: None,
-            split: Split::Fit,
             full,
             rate_hz,
             inlet,
@@ -233,7 +228,7 @@ impl TrialPlan {
             excitation: excitation(trial)?,
             set_length_mm: trial.channel(SET_LENGTH).map(<[f64]>::to_vec),
             shunt: shunt(trial)?,
-            start_s: None,
+            ..Self::new(file, TrialKind::Other, 0.0)
         })
     }
 

@@ -10,7 +10,8 @@ use std::{
 
 use stretch_effects::{EffectParameter, Extent, KINDS, Kind, Signals, Skew, Span};
 use stretch_sim::{
-    Action, CATALOGUE, Effect, Grid, Language, Operator, Quantity, RigParams, Role, Sketch, Start,
+    Action, CATALOGUE, Effect, Grid, Language, Operator, Place, Quantity, RigParams, Role, Sketch,
+    Start,
 };
 
 /// Difference between two mathematics libraries over four seconds of memory, as a share of the
@@ -78,18 +79,19 @@ fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
     };
     let alone = |a: &[f64]| -> Vec<Vec<f64>> { a.iter().map(|a| vec![*a]).collect() };
     match effect.action(values, &around) {
-        Action::Strain(operator) => {
+        Action::At(Place::Strain, operator) => {
             let span = Span { pressure_kpa: &pressure, ..plain };
             let expected = run(&*operator, &span, strain[0], &strain);
             let rows =
                 if effect.needs.is_some() { pairs(&strain, &pressure) } else { alone(&strain) };
             Trace { rows, expected }
         }
-        Action::StaticContraction(operator) | Action::MovingContraction(operator) => {
+        Action::At(Place::StaticContraction, operator)
+        | Action::At(Place::MovingContraction, operator) => {
             let x = on(&course, 0.0, 0.16);
             Trace { rows: alone(&x), expected: run(&*operator, &plain, x[0], &x) }
         }
-        Action::Resistance(operator) => {
+        Action::At(Place::Resistance, operator) => {
             let x = on(&course, 4.0, 6.0);
             let span = Span { strain: &strain, ..plain };
             let expected = run(&*operator, &span, strain[0], &x);
@@ -100,15 +102,15 @@ fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
             let rows = if effect.name == "self_heating" { alone(&x) } else { pairs(&x, second) };
             Trace { rows, expected }
         }
-        Action::Volts(operator) => {
+        Action::At(Place::Volts, operator) => {
             let x = on(&course, 1.2, 2.4);
             Trace { rows: alone(&x), expected: run(&*operator, &plain, x[0], &x) }
         }
-        Action::Record(operator) => {
+        Action::At(Place::Record, operator) => {
             let x = on(&course, 1.2, 2.4);
             Trace { rows: pairs(&x, &times), expected: run(&*operator, &plain, x[0], &x) }
         }
-        Action::Length(operator) => {
+        Action::At(Place::Length, operator) => {
             let x = on(&course, 150.0, 180.0);
             Trace { rows: alone(&x), expected: run(&*operator, &plain, x[0], &x) }
         }

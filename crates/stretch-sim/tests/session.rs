@@ -269,7 +269,7 @@ fn a_gauge_alone_is_a_rig() {
 
 #[test]
 fn a_users_own_effect_takes_part() {
-    use stretch_sim::{Action, Acts, Effect, EffectParameter, Operator, Span};
+    use stretch_sim::{Action, Acts, Effect, EffectParameter, Operator, Place, Span};
 
     /// The last sample stays.
     #[derive(Debug)]
@@ -287,7 +287,7 @@ fn a_users_own_effect_takes_part() {
         equation: "v_i -> v_i + share (v_(i-1) - v_i) for every tenth i",
         parameters: &[EffectParameter::strength("share", "1", 0.0, 1.0, 1.0)],
         acts: Acts::Own {
-            action: |values, _| Action::Record(Box::new(Hold(values[0]))),
+            action: |values, _| Action::At(Place::Record, Box::new(Hold(values[0]))),
             sketch: None,
         },
         ..Effect::PLAIN

@@ -3,29 +3,23 @@
 
 use stretch_effects::{Effect, GAUGE};
 
-mod catalogue;
+use crate::SimError;
+
+mod actuation;
 mod set;
 
-mod chamber_volume;
-mod leak;
-mod muscle;
-mod supply_sag;
-mod valve_deadband;
-mod valve_delay;
-
-pub use catalogue::Catalogue;
 pub use set::{ActiveEffect, EffectSet};
 
 /// Effects of valves, chamber and muscle.
 static ACTUATION: [&Effect; 8] = [
-    &supply_sag::SUPPLY_SAG,
-    &valve_delay::VALVE_DELAY,
-    &valve_deadband::VALVE_DEADBAND,
-    &leak::LEAK,
-    &chamber_volume::CHAMBER_VOLUME,
-    &muscle::MUSCLE_HYSTERESIS,
-    &muscle::MUSCLE_CREEP,
-    &muscle::CROSSBEAM_INERTIA,
+    &actuation::SUPPLY_SAG,
+    &actuation::VALVE_DELAY,
+    &actuation::VALVE_DEADBAND,
+    &actuation::LEAK,
+    &actuation::CHAMBER_VOLUME,
+    &actuation::MUSCLE_HYSTERESIS,
+    &actuation::MUSCLE_CREEP,
+    &actuation::CROSSBEAM_INERTIA,
 ];
 
 /// Every effect, in the order in which several of one stage act: those of the actuation, then those of the gauge.
@@ -49,4 +43,64 @@ const fn joined() -> [&'static Effect; ACTUATION.len() + GAUGE.len()] {
 /// ```
 pub fn effect_named(name: &str) -> Option<&'static Effect> {
     CATALOGUE.iter().copied().find(|e| e.name == name)
+}
+
+/// Effects that a diagnosis knows.
+///
+/// ```
+/// use stretch_sim::{Catalogue, Effect};
+/// static OWN: Effect = Effect { name: "own", ..Effect::PLAIN };
+/// let catalogue = Catalogue::default().without(&["leak"])?.with(&OWN)?;
+/// assert!(catalogue.named("leak").is_none() && catalogue.named("own").is_some());
+/// # Ok::<(), stretch_sim::SimError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Catalogue {
+    effects: Vec<&'static Effect>,
+}
+
+impl Default for Catalogue {
+    /// The built-in catalogue.
+    fn default() -> Self {
+        Self { effects: CATALOGUE.to_vec() }
+    }
+}
+
+impl Catalogue {
+    /// With one more effect, after the others.
+    ///
+    /// # Errors
+    /// An effect with that name exists.
+    pub fn with(mut self, effect: &'static Effect) -> Result<Self, SimError> {
+        if self.named(effect.name).is_some() {
+            return Err(SimError::RepeatedEffect { name: effect.name.to_owned() });
+        }
+        self.effects.push(effect);
+        Ok(self)
+    }
+
+    /// Without effects of these names.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn without(mut self, names: &[impl AsRef<str>]) -> Result<Self, SimError> {
+        for name in names.iter().map(AsRef::as_ref) {
+            let known = |e: &&&'static Effect| e.name == name;
+            if self.effects.iter().chain(CATALOGUE).find(known).is_none() {
+                return Err(SimError::unknown_effect(name, &self.effects));
+            }
+            self.effects.retain(|e| e.name != name);
+        }
+        Ok(self)
+    }
+
+    /// The effect called `name`, if it is in.
+    pub fn named(&self, name: &str) -> Option<&'static Effect> {
+        self.effects.iter().copied().find(|e| e.name == name)
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &'static Effect> {
+        self.effects.iter().copied()
+    }
 }

@@ -4,7 +4,7 @@ use stretch_data::EffectEntry;
 use stretch_effects::{Action, Effect, EffectParameter, Grid, RigStage, Role, Surroundings};
 
 use super::{CATALOGUE, effect_named};
-use crate::{SimError, nearest::nearest, params::RigParams};
+use crate::{SimError, error::nearest, params::RigParams};
 
 /// One effect with the values of its parameters, in the order of [`Effect`]'s parameters.
 #[derive(Debug, Clone)]
@@ -27,11 +27,6 @@ impl ActiveEffect {
     /// Values, one per parameter.
     pub fn values(&self) -> &[f64] {
         &self.values
-    }
-
-    /// Mutable values; the caller keeps them finite.
-    pub fn values_mut(&mut self) -> &mut [f64] {
-        &mut self.values
     }
 
     /// Its action with its values.
@@ -220,10 +215,7 @@ impl EffectSet {
 
 /// The catalogue's effect of that name.
 fn known(name: &str) -> Result<&'static Effect, SimError> {
-    effect_named(name).ok_or_else(|| SimError::UnknownEffect {
-        name: name.to_string(),
-        nearest: nearest(name, CATALOGUE.iter().map(|e| e.name)),
-    })
+    effect_named(name).ok_or_else(|| SimError::unknown_effect(name, CATALOGUE))
 }
 
 fn out_of_range(effect: &Effect, p: &EffectParameter, value: f64) -> SimError {

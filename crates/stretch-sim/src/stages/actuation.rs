@@ -2,8 +2,8 @@
 
 use stretch_effects::{Grid, Start};
 
-use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
-use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
+use super::{Memory, Muscle, Openings, Pneumatics, check_length, pick, pneumatics::Drive};
+use crate::{SimError, effects::EffectSet, params::RigParams};
 
 /// Valves, chamber and muscle, prepared: in sequence, or coupled if the chamber's volume follows
 /// the muscle.
@@ -62,10 +62,8 @@ impl Actuation {
         pressure.resize(nodes, 0.0);
         length.resize(nodes, 0.0);
         let done = self.run_nodes(memory, start, openings, initial_kpa, &mut pressure, &mut length);
-        let pieces = self.grid().pieces();
-        for (i, (p, l)) in pressure_kpa.iter_mut().zip(length_mm).enumerate() {
-            (*p, *l) = (pressure[i * pieces], length[i * pieces]);
-        }
+        pick(self.grid(), None, &pressure, pressure_kpa);
+        pick(self.grid(), None, &length, length_mm);
         (memory.nodes, memory.more_nodes) = (pressure, length);
         done
     }
@@ -89,12 +87,9 @@ impl Actuation {
         if nodes_kpa.is_empty() {
             return Ok(());
         }
-        let start = memory.start(start);
-        let taken = self.pneumatics.taken(memory, start, openings);
-        let openings = Openings::of(taken.as_ref(), openings);
-        let done = self.fill(&mut memory.cells, start, openings, initial_kpa, nodes_kpa);
-        memory.commands = taken.unwrap_or_default();
-        done
+        self.pneumatics.taking(memory, start, openings, |cells, start, openings| {
+            self.fill(cells, start, openings, initial_kpa, nodes_kpa)
+        })
     }
 
     /// Length in mm at every sample, from the gauge pressure in kPa at every node. This is the
@@ -135,8 +130,7 @@ impl Actuation {
         nodes.extend_from_slice(nodes_kpa);
         let start = memory.start(start);
         self.muscle.run_nodes(&mut memory.cells, start, &mut nodes);
-        let samples = nodes.iter().step_by(self.grid().pieces());
-        length_mm.iter_mut().zip(samples).for_each(|(out, node)| *out = *node);
+        pick(self.grid(), None, &nodes, length_mm);
         memory.nodes = nodes;
         Ok(())
     }
@@ -154,33 +148,15 @@ impl Actuation {
         if pressure.is_empty() {
             return Ok(());
         }
-        let start = memory.start(start);
-        let taken = self.pneumatics.taken(memory, start, openings);
-        let openings = Openings::of(taken.as_ref(), openings);
-        let cells = &mut memory.cells;
-        let done = if self.is_coupled() {
-            self.run_coupled(cells, start, openings, initial_kpa, pressure, length)
-        } else {
-            self.run_in_turn(cells, start, openings, initial_kpa, pressure, length)
-        };
-        memory.commands = taken.unwrap_or_default();
-        done
-    }
-
-    /// The pressure first, then the length that follows it.
-    fn run_in_turn(
-        &self,
-        cells: &mut [f64],
-        start: Start,
-        openings: Openings<'_>,
-        initial_kpa: f64,
-        pressure: &mut [f64],
-        length: &mut [f64],
-    ) -> Result<(), SimError> {
-        self.fill(cells, start, openings, initial_kpa, pressure)?;
-        length.copy_from_slice(pressure);
-        self.muscle.run_nodes(cells, start, length);
-        Ok(())
+        self.pneumatics.taking(memory, start, openings, |cells, start, openings| {
+            if self.is_coupled() {
+                return self.run_coupled(cells, start, openings, initial_kpa, pressure, length);
+            }
+            self.fill(cells, start, openings, initial_kpa, pressure)?;
+            length.copy_from_slice(pressure);
+            self.muscle.run_nodes(cells, start, length);
+            Ok(())
+        })
     }
 
     /// The pressure at every node, at least one.

@@ -2,22 +2,20 @@
 
 mod actuation;
 mod chain;
-mod held;
 mod muscle;
-mod openings;
 mod pneumatics;
 mod reference;
 mod sensing;
 
 pub use actuation::Actuation;
-pub use chain::{Chain, ChainMemory, Recorded};
-pub use held::{Held, Setting};
+pub use chain::{Chain, ChainMemory, Held, Recorded, Setting};
 pub use muscle::Muscle;
-pub use openings::Openings;
 pub use pneumatics::Pneumatics;
 pub use reference::Reference;
 pub use sensing::{Bridge, Sensing};
 pub(crate) use sensing::{Sites, pick};
+
+use stretch_effects::Start;
 
 use crate::SimError;
 
@@ -28,4 +26,77 @@ pub(crate) fn check_length(
     found: usize,
 ) -> Result<(), SimError> {
     if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
+}
+
+/// Openings of the two valves, one value a sample, held until the next.
+#[derive(Debug, Clone, Copy)]
+pub struct Openings<'a> {
+    /// Inlet, 0..1.
+    pub inlet: &'a [f64],
+    /// Outlet, 0..1.
+    pub outlet: &'a [f64],
+}
+
+impl Openings<'_> {
+    /// Number of samples.
+    ///
+    /// # Errors
+    /// The valves have different numbers of samples, or an opening is not within 0..1.
+    pub fn check(&self) -> Result<usize, SimError> {
+        check_length("outlet", self.inlet.len(), self.outlet.len())?;
+        for (column, openings) in [("inlet", self.inlet), ("outlet", self.outlet)] {
+            if let Some(sample) = openings.iter().position(|u| !(0.0..=1.0).contains(u)) {
+                return Err(SimError::Opening { column, sample, value: openings[sample] });
+            }
+        }
+        Ok(self.inlet.len())
+    }
+}
+
+/// Memory of a prepared stage: its operators' states, and buffers that grow once and are used again.
+///
+/// Every stage hands out its own by `memory()`; a memory fits the stage (and effects) that made it, and any stage with
+/// the same effects at other values.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    pub(crate) cells: Vec<f64>,
+    /// Whether a trial has run in it.
+    pub(crate) used: bool,
+    pub(crate) nodes: Vec<f64>,
+    pub(crate) more_nodes: Vec<f64>,
+    /// Openings as the valves take them.
+    pub(crate) commands: [Vec<f64>; 2],
+}
+
+impl Memory {
+    pub(crate) fn with_cells(count: usize) -> Self {
+        Self { cells: vec![0.0; count], ..Self::default() }
+    }
+
+    /// How a trial may start in it: nothing can be carried out of a fresh memory, so it settles.
+    pub(crate) fn start(&mut self, asked: Start) -> Start {
+        let used = std::mem::replace(&mut self.used, true);
+        match asked {
+            Start::Carried { .. } if !used => Start::Settled,
+            Start::Hysteresis(_) if !used => {
+                self.cells.fill(0.0);
+                asked
+            }
+            _ => asked,
+        }
+    }
+
+    /// Moves what is remembered a share of the way to what another memory of the same stage remembers: between two states that an
+    /// operator may be in lie only such states.
+    pub fn move_towards(&mut self, other: &Self, share: f64) {
+        for (own, other) in self.cells.iter_mut().zip(&other.cells) {
+            *own += share * (other - *own);
+        }
+    }
+
+    /// Forgets everything: the next trial settles unless it begins with a given hysteresis state.
+    pub fn clear(&mut self) {
+        self.cells.fill(0.0);
+        self.used = false;
+    }
 }

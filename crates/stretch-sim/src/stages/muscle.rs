@@ -1,12 +1,11 @@
 //! Stage `muscle`: chamber pressure to length.
 
-use stretch_effects::{Action, Grid, MeanReversion, RigStage, Row, Span, Start};
+use stretch_effects::{Action, Grid, MeanReversion, Place, RigStage, Row, Span, Start};
 
-use super::check_length;
+use super::{Memory, check_length, pick};
 use crate::{
     SimError,
     effects::EffectSet,
-    memory::Memory,
     params::{Key, RigParams},
     static_law::StaticLaw,
 };
@@ -46,8 +45,8 @@ impl Muscle {
         let (mut before, mut behind) = (Vec::new(), Vec::new());
         for active in effects.acting_in(RigStage::Muscle) {
             match active.action(&around) {
-                Action::StaticContraction(operator) => before.push(operator),
-                Action::MovingContraction(operator) => behind.push(operator),
+                Action::At(Place::StaticContraction, operator) => before.push(operator),
+                Action::At(Place::MovingContraction, operator) => behind.push(operator),
                 _ => {}
             }
         }
@@ -95,9 +94,7 @@ impl Muscle {
         interpolate(&self.grid, pressure_kpa, &mut nodes);
         let start = memory.start(start);
         self.run_nodes(&mut memory.cells, start, &mut nodes);
-        for (out, node) in length_mm.iter_mut().zip(nodes.iter().step_by(self.grid.pieces())) {
-            *out = *node;
-        }
+        pick(&self.grid, None, &nodes, length_mm);
         memory.nodes = nodes;
         Ok(())
     }

@@ -2,11 +2,10 @@
 
 use stretch_effects::{Action, Droop, Grid, Law, RigStage, Row, Span, Start};
 
-use super::{check_length, openings::Openings};
+use super::{Memory, Openings, check_length};
 use crate::{
     SimError,
     effects::EffectSet,
-    memory::Memory,
     params::{Key, RigParams},
 };
 
@@ -205,26 +204,24 @@ impl Pneumatics {
             })
         };
         let mut volume = at(0, 0.0);
-        let start = memory.start(start);
-        let taken = self.taken(memory, start, openings);
-        let openings = Openings::of(taken.as_ref(), openings);
-        let mut chamber = self.begin(start, initial_kpa, volume, &mut memory.cells)?;
-        pressure_kpa[0] = initial_kpa;
-        let mut drive = Drive::new(self, openings);
-        for sample in 0..last {
-            let mut through = 0.0;
-            for (piece, h) in self.grid.steps().iter().enumerate() {
-                through += h;
-                let valves = drive.valves(sample, piece);
-                let next = at(sample, through / self.grid.dt_s());
-                self.advance(valves, &mut chamber, [volume, next], *h);
-                volume = next;
+        self.taking(memory, start, openings, |cells, start, openings| {
+            let mut chamber = self.begin(start, initial_kpa, volume, cells)?;
+            pressure_kpa[0] = initial_kpa;
+            let mut drive = Drive::new(self, openings);
+            for sample in 0..last {
+                let mut through = 0.0;
+                for (piece, h) in self.grid.steps().iter().enumerate() {
+                    through += h;
+                    let valves = drive.valves(sample, piece);
+                    let next = at(sample, through / self.grid.dt_s());
+                    self.advance(valves, &mut chamber, [volume, next], *h);
+                    volume = next;
+                }
+                pressure_kpa[sample + 1] = self.pressure_kpa(chamber.held, volume);
             }
-            pressure_kpa[sample + 1] = 1e-3 * (chamber.held / volume - self.atmosphere_pa);
-        }
-        self.remember(&chamber, &mut memory.cells);
-        memory.commands = taken.unwrap_or_default();
-        Ok(())
+            self.remember(&chamber, cells);
+            Ok(())
+        })
     }
 
     /// V/V0 at y = k/k_max.
@@ -270,9 +267,28 @@ impl Pneumatics {
         cells[1..=MOST_DROOPS].copy_from_slice(&chamber.droops);
     }
 
+    /// Runs a trial with the openings as the valves take them.
+    pub(crate) fn taking<T>(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        commanded: Openings<'_>,
+        run: impl FnOnce(&mut [f64], Start, Openings<'_>) -> T,
+    ) -> T {
+        let start = memory.start(start);
+        let taken = self.taken(memory, start, commanded);
+        let openings = match &taken {
+            Some([inlet, outlet]) => Openings { inlet, outlet },
+            None => commanded,
+        };
+        let done = run(&mut memory.cells, start, openings);
+        memory.commands = taken.unwrap_or_default();
+        done
+    }
+
     /// Openings as the valves receive them, in buffers of the memory; `None` if no effect acts on
     /// the commands.
-    pub(crate) fn taken(
+    fn taken(
         &self,
         memory: &mut Memory,
         start: Start,

@@ -1,9 +1,9 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use stretch_effects::{Action, Grid, RigStage, Row, Span, Start, Surroundings};
+use stretch_effects::{Action, Grid, Place, RigStage, Row, Span, Start, Surroundings};
 
-use super::{check_length, sensing::pick};
-use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
+use super::{Memory, check_length, pick};
+use crate::{SimError, effects::EffectSet, params::RigParams};
 
 /// The reference, prepared; without an effect it shows the true length.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ impl Reference {
         let row = effects
             .acting_in(RigStage::Reference)
             .filter_map(|active| match active.action(around) {
-                Action::Length(operator) => Some(operator),
+                Action::At(Place::Length, operator) => Some(operator),
                 _ => None,
             })
             .collect();

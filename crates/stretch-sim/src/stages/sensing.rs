@@ -1,14 +1,13 @@
 //! Stage `sensing`: length to bridge voltage.
 
 use stretch_effects::{
-    Action, Grid, Need, RigStage, Row, Skew, SkewSpec, Span, Start, Surroundings,
+    Action, Grid, Need, Place, RigStage, Row, Skew, SkewSpec, Span, Start, Surroundings,
 };
 
-use super::check_length;
+use super::{Memory, check_length};
 use crate::{
     SimError,
     effects::{ActiveEffect, EffectSet},
-    memory::Memory,
     params::{Key, RigParams},
 };
 
@@ -169,16 +168,6 @@ impl Sensing {
         let Some(first) = length_mm.first() else { return Ok(()) };
         let start = memory.start(start);
         let (bridge, sites) = (&self.bridge, &self.sites);
-        if sites.strain.is_empty() && sites.resistance.is_empty() && sites.volts.is_empty() {
-            // The nominal bridge takes one pass.
-            if self.grid.pieces() == 1 && self.skew.is_none() && shunt.is_empty() {
-                for (v, length) in bridge_v.iter_mut().zip(length_mm) {
-                    *v = bridge.volts(bridge.resistance(bridge.strain(*length)));
-                }
-                self.write_down(memory, start_s, bridge_v);
-                return Ok(());
-            }
-        }
         let grid = &self.grid;
         let span = |first_node: usize| Span { first_node, start_s, ..Span::whole(grid) };
         let cells = &mut memory.cells;
@@ -271,10 +260,10 @@ impl Sites {
         let mut skew = SkewSpec::default();
         for active in effects {
             match active.action(around) {
-                Action::Strain(operator) => strain.push(operator),
-                Action::Resistance(operator) => resistance.push(operator),
-                Action::Volts(operator) => volts.push(operator),
-                Action::Record(operator) => record.push(operator),
+                Action::At(Place::Strain, operator) => strain.push(operator),
+                Action::At(Place::Resistance, operator) => resistance.push(operator),
+                Action::At(Place::Volts, operator) => volts.push(operator),
+                Action::At(Place::Record, operator) => record.push(operator),
                 Action::Skew(own) => {
                     skew.skew_s += own.skew_s;
                     skew.rate += own.rate;

@@ -15,7 +15,7 @@ pub use judge::{
     ModelChoice, ModelRow, Reach, TrialErrors, apply, at_rate, beside_a_constant, candidate_models,
     choose_among, choose_model, evaluate, explains_little, explains_nothing, fitted_on,
     judge_model, m3_instructions, m3_instructions_fixed, not_its_own, off_throughout,
-    on_own_ranges, pressure_column, rank_signals, rate_delay_s, worse_than_the_mean,
+    on_own_ranges, pressure_column, rank_signals, worse_than_the_mean,
 };
 pub use options::{
     Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate,

@@ -12,7 +12,7 @@ use super::{
     history::{HistoryChoice, history},
     observer::observer,
     observer_model::ObserverChoice,
-    report::{FitReport, Fitted},
+    report::FitReport,
     surfaces::{curve, linear, surfaces},
 };
 
@@ -73,7 +73,12 @@ pub(crate) fn calibrate_with(
         ModelKind::Curve => curve(&prepared, options)?,
         ModelKind::Surface(degree) => surfaces(&prepared, options, degree)?,
         ModelKind::Remembering { kind, rest } => {
-            let (fitted, chosen) = remembering(&prepared, kind, rest, choice)?;
+            let fit = match kind {
+                Memory::History => history,
+                Memory::Observer => observer,
+                Memory::Diagnosed => diagnosed,
+            };
+            let (fitted, chosen) = fit(&prepared, rest, choice)?;
             made = Some(chosen);
             fitted
         }
@@ -116,29 +121,4 @@ pub(crate) enum Choice {
     History(HistoryChoice),
     Observer(ObserverChoice),
     Diagnosed(DiagnosedChoice),
-}
-
-fn remembering(
-    prepared: &Prepared,
-    kind: Memory,
-    rest: bool,
-    choice: Option<Choice>,
-) -> Result<(Fitted, Choice), CalibrateError> {
-    match kind {
-        Memory::History => {
-            let choice =
-                choice.and_then(|c| if let Choice::History(c) = c { Some(c) } else { None });
-            history(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::History(c)))
-        }
-        Memory::Observer => {
-            let choice =
-                choice.and_then(|c| if let Choice::Observer(c) = c { Some(c) } else { None });
-            observer(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Observer(c)))
-        }
-        Memory::Diagnosed => {
-            let choice =
-                choice.and_then(|c| if let Choice::Diagnosed(c) = c { Some(c) } else { None });
-            diagnosed(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Diagnosed(c)))
-        }
-    }
 }

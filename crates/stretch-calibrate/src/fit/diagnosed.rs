@@ -1,21 +1,20 @@
 //! Fits the forward model of the effects that a diagnosis named, then the filter that inverts this model.
 
-use stretch_core::{
-    Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
-};
-use stretch_receptor::{Defects as LiveDefects, DiagnosedReceptor};
+use stretch_core::{DiagnosedMap, Interval, Model, RestTracker, Values};
+use stretch_receptor::Defects as LiveDefects;
 
 use crate::{
     CalibrateError, Memory,
-    prepare::{Prepared, Tally, extent},
+    prepare::{Prepared, extent},
 };
 
 use super::{
+    calibrate::Choice,
     curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
     defects::Defects,
-    observer_model::{Piece, SETTLE, pieces},
-    report::{Coefficient, FitReport, Fitted, Order},
-    rest::{LIVE_CATCH_UP_S, candidates},
+    history::SETTLE,
+    observer_model::{LIVE_CATCH_UP_S, Piece, candidates, judge_live, pieces},
+    report::{Coefficient, FitReport, Fitted},
 };
 
 const ITERATIONS: usize = 14;
@@ -47,13 +46,14 @@ pub(crate) struct DiagnosedChoice {
 pub(crate) fn diagnosed(
     prepared: &Prepared,
     rest: bool,
-    choice: Option<DiagnosedChoice>,
-) -> Result<(Fitted, DiagnosedChoice), CalibrateError> {
+    choice: Option<Choice>,
+) -> Result<(Fitted, Choice), CalibrateError> {
     let defects = Defects::of(prepared)?;
-    let mut trackers = vec![choice.as_ref().and_then(|c| c.rest)];
-    if choice.is_none() && (rest || defects.drifts()) {
-        trackers = candidates(prepared).into_iter().map(Some).collect();
-    }
+    let choice = if let Some(Choice::Diagnosed(choice)) = choice { Some(choice) } else { None };
+    let trackers = match &choice {
+        Some(choice) => vec![choice.rest],
+        None => candidates(prepared, rest || defects.drifts()),
+    };
     let mut best: Option<(Forward, DiagnosedMap)> = None;
     for rest in trackers {
         let (forward, map) = match &choice {
@@ -82,7 +82,7 @@ pub(crate) fn diagnosed(
     let at = defects.at;
     let choice =
         DiagnosedChoice { at, errors_in, rest, agility: map.agility, steady_s: map.steady_s };
-    Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
+    Ok(((Model::Diagnosed(map), vec![report], vec![note]), Choice::Diagnosed(choice)))
 }
 
 /// Fits the forward model to the signal first, then to the error of the target, which the slope of the curve weights
@@ -126,16 +126,9 @@ fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
     };
     let coefficients: Vec<Coefficient> = forward.errors.iter().enumerate().map(named).collect();
     let kind = Memory::Diagnosed.to_string();
-    let order = Order {
-        model: kind.clone(),
-        terms: forward.curve.len() + coefficients.len() + 3,
-        r_squared: Some(map.fit.r_squared),
-        rmse: Some(map.fit.rmse),
-        cross_validated_rmse: None,
-        problem: None,
-    };
+    let terms = forward.curve.len() + coefficients.len() + 3;
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
-    FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, order)
+    FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, terms, None)
 }
 
 /// The errors whose squares a fit minimises.
@@ -396,27 +389,11 @@ impl<'a> Record<'a> {
     ) -> Result<DiagnosedMap, CalibrateError> {
         let prepared = self.prepared;
         let map = self.map(forward, agility, steady_s)?;
-        let calibration = prepared.calibration(Model::Diagnosed(map), Provenance::new("", []))?;
-        let receptor = DiagnosedReceptor::<f64>::new(&calibration)?;
         let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
-        let (mut tally, mut apart) = (Tally::default(), 0.0);
-        for series in &prepared.series {
-            let mut memory = receptor.memory();
-            for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
-                if let Some(&p) = series.pressure.get(i) {
-                    memory.set_pressure(p);
-                }
-                let Ok(reading) = receptor.step(&mut memory, Volts(v)) else { continue };
-                if i < SETTLE {
-                    continue;
-                }
-                let truth = prepared.target_range.normalise(target);
-                let estimate = prepared.target.from_reference(reading.estimate);
-                let error = truth - prepared.target_range.normalise(estimate);
-                tally.take(truth, error);
-                apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));
-            }
-        }
+        let mut apart = 0.0;
+        let tally = judge_live(prepared, Model::Diagnosed(map), |error, reading| {
+            apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));
+        })?;
         let spread = f64::max(apart / f64::max(tally.count(), 1.0), 1e-12).sqrt();
         Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }

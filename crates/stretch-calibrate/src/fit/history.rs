@@ -10,9 +10,10 @@ use stretch_data::listed;
 use crate::{CalibrateError, prepare::Prepared};
 
 use super::{
+    calibrate::Choice,
     least_squares::{LinearFactor, RowAccumulator, Solution, leave_one_out},
-    report::{Coefficient, FitReport, Fitted, Order},
-    rest::{candidates, rested},
+    observer_model::{candidates, rested},
+    report::{Coefficient, FitReport, Fitted},
 };
 
 /// Name of the model in reports and messages.
@@ -169,11 +170,13 @@ struct Trained {
 pub(crate) fn history(
     prepared: &Prepared,
     rest: bool,
-    choice: Option<HistoryChoice>,
-) -> Result<(Fitted, HistoryChoice), CalibrateError> {
+    choice: Option<Choice>,
+) -> Result<(Fitted, Choice), CalibrateError> {
     let best = match choice {
-        Some(choice) => train(prepared, choice.design, choice.rest, &[choice.ridge])?,
-        None => choose(prepared, rest)?,
+        Some(Choice::History(choice)) => {
+            train(prepared, choice.design, choice.rest, &[choice.ridge])?
+        }
+        _ => choose(prepared, rest)?,
     };
     let choice = best.choice;
     let solution = solve(&best.whole, choice.ridge).ok_or_else(undetermined)?;
@@ -201,14 +204,8 @@ pub(crate) fn history(
         fit.rmse.powi(2) * dof(best.samples, weights.len()),
         solution.condition(),
         coefficients,
-        Order {
-            model: NAME.to_owned(),
-            terms: weights.len(),
-            r_squared: Some(fit.r_squared),
-            rmse: Some(fit.rmse),
-            cross_validated_rmse: Some(best.cross_validated),
-            problem: None,
-        },
+        weights.len(),
+        Some(best.cross_validated),
     );
     let note = format!(
         "{NAME}: {} terms{}{}, ridge {}{}",
@@ -221,7 +218,7 @@ pub(crate) fn history(
             None => String::new(),
         }
     );
-    Ok(((Model::History(map), vec![report], vec![note]), choice))
+    Ok(((Model::History(map), vec![report], vec![note]), Choice::History(choice)))
 }
 
 /// The states of one kind in words; empty where the model has none of this kind.
@@ -237,12 +234,8 @@ fn undetermined() -> CalibrateError {
 fn choose(prepared: &Prepared, rest: bool) -> Result<Trained, CalibrateError> {
     // the baseline first, with the smallest design; then states and ridge
     let [first, others @ ..] = DESIGNS;
-    let mut trackers = vec![None];
-    if rest {
-        trackers = candidates(prepared).into_iter().map(Some).collect();
-    }
     let mut best: Option<Trained> = None;
-    for tracker in trackers {
+    for tracker in candidates(prepared, rest) {
         better(&mut best, train(prepared, first, tracker, &RIDGES));
     }
     let tracker = best.as_ref().ok_or_else(undetermined)?.choice.rest;

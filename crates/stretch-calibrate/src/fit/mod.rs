@@ -9,7 +9,6 @@ mod least_squares;
 mod observer;
 mod observer_model;
 mod report;
-mod rest;
 mod surfaces;
 
 pub use calibrate::{Calibrated, calibrate};

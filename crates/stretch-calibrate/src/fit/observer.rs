@@ -1,20 +1,20 @@
 //! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts this model.
 
-use stretch_core::{
-    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
-};
-use stretch_receptor::ObserverReceptor;
+use stretch_core::{FitSummary, Interval, Model, ObserverMap, RestTracker, Values};
 
 use crate::{
     CalibrateError, Memory,
-    prepare::{Prepared, Tally, extent},
+    prepare::{Prepared, extent},
 };
 
 use super::{
+    calibrate::Choice,
     curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
-    observer_model::{Forward, ObserverChoice, Piece, SETTLE, Sample, pieces},
-    report::{Coefficient, FitReport, Fitted, Order},
-    rest::{LIVE_CATCH_UP_S, candidates},
+    history::SETTLE,
+    observer_model::{
+        Forward, LIVE_CATCH_UP_S, ObserverChoice, Piece, Sample, candidates, judge_live, pieces,
+    },
+    report::{Coefficient, FitReport, Fitted},
 };
 
 /// Ridge on the dynamic parameters, as a share of each one's own power.
@@ -39,15 +39,15 @@ const BOUNDS_RIDGE: f64 = 1e-9;
 pub(crate) fn observer(
     prepared: &Prepared,
     rest: bool,
-    choice: Option<ObserverChoice>,
-) -> Result<(Fitted, ObserverChoice), CalibrateError> {
+    choice: Option<Choice>,
+) -> Result<(Fitted, Choice), CalibrateError> {
     let (forward, map) = match choice {
-        Some(choice) => {
+        Some(Choice::Observer(choice)) => {
             let forward = forward(prepared, &pieces(prepared, choice.rest)?, choice)?;
             let map = map(prepared, &forward)?;
             (forward, judged(prepared, map)?)
         }
-        None => choose(prepared, rest)?,
+        _ => choose(prepared, rest)?,
     };
     let choice = forward.choice;
     let terms = forward.curve.len() + forward.dynamics.len() + 2;
@@ -61,33 +61,22 @@ pub(crate) fn observer(
     let coefficients =
         coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
     let kind = Memory::Observer.to_string();
-    let order = Order {
-        model: kind.clone(),
-        terms,
-        r_squared: Some(map.fit.r_squared),
-        rmse: Some(map.fit.rmse),
-        cross_validated_rmse: None,
-        problem: None,
-    };
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
-    let report = FitReport::of_model(kind, &map.fit, sse, bounds.condition, coefficients, order);
+    let report =
+        FitReport::of_model(kind, &map.fit, sse, bounds.condition, coefficients, terms, None);
     let note = format!(
         "observer: {terms} numbers; noise of the signal {:.4}; the speed of the motion is taken as a random walk of {} 1/s^3{}",
         forward.noise,
         choice.agility,
         choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),
     );
-    Ok(((Model::Observer(map), vec![report], vec![note]), choice))
+    Ok(((Model::Observer(map), vec![report], vec![note]), Choice::Observer(choice)))
 }
 
 fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), CalibrateError> {
-    let mut trackers = vec![None];
-    if rest {
-        trackers = candidates(prepared).into_iter().map(Some).collect();
-    }
     let bare = ObserverChoice { taus: [None; 2], plays: false, agility: 10.0, rest: None };
     let mut best: Option<(Forward, ObserverMap)> = None;
-    for rest in trackers {
+    for rest in candidates(prepared, rest) {
         let pieces = pieces(prepared, rest)?;
         let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
         let two = second_relaxation(prepared, &pieces, one)?;
@@ -295,23 +284,8 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
 
 /// The map with the statistics of its estimates, computed by the receptor that runs live.
 fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, CalibrateError> {
-    let calibration = prepared.calibration(Model::Observer(map), Provenance::new("", []))?;
-    let design = ObserverReceptor::<f64>::new(&calibration)?;
-    let mut receptor = Runner::new(design);
-    let mut tally = Tally::default();
-    for series in &prepared.series {
-        receptor.reset();
-        for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
-            let Ok(reading) = receptor.step(Volts(v)) else { continue };
-            if i < SETTLE {
-                continue;
-            }
-            let truth = prepared.target_range.normalise(target);
-            let estimate = prepared.target.from_reference(reading.estimate);
-            tally.take(truth, truth - prepared.target_range.normalise(estimate));
-        }
-    }
-    Ok(ObserverMap { fit: tally.summary(), ..map })
+    let fit = judge_live(prepared, Model::Observer(map), |_, _| ())?.summary();
+    Ok(ObserverMap { fit, ..map })
 }
 
 /// Standard errors and condition of a forward model.

@@ -1,22 +1,25 @@
 //! A gauge's forward model: `signal = curve(drive)`, `drive = target + dynamics`.
 
 use stretch_core::{
-    Interval, RestTracker,
+    Design, Interval, Model, Polarity, Provenance, Range, RestLevel, RestTracker, SampleRate,
+    Stage, Volts,
     arithmetic::{lag, lag_share, play},
 };
 use stretch_filter::{SgFilter, SgShape};
+use stretch_receptor::{Reading, Receptor};
 
-use crate::{CalibrateError, prepare::Prepared};
+use crate::{
+    CalibrateError,
+    prepare::{Prepared, Tally, noise},
+};
 
-use super::{curve::Place, rest::rested};
+use super::{curve::Place, history::SETTLE};
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 /// Least slope of the drive over the target while plays are engaged.
 const LEAST_ANSWER: f64 = 0.1;
 /// Window of the reference's smoothing, in samples; quadratic.
 const SMOOTH: usize = 7;
-/// Samples at the start of a piece while low-passes forget where they began.
-pub(crate) const SETTLE: usize = 10;
 
 /// The choices of a fit. A fit that is given earlier choices makes no further ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,4 +164,89 @@ impl Forward {
     pub(crate) fn place(&self, sample: &Sample) -> Place {
         Place::new(sample.drive(&self.dynamics), self.drive)
     }
+}
+
+/// Time in which the live baseline of a forward model follows a signal below rest, s. The time is short because the
+/// level of a forward model is exact.
+pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
+/// Time in which a baseline follows a signal below rest, s.
+const CATCH_UP_S: f64 = 0.5;
+/// Leaks that are tried, as shares of the signal's range per second.
+const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
+/// Standard deviations of the noise by which a signal at rest may lie below the level.
+const MARGIN: f64 = 1.0;
+/// A trial that begins this low in the range begins at rest.
+const LOWEST_QUARTER: f64 = 0.25;
+/// Samples at a trial's start that may stand at rest.
+const FIRST: usize = 50;
+
+/// Candidate baselines. The resting level is that of the first trial that begins in the lowest quarter of the range,
+/// less a margin for noise. Later rests below this level are drift. Without a baseline that is followed there is one candidate: none.
+pub(crate) fn candidates(prepared: &Prepared, rest: bool) -> Vec<Option<RestTracker>> {
+    if !rest {
+        return vec![None];
+    }
+    let sign = prepared.polarity.sign();
+    let starts: Vec<f64> = prepared
+        .series
+        .iter()
+        .map(|series| {
+            let first = &series.signal[..series.signal.len().min(FIRST)];
+            let mut signed: Vec<f64> = first.iter().map(|v| sign * v).collect();
+            signed.sort_by(f64::total_cmp);
+            signed[signed.len() / 2]
+        })
+        .collect();
+    let records = prepared.series.iter().map(|s| s.signal.as_slice());
+    let lowest = (prepared.series.iter().flat_map(|s| s.signal.iter()).map(|v| sign * v))
+        .fold(f64::INFINITY, f64::min);
+    let resting = lowest + LOWEST_QUARTER * prepared.signal_range.span();
+    let first = starts.iter().copied().find(|&start| start < resting).unwrap_or(lowest);
+    let level = sign * (first - MARGIN * noise(records));
+    let span = prepared.signal_range.span();
+    let tracker = |share| Some(RestTracker { level, catch_up_s: CATCH_UP_S, leak: share * span });
+    LEAKS.map(tracker).into()
+}
+
+/// A log minus its baseline, computed as in the receptor.
+pub(crate) fn rested(
+    signal: &[f64],
+    rest: Option<RestTracker>,
+    polarity: Polarity,
+    range: Range,
+    sample_rate: SampleRate,
+) -> Vec<f64> {
+    let level = RestLevel::new(rest, polarity, range, sample_rate);
+    let (sign, mut baseline) = (polarity.sign(), level.memory());
+    signal.iter().map(|v| sign * level.step(&mut baseline, sign * v, 0.0)).collect()
+}
+
+/// What the receptor that runs live makes of the trials with a model, behind the first samples of each. `see` is told of the error of each
+/// reading, in the normalised target.
+pub(crate) fn judge_live(
+    prepared: &Prepared,
+    model: Model,
+    mut see: impl FnMut(f64, &Reading),
+) -> Result<Tally, CalibrateError> {
+    let calibration = prepared.calibration(model, Provenance::new("", []))?;
+    let receptor = Receptor::<f64>::new(&calibration)?;
+    let mut tally = Tally::default();
+    for series in &prepared.series {
+        let mut memory = receptor.memory();
+        for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
+            if let Some(&p) = series.pressure.get(i) {
+                memory.set_pressure(p);
+            }
+            let Ok(reading) = receptor.step(&mut memory, Volts(v)) else { continue };
+            if i < SETTLE {
+                continue;
+            }
+            let truth = prepared.target_range.normalise(target);
+            let estimate = prepared.target.from_reference(reading.estimate);
+            let error = truth - prepared.target_range.normalise(estimate);
+            tally.take(truth, error);
+            see(error, &reading);
+        }
+    }
+    Ok(tally)
 }

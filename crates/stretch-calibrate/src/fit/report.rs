@@ -100,10 +100,18 @@ impl FitReport {
         sse: f64,
         condition: f64,
         coefficients: Vec<Coefficient>,
-        order: Order,
+        terms: usize,
+        cross_validated_rmse: Option<f64>,
     ) -> Self {
-        let terms = order.terms as f64;
-        let dof = (fit.samples as f64 - terms).max(1.0);
+        let dof = (fit.samples as f64 - terms as f64).max(1.0);
+        let order = Order {
+            model: name.clone(),
+            terms,
+            r_squared: Some(fit.r_squared),
+            rmse: Some(fit.rmse),
+            cross_validated_rmse,
+            problem: None,
+        };
         Self {
             model: name.clone(),
             name,

@@ -5,7 +5,7 @@ use stretch_core::{
     SampleRate, Seconds, Stage, Volts,
 };
 use stretch_data::Trial;
-use stretch_filter::{Arrival, Cadence, RateFilter};
+use stretch_filter::{Arrival, Cadence};
 use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, StretchReceptor, Withheld};
 
 use crate::{
@@ -192,18 +192,6 @@ pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
     match &calibration.spec().model {
         Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),
         _ => None,
-    }
-}
-
-/// How late the calibration's rate is, in seconds; zero for the paper's
-/// central difference.
-///
-/// # Errors
-/// [`CalibrateError::Filter`] when the estimator cannot be designed.
-pub fn rate_delay_s(calibration: &Calibration) -> Result<f64, CalibrateError> {
-    match calibration.spec().rate_estimator {
-        RateEstimator::CentralDifference => Ok(0.0),
-        live => Ok(RateFilter::<f64>::new(live, calibration.spec().sample_rate_hz)?.delay_s()),
     }
 }
 

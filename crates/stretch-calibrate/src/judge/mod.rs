@@ -2,24 +2,21 @@
 
 mod acceptance;
 mod apply;
-mod cost;
 mod evaluate;
 mod left_out;
 mod model_choice;
 mod model_words;
 mod reach;
-mod signal_choice;
 
 pub use acceptance::{
     beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,
     worse_than_the_mean,
 };
-pub use apply::{
-    Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column, rate_delay_s,
-};
-pub use cost::{m3_instructions, m3_instructions_fixed};
+pub use apply::{Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column};
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use left_out::{Judged, judge_model};
-pub use model_choice::{ModelChoice, ModelRow, candidate_models, choose_among, choose_model};
+pub use model_choice::{
+    Candidate, ModelChoice, ModelRow, candidate_models, choose_among, choose_model,
+    m3_instructions, m3_instructions_fixed, rank_signals,
+};
 pub use reach::Reach;
-pub use signal_choice::{Candidate, rank_signals};

@@ -1,15 +1,18 @@
-//! Which model to calibrate with, by errors on trials left out.
+//! Which model and which signal to calibrate with, by errors on data left out, and what a model costs on a board.
 
 use rayon::prelude::*;
 use serde::Serialize;
+use stretch_core::Degree;
 use stretch_data::{Trial, unit_of};
 
-use crate::{CalibrateError, Memory, ModelKind, Options};
+use crate::{
+    CalibrateError, Memory, ModelKind, Options,
+    fit::{Calibrated, calibrate},
+};
 
 use super::{
-    cost::{m3_instructions, m3_instructions_fixed},
     left_out::{Errors, Judged, LEAST_TRIALS, PARTS, excess, judge_model, turning},
-    model_words::{Grounds, Seen, why},
+    model_words::{Grounds, why},
 };
 
 /// A root mean square error of at most this multiple of the best one counts as equally good.
@@ -81,14 +84,16 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
         .into_par_iter()
         .map(|kind| (kind, judge_model(trials, options, kind)))
         .collect();
-    let outcome = |judged: &Result<Judged, CalibrateError>| match judged {
-        Ok(judged) => Ok(judged.clone()),
-        Err(error) => Err(error.to_string()),
+    let mut first = None;
+    let mut in_words = |problem: CalibrateError| {
+        let text = problem.to_string();
+        first.get_or_insert(problem);
+        text
     };
-    let found = judged.iter().map(|(kind, judged)| (*kind, outcome(judged))).collect();
-    choose_among(trials, options, found).ok_or_else(|| {
+    let judged =
+        judged.into_iter().map(|(kind, judged)| (kind, judged.map_err(&mut in_words))).collect();
+    choose_among(trials, options, judged).ok_or_else(|| {
         // a part without a sample has no trial, but the user named at least one trial
-        let first = judged.into_iter().find_map(|(_, judged)| judged.err());
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
         first.unwrap_or(CalibrateError::TooFewToJudge)
     })
@@ -132,89 +137,73 @@ pub fn choose_among(
     judged: Vec<(ModelKind, Result<Judged, String>)>,
 ) -> Option<ModelChoice> {
     let turning = turning(trials, options).ok()?;
-    let found: Vec<_> = judged
-        .into_iter()
-        .map(|(kind, judged)| match judged {
-            Ok(Judged { parameters, errors }) => (kind, parameters, Ok(errors)),
-            Err(problem) => (kind, 0, Err(problem)),
-        })
-        .collect();
-    let good = |f: &(ModelKind, usize, Result<Errors, String>)| {
-        let errors = f.2.as_ref().ok()?;
-        errors.rmse().filter(|r| r.is_finite())
-    };
-    let best = (0..found.len()).filter(|&i| good(&found[i]).is_some()).min_by(|&a, &b| {
-        good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0))
-    })?;
+    let found: Vec<Found> = judged.into_iter().map(Found::new).collect();
     // of a table no candidate remembers
     let memory_shows = options.is_table || turning.iter().any(|&t| t);
-    let eligible = |kind: ModelKind| memory_shows || !matches!(kind, ModelKind::Remembering { .. });
-    let excesses: Vec<_> = found
-        .iter()
-        .map(|f| match (&f.2, &found[best].2) {
-            (Ok(errors), Ok(best)) => excess(&errors.parts, &best.parts),
-            _ => None,
-        })
-        .collect();
-    // among the candidates that may be chosen: the best one and all that are equally good
-    let bar = (0..found.len())
-        .filter(|&i| eligible(found[i].0) && good(&found[i]).is_some())
-        .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
-    let bar = bar.unwrap_or(best);
-    let as_good = |i: &usize| {
-        let (Ok(errors), Ok(least)) = (&found[*i].2, &found[bar].2) else { return false };
-        let close = excess(&errors.parts, &least.parts);
-        let share = good(&found[*i]).zip(good(&found[bar])).map(|(own, least)| own / least);
-        eligible(found[*i].0)
-            && (close.is_some_and(|(mean, error)| mean <= error)
-                || share.is_some_and(|share| share <= AS_GOOD))
+    let is_eligible =
+        |i: usize| memory_shows || !matches!(found[i].kind, ModelKind::Remembering { .. });
+    let least = |is_one: &dyn Fn(usize) -> bool| {
+        let good = (0..found.len()).filter(|&i| found[i].rmse.is_finite() && is_one(i));
+        good.min_by(|&a, &b| found[a].rmse.total_cmp(&found[b].rmse))
     };
-    let model = (0..found.len()).filter(as_good).min_by_key(|&i| found[i].1).unwrap_or(bar);
-    // a length cannot pass its resting stop, so that a followed baseline insures against drift
-    let insured = (0..found.len()).find(|&i| {
-        let twin = matches!((found[model].0, found[i].0),
-            (ModelKind::Remembering { kind: a, rest: false }, ModelKind::Remembering { kind: b, rest: true }) if a == b);
-        let premium = good(&found[i]).zip(good(&found[model])).map(|(own, bare)| own / bare);
-        twin && is_length(options) && premium.is_some_and(|premium| premium <= PREMIUM)
-    });
-    let seen: Vec<Seen> = found.iter().map(|f| seen(f, good(f))).collect();
-    let others = (0..found.len()).filter(|&i| i != bar && eligible(found[i].0));
-    let second = others
-        .filter(|&i| good(&found[i]).is_some())
-        .min_by(|&a, &b| seen[a].rmse.total_cmp(&seen[b].rmse));
-    let between = match (&found[model].2, &found[bar].2) {
+    let excess_over = |i: usize, least: usize| match (&found[i].errors, &found[least].errors) {
         (Ok(own), Ok(least)) => excess(&own.parts, &least.parts),
         _ => None,
     };
+    let best = least(&|_| true)?;
+    // among the candidates that may be chosen: the best one and all that are equally good
+    let bar = least(&is_eligible).unwrap_or(best);
+    let is_as_good = |i: &usize| {
+        let is_close = excess_over(*i, bar).is_some_and(|(mean, error)| mean <= error);
+        is_eligible(*i) && (is_close || found[*i].rmse / found[bar].rmse <= AS_GOOD)
+    };
+    let model =
+        (0..found.len()).filter(is_as_good).min_by_key(|&i| found[i].numbers).unwrap_or(bar);
+    // a length cannot pass its resting stop, so that a followed baseline insures against drift
+    let insured = (0..found.len()).find(|&i| {
+        let twin = matches!((found[model].kind, found[i].kind),
+            (ModelKind::Remembering { kind: a, rest: false }, ModelKind::Remembering { kind: b, rest: true }) if a == b);
+        twin && is_length(options) && found[i].rmse / found[model].rmse <= PREMIUM
+    });
     let why = why(&Grounds {
-        best: &seen[bar],
-        second: second.map(|i| &seen[i]),
-        simplest: &seen[model],
-        excess: between,
-        insured: insured.map(|i| &seen[i]),
+        best: &found[bar],
+        second: least(&|i| i != bar && is_eligible(i)).map(|i| &found[i]),
+        simplest: &found[model],
+        excess: excess_over(model, bar),
+        insured: insured.map(|i| &found[i]),
         unit: &unit_of(&options.reference),
         memory_shows,
         as_good: AS_GOOD,
     });
-    let model = found[insured.unwrap_or(model)].0;
-    let mut rows: Vec<ModelRow> = found
-        .into_iter()
-        .zip(excesses)
-        .map(|((kind, parameters, errors), excess)| row(kind, parameters, errors, excess))
-        .collect();
+    let model = found[insured.unwrap_or(model)].kind;
+    let mut rows: Vec<ModelRow> =
+        (0..found.len()).map(|i| row(&found[i], excess_over(i, best))).collect();
     let key = |r: &ModelRow| r.rmse.unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| key(a).total_cmp(&key(b)));
     Some(ModelChoice { rows, model, why, notes: notes(trials, options, memory_shows) })
 }
 
-fn seen(
-    (kind, numbers, _): &(ModelKind, usize, Result<Errors, String>),
-    rmse: Option<f64>,
-) -> Seen {
-    Seen { model: kind.to_string(), rmse: rmse.unwrap_or(f64::NAN), numbers: *numbers }
+/// A candidate, and how it erred on the data left out of its fit.
+#[derive(Debug)]
+pub(crate) struct Found {
+    pub(crate) kind: ModelKind,
+    /// Numbers that the fit determines.
+    pub(crate) numbers: usize,
+    /// The errors, or why there are none.
+    pub(crate) errors: Result<Errors, String>,
+    /// Root mean square error; not a number where it cannot be told.
+    pub(crate) rmse: f64,
 }
 
-/// Whether the target is a contraction, which has a stop.
+impl Found {
+    fn new((kind, judged): (ModelKind, Result<Judged, String>)) -> Self {
+        let numbers = judged.as_ref().map_or(0, |judged| judged.parameters);
+        let errors = judged.map(|judged| judged.errors);
+        let rmse = errors.as_ref().ok().and_then(Errors::rmse).filter(|rmse| rmse.is_finite());
+        Self { kind, numbers, errors, rmse: rmse.unwrap_or(f64::NAN) }
+    }
+}
+
 fn is_length(options: &Options) -> bool {
     options.rest_length.is_some() || options.reference.starts_with("length")
 }
@@ -244,29 +233,145 @@ fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String>
     notes
 }
 
-fn row(
-    kind: ModelKind,
-    parameters: usize,
-    errors: Result<Errors, String>,
-    excess: Option<(f64, f64)>,
-) -> ModelRow {
-    let (errors, problem) = match errors {
-        Ok(errors) => (Some(errors), None),
-        Err(problem) => (None, Some(problem)),
-    };
-    let of = |which: usize| errors.as_ref().and_then(|e| e.rmse_of(which));
+fn row(found: &Found, excess: Option<(f64, f64)>) -> ModelRow {
+    let kind = found.kind;
+    let errors = found.errors.as_ref().ok();
+    let of = |which: usize| errors.and_then(|e| e.rmse_of(which));
     ModelRow {
         model: kind.to_string(),
-        parameters,
+        parameters: found.numbers,
         m3_instructions: m3_instructions(kind),
         m3_instructions_fixed: m3_instructions_fixed(kind),
-        rmse: errors.as_ref().and_then(Errors::rmse),
+        rmse: errors.and_then(Errors::rmse),
         rmse_arbitrary: of(0),
         rmse_pulses: of(1),
         rmse_ramps: of(2),
-        lag_s: errors.as_ref().filter(|e| e.lag.1 > 0.0).map(|e| e.lag.0 / e.lag.1),
-        worst: errors.as_ref().map(|e| e.worst),
+        lag_s: errors.filter(|e| e.lag.1 > 0.0).map(|e| e.lag.0 / e.lag.1),
+        worst: errors.map(|e| e.worst),
         excess,
-        problem,
+        problem: found.errors.as_ref().err().cloned(),
+    }
+}
+
+/// Figures that `firmware/gate.sh --write` measures and `firmware/gate.sh` checks against a new measurement.
+const BUDGET: &str = include_str!("../budget.txt");
+
+/// Instructions a sample on a Cortex-M3, from volts in `f32`, without a floating-point unit; `None` for a model that
+/// was not measured.
+///
+/// The figure holds for the largest shape that a fit of that name may choose, with one relaxation in an observer.
+///
+/// ```
+/// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
+/// let line = m3_instructions(ModelKind::Linear).unwrap();
+/// assert!(m3_instructions_fixed(ModelKind::Linear).unwrap() < line);
+/// assert_eq!(m3_instructions("poly55".parse()?), None);
+/// # Ok::<(), stretch_calibrate::SpellingError>(())
+/// ```
+pub fn m3_instructions(model: ModelKind) -> Option<f64> {
+    match model {
+        ModelKind::Linear | ModelKind::Surface(Degree::POLY13) => {
+            mean(&format!("{model}-f32-volts"))
+        }
+        // a curve of three terms or more costs less than a surface
+        ModelKind::Curve => None,
+        _ => mean(&model.to_string()),
+    }
+}
+
+/// Instructions a sample on a Cortex-M3, from a converter's codes in fixed point; `None` for a model without a
+/// fixed-point form.
+pub fn m3_instructions_fixed(model: ModelKind) -> Option<f64> {
+    mean(&format!("{model}-fixed"))
+}
+
+fn mean(program: &str) -> Option<f64> {
+    let value = |line: &'static str, key: &str| {
+        line.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+    };
+    let line = BUDGET
+        .lines()
+        .find(|line| value(line, "core") == Some("m3") && value(line, "model") == Some(program))?;
+    value(line, "mean")?.parse().ok()
+}
+
+/// A candidate signal and its error on data left out of the fit.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidate {
+    /// The column.
+    pub signal: String,
+    /// Root mean square error on data left out, over both branches, in normalised target; `None` where the signal
+    /// cannot be calibrated on.
+    pub cross_validated_rmse: Option<f64>,
+    /// Why the signal cannot be calibrated on.
+    pub problem: Option<String>,
+}
+
+/// Ranks signals by their cross-validated error with the model of `options`,
+/// best first.
+///
+/// Trials are left out one by one, or tenths of the data when there are fewer
+/// than three.
+///
+/// # Errors
+/// [`CalibrateError`] of the first candidate when none can be calibrated on.
+pub fn rank_signals(
+    trials: &[Trial],
+    signals: &[String],
+    options: &Options,
+) -> Result<Vec<Candidate>, CalibrateError> {
+    let mut first_problem = None;
+    let mut candidates = Vec::new();
+    for signal in signals {
+        let surfaces = match options.model {
+            ModelKind::Linear => ModelKind::Surface(Degree::LINE),
+            surface => surface,
+        };
+        let with = Options { signal: signal.clone(), model: surfaces, ..options.clone() };
+        let (rmse, problem) = match calibrate(trials, &with) {
+            Ok(calibrated) => (pooled(&calibrated), None),
+            Err(error) => {
+                let text = error.to_string();
+                first_problem.get_or_insert(error);
+                (None, Some(text))
+            }
+        };
+        candidates.push(Candidate { signal: signal.clone(), cross_validated_rmse: rmse, problem });
+    }
+    let key = |c: &Candidate| c.cross_validated_rmse.unwrap_or(f64::INFINITY);
+    candidates.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    match (candidates.first().and_then(|c| c.cross_validated_rmse), first_problem) {
+        (None, Some(error)) => Err(error),
+        _ => Ok(candidates),
+    }
+}
+
+/// Both branches' cross-validated errors as one, weighted by samples.
+fn pooled(calibrated: &Calibrated) -> Option<f64> {
+    let mut squares = 0.0;
+    let mut samples = 0.0;
+    for fit in &calibrated.fits {
+        let row = fit.orders.iter().find(|row| row.model == fit.model)?;
+        squares += row.cross_validated_rmse?.powi(2) * fit.samples as f64;
+        samples += fit.samples as f64;
+    }
+    Some((squares / samples).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_candidate_was_measured() {
+        for kind in ModelKind::named() {
+            let instructions = m3_instructions(kind);
+            assert!(instructions.is_some_and(|n| n > 100.0), "{kind}: {instructions:?}");
+        }
+        for kind in ["linear", "poly13", "observer", "observer+rest"] {
+            let kind = kind.parse().unwrap();
+            let (float, fixed) = (m3_instructions(kind), m3_instructions_fixed(kind));
+            assert!(fixed.unwrap() < 0.2 * float.unwrap(), "{kind}: {fixed:?} {float:?}");
+        }
     }
 }

@@ -1,30 +1,20 @@
 //! Sentences that say why a model was chosen.
 
-use super::reach::four_digits;
-
-/// The numbers of a candidate that the choice compared.
-#[derive(Debug, Clone)]
-pub(crate) struct Seen {
-    pub(crate) model: String,
-    /// Root mean square error on the data left out.
-    pub(crate) rmse: f64,
-    /// Numbers that the fit determines.
-    pub(crate) numbers: usize,
-}
+use super::{model_choice::Found, reach::four_digits};
 
 /// The figures behind a choice.
 #[derive(Debug)]
 pub(crate) struct Grounds<'a> {
     /// The candidate of the least error, among the candidates that may be chosen.
-    pub(crate) best: &'a Seen,
+    pub(crate) best: &'a Found,
     /// The runner-up of the best.
-    pub(crate) second: Option<&'a Seen>,
+    pub(crate) second: Option<&'a Found>,
     /// The simplest candidate that counts as equally good.
-    pub(crate) simplest: &'a Seen,
+    pub(crate) simplest: &'a Found,
     /// Mean squared error of the simplest candidate minus that of the best, part by part, and its standard error.
     pub(crate) excess: Option<(f64, f64)>,
     /// The simplest candidate with a followed baseline, where this form was taken instead.
-    pub(crate) insured: Option<&'a Seen>,
+    pub(crate) insured: Option<&'a Found>,
     /// Unit of the reference.
     pub(crate) unit: &'a str,
     /// Whether models that remember were among the candidates.
@@ -36,12 +26,12 @@ pub(crate) struct Grounds<'a> {
 /// A sentence with the figures that were compared and the rule that decided.
 pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
-    let error = |seen: &Seen| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
+    let error = |seen: &Found| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
     // the form with a followed baseline is no candidate of this comparison
-    let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.model));
-    let mut sentence = if simplest.model == best.model {
-        let before = second.map_or(String::new(), |s| format!(", {} {}", s.model, error(s)));
-        let (model, least) = (&best.model, error(best));
+    let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.kind));
+    let mut sentence = if simplest.kind == best.kind {
+        let before = second.map_or(String::new(), |s| format!(", {} {}", s.kind, error(s)));
+        let (model, least) = (&best.kind, error(best));
         let among = if *memory_shows { "" } else { " of those without memory" };
         format!(
             "{chosen}{model} errs least{among} on what was left out of the fit, {least}{before}"
@@ -58,9 +48,9 @@ pub(crate) fn why(grounds: &Grounds<'_>) -> String {
         };
         format!(
             "{chosen}{} errs {} on what was left out of the fit, the best, {}, {}; {decided}, and {} numbers are fewer than {}",
-            simplest.model,
+            simplest.kind,
             error(simplest),
-            best.model,
+            best.kind,
             error(best),
             simplest.numbers,
             best.numbers
@@ -84,7 +74,12 @@ mod tests {
 
     #[test]
     fn what_decided_is_said_with_its_figures() {
-        let seen = |model: &str, rmse, numbers| Seen { model: model.to_owned(), rmse, numbers };
+        let seen = |model: &str, rmse, numbers| Found {
+            kind: model.parse().unwrap(),
+            numbers,
+            errors: Err(String::new()),
+            rmse,
+        };
         let (best, simple) = (seen("observer", 0.5, 31), seen("history", 0.52, 13));
         let rest = seen("history+rest", 0.53, 16);
         let grounds = Grounds {

@@ -1,13 +1,11 @@
 //! Brings trials onto one even grid, with the rates that a live receptor has and the ranges of a calibration.
 
 mod gross_errors;
-mod rated;
 mod series;
 mod trials;
 
 pub use gross_errors::without_gross_errors;
-pub use rated::{Rated, RatedPart, rated};
-pub use series::{extent, noise, sample_rate_hz};
+pub use series::{Rated, RatedPart, extent, noise, rated, sample_rate_hz};
 pub use trials::{MOST_ROWS, SHORTEST, check_rows, check_turns, even_signals};
 
 pub(crate) use gross_errors::rows;

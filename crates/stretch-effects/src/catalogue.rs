@@ -1,82 +1,55 @@
 //! The catalogue: every kind of effect, and the effects of a gauge and of its reference.
 
-use crate::{
-    bow::{GAUGE_NONLINEARITY, POT_NONLINEARITY},
-    crosstalk::PRESSURE_CROSSTALK,
-    drift::THERMAL_DRIFT,
-    effect::Effect,
-    fading::{GAUGE_RELAXATION, SELF_HEATING},
-    hum::MAINS_HUM,
-    hysteresis::GAUGE_HYSTERESIS,
-    kind::Kind,
-    knees::{AMPLIFIER_SATURATION, SLEEVE_SLACK},
-    lowpass::AMPLIFIER_LOWPASS,
-    play::{POT_BACKLASH, SLEEVE_SLIP},
-    skew::CHANNEL_SKEW,
-    softening::GAUGE_SOFTENING,
-};
+use crate::{effect::Effect, kind::Kind};
 
-/// Every kind by its own name.
-pub mod kinds {
-    pub use crate::{
-        bow::{CURVE, GAIN_CURVE},
-        crosstalk::CROSSTALK,
-        dahl::{DAHL_FRICTION, LOAD_DAHL_FRICTION, PLAY_FRICTION},
-        dead_zone::{DEAD_ZONE, FIRMWARE_DEAD_BAND, QUANTISATION},
-        drift::{DRIFT, GAIN_DRIFT, OFFSET},
-        fading::{RELAXATION, WARMING},
-        friction::{
-            COULOMB_FRICTION, LOAD_FRICTION, STRIBECK_FRICTION, TORQUE_SPEED_LIMIT,
-            VISCOUS_FRICTION,
-        },
-        hum::HUM,
-        hysteresis::{BOUC_WEN, HYSTERESIS},
-        knees::SATURATION,
-        lowpass::LAG,
-        oscillator::{FLEXIBLE_JOINT, SECOND_ORDER_LAG},
-        play::BACKLASH,
-        profile::{PROFILE, SLEW_LIMIT},
-        skew::{CLOCK_DRIFT, DELAY, SKEW},
-        softening::SOFTENING,
+/// Lists the kinds once: by their own names, and in their order.
+macro_rules! kinds {
+    ($($file:ident::$kind:ident,)*) => {
+        /// Every kind by its own name.
+        pub mod kinds {
+            $(pub use crate::$file::$kind;)*
+        }
+
+        /// Every kind, in the order in which they act where several are on one channel.
+        pub static KINDS: &[&Kind] = &[$(&kinds::$kind,)*];
     };
 }
 
-/// Every kind, in the order in which they act where several are on one channel.
-pub static KINDS: &[&Kind] = &[
-    &kinds::COULOMB_FRICTION,
-    &kinds::VISCOUS_FRICTION,
-    &kinds::STRIBECK_FRICTION,
-    &kinds::LOAD_FRICTION,
-    &kinds::DAHL_FRICTION,
-    &kinds::LOAD_DAHL_FRICTION,
-    &kinds::PLAY_FRICTION,
-    &kinds::TORQUE_SPEED_LIMIT,
-    &kinds::FIRMWARE_DEAD_BAND,
-    &kinds::DEAD_ZONE,
-    &kinds::BACKLASH,
-    &kinds::HYSTERESIS,
-    &kinds::BOUC_WEN,
-    &kinds::CURVE,
-    &kinds::GAIN_CURVE,
-    &kinds::SOFTENING,
-    &kinds::GAIN_DRIFT,
-    &kinds::WARMING,
-    &kinds::CROSSTALK,
-    &kinds::SLEW_LIMIT,
-    &kinds::PROFILE,
-    &kinds::LAG,
-    &kinds::SECOND_ORDER_LAG,
-    &kinds::FLEXIBLE_JOINT,
-    &kinds::RELAXATION,
-    &kinds::SATURATION,
-    &kinds::OFFSET,
-    &kinds::DRIFT,
-    &kinds::DELAY,
-    &kinds::SKEW,
-    &kinds::CLOCK_DRIFT,
-    &kinds::HUM,
-    &kinds::QUANTISATION,
-];
+kinds! {
+    friction::COULOMB_FRICTION,
+    friction::VISCOUS_FRICTION,
+    friction::STRIBECK_FRICTION,
+    friction::LOAD_FRICTION,
+    dahl::DAHL_FRICTION,
+    dahl::LOAD_DAHL_FRICTION,
+    dahl::PLAY_FRICTION,
+    friction::TORQUE_SPEED_LIMIT,
+    dead_zone::FIRMWARE_DEAD_BAND,
+    dead_zone::DEAD_ZONE,
+    play::BACKLASH,
+    hysteresis::HYSTERESIS,
+    hysteresis::BOUC_WEN,
+    bow::CURVE,
+    bow::GAIN_CURVE,
+    softening::SOFTENING,
+    drift::GAIN_DRIFT,
+    fading::WARMING,
+    crosstalk::CROSSTALK,
+    profile::SLEW_LIMIT,
+    profile::PROFILE,
+    lowpass::LAG,
+    oscillator::SECOND_ORDER_LAG,
+    oscillator::FLEXIBLE_JOINT,
+    fading::RELAXATION,
+    knees::SATURATION,
+    drift::OFFSET,
+    drift::DRIFT,
+    skew::DELAY,
+    skew::SKEW,
+    skew::CLOCK_DRIFT,
+    hum::HUM,
+    dead_zone::QUANTISATION,
+}
 
 /// The kind of that name.
 ///
@@ -95,21 +68,21 @@ pub fn kind_named(name: &str) -> Option<&'static Kind> {
 
 /// Effects of a gauge and of its reference, in the order in which they act.
 pub static GAUGE: &[&Effect] = &[
-    &SLEEVE_SLACK,
-    &SLEEVE_SLIP,
-    &PRESSURE_CROSSTALK,
-    &GAUGE_HYSTERESIS,
-    &GAUGE_RELAXATION,
-    &GAUGE_SOFTENING,
-    &GAUGE_NONLINEARITY,
-    &THERMAL_DRIFT,
-    &SELF_HEATING,
-    &AMPLIFIER_SATURATION,
-    &AMPLIFIER_LOWPASS,
-    &MAINS_HUM,
-    &CHANNEL_SKEW,
-    &POT_NONLINEARITY,
-    &POT_BACKLASH,
+    &crate::knees::SLEEVE_SLACK,
+    &crate::play::SLEEVE_SLIP,
+    &crate::crosstalk::PRESSURE_CROSSTALK,
+    &crate::hysteresis::GAUGE_HYSTERESIS,
+    &crate::fading::GAUGE_RELAXATION,
+    &crate::softening::GAUGE_SOFTENING,
+    &crate::bow::GAUGE_NONLINEARITY,
+    &crate::drift::THERMAL_DRIFT,
+    &crate::fading::SELF_HEATING,
+    &crate::knees::AMPLIFIER_SATURATION,
+    &crate::lowpass::AMPLIFIER_LOWPASS,
+    &crate::hum::MAINS_HUM,
+    &crate::skew::CHANNEL_SKEW,
+    &crate::bow::POT_NONLINEARITY,
+    &crate::play::POT_BACKLASH,
 ];
 
 /// The effect of a gauge or its reference called `name`.

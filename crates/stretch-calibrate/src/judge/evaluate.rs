@@ -199,19 +199,13 @@ fn estimates(calibration: &Calibration, trial: &Trial) -> Result<Estimates, Cali
 }
 
 /// Sums behind one [`MethodErrors`], which can be merged over trials.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Tally {
     agreement: Agreement<f64>,
     withheld: u64,
     clamped: u64,
     /// Sum of the lags, each weighted by its samples, and the sum of these samples.
     lag: (f64, u64),
-}
-
-impl Default for Tally {
-    fn default() -> Self {
-        Self { agreement: Agreement::new(), withheld: 0, clamped: 0, lag: (0.0, 0) }
-    }
 }
 
 impl Tally {

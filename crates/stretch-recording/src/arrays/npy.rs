@@ -6,7 +6,7 @@
 use std::io::Cursor;
 
 use crate::{
-    ReadOptions, RecordingError,
+    ReadOptions, RecordingError, TimeUnit,
     arrays::{Array, beside, tracks},
     grid::{Track, listed, note},
     names::time_rank,
@@ -141,11 +141,8 @@ impl Kind {
         let (size, unit) = rest.split_once('[').unwrap_or((rest, ""));
         let bytes = size.parse().map_err(|_| fail())?;
         let per_second = match unit.trim_end_matches(']') {
-            "" | "s" => 1.0,
-            "ms" => 1e3,
-            "us" => 1e6,
-            "ns" => 1e9,
-            _ => return Err(fail()),
+            "" => 1.0,
+            unit => TimeUnit::abbreviated(unit).ok_or_else(fail)?.per_second(),
         };
         match (letter, bytes) {
             (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'b', 1) | (b'M' | b'm', 8) => {

@@ -1,6 +1,7 @@
 //! The sample rate that the lines above a table state.
 
 use crate::{
+    TimeUnit,
     names::{plain, unit},
     text::dialect::cells,
 };
@@ -52,12 +53,9 @@ fn rate_of(key: &str, value: &str) -> Option<f64> {
     let (number, length) = fast_float2::parse_partial::<f64, _>(&value).ok()?;
     let of_value = value.get(length..)?.trim();
     let scale = match unit(if of_value.is_empty() { of_key } else { of_value })?.as_str() {
-        "" | "s" | "hz" => 1.0,
-        "ms" => 1e-3,
-        "us" => 1e-6,
-        "ns" => 1e-9,
+        "" | "hz" => 1.0,
         "khz" => 1e3,
-        _ => return None,
+        time => 1.0 / TimeUnit::abbreviated(time)?.per_second(),
     };
     let rate_hz = if INTERVALS.contains(&&*key) {
         1.0 / (number * scale)

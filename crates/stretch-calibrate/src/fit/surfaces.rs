@@ -2,7 +2,7 @@
 
 use stretch_core::{
     Branch, BranchSurface, Degree, Interval, LinearMap, MAX_DEGREE, Model, Range, RangeSpec,
-    RateSource, Surface, sizes::MOST,
+    RateSource, sizes::MOST,
 };
 use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, robust_fit};
 
@@ -51,14 +51,14 @@ fn of_signal(prepared: &Prepared) -> (Vec<Sample>, Interval) {
 /// Fits a line of the signal.
 pub(crate) fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateError> {
     let (samples, signal_domain) = of_signal(prepared);
-    let (report, surface) = fit("linear fit", None, &samples, Degree::LINE, options.robust)?;
-    Ok((line(&surface, signal_domain, &report), vec![report], Vec::new()))
+    let report = fit("linear fit", None, &samples, Degree::LINE, options.robust)?;
+    Ok((line(signal_domain, &report), vec![report], Vec::new()))
 }
 
-fn line(surface: &Surface, signal_domain: Interval, report: &FitReport) -> Model {
+fn line(signal_domain: Interval, report: &FitReport) -> Model {
     Model::Linear(LinearMap {
-        slope: surface.coefficient(0, 1),
-        intercept: surface.coefficient(0, 0),
+        slope: report.surface.coefficient(0, 1),
+        intercept: report.surface.coefficient(0, 0),
         signal_domain,
         fit: report.summary(),
     })
@@ -77,17 +77,17 @@ pub(crate) fn curve(prepared: &Prepared, options: &Options) -> Result<Fitted, Ca
     let folds = factors(&samples, highest).map_err(failed)?;
     let table = OrderTable::curves(&folds).map_err(failed)?;
     let degree = table.recommended().unwrap_or(Degree::LINE);
-    let (mut report, surface) = fit("curve", None, &samples, degree, options.robust)?;
+    let mut report = fit("curve", None, &samples, degree, options.robust)?;
     let named = |degree: Degree| format!("degree {}", degree.volts());
     report.model = "curve".to_owned();
     (report.orders, report.recommended) = (orders(&table, named), Some(named(degree)));
     let model = if degree == Degree::LINE {
-        line(&surface, signal_domain, &report)
+        line(signal_domain, &report)
     } else {
         let any = RangeSpec { mode: options.normalisation, zero: 0.0, min: -0.5, max: 0.5 };
         let both = BranchSurface {
             rate_range: Range::new(any)?,
-            surface,
+            surface: report.surface,
             signal_domain,
             // every rate is inside
             rate_domain: Interval { min: -MOST, max: MOST },
@@ -191,10 +191,10 @@ fn surface(
             target: prepared.target_range.normalise(raw.target[i]),
         })
         .collect();
-    let (report, surface) = fit(name, Some(branch), &samples, degree, options.robust)?;
+    let report = fit(name, Some(branch), &samples, degree, options.robust)?;
     let fitted = BranchSurface {
         rate_range,
-        surface,
+        surface: report.surface,
         signal_domain: extent(raw.signal.iter().copied()),
         rate_domain: extent(raw.signal_rate.iter().copied()),
         fit: report.summary(),
@@ -212,7 +212,7 @@ fn fit(
     samples: &[Sample],
     degree: Degree,
     robust: Robust,
-) -> Result<(FitReport, Surface), CalibrateError> {
+) -> Result<FitReport, CalibrateError> {
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
     // the order table around a surface needs higher degrees; a line has no table
     let wide = if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree };
@@ -233,24 +233,17 @@ fn fit(
     };
     let step = samples.len().div_ceil(CLOUD).max(1);
     let cloud = samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect();
-    report(name, branch, degree, &folds, fitted, Seen { rejected, cloud })
+    Ok(FitReport { rejected, cloud, ..report(name, branch, degree, &folds, &fitted)? })
 }
 
-/// Parts of a report other than the numbers of the fit.
-struct Seen {
-    rejected: Option<u64>,
-    cloud: Vec<[f64; 3]>,
-}
-
-/// The report of a fit; the `folds` hold the neighbouring orders, too.
+/// The report of a fit, without samples; the `folds` hold the neighbouring orders, too.
 fn report(
     name: &'static str,
     branch: Option<Branch>,
     degree: Degree,
     folds: &Factors,
-    fitted: Fit<f64>,
-    Seen { rejected, cloud }: Seen,
-) -> Result<(FitReport, Surface), CalibrateError> {
+    fitted: &Fit<f64>,
+) -> Result<FitReport, CalibrateError> {
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
     let bounds = fitted.confidence(0.95).map_err(failed)?;
     let coefficients = degree
@@ -277,7 +270,7 @@ fn report(
         None => (Vec::new(), None),
     };
     let model = if branch.is_some() { degree.to_string() } else { "linear".to_owned() };
-    let fit_report = FitReport {
+    Ok(FitReport {
         name: name.to_owned(),
         branch,
         model,
@@ -287,14 +280,13 @@ fn report(
         adjusted_r_squared: fitted.adjusted_r_squared().unwrap_or(0.0),
         rmse: fitted.rmse().unwrap_or(0.0),
         condition: fitted.condition(),
-        rejected,
+        rejected: None,
         coefficients,
         orders,
         recommended,
-        cloud,
+        cloud: Vec::new(),
         surface: fitted.surface(),
-    };
-    Ok((fit_report, fitted.surface()))
+    })
 }
 
 /// Greatest number of points in a picture.

@@ -139,12 +139,8 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
         for span in [0..fold.from.saturating_sub(gap), fold.to.saturating_add(gap)..trial.len()] {
             // a short remainder is not fitted, because the estimators would hardly warm up on it
             if span.len() > 5 * SETTLE {
-                let mut part = trial.clone();
-                part.time_s = trial.time_s[span.clone()].to_vec();
-                for (own, whole) in part.channels.iter_mut().zip(&trial.channels) {
-                    own.values = whole.values[span.clone()].to_vec();
-                }
-                rest.push(part);
+                let stays: Vec<bool> = (0..trial.len()).map(|i| span.contains(&i)).collect();
+                rest.push(rows(trial, &stays));
             }
         }
     }

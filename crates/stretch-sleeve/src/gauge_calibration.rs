@@ -1,9 +1,10 @@
-//! The record of one gauge that watches its zero.
+//! The record of one gauge, and of the turning points of its movements, from which a zero shift is detected.
 
 use serde::{Deserialize, Serialize};
-use stretch_core::{Calibration, DesignError};
-
-use crate::Turns;
+use stretch_core::{
+    Calibration, DesignError,
+    sizes::{MOST_SLOPE, extent, size},
+};
 
 /// A calibration of one gauge, and the turning points of its movements.
 ///
@@ -65,5 +66,104 @@ impl TryFrom<Parts> for GaugeCalibration {
 impl From<GaugeCalibration> for Parts {
     fn from(gauge: GaugeCalibration) -> Self {
         Self(gauge.calibration, gauge.turns)
+    }
+}
+
+/// The levels at which the signal turned during the calibration, and the limits for later ones.
+///
+/// A movement goes down and up again by at least `least_span`. Its level is `y = (1 - high_share)
+/// low + high_share high` of its two turning points, weighted such that levels of the calibration
+/// scatter least. The calibration has `n` movements with mean `level` and standard deviation
+/// `scatter`. The median of five further movements deviates by more than `limit = t scatter sqrt(v +
+/// 1/n)` with probability `p = false_alarms_an_hour/movements_an_hour`. Here `t` is the two-sided
+/// quantile of Student's t for `n - 1` degrees of freedom (Hahn and Meeker, Statistical Intervals,
+/// 1991, section 4.6), and `v` is the ratio of the variance of a median of five to that of one,
+/// 0.2868 for normal and independent levels (David and Nagaraja, Order Statistics, 2003, section
+/// 3.2). `n` and `v` account for the correlation of neighbouring levels. For levels that are not
+/// normal the limit is at least the distance that a share `q` of the calibration's levels exceeds
+/// on either side, where `10 q^3 = p/2`: three of five exceed it as often as that.
+///
+/// A smaller but lasting deviation is found by a running mean of levels about `level`, clipped at
+/// [`MOST_INNOVATION`](Self::MOST_INNOVATION) standard deviations, with a weight of
+/// [`MEAN_SHARE`](Self::MEAN_SHARE) for the newest (Roberts, Technometrics 1 (1959) 239). Its
+/// variance is that of levels times `k/(2 - k)`, and `mean_limit` is derived from it as `limit` is
+/// from `v`. Each of the two has half of the false alarms.
+///
+/// ```
+/// use stretch_sleeve::Turns;
+/// let turns = Turns {
+///     level: 1.24,
+///     high_share: 0.0,
+///     least_span: 0.3,
+///     scatter: 0.01,
+///     movements: 40,
+///     limit: 0.03,
+///     mean_limit: 0.012,
+///     false_alarms_an_hour: 0.25,
+///     movements_an_hour: 1200.0,
+///     follow: 0.025,
+///     reference_per_signal: -30.0,
+/// };
+/// assert!(turns.validate().is_ok());
+/// assert!(Turns { limit: f64::NAN, ..turns }.validate().is_err());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Turns {
+    /// Mean level of the movements, each clipped at [`Turns::MOST_INNOVATION`] standard deviations from it, in the signal's unit.
+    pub level: f64,
+    /// Weight of the high turning point in a level, 0 to 1. High is where the target is.
+    pub high_share: f64,
+    /// What the signal goes back by at least before that is a turn, in the signal's unit.
+    pub least_span: f64,
+    /// Standard deviation of levels, in the signal's unit.
+    pub scatter: f64,
+    /// Movements of the calibration.
+    pub movements: u32,
+    /// How far the median of five levels may be off, in the signal's unit.
+    pub limit: f64,
+    /// How far the running mean of levels may be off, in the signal's unit.
+    pub mean_limit: f64,
+    /// The rate of false alarms that both limits are for, while movements are of the kind that the calibration saw.
+    pub false_alarms_an_hour: f64,
+    /// Movements an hour of the calibration.
+    pub movements_an_hour: f64,
+    /// Share of a level's innovation by which a zero that is followed moves, 0 to 1.
+    pub follow: f64,
+    /// Change of the estimate per change of the signal at the level.
+    pub reference_per_signal: f64,
+}
+
+impl Turns {
+    /// Levels whose median is held against the limit.
+    pub const MEDIAN_OF: usize = 5;
+    /// Weight of the newest level in the running mean: twenty movements are a minute or two.
+    pub const MEAN_SHARE: f64 = 0.05;
+    /// What a level counts for at most in a mean, or in a zero that is followed, in standard deviations of levels: a movement
+    /// that ends elsewhere is no drift (Huber, Ann. Math. Stat. 35 (1964) 73, doi 10.1214/aoms/1177703732).
+    pub const MOST_INNOVATION: f64 = 2.0;
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`DesignError`] that names the field.
+    pub fn validate(&self) -> Result<(), DesignError> {
+        size("turns.level", self.level)?;
+        for (field, x) in [
+            ("turns.least_span", self.least_span),
+            ("turns.scatter", self.scatter),
+            ("turns.limit", self.limit),
+            ("turns.mean_limit", self.mean_limit),
+            ("turns.false_alarms_an_hour", self.false_alarms_an_hour),
+            ("turns.movements_an_hour", self.movements_an_hour),
+        ] {
+            extent(field, x)?;
+        }
+        for (field, x) in [("turns.high_share", self.high_share), ("turns.follow", self.follow)] {
+            DesignError::check(field, x, (0.0..=1.0).contains(&x))?;
+        }
+        let slope = self.reference_per_signal;
+        DesignError::check("turns.reference_per_signal", slope, slope.abs() <= MOST_SLOPE)?;
+        Ok(())
     }
 }

@@ -7,7 +7,6 @@ mod calibrate;
 mod example;
 mod gauge_calibration;
 mod live;
-mod turns;
 
 pub use array_calibration::{
     ARRAY_RELAXATIONS, ARRAY_STATES, ARRAY_TERMS, ArrayCalibration, ArrayChannel, ArrayGains,
@@ -16,11 +15,9 @@ pub use array_calibration::{
 #[cfg(feature = "calibrate")]
 pub use calibrate::*;
 pub use example::example_array;
-pub use gauge_calibration::GaugeCalibration;
+pub use gauge_calibration::{GaugeCalibration, Turns};
 pub use live::{
-    ArrayAloneNumbers, ArrayChannelNumbers, ArrayGainNumbers, ArrayLoss, ArrayMemory, ArrayNumbers,
-    ArrayReading, ArrayReceptor, ArrayWithheld, JUMP_SAMPLES, Jump, Repeats, ShiftMemory,
-    ShiftWatch, Shifts, TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch, block_of,
-    samples_a_tick,
+    ArrayChannelNumbers, ArrayGainNumbers, ArrayLoss, ArrayMemory, ArrayNumbers, ArrayReading,
+    ArrayReceptor, ArrayWithheld, JUMP_SAMPLES, Jump, Repeats, ShiftMemory, ShiftWatch, Shifts,
+    TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch, block_of, samples_a_tick,
 };
-pub use turns::Turns;

@@ -100,7 +100,7 @@ fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, 
     constants
         .array("float", "alone_constant", &each(alone, |gains| gains.constant))
         .array("float", "alone_sd", &each(alone, |gains| gains.sd))
-        .rows("float", "alone", &each(alone, |gains| gains.terms[..terms].to_vec()))
+        .rows("float", "alone", &each(alone, |gains| gains.terms[0][..terms].to_vec()))
         .define("LOW", numbers.low, "the least estimate")
         .define("HIGH", numbers.high, "the greatest");
 }

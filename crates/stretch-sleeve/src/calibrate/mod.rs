@@ -7,11 +7,9 @@
 mod array;
 mod bank;
 mod channels;
-mod correlated;
 mod error;
 mod gauge;
 mod linear;
-mod matrices;
 mod prior;
 mod record;
 mod turns;

@@ -11,7 +11,7 @@ use stretch_receptor::Receptor;
 
 use crate::{GaugeCalibration, TurnFinder, Turns};
 
-use super::correlated::{Levels, independent, levels};
+use super::channels::{Levels, independent, levels};
 
 /// False alarms per hour, equal to the array's share for a shifted gauge.
 const FALSE_ALARMS_AN_HOUR: f64 = 0.25;

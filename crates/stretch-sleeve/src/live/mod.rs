@@ -5,14 +5,12 @@ use stretch_filter::LARGEST_SAMPLE;
 
 mod channel_watch;
 mod numbers;
-mod reading;
 mod receptor;
 mod shift_watch;
 mod zero_watch;
 
 pub use channel_watch::{JUMP_SAMPLES, Jump, Repeats, samples_a_tick};
-pub use numbers::{ArrayAloneNumbers, ArrayChannelNumbers, ArrayGainNumbers, ArrayNumbers};
-pub use reading::{ArrayLoss, ArrayReading, ArrayWithheld};
+pub use numbers::{ArrayChannelNumbers, ArrayGainNumbers, ArrayNumbers};
 pub use receptor::{ArrayMemory, ArrayReceptor};
 pub use shift_watch::{ShiftMemory, ShiftWatch, Shifts, block_of};
 pub use zero_watch::{TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch};
@@ -21,4 +19,73 @@ pub use zero_watch::{TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch};
 #[inline(always)]
 fn is_usable<T: Real>(sample: T) -> bool {
     sample.abs() <= T::from_f64(LARGEST_SAMPLE)
+}
+
+/// Why a channel is excluded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ArrayLoss {
+    /// Its samples are missing.
+    Missing,
+    /// Its samples are impossible: it is cut off, or at the end of the converter.
+    Outside,
+    /// It repeats one value while others change: it sticks, or it is at the end of its converter.
+    Still,
+    /// It jumped away from what the other channels predict: it slipped, or it is loose.
+    Slipped,
+}
+
+/// A reading of an [`ArrayReceptor`](crate::ArrayReceptor).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrayReading<T> {
+    /// The estimated reference, in its unit.
+    pub estimate: T,
+    /// Standard deviation of the estimate, in the same unit, with the remaining channels.
+    pub sd: T,
+    /// One bit for each excluded channel, the first channel's the lowest.
+    pub lost: u16,
+    /// Whether a state was outside of its domain and was clamped.
+    pub clamped: bool,
+}
+
+impl<T> ArrayReading<T> {
+    /// Whether a channel is left out.
+    pub fn is_lost(&self, channel: usize) -> bool {
+        channel < 16 && self.lost & (1 << channel) != 0
+    }
+}
+
+/// Why there is no [`ArrayReading`] for a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ArrayWithheld {
+    /// A channel in use has not had a sample yet.
+    Warming,
+    /// No channel in use had a sample. A short gap is bridged; after a longer one the signals are forgotten.
+    Missing,
+    /// Every channel is lost.
+    AllLost,
+}
+
+impl core::fmt::Display for ArrayWithheld {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.pad(match self {
+            Self::Warming => "warming",
+            Self::Missing => "missing",
+            Self::AllLost => "all channels lost",
+        })
+    }
+}
+
+impl core::error::Error for ArrayWithheld {}
+
+impl core::fmt::Display for ArrayLoss {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.pad(match self {
+            Self::Missing => "missing",
+            Self::Outside => "outside",
+            Self::Still => "still",
+            Self::Slipped => "slipped",
+        })
+    }
 }

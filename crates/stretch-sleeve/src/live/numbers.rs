@@ -31,7 +31,7 @@ pub struct ArrayNumbers<T, const N: usize> {
     /// Gains without each channel in turn.
     pub without: [ArrayGainNumbers<T, N>; N],
     /// Gains of each channel alone.
-    pub alone: [ArrayAloneNumbers<T>; N],
+    pub alone: [ArrayGainNumbers<T, 1>; N],
     /// The least estimate.
     pub low: T,
     /// The greatest estimate.
@@ -57,7 +57,7 @@ pub struct ArrayChannelNumbers<T, const N: usize> {
     pub per_slip: T,
 }
 
-/// Gains of several channels.
+/// Gains of several channels, or of one alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArrayGainNumbers<T, const N: usize> {
     /// The estimate where every term is zero.
@@ -66,17 +66,6 @@ pub struct ArrayGainNumbers<T, const N: usize> {
     pub sd: T,
     /// One gain a term, for each channel.
     pub terms: [[T; ARRAY_TERMS]; N],
-}
-
-/// Gains of one channel alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ArrayAloneNumbers<T> {
-    /// The estimate where every term is zero.
-    pub constant: T,
-    /// Standard deviation of the estimate.
-    pub sd: T,
-    /// One gain a term.
-    pub terms: [T; ARRAY_TERMS],
 }
 
 impl<T: Real, const N: usize> ArrayNumbers<T, N> {
@@ -91,15 +80,15 @@ impl<T: Real, const N: usize> ArrayNumbers<T, N> {
         });
         let period_s = calibration.spec().sample_rate_hz.period_s();
         let shares = calibration.spec().relaxations_s.iter().map(|&tau| lag_share(period_s, tau));
-        let nothing = ArrayAloneNumbers {
+        let nothing = ArrayGainNumbers {
             constant: T::zero(),
             sd: T::zero(),
-            terms: [T::zero(); ARRAY_TERMS],
+            terms: [[T::zero(); ARRAY_TERMS]],
         };
         let mut alone = [nothing; N];
         for (k, (place, gains)) in alone.iter_mut().zip(&calibration.spec().alone).enumerate() {
             let ArrayGainNumbers { constant, sd, terms } = ArrayGainNumbers::<T, N>::round(gains);
-            *place = ArrayAloneNumbers { constant, sd, terms: terms[k] };
+            *place = ArrayGainNumbers { constant, sd, terms: [terms[k]] };
         }
         let all = ArrayGainNumbers::round(&calibration.spec().all);
         let mut without = [all; N];

@@ -6,10 +6,10 @@ use stretch_receptor::{MAX_BRIDGED, numbers::held};
 use crate::{ARRAY_RELAXATIONS, ARRAY_STATES, ARRAY_TERMS, ArrayCalibration};
 
 use super::{
+    ArrayLoss, ArrayReading, ArrayWithheld,
     channel_watch::{JUMP_SAMPLES, Jump, Repeats},
     is_usable,
     numbers::ArrayNumbers,
-    reading::{ArrayLoss, ArrayReading, ArrayWithheld},
 };
 
 /// A receptor of up to `N` gauges that share a recorder.
@@ -351,7 +351,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         let mut out = [T::zero(); N];
         for k in 0..count {
             let (alone, without) = (&self.0.alone[k], &self.0.without[k]);
-            let own = self.plus(alone.constant, &alone.terms, &made[k]);
+            let own = self.plus(alone.constant, &alone.terms[0], &made[k]);
             let mut others = without.constant;
             for j in (0..count).filter(|&j| j != k) {
                 others = self.plus(others, &without.terms[j], &made[j]);
@@ -372,7 +372,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         let k = best?;
         let (made, clamped) = self.made(k, &memory.of[k]);
         let alone = &self.0.alone[k];
-        Some((self.plus(alone.constant, &alone.terms, &made), alone.sd, clamped))
+        Some((self.plus(alone.constant, &alone.terms[0], &made), alone.sd, clamped))
     }
 }
 

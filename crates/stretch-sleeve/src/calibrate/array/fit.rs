@@ -10,11 +10,9 @@ use crate::{
 };
 
 use super::{
-    carried::{Carried, carried},
-    parted::parted,
+    parted::{Carried, carried, parted},
     shifts::shifts,
-    still::Still,
-    watch::watched,
+    watch::{Still, watched},
 };
 
 /// A note on data that do not show which difference between channels is usual.

@@ -12,8 +12,7 @@ use crate::{
     ArrayShifts, MAX_CHANNELS, SleeveError, block_of,
     calibrate::{
         bank::Bank,
-        channels::Channels,
-        correlated::{Levels, independent, levels},
+        channels::{Channels, Levels, independent, levels},
         linear::Linear,
     },
 };

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::calibrate::matrices::inverse;
+use crate::calibrate::linear::inverse;
 
 use super::{
     session::PARTS_S,

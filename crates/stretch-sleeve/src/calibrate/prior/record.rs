@@ -73,7 +73,58 @@ impl Prior {
     /// # Errors
     /// [`SleeveError::Prior`] with the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, SleeveError> {
-        read(path)
+        let (record, file): (Record, _) = opened(path)?;
+        if record.schema != SCHEMA {
+            return Err(problem(&file, "it was written by another release"));
+        }
+        let wrong = || problem(&file, "its numbers are not as many as its channels need");
+        let has_domain = |d: &Vec<Interval>| !d.is_empty() && d.iter().all(|d| d.min < d.max);
+        if record.domains.len() != record.signals.len()
+            || record.still_samples.len() != record.signals.len()
+            || !record.domains.iter().all(has_domain)
+        {
+            return Err(wrong());
+        }
+        let terms = Bank::new(record.domains.clone()).terms();
+        let matrix = |numbers: &Vec<f64>| {
+            let upper = unpacked(numbers, terms).ok_or_else(wrong)?;
+            Ok::<_, SleeveError>(mirrored(upper))
+        };
+        let known: Result<Vec<_>, SleeveError> = record
+            .known
+            .iter()
+            .map(|known| {
+                if known.mean.len() != terms {
+                    return Err(wrong());
+                }
+                let mean = DVector::from_column_slice(&known.mean);
+                Ok((known.path.clone(), Normal { mean, covariance: matrix(&known.covariance)? }))
+            })
+            .collect();
+        let known = known?;
+        if known.first().is_none_or(|(path, _)| !path.is_empty())
+            || record.noise.is_nan()
+            || record.noise <= 0.0
+        {
+            return Err(wrong());
+        }
+        Ok(Self {
+            levels: record.levels.iter().map(matrix).collect::<Result<_, _>>()?,
+            gram: matrix(&record.gram)?,
+            known,
+            signals: record.signals,
+            reference: record.reference,
+            sample_rate_hz: record.sample_rate_hz,
+            sessions: record.sessions,
+            expected: record.expected,
+            target: record.target,
+            target_range: record.target_range,
+            estimate: record.estimate,
+            domains: record.domains,
+            noise: record.noise,
+            still: Still { longest: record.still_samples, samples: record.still_seen },
+            landmarks: record.landmarks.into_iter().map(|l| (l.path, l.at)).collect(),
+        })
     }
 
     /// The prior in JSON.
@@ -81,40 +132,36 @@ impl Prior {
     /// # Errors
     /// Never, because all of its numbers are finite.
     pub fn to_json(&self) -> Result<String, SleeveError> {
-        to_json(self)
+        let known = self.known.iter().map(|(path, normal)| Known {
+            path: path.clone(),
+            mean: normal.mean.iter().copied().collect(),
+            covariance: packed(&normal.covariance),
+        });
+        let record = Record {
+            schema: SCHEMA,
+            signals: self.signals.clone(),
+            reference: self.reference.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            sessions: self.sessions,
+            expected: self.expected.clone(),
+            target: self.target,
+            target_range: self.target_range,
+            estimate: self.estimate,
+            domains: self.domains.clone(),
+            known: known.collect(),
+            levels: self.levels.iter().map(packed).collect(),
+            noise: self.noise,
+            gram: packed(&self.gram),
+            still_samples: self.still.longest.clone(),
+            still_seen: self.still.samples,
+            landmarks: self
+                .landmarks
+                .iter()
+                .map(|(path, at)| Landmarks { path: path.clone(), at: *at })
+                .collect(),
+        };
+        sealed(&record, "prior")
     }
-}
-
-fn to_json(prior: &Prior) -> Result<String, SleeveError> {
-    let known = prior.known.iter().map(|(path, normal)| Known {
-        path: path.clone(),
-        mean: normal.mean.iter().copied().collect(),
-        covariance: packed(&normal.covariance),
-    });
-    let record = Record {
-        schema: SCHEMA,
-        signals: prior.signals.clone(),
-        reference: prior.reference.clone(),
-        sample_rate_hz: prior.sample_rate_hz,
-        sessions: prior.sessions,
-        expected: prior.expected.clone(),
-        target: prior.target,
-        target_range: prior.target_range,
-        estimate: prior.estimate,
-        domains: prior.domains.clone(),
-        known: known.collect(),
-        levels: prior.levels.iter().map(packed).collect(),
-        noise: prior.noise,
-        gram: packed(&prior.gram),
-        still_samples: prior.still.longest.clone(),
-        still_seen: prior.still.samples,
-        landmarks: prior
-            .landmarks
-            .iter()
-            .map(|(path, at)| Landmarks { path: path.clone(), at: *at })
-            .collect(),
-    };
-    sealed(&record, "prior")
 }
 
 /// An object in JSON with its digest as the last field.
@@ -158,61 +205,6 @@ impl Session {
     pub fn to_json(&self) -> Result<String, SleeveError> {
         sealed(self, &self.name)
     }
-}
-
-fn read(path: &Path) -> Result<Prior, SleeveError> {
-    let (record, file): (Record, _) = opened(path)?;
-    if record.schema != SCHEMA {
-        return Err(problem(&file, "it was written by another release"));
-    }
-    let wrong = || problem(&file, "its numbers are not as many as its channels need");
-    let has_domain = |d: &Vec<Interval>| !d.is_empty() && d.iter().all(|d| d.min < d.max);
-    if record.domains.len() != record.signals.len()
-        || record.still_samples.len() != record.signals.len()
-        || !record.domains.iter().all(has_domain)
-    {
-        return Err(wrong());
-    }
-    let terms = Bank::new(record.domains.clone()).terms();
-    let matrix = |numbers: &Vec<f64>| {
-        let upper = unpacked(numbers, terms).ok_or_else(wrong)?;
-        Ok::<_, SleeveError>(mirrored(upper))
-    };
-    let known: Result<Vec<_>, SleeveError> = record
-        .known
-        .iter()
-        .map(|known| {
-            if known.mean.len() != terms {
-                return Err(wrong());
-            }
-            let mean = DVector::from_column_slice(&known.mean);
-            Ok((known.path.clone(), Normal { mean, covariance: matrix(&known.covariance)? }))
-        })
-        .collect();
-    let known = known?;
-    if known.first().is_none_or(|(path, _)| !path.is_empty())
-        || record.noise.is_nan()
-        || record.noise <= 0.0
-    {
-        return Err(wrong());
-    }
-    Ok(Prior {
-        levels: record.levels.iter().map(matrix).collect::<Result<_, _>>()?,
-        gram: matrix(&record.gram)?,
-        known,
-        signals: record.signals,
-        reference: record.reference,
-        sample_rate_hz: record.sample_rate_hz,
-        sessions: record.sessions,
-        expected: record.expected,
-        target: record.target,
-        target_range: record.target_range,
-        estimate: record.estimate,
-        domains: record.domains,
-        noise: record.noise,
-        still: Still { longest: record.still_samples, samples: record.still_seen },
-        landmarks: record.landmarks.into_iter().map(|l| (l.path, l.at)).collect(),
-    })
 }
 
 /// The symmetric matrix of an upper triangle.

@@ -20,8 +20,7 @@ use crate::{
         array::watched,
         bank::Bank,
         channels::Channels,
-        linear::Linear,
-        matrices::{inverse, symmetric},
+        linear::{Linear, inverse, symmetric},
     },
 };
 

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::calibrate::matrices::{inverse, symmetric};
+use crate::calibrate::linear::{inverse, symmetric};
 
 /// Weight of the diagonal in a covariance, in nodes per term, because a term has few nodes to learn
 /// from.

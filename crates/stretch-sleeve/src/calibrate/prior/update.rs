@@ -15,8 +15,7 @@ use crate::{
         array::{Still, watched},
         bank::Bank,
         channels::{Channels, correlation},
-        linear::Linear,
-        matrices::{cholesky, term_correlation},
+        linear::{Linear, cholesky, term_correlation},
     },
 };
 

@@ -1,17 +1,23 @@
 //! From a calibration to a header.
 
-use std::fmt::Write;
+use std::{
+    fmt::{self, Write},
+    str::FromStr,
+};
 
-use stretch_calibrate::{CalibrateError, RecordNumbers, calibration_seal, fixed_record};
+use stretch_calibrate::{
+    CalibrateError, RecordNumbers, SpellingError, calibration_seal, fixed_record,
+};
 use stretch_core::{Calibration, Label, Model, Provenance, SampleRate};
+use stretch_receptor::code::Adc;
 use stretch_sleeve::{ArrayCalibration, GaugeCalibration, Turns, array_seal};
 
 use crate::{
-    ExportError, Form, Options, array_test,
+    ExportError,
     constants::{Constants, comment_safe},
     models::{
         array_float, diagnosed_float, observer_fixed, observer_float, surfaces_fixed,
-        surfaces_float, with_zero,
+        surfaces_float,
     },
     part::{Part, kept},
     self_test,
@@ -22,6 +28,45 @@ pub const HEADER: &str = "stretch.h";
 
 /// Samples of the self-test.
 pub const SELF_TEST_SAMPLES: usize = self_test::SAMPLES;
+
+/// The arithmetic of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Integers alone: converter codes in, thousandths of the reference's unit out.
+    Fixed,
+    /// `float`: the signal's unit in, the reference's unit out.
+    Float,
+}
+
+impl fmt::Display for Form {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Fixed => "fixed",
+            Self::Float => "float",
+        })
+    }
+}
+
+impl FromStr for Form {
+    type Err = SpellingError;
+
+    fn from_str(text: &str) -> Result<Self, SpellingError> {
+        match text {
+            "fixed" => Ok(Self::Fixed),
+            "float" => Ok(Self::Float),
+            _ => Err(SpellingError::new(text, "fixed (integers) or float")),
+        }
+    }
+}
+
+/// What an export is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// The arithmetic; `None` takes integers where the model has a form in them, else `float`.
+    pub form: Option<Form>,
+    /// The board's converter.
+    pub adc: Adc,
+}
 
 /// A calibration in C.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -118,7 +163,7 @@ fn float(
         }
     };
     if let Some(turns) = turns {
-        part = with_zero(part, calibration.spec().polarity, turns);
+        part = part.with_zero(calibration.spec().polarity, turns);
     }
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
@@ -159,7 +204,7 @@ pub fn array_header<const N: usize>(
         options,
         Form::Float,
         array_float(calibration),
-        &array_test::array(calibration)?,
+        &self_test::array(calibration)?,
     );
     Ok(Header { array: Some(names.len()), ..made })
 }

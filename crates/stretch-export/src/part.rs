@@ -1,5 +1,10 @@
 //! What a model gives to a header.
 
+use stretch_core::Polarity;
+use stretch_sleeve::{Turns, ZeroWatch};
+
+use crate::constants::Constants;
+
 /// A model in C: its record as constants, and its step over them.
 #[derive(Debug)]
 pub(crate) struct Part {
@@ -11,6 +16,33 @@ pub(crate) struct Part {
     pub(crate) step: Vec<&'static str>,
     /// What of the step there is, where it has parts: the words behind its `@if`.
     pub(crate) has: Vec<&'static str>,
+}
+
+impl Part {
+    /// The same in `float`, with the watch of the gauge's zero behind the step.
+    pub(crate) fn with_zero(mut self, polarity: Polarity, turns: &Turns) -> Self {
+        let watch = ZeroWatch::<f32>::new(polarity, turns);
+        let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
+        let mut constants = Constants::default();
+        constants
+            .define("ZERO_LEVELS", Turns::MEDIAN_OF as i32, "that a median is taken of")
+            .define("ZERO_SPAN", finder.least_span, "what the signal goes through in a movement")
+            .define("ZERO_SIGN", sign, "-1 where the signal falls as the target rises")
+            .define("ZERO_LOW_SHARE", low, "of the low end in a level")
+            .define("ZERO_HIGH_SHARE", high, "of the high end")
+            .define("ZERO_LEVEL", level, "of the calibration, times the sign")
+            .define("ZERO_LIMIT", limit, "how far the median of levels may be off")
+            .define("ZERO_MEAN_LIMIT", watch.mean_limit, "how far their running mean may be off")
+            .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in it")
+            .define("ZERO_MOST", most, "what a level counts for at most in a zero that is followed")
+            .define("ZERO_FOLLOW", watch.following(turns).follow, "the share by which it moves")
+            .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
+        self.constants.push_str(&constants.into_text());
+        // the last part of a step ends the compiler's rules for floats
+        let last = self.step.len() - 1;
+        self.step.insert(last, include_str!("c/zero_float.h"));
+        self
+    }
 }
 
 /// The lines of a text that there are: between `@if this that` and its `@end` if one of those is in `has`.

@@ -8,13 +8,14 @@ use stretch_receptor::{
     Receptor, Withheld,
     code::{Adc, AdcCode},
 };
+use stretch_sleeve::{ArrayCalibration, ArrayReceptor, ArrayWithheld};
 
 use crate::{ExportError, Form, part::kept};
 
 /// How many.
 pub(crate) const SAMPLES: usize = 200;
 /// Larger than any sample: one that did not come (`STRETCH_NO_VOLTS`).
-pub(crate) const NO_VOLTS: f32 = 2e18;
+const NO_VOLTS: f32 = 2e18;
 /// What stands in the flags beside the status.
 const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Up and down once in this many samples.
@@ -31,7 +32,7 @@ fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
 }
 
 /// Where in the calibrated range a sample lies: from -0.1 to 1.1 and back.
-pub(crate) fn share(n: usize) -> f64 {
+fn share(n: usize) -> f64 {
     // smooth at both ends, by products alone: the same numbers on every computer
     let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
     let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
@@ -40,7 +41,7 @@ pub(crate) fn share(n: usize) -> f64 {
 
 /// How far the estimates in 32 bits, which a board gives, are from those in 64 bits.
 #[derive(Default)]
-pub(crate) struct Rounding {
+struct Rounding {
     squares: f64,
     count: usize,
 }
@@ -49,13 +50,13 @@ impl Rounding {
     /// Root mean square difference, as a share of the error of the fit, beyond which there is no header.
     const MOST: f64 = 0.1;
 
-    pub(crate) fn add(&mut self, single: f32, double: f64) {
+    fn add(&mut self, single: f32, double: f64) {
         self.squares += (f64::from(single) - double).powi(2);
         self.count += 1;
     }
 
     /// Refuses a calibration that loses more than a tenth of `error`, in the unit of `reference`, in 32 bits.
-    pub(crate) fn check(&self, error: f64, reference: &Label) -> Result<(), ExportError> {
+    fn check(&self, error: f64, reference: &Label) -> Result<(), ExportError> {
         let rms = (self.squares / self.count.max(1) as f64).sqrt();
         if rms <= Self::MOST * error {
             return Ok(());
@@ -162,20 +163,87 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
 }
 
+/// Up and down through the calibrated range and beyond it. The recorder is silent for one sample and for five, the
+/// first gauge slips, the second is cut off, the third misses its samples, the fourth sticks, and at last all are cut
+/// off.
+fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32; N] {
+    let mut out = [NO_VOLTS; N];
+    if n == 24 || (30..35).contains(&n) {
+        return out;
+    }
+    for (k, (place, channel)) in out.iter_mut().zip(&calibration.spec().channels).enumerate() {
+        let ends = channel.state_min.iter().zip(channel.state_max.iter()).next();
+        let (min, max) = ends.map_or((0.0, 1.0), |(&min, &max)| (min, max));
+        let possible = channel.possible;
+        let cut_off = possible.max + (possible.max - possible.min);
+        *place = match k {
+            _ if n >= 190 => cut_off,
+            0 if n >= 80 => min + share(n) * (max - min) + 3.0 * channel.largest_jump,
+            1 if n >= 110 => cut_off,
+            2 if n >= 130 => f64::from(NO_VOLTS),
+            3 if n >= 150 => min,
+            _ => min + share(n) * (max - min),
+        } as f32;
+    }
+    out
+}
+
+/// The self-test of several gauges: their samples, every kind of loss, and the computer's answers.
+pub(crate) fn array<const N: usize>(
+    calibration: &ArrayCalibration<N>,
+) -> Result<String, ExportError> {
+    let receptor = ArrayReceptor::<f32, N>::new(calibration);
+    let exact = ArrayReceptor::<f64, N>::new(calibration);
+    let (mut memory, mut rows) = (receptor.memory(), Rows::default());
+    let (mut exact_memory, mut rounding, mut errors) = (exact.memory(), Rounding::default(), 0.0);
+    for n in 0..SAMPLES {
+        let volts = array_samples(calibration, n);
+        let answer = receptor.step(&mut memory, volts);
+        let double = exact.step(&mut exact_memory, volts.map(f64::from));
+        if let (Ok(single), Ok(double)) = (&answer, double)
+            && single.lost == double.lost
+        {
+            rounding.add(single.estimate, double.estimate);
+            errors += double.sd;
+        }
+        let status = match answer {
+            Ok(_) => 0,
+            Err(ArrayWithheld::Warming) => 1,
+            Err(ArrayWithheld::AllLost) => 3,
+            Err(_) => 2,
+        };
+        let (estimate, sd, lost, clamped) =
+            answer.map_or((0.0, 0.0, 0, false), |r| (r.estimate, r.sd, r.lost, r.clamped));
+        let flags = status | u8::from(clamped) << 2;
+        let volts = volts[..calibration.spec().channels.len()].iter().map(|x| format!("{x:?}f"));
+        let volts = volts.collect::<Vec<_>>().join(", ");
+        rows.push(&format!("{{{{{volts}}}, {estimate:?}f, {sd:?}f, {lost}u, {flags}}}"));
+    }
+    rounding.check(errors / SAMPLES as f64, &calibration.spec().reference)?;
+    let fields =
+        "float volts[STRETCH_CHANNELS];\n    float estimate;\n    float sd;\n    uint16_t lost;";
+    let unlike = format!(
+        "reading.lost != samples[n].lost || {} ||\n            {}",
+        differs("estimate"),
+        differs("sd")
+    );
+    Ok(kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[]))
+}
+
 /// Whether a number of a reading is not that of a row.
-pub(crate) fn differs(number: &str) -> String {
+fn differs(number: &str) -> String {
     format!("reading.{number} < samples[n].{number} || reading.{number} > samples[n].{number}")
 }
 
 /// Rows of the table, as many on a line as fit.
 #[derive(Default)]
-pub(crate) struct Rows {
+struct Rows {
     done: String,
     line: String,
 }
 
 impl Rows {
-    pub(crate) fn push(&mut self, row: &str) {
+    fn push(&mut self, row: &str) {
         if self.line.len() + row.len() > 90 {
             self.end_line();
         }
@@ -190,7 +258,7 @@ impl Rows {
 
     /// The table and the test: the fields of a row, that which is the input, what of a reading stands in the flags
     /// beside its status, and what must not hold.
-    pub(crate) fn text(mut self, fields: &str, input: &str, flags: &str, differs: &str) -> String {
+    fn text(mut self, fields: &str, input: &str, flags: &str, differs: &str) -> String {
         self.end_line();
         let sample = format!(
             "#define STRETCH_SELF_TEST {SAMPLES}\n\ntypedef struct stretch_sample {{\n    {fields}\n    \

@@ -1,12 +1,13 @@
 //! `diagnosed` and `diagnosed+rest` in `float`.
 
-use stretch_core::{Calibration, RestLevel};
+use stretch_core::Calibration;
 use stretch_receptor::{
     Defects, DiagnosedReceptor,
     model::Diagnosed,
     numbers::{Bound, LEAST_ANSWER, LEAST_RUN, SMOOTH},
 };
 
+use super::observer::define_rest;
 use crate::{ExportError, constants::Constants, part::Part};
 
 /// The constants and the step of a gauge with named defects: of those that it has.
@@ -39,15 +40,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     }
     if model.rest.follows() {
         has.push("rest");
-        let RestLevel { level, pull, leak, average, furthest, most } = model.rest;
-        constants
-            .define("AT_REST", model.at_rest, "the signal where the target rests, memory settled")
-            .define("REST_LEVEL", level, "the resting signal")
-            .define("REST_PULL", pull, "the share of an excess below rest that is taken up")
-            .define("REST_LEAK", leak, "what the baseline rises by otherwise")
-            .define("REST_AVERAGE", average, "share of a sample in the running average")
-            .define("REST_MOST", most, "what an excess counts for at most")
-            .define("REST_FURTHEST", furthest, "the furthest that the baseline goes");
+        define_rest(&mut constants, model.at_rest, model.rest);
     }
     Ok(Part {
         model: if model.rest.follows() { "diagnosed+rest" } else { "diagnosed" }.into(),

@@ -1,9 +1,10 @@
-//! `linear`, `poly13` and `curve` in `float`.
+//! `linear` and `poly13`, in integers and in `float`; `curve` in `float`.
 
-use stretch_core::{Branch, Calibration, Poly13, RateEstimator};
+use stretch_core::{Branch, Calibration, Poly13, RateEstimator, fixed::FixedPoly13};
 use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::{
     ReceptorError, StretchReceptor,
+    code::{CodeMap, CodeSurface, FixedNumbers, Scaled, Span},
     numbers::{Line, Map, RangedSurface},
 };
 
@@ -13,9 +14,77 @@ use crate::{
     part::Part,
 };
 
-/// What stands before and after the surface.
-const RATE: &str = include_str!("../c/surfaces_float.h");
-const STEP: &str = include_str!("../c/surfaces_float_step.h");
+/// The constants and the step of a converted calibration.
+pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
+    let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
+    let adc_bits = u32::from((*adc_bits).min(16));
+    let (factor, shift) = (rate.change_factor, rate.change_shift);
+    let mut constants = Constants::default();
+    constants
+        .define("CODES", 1u32 << adc_bits, "the first number that is no code")
+        .define("ALIGN", 1u32 << (16 - adc_bits), "moves a code to the upper end of 16 bits")
+        .define("WINDOW", rate.window as i32, "samples")
+        .define("DEGREE", rate.degree as i32, "of the polynomial that gives the rate");
+    for k in 0..=rate.degree {
+        constants.define(&format!("WEIGHT_{k}"), rate.weights[k], "");
+    }
+    for k in 1..=rate.degree {
+        constants.define(&format!("CHOOSE_{k}"), rate.choose[k] as u32, "");
+    }
+    let half = if rate.shift == 0 { 0 } else { 1i64 << (rate.shift - 1) };
+    constants
+        .define("SHIFT", rate.shift as i32, "low bits of the weighted sum that are rounded away")
+        .define("HALF", half, "")
+        .define("CHANGE", factor, "from a rate to a change a sample")
+        .define("CHANGE_SHIFT", shift as i32, "")
+        .define("DEAD_BAND", *dead_band as u32, "the largest rate that keeps the branch")
+        .define(
+            "MIRROR",
+            if *falling { u32::MAX } else { 0 },
+            "all ones where a rising signal means a falling target",
+        );
+    let (model, surface) = match surfaces {
+        CodeMap::Line(ranged) => {
+            let Scaled { of, thousandths } = ranged.surface;
+            let (intercept, slope) = <(i32, i32)>::from(of);
+            let signal = span(&ranged.signal);
+            let line = [thousandths, intercept, slope].map(|n| n.c()).join(", ");
+            constants.surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
+            ("linear", include_str!("../c/line_fixed.h"))
+        }
+        CodeMap::Poly13([inflation, deflation]) => {
+            constants.surfaces(&[poly13_fixed(inflation), poly13_fixed(deflation)]);
+            ("poly13", include_str!("../c/poly13_fixed.h"))
+        }
+    };
+    Part {
+        model: model.into(),
+        constants: constants.into_text(),
+        step: vec![
+            include_str!("../c/fixed.h"),
+            include_str!("../c/surfaces_fixed.h"),
+            surface,
+            include_str!("../c/surfaces_fixed_step.h"),
+        ],
+        has: Vec::new(),
+    }
+}
+
+fn span(span: &Span) -> String {
+    format!("{{{}, {}, {}}}", span.min.c(), span.width.c(), span.factor.c())
+}
+
+/// The surface of one branch with its ranges.
+fn poly13_fixed(ranged: &CodeSurface<Scaled<FixedPoly13>>) -> String {
+    let Scaled { of, thousandths } = ranged.surface;
+    // all of them integers of 32 bits: nothing is lost
+    let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = of.coefficients();
+    let ordered = [p11, p12, p10, p00, p02, p03, p01].map(|p| p as i32);
+    let ordered = ordered.map(|p| p.c()).join(", ");
+    let (signal, rate) = (span(&ranged.signal), span(&ranged.rate));
+    let domain = format!("{}, {signal}, {rate}, {}", ranged.centre, thousandths.c());
+    format!("{{{domain}, \\\n         {{{ordered}}}}}")
+}
 
 /// The constants and the step of a line, of surfaces without a term beyond poly13, or of a curve.
 pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportError> {
@@ -55,7 +124,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             ("linear", include_str!("../c/line_float.h"))
         }
         Map::Poly13([inflation, deflation]) => {
-            constants.surfaces(&[poly13(inflation), poly13(deflation)]);
+            constants.surfaces(&[poly13_float(inflation), poly13_float(deflation)]);
             ("poly13", include_str!("../c/poly13_float.h"))
         }
         Map::Surface([curve, _]) if calibration.spec().model.needs_signal_only() => {
@@ -81,9 +150,9 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         step: vec![
             include_str!("../c/float.h"),
             include_str!("../c/float_reading.h"),
-            RATE,
+            include_str!("../c/surfaces_float.h"),
             surface,
-            STEP,
+            include_str!("../c/surfaces_float_step.h"),
             include_str!("../c/float_end.h"),
         ],
         has: Vec::new(),
@@ -91,7 +160,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
 }
 
 /// The surface of one branch with its ranges.
-fn poly13(ranged: &RangedSurface<f32, Poly13<f32>>) -> String {
+fn poly13_float(ranged: &RangedSurface<f32, Poly13<f32>>) -> String {
     let RangedSurface { signal, rate, offset, rate_offset, surface } = *ranged;
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = surface;
     let join = |numbers: &[f32]| numbers.iter().map(Literal::c).collect::<Vec<_>>().join(", ");

@@ -1,0 +1,148 @@
+//! `observer` and `observer+rest`, in integers and in `float`.
+
+use stretch_core::{Calibration, RestLevel};
+use stretch_receptor::{
+    ObserverReceptor,
+    code::{IntegerObserver, RestNumbers},
+};
+
+use crate::{
+    ExportError,
+    constants::{Constants, Literal},
+    part::Part,
+};
+
+/// The constants and the step of a converted observer.
+pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
+    let IntegerObserver { numbers: n, recips, recip_bits, tangents, at_rest } = observer;
+    let adc_bits = u32::from(n.adc_bits.min(16));
+    let per_code = 1i32 << (16 - adc_bits + 12);
+    let knots = usize::from(n.knots);
+    let follows = n.rest.pull != 0;
+    let mut constants = Constants::default();
+    constants
+        .define("CODES", 1u32 << adc_bits, "the first number that is no code")
+        .define("SIGNAL_PER_CODE", if n.falling { -per_code } else { per_code }, "")
+        .define("KNOTS", knots as i32, "of the curve from drive to signal")
+        .array("int32_t", "curve", &n.curve[..knots])
+        .array("int32_t", "recips", &recips[..knots])
+        .define("RECIP_BITS", *recip_bits as i32, "places per signal, times 2 to this: recips")
+        .array(
+            "int32_t",
+            "tangents",
+            &tangents[..knots].iter().map(|&t| t.into()).collect::<Vec<i32>>(),
+        )
+        .define("DRIVE_LOW", n.drive_low, "the drive of the first knot")
+        .define("PER_STEP", n.per_step, "places per drive");
+    constants.define("LEAD", n.lead, "samples by which the signal leads");
+    define_memory(
+        &mut constants,
+        "int32_t",
+        [n.relaxations.into(), n.plays.into()],
+        [&n.shares, &n.amplitudes, &n.radii, &n.play_weights],
+    );
+    constants
+        .define("SLOPES", n.gains.len() as i32, "that there are gains for")
+        .array("int32_t", "ends", &n.ends)
+        .rows("int32_t", "gains", &n.gains)
+        .define("GAIN_BITS", i32::from(n.gain_bits), "state per signal, times 2 to this: gains")
+        .define("GAIN_HALF", (1i64 << n.gain_bits) >> 1, "")
+        .define("LOW", n.low, "the least target")
+        .define("HIGH", n.high, "the greatest")
+        .define("DEAD_BAND", n.dead_band, "the largest rate that keeps the branch")
+        .define("ZERO", n.zero, "the output at a target of 0")
+        .define("GAIN", n.gain, "the output per target")
+        .define("OUTPUT_SHIFT", 26 + i32::from(n.output_bits), "")
+        .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
+    if follows {
+        let RestNumbers { level, pull, leak, average, most, furthest } = n.rest;
+        let rest = RestLevel { level, pull, leak, average, furthest, most };
+        define_rest(&mut constants, *at_rest, rest);
+    }
+    Part {
+        model: if follows { "observer+rest" } else { "observer" }.into(),
+        constants: constants.into_text(),
+        step: vec![include_str!("../c/fixed.h"), include_str!("../c/observer_fixed.h")],
+        has: Vec::new(),
+    }
+}
+
+/// A secant is taken over at least this share of the way between knots, as in the receptor.
+const LEAST_RUN: f32 = 0.01;
+
+/// The constants and the step of an observer.
+pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportError> {
+    let receptor = ObserverReceptor::<f32>::new(calibration)?;
+    let o = receptor.model();
+    let follows = o.rest.follows();
+    let mut constants = Constants::default();
+    constants
+        .define("SIGN", o.sign, "-1 where the signal falls as the target rises")
+        .define("PERIOD_S", o.period_s, "from a sample to the next")
+        .define("KNOTS", o.knots as i32, "of the curve from drive to signal")
+        .array("float", "curve", &o.curve[..o.knots])
+        .define("DRIVE_LOW", o.drive_low, "the drive of the first knot")
+        .define("DRIVE_STEP", o.drive_step, "from knot to knot")
+        .define("PER_STEP", o.per_step, "its reciprocal")
+        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "the least that a secant is taken over");
+    constants.define("LEAD_S", o.lead_s, "seconds by which the signal leads");
+    define_memory(
+        &mut constants,
+        "float",
+        [o.relaxations as i32, o.plays as i32],
+        [&o.shares, &o.amplitudes, &o.radii, &o.play_weights],
+    );
+    constants
+        .define("SLOPES", o.gains.len() as i32, "that there are gains for")
+        .array("float", "ends", &o.ends)
+        .rows("float", "gains", &o.gains)
+        .define("LOW", o.low, "the least target")
+        .define("HIGH", o.high, "the greatest")
+        .define("DEAD_BAND", o.dead_band, "the largest rate of the target that keeps the branch")
+        .define("ZERO", o.zero, "the reference at a target of 0")
+        .define("GAIN", o.gain, "the reference per target")
+        .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
+    if follows {
+        define_rest(&mut constants, o.at_rest, o.rest);
+    }
+    Ok(Part {
+        model: if follows { "observer+rest" } else { "observer" }.into(),
+        constants: constants.into_text(),
+        step: vec![
+            include_str!("../c/float.h"),
+            include_str!("../c/float_reading.h"),
+            include_str!("../c/observer_float.h"),
+            include_str!("../c/float_end.h"),
+        ],
+        has: Vec::new(),
+    })
+}
+
+/// What the gauge remembers. C has no arrays of nothing: those that are not used stay, as zeros.
+fn define_memory<L: Literal>(
+    constants: &mut Constants,
+    kind: &str,
+    [relaxations, plays]: [i32; 2],
+    [shares, amplitudes, radii, play_weights]: [&[L]; 4],
+) {
+    constants
+        .define("RELAXATIONS", relaxations, "")
+        .array(kind, "shares", shares)
+        .array(kind, "amplitudes", amplitudes)
+        .define("PLAYS", plays, "")
+        .array(kind, "radii", radii)
+        .array(kind, "play_weights", play_weights);
+}
+
+/// The baseline that is followed at rest.
+pub(super) fn define_rest<L: Literal>(constants: &mut Constants, at_rest: L, rest: RestLevel<L>) {
+    let RestLevel { level, pull, leak, average, furthest, most } = rest;
+    constants
+        .define("AT_REST", at_rest, "the signal where the target rests, memory settled")
+        .define("REST_LEVEL", level, "the resting signal")
+        .define("REST_PULL", pull, "the share of an excess below rest that is taken up")
+        .define("REST_LEAK", leak, "what the baseline rises by otherwise")
+        .define("REST_AVERAGE", average, "share of a sample in the running average")
+        .define("REST_MOST", most, "what an excess counts for at most")
+        .define("REST_FURTHEST", furthest, "the furthest that the baseline goes");
+}

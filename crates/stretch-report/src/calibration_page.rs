@@ -2,6 +2,7 @@
 
 use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, ModelKind, TrialErrors};
 use stretch_data::listed;
+use stretch_problem::in_words;
 
 use super::{
     branch::BranchView,
@@ -10,13 +11,15 @@ use super::{
         signal_table,
     },
     canvas::Ink,
+    diagnosis_page::{diagnosis_sections, diagnosis_title},
     error_figure::{Against, error_figure, residual_figure},
-    estimate_figure::{closest_look, estimate_figure, estimate_picture},
+    estimate_figure::{closest_look, estimate_figure},
+    first_seconds::headline,
     markup::{fixed, number, with_unit},
     memory_figure::{loop_figure, remembers, step_figure},
     page::Page,
-    slice_figure::slice_figure,
-    surface_figure::surface_figure,
+    subject::Subject,
+    surface_figure::{slice_figure, surface_figure},
 };
 
 /// Most trials whose curves are drawn; the tables hold all trials.
@@ -75,7 +78,7 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
 pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> String {
     let names = method_names(calibrated, evaluation);
     let first = evaluation.trials.first();
-    first.map_or_else(String::new, |trial| estimate_picture(evaluation, trial, &names))
+    first.map_or_else(String::new, |trial| closest_look(evaluation, trial, &names).standalone())
 }
 
 /// The result in one sentence.
@@ -324,4 +327,20 @@ fn recordings(names: &[String]) -> String {
         }
         _ => listed(names),
     }
+}
+
+/// The report of a demonstration as one HTML file: a calibration, and the diagnosis of the difference between simulator and rig. Each part has the
+/// content of its own page.
+pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
+    let worded = in_words(subject.diagnosis);
+    let subject = &Subject { diagnosis: &worded, ..*subject };
+    // where the second part begins
+    let diagnosis = "diagnosis";
+    let both = format!("{} {}", calibration_verdict(judged), headline(subject));
+    let mut page = Page::new(&judged.context.title, &both);
+    page.jump(diagnosis, "Go to the diagnosis");
+    calibration_sections(&mut page, judged);
+    page.part(diagnosis, &diagnosis_title(subject), &headline(subject));
+    diagnosis_sections(&mut page, subject);
+    page.finish()
 }

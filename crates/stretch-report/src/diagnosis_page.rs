@@ -7,27 +7,23 @@ use stretch_sim::Language;
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure, picking_figure},
-    by_trial_tables::{difference_table, run_table},
     canvas::Ink,
     diagnosis_tables::{
-        baseline_table, candidate_numbers_table, candidate_table, parameter_table, slice_table,
-        stage_table, transfer_table,
+        baseline_table, candidate_numbers_table, candidate_table, difference_table, limit_table,
+        parameter_table, run_table, slice_table, stage_table, transfer_in_words, transfer_table,
     },
     figure::Figure,
     first_seconds::{GIVEN, causes, facts, headline},
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, shown, trace_figures,
     },
-    limit_table::limit_table,
     live::Pick,
-    markup::{number, percent},
-    multiple::multiple,
+    markup::{multiple, number, percent},
     output_table::output_table,
     page::Page,
     subject::Subject,
     turn_figure::turn_figure,
 };
-use crate::plain::transfer_in_words;
 
 /// Most candidates that are drawn.
 const DRAWN: usize = 6;

@@ -1,15 +1,16 @@
 //! The tables of a diagnosis's report.
 
+use stretch_data::listed;
 use stretch_gap::{
-    Baselines, Candidate, Diagnosis, EffectStability, EffectValue, SliceGap, StageGap, Transfer,
+    Baselines, Candidate, DetectionLimit, Diagnosis, EffectStability, EffectValue, Identified,
+    Knowledge, SliceGap, StageGap, Transfer, TransferError,
 };
+use stretch_problem::{ByTrial, RunFit};
 
-use super::multiple::{both, times};
 use super::{
-    markup::{NONE, fixed, number, percent, shown_unit, with_unit},
+    markup::{NONE, both, fixed, number, percent, shown_unit, times, with_unit},
     page::Table,
 };
-use crate::plain::{LINE, SURFACE, methods};
 
 fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
     format!("{} .. {}", text(low), text(high))
@@ -148,4 +149,113 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
         format!("{stage}: what is left by slice in multiples of the noise, re-tuned, all trials");
     let head = ["Slice", "Share of the gap", "Left", "95 % interval", "Stands out"];
     (!rows.is_empty()).then(|| Table::new(caption, &head, rows))
+}
+
+/// A table of how strong each effect would have to be to be named, with the parameter that says so.
+///
+/// ```
+/// use stretch_gap::DetectionLimit;
+/// use stretch_report::limit_table;
+/// let strength = Some(0.0123);
+/// let limit = DetectionLimit { effect: "creep".into(), parameter: "c".into(), strength, unit: "1".into(), others: Default::default() };
+/// assert_eq!(limit_table(&[limit]).rows[0], ["creep", "c", "0.0123"]);
+/// ```
+pub fn limit_table(limits: &[DetectionLimit]) -> Table {
+    let row = |limit: &DetectionLimit| {
+        let strength =
+            limit.strength.map(|strength| with_unit(&number(strength, 3), shown_unit(&limit.unit)));
+        let none = || "none within its range".to_owned();
+        vec![limit.effect.clone(), limit.parameter.clone(), strength.unwrap_or_else(none)]
+    };
+    Table::new(
+        "Detection limits: the strength at which each effect would be named on these data with probability 0.9, \
+         the simulator being right otherwise",
+        &["Effect", "Parameter", "Limit"],
+        limits.iter().map(row),
+    )
+}
+
+/// Every value of every run with its 95 % interval, and whether the run determines it.
+pub fn run_table(by_trial: &ByTrial) -> Table {
+    let head = ["value", "run", "fitted", "from", "to", "unit", "determined"];
+    let all: Vec<&RunFit> = std::iter::once(&by_trial.all).chain(&by_trial.runs).collect();
+    let row = |fit: &RunFit, i: usize| {
+        let v = &fit.values[i];
+        let numbers = [v.value, v.interval[0], v.interval[1]].map(|x| number(x, 4));
+        let texts = [v.identified.name.clone(), fit.run.clone()];
+        let behind = [v.identified.unit.clone(), knowledge(&v.identified)];
+        texts.into_iter().chain(numbers).chain(behind).collect::<Vec<String>>()
+    };
+    let values = 0..by_trial.all.values.len();
+    let rows = values.flat_map(|i| all.iter().map(move |fit| row(fit, i)));
+    Table::new("Every run by itself, with 95 % intervals", &head, rows.collect::<Vec<_>>())
+}
+
+fn knowledge(value: &Identified) -> String {
+    match value.knowledge {
+        Knowledge::Determined => "yes".to_owned(),
+        _ if !value.like.is_empty() => format!("only with {}", value.like.join(", ")),
+        Knowledge::Weakly => "weakly".to_owned(),
+        Knowledge::Not => "no".to_owned(),
+        Knowledge::Dead => "no, it does nothing".to_owned(),
+    }
+}
+
+/// Whether each value is the same in all runs.
+pub fn difference_table(by_trial: &ByTrial) -> Table {
+    let head = ["value", "runs", "mean", "from", "to", "Q", "beyond intervals", "P", "agrees"];
+    let rows = by_trial.values.iter().map(|v| {
+        let [low, high] = v.range;
+        let numbers = [v.mean, low, high, v.q].map(|x| number(x, 4));
+        let agrees = if v.differs { "no" } else { "yes" };
+        let p = number(v.p_corrected, 2);
+        let behind = [percent(v.i_squared), p, agrees.to_owned()];
+        let front = [v.name.clone(), v.runs.to_string()];
+        front.into_iter().chain(numbers).chain(behind).collect::<Vec<String>>()
+    });
+    Table::new("Whether the runs agree", &head, rows.collect::<Vec<_>>())
+}
+
+/// Difference of two errors, in percent of full scale, below which the errors count as equal.
+const ALIKE: f64 = 0.05;
+
+/// The calibrations that a transfer tries, `linear` and `poly13`.
+const LINE: &str = "linear";
+const SURFACE: &str = "non-linear";
+
+/// What the effect costs a calibration where its table does not say it: that it is too small to matter to any, or why a calibration errs more with
+/// the better simulator; `None` where the table says it all.
+pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
+    let kinds = [(LINE, &transfer.linear), (SURFACE, &transfer.poly13)];
+    let gain = |e: &TransferError| e.sim - e.sim_with_effect;
+    if kinds.iter().all(|(_, e)| gain(e).abs() <= ALIKE) {
+        let most = kinds.iter().map(|(_, e)| gain(e).abs()).fold(0.0, f64::max);
+        return Some(format!(
+            "What was found is too small to matter to a calibration: trained with it or without, the errors differ by {most:.2} % \
+             of full scale at most."
+        ));
+    }
+    let worse: Vec<String> = kinds
+        .iter()
+        .filter(|(_, e)| gain(e) < -ALIKE)
+        .map(|(name, _)| (*name).to_owned())
+        .collect();
+    (!worse.is_empty()).then(|| {
+        format!(
+            "Trained with the effect, the {} calibration does worse here although the simulator is closer to the rig: a \
+             calibration without memory cannot hold what the effect does. It learns the mean of it over the training \
+             motion, which is not that of the test motion; the wrong parameters that stood in for the effect happened to \
+             be nearer.",
+            listed(&worse)
+        )
+    })
+}
+
+/// Simpler methods in words, each with the effect that it named.
+fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
+    [
+        ("largest drop of the error, parameters as shipped", said.largest_drop.as_deref()),
+        ("likeness of a one-step signature", said.signature.as_deref()),
+        ("BIC alone", said.bic.as_deref()),
+    ]
 }

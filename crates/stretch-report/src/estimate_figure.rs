@@ -9,7 +9,7 @@ use super::{
     figure::{Figure, FigureSize, lines_figure},
     live::TimePlot,
     markup::{number, with_unit},
-    thin::{curve, extent},
+    thin::extent,
 };
 
 /// Length of the window of [`closest_look`], in seconds.
@@ -75,30 +75,17 @@ fn y_label(evaluation: &Evaluation) -> String {
     label.trim_end_matches(',').to_owned()
 }
 
-/// A picture that stands alone, as in a README, in light colours with its legend inside.
-pub(crate) fn estimate_picture(
-    evaluation: &Evaluation,
-    trial: &TrialErrors,
-    names: &[String],
-) -> String {
-    closest_look(evaluation, trial, names).standalone()
-}
-
 fn window_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
     names: &[String],
     window: &Range<f64>,
 ) -> Figure {
-    let lines = |bins: usize| {
-        let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins);
-        let estimates = trial.estimates.iter().enumerate();
-        // the reference is a broad line below, so that a correct estimate lies inside it
-        let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
-        let reference = [(Ink::Truth, broad, thin(&trial.reference))];
-        let estimates = estimates.map(|(i, y)| (Ink::of(i), 1.4, thin(y)));
-        reference.into_iter().chain(estimates).collect()
-    };
+    // the reference is a broad line below, so that a correct estimate lies inside it
+    let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
+    let estimates = trial.estimates.iter().enumerate();
+    let mut lines = vec![(Ink::Truth, broad, &trial.reference[..])];
+    lines.extend(estimates.map(|(i, y)| (Ink::of(i), 1.4, &y[..])));
     let from_to = [window.start, window.end].map(|t| number(t, 3)).join(" to ");
     let description = format!(
         "Reference and estimates of {} over time, from {from_to} s; unit: {}",
@@ -106,10 +93,10 @@ fn window_figure(
     );
     let y_label = y_label(evaluation);
     let axes = (window, 0.04, ["time, s", &*y_label]);
-    let frames = [(FigureSize::NARROW, lines(360)), (FigureSize::WIDE, lines(750))];
+    let heights = [FigureSize::NARROW, FigureSize::WIDE].map(|frame| frame.height);
     let missing = "Reference and estimates hold no number here.";
     let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
-    let figure = lines_figure(&description, axes, frames, missing);
+    let figure = lines_figure(&description, axes, heights, (&trial.time_s, &lines), missing);
     if figure.missing.is_some() {
         return figure;
     }

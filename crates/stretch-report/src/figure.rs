@@ -11,7 +11,7 @@ use plotters::{
 use super::{
     canvas::{Canvas, Ink, STEPS},
     markup::{escape, number, tick},
-    thin::{extent, padded},
+    thin::{curve, extent, padded},
 };
 
 /// Font size of words and numbers, in pixels of the figure.
@@ -184,23 +184,30 @@ impl Axes {
     }
 }
 
-/// Lines over time: each with its ink, its width in pixels, and its pieces.
-pub(crate) type Lines = Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)>;
+/// A line over time: its ink, its width in pixels, and its values.
+pub(crate) type Line<'a> = (Ink, f64, &'a [f64]);
 
-/// Lines in two frames, the frame for phones first, on axes that hold all lines; `missing` where there is no number.
+/// Lines over time in two frames of these heights, the frame for phones first, on axes that hold all lines; `missing` where there is no number.
 pub(crate) fn lines_figure(
     description: &str,
     (x, pad, labels): (&Range<f64>, f64, [&str; 2]),
-    frames: [(FigureSize, Lines); 2],
+    [narrow, wide]: [u32; 2],
+    (time, lines): (&[f64], &[Line<'_>]),
     missing: &str,
 ) -> Figure {
-    let points = frames[1].1.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());
+    let pieces = |bins: usize| {
+        let thin = move |&(ink, width, y): &Line<'_>| (ink, width, curve(time, y, x, bins));
+        lines.iter().map(thin).collect::<Vec<_>>()
+    };
+    let [for_phones, for_desktops] = [360, 750].map(pieces);
+    let points = for_desktops.iter().flat_map(|(.., pieces)| pieces.iter().flatten());
     let Some(y) = extent(points.map(|(_, y)| *y)) else {
         return Figure::missing(missing);
     };
     let axes = Axes::new(x.clone(), padded(&y, pad), labels);
-    frames.into_iter().fold(Figure::new(description), |figure, (frame, lines)| {
-        figure.draw(frame, |area| {
+    let frames = [(400, narrow, for_phones), (880, wide, for_desktops)];
+    frames.into_iter().fold(Figure::new(description), |figure, (width, height, lines)| {
+        figure.draw(FigureSize { width, height }, |area| {
             plot(area, &axes, |chart| {
                 for (ink, width, pieces) in lines {
                     for piece in pieces {

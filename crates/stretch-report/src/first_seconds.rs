@@ -6,8 +6,7 @@ use stretch_gap::{Diagnosis, Gross, VerdictKind};
 use stretch_problem::effect_in_words;
 
 use super::{
-    markup::{number, percent, shown_unit, with_unit},
-    multiple::multiple,
+    markup::{multiple, number, percent, shown_unit, with_unit},
     subject::Subject,
 };
 

@@ -8,11 +8,11 @@ use super::{
     bar_figure::GAP,
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Figure, FigureSize, lines_figure},
+    figure::{Figure, Line, lines_figure},
     live::TimePlot,
     markup::labelled,
     subject::Subject,
-    thin::{curve, padded, quantile, sorted},
+    thin::{padded, quantile, sorted},
 };
 
 /// Length of the window that is drawn, s.
@@ -65,18 +65,16 @@ pub(crate) fn trace_figures(
     let span = trial.clone();
     let measured = &subject.simulator.measured(stage)[trial.clone()];
     let after = has_after(subject);
-    let mut lines = vec![
-        (Ink::Truth, 3.2, measured.to_vec()),
-        (BEFORE, 1.5, evidence.retuned[trial.clone()].to_vec()),
-    ];
-    let mut left = vec![(BEFORE, 1.4, evidence.residual_retuned[trial.clone()].to_vec())];
+    let mut lines =
+        vec![(Ink::Truth, 3.2, measured), (BEFORE, 1.5, &evidence.retuned[trial.clone()])];
+    let mut left = vec![(BEFORE, 1.4, &evidence.residual_retuned[trial.clone()])];
     let mut legend = vec![
         (Ink::Truth, "measured".to_owned()),
         (BEFORE, "simulated, parameters re-tuned".to_owned()),
     ];
     if after {
-        lines.push((AFTER, 1.5, evidence.after[trial.clone()].to_vec()));
-        left.push((AFTER, 1.4, evidence.residual_after[trial.clone()].to_vec()));
+        lines.push((AFTER, 1.5, &evidence.after[trial.clone()]));
+        left.push((AFTER, 1.4, &evidence.residual_after[trial.clone()]));
         legend.push((AFTER, format!("simulated, {}", after_name(subject.diagnosis))));
     }
     let name = labelled(&spec.channel, &spec.unit);
@@ -84,8 +82,8 @@ pub(crate) fn trace_figures(
     let keys = [("level", motion.to_vec()), ("rate", rates(subject, motion))]
         .map(|(key, values)| (key, values.get(span.clone()).unwrap_or_default().to_vec()));
     let names: Vec<&str> = legend.iter().map(|(_, name)| name.as_str()).collect();
-    let live = |lines: &[(Ink, f64, Vec<f64>)], names: &[&str], is_first: bool| {
-        let lines = lines.iter().zip(names).map(|((ink, w, y), name)| (*name, *ink, *w, &y[..]));
+    let live = |lines: &[Line<'_>], names: &[&str], is_first: bool| {
+        let lines = lines.iter().zip(names).map(|(&(ink, w, y), name)| (*name, ink, w, y));
         TimePlot {
             link: GAP.to_owned(),
             labels: [TIME, if is_first { &name } else { LEFT }],
@@ -102,17 +100,11 @@ pub(crate) fn trace_figures(
     };
     let (whole, whole_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
     let left_legend = legend[1..].to_vec();
-    let figure = |lines: &[(Ink, f64, Vec<f64>)], name: &str, height: u32| {
-        let thin = |bins: usize| {
-            lines.iter().map(|(ink, w, y)| (*ink, *w, curve(time, y, window, bins))).collect()
-        };
-        let frames = [
-            (FigureSize { width: 400, height: height.min(250) }, thin(360)),
-            (FigureSize { width: 880, height }, thin(750)),
-        ];
+    let figure = |lines: &[Line<'_>], name: &str, height: u32| {
         let description = format!("{name} over time, eight seconds of a test trial");
         let axes = (window, 0.06, [TIME, name]);
-        lines_figure(&description, axes, frames, "There is no number here.")
+        let heights = [height.min(250), height];
+        lines_figure(&description, axes, heights, (time, lines), "There is no number here.")
     };
     let top = figure(&lines, &name, 280).legend(legend).live(whole);
     (top, figure(&left, LEFT, 190).legend(left_legend).live(whole_left))

@@ -2,11 +2,9 @@
 
 mod bar_figure;
 mod branch;
-mod by_trial_tables;
 mod calibration_page;
 mod calibration_tables;
 mod canvas;
-mod demo_page;
 mod diagnosis_page;
 mod diagnosis_tables;
 mod dots_figure;
@@ -15,38 +13,46 @@ mod estimate_figure;
 mod figure;
 mod first_seconds;
 mod gap_figures;
-pub mod kit;
-mod limit_table;
 mod live;
 mod markup;
 mod memory_figure;
-mod multiple;
 mod output_table;
 mod page;
-mod plain;
 mod predict_page;
 mod script;
-mod slice_figure;
 mod subject;
 mod surface_figure;
 mod thin;
 mod turn_figure;
 
-pub use by_trial_tables::{difference_table, run_table};
-pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
-pub use demo_page::demo_page;
+pub use calibration_page::{Context, Judged, calibration_page, demo_page, readme_picture};
 pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{
-    baseline_table, candidate_numbers_table, candidate_table, stage_table, transfer_table,
+    baseline_table, candidate_numbers_table, candidate_table, difference_table, limit_table,
+    run_table, stage_table, transfer_in_words, transfer_table,
 };
-pub use limit_table::limit_table;
-pub use markup::percent;
-pub use multiple::times;
+pub use markup::{percent, plain_number as number, times};
 pub use output_table::output_table;
 pub use page::Table;
-pub use plain::{number, transfer_in_words};
 pub use predict_page::{predict_page, predict_table};
 pub use subject::Subject;
+
+pub mod kit {
+    //! Parts for the pages of other crates: the frame of a page, its figures, and its numbers.
+    //!
+    //! Figures are drawn with `plotters`, whose types appear in [`Area`] and [`Chart`]: a crate that draws with these
+    //! types needs the same version of `plotters`.
+
+    pub use crate::{
+        bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
+        canvas::{Canvas, Ink, STEPS},
+        figure::{
+            Area, Axes, Chart, Drawn, Figure, FigureSize, TEXT_PX, dot, plot, px, stroke, words,
+        },
+        markup::{escape, fixed, number, percent},
+        page::{Page, Table},
+    };
+}
 
 #[cfg(test)]
 mod tests;

@@ -3,8 +3,7 @@
 use stretch_gap::{Diagnosis, ParameterShift, Simulator};
 
 use super::{
-    markup::{NONE, number, shown_unit, with_unit},
-    multiple::times,
+    markup::{NONE, number, shown_unit, times, with_unit},
     page::Table,
 };
 

@@ -6,11 +6,10 @@ use stretch_problem::{PredictedOutput, Prediction};
 
 use super::{
     canvas::Ink,
-    figure::{Figure, FigureSize, lines_figure},
+    figure::{Figure, lines_figure},
     gap_figures::{AFTER, BEFORE, worst_window},
     markup::{labelled, number},
     page::{Page, Table},
-    thin::curve,
 };
 
 /// The report as a page.
@@ -72,23 +71,17 @@ pub fn predict_table(prediction: &Prediction) -> Table {
 fn traces(prediction: &Prediction, output: &PredictedOutput, window: &Range<f64>) -> Figure {
     let time: Vec<f64> = (0..output.measured.len()).map(|i| i as f64 * prediction.dt_s).collect();
     let lines = [
-        (Ink::Truth, 3.2, &output.measured),
-        (BEFORE, 1.5, &output.without),
-        (AFTER, 1.5, &output.with),
-    ];
-    let thin = |bins: usize| {
-        lines.iter().map(|(ink, w, y)| (*ink, *w, curve(&time, y, window, bins))).collect()
-    };
-    let frames = [
-        (FigureSize { width: 400, height: 250 }, thin(360)),
-        (FigureSize { width: 880, height: 280 }, thin(750)),
+        (Ink::Truth, 3.2, &output.measured[..]),
+        (BEFORE, 1.5, &output.without[..]),
+        (AFTER, 1.5, &output.with[..]),
     ];
     let name = labelled(&output.column, &output.unit);
     let axes = (window, 0.06, ["time in the recording, s", &*name]);
     let description = format!("{name} over time, measured and predicted");
-    lines_figure(&description, axes, frames, "There is no number here.").legend(vec![
-        (Ink::Truth, "measured".to_owned()),
-        (BEFORE, "predicted without the fix".to_owned()),
-        (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
-    ])
+    lines_figure(&description, axes, [250, 280], (&time, &lines), "There is no number here.")
+        .legend(vec![
+            (Ink::Truth, "measured".to_owned()),
+            (BEFORE, "predicted without the fix".to_owned()),
+            (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
+        ])
 }

@@ -29,9 +29,7 @@ impl<'a> Subject<'a> {
         let simulator = problem.simulator();
         Self { name, diagnosis, evidence, implementations, simulator, by_trial: None }
     }
-}
 
-impl<'a> Subject<'a> {
     /// The same, with every run fitted by itself.
     #[must_use]
     pub fn by_trial(self, by_trial: Option<&'a ByTrial>) -> Self {

@@ -10,7 +10,7 @@ pub struct Reading<T = f64> {
     /// The estimated reference, in the unit of the reference (millimetres of a muscle, degrees of a joint).
     pub estimate: T,
     /// Rate of the estimate, in that unit per second: the local slope of the calibration times the rate of the
-    /// signal.
+    /// signal; 0 while a model that needs no rate has seen too few samples for one.
     pub rate: T,
     /// The branch that was evaluated.
     pub branch: Branch,
@@ -75,7 +75,7 @@ impl fmt::Display for Domain {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Withheld {
-    /// The rate estimator has not seen enough samples yet.
+    /// The rate estimator has not seen enough samples yet, and the model needs a rate.
     Warming,
     /// The sample was missing or not a number. A short gap is bridged inside;
     /// a longer one starts the warm-up again.

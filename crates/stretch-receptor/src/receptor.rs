@@ -21,7 +21,11 @@ use crate::{
 ///    the signal gives the estimate's rate (the derivative leaves out the surface's dependence on the rate, which would
 ///    need the second derivative of a noisy signal).
 ///
-/// **Missing samples, warm-up, branch**: see [`Front`]. A short gap is bridged by
+/// **Warm-up**: a calibration that [needs the signal only](stretch_core::Model::needs_signal_only), a line or one curve
+/// for both branches, answers from the first sample on. The rate of such a reading is 0 until the rate estimator has
+/// seen enough samples.
+///
+/// **Missing samples, branch**: see [`Front`]. A short gap is bridged by
 /// the last sample moved on by the last rate, so that one lost sample costs one
 /// reading and not a warm-up.
 ///
@@ -56,6 +60,7 @@ pub struct Surfaces<T, R> {
     map: Map<T>,
     direction: Direction<T>,
     period_s: T,
+    needs_signal_only: bool,
 }
 
 impl<T: Real, R> Surfaces<T, R> {
@@ -117,6 +122,7 @@ impl<T: Real, R> StretchReceptor<T, R> {
             map: Map::of(calibration)?,
             direction,
             period_s: T::from_f64(calibration.spec().sample_rate_hz.period_s()),
+            needs_signal_only: calibration.spec().model.needs_signal_only(),
         };
         Ok(Self { model })
     }
@@ -169,7 +175,11 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for Surfaces<T, R> {
         signal: T,
     ) -> Option<Reading<T>> {
         memory.last = signal;
-        let rate = self.rate.step(&mut memory.rate, signal)?;
+        let estimated = self.rate.step(&mut memory.rate, signal);
+        if estimated.is_none() && !self.needs_signal_only {
+            return None;
+        }
+        let rate = estimated.unwrap_or(T::zero());
         memory.last_rate = rate;
         *branch = self.direction.next(*branch, rate);
         Some(self.reading(*branch, rate, signal))

@@ -69,7 +69,7 @@ fn trial() -> Vec<u16> {
     codes
 }
 
-fn linear() -> Calibration {
+pub(crate) fn linear() -> Calibration {
     let mut spec = example_calibration().into_spec();
     spec.model = Model::Linear(LinearMap {
         slope: 0.97,

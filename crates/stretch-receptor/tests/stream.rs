@@ -3,8 +3,8 @@
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{
-    Branch, Calibration, Design, Model, Polarity, Runner, SampleRate, Stage, Volts,
-    strategies::paper_calibration,
+    Branch, Calibration, Degree, Design, Model, Polarity, Runner, SampleRate, Stage, Surface,
+    Volts, strategies::paper_calibration,
 };
 use stretch_filter::{RateFilter, SgRate};
 use stretch_receptor::{
@@ -54,9 +54,13 @@ proptest! {
         let mut branch = Branch::Inflation;
         for &volts in &stream {
             let reading = receptor.step(&mut memory, Volts(volts));
-            let Some(rate) = rates.step(&mut rate_memory, volts) else {
-                prop_assert_eq!(reading, Err(Withheld::Warming));
-                continue;
+            let rate = match rates.step(&mut rate_memory, volts) {
+                Some(rate) => rate,
+                None if calibration.spec().model.needs_signal_only() => 0.0,
+                None => {
+                    prop_assert_eq!(reading, Err(Withheld::Warming));
+                    continue;
+                }
             };
             let reading = reading.unwrap();
             branch = branch.next(calibration.spec().polarity.sign() * rate, calibration.spec().dead_band);
@@ -142,6 +146,26 @@ fn the_window_fills_before_the_first_reading() {
     let reading = receptor.step(Volts(1.5)).unwrap();
     assert_eq!(reading.rate, 0.0);
     assert_eq!(reading.branch, Branch::Inflation);
+}
+
+/// A line, and one curve for both branches, need no rate; after a long gap they answer at once again.
+#[test]
+fn what_needs_the_signal_only_answers_from_the_first_sample() {
+    let mut spec = example_calibration().into_spec();
+    let Model::Surfaces { inflation, deflation } = &mut spec.model else { unreachable!() };
+    inflation.surface = Surface::new(Degree::new(0, 2).unwrap(), &[0.02, 0.8, 0.3]).unwrap();
+    *deflation = *inflation;
+    for calibration in [Calibration::new(spec).unwrap(), crate::firmware::linear()] {
+        let mut receptor = Runner::new(StretchReceptor::<f64>::new(&calibration).unwrap());
+        let (known, inside) = by_hand(&calibration, Branch::Inflation, 0.0, 1.5);
+        assert!(inside);
+        for missing in [0, 1, 2 * MAX_BRIDGED] {
+            (0..missing).for_each(|_| assert!(receptor.step(Volts(f64::NAN)).is_err()));
+            let Reading { estimate, rate, .. } = receptor.step(Volts(1.5)).unwrap();
+            assert_abs_diff_eq!(estimate, known, epsilon = 180.0 * tolerance::FOLDED);
+            assert_eq!(rate, 0.0);
+        }
+    }
 }
 
 #[test]

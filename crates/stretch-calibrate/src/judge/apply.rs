@@ -1,12 +1,12 @@
 //! A calibration applied to time-stamped samples, live or from a file.
 
 use stretch_core::{
-    Branch, Calibration, Design, Interval, Model, Range, RangeSpec, RateEstimator, Runner,
-    SampleRate, Seconds, Stage, Volts,
+    Calibration, Design, Interval, Model, Range, RangeSpec, RateEstimator, Runner, SampleRate,
+    Seconds, Stage, Volts,
 };
 use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence};
-use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, StretchReceptor, Withheld};
+use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{
     CalibrateError,
@@ -18,9 +18,6 @@ const JITTER_TOLERANCE: f64 = 0.2;
 
 /// A receptor that checks the time stamps: missing ticks are stepped as missing samples, and a stamp that runs
 /// backwards resets the receptor.
-///
-/// A calibration that [needs the signal only](Model::needs_signal_only) answers from the first sample on. The rate of
-/// such a reading is NaN until the rate estimator has seen enough samples.
 ///
 /// ```
 /// use stretch_calibrate::LiveReceptor;
@@ -39,8 +36,6 @@ const JITTER_TOLERANCE: f64 = 0.2;
 #[derive(Debug, Clone)]
 pub struct LiveReceptor {
     receptor: Receptor<f64>,
-    /// The same calibration without a rate, where it needs none.
-    without_rate: Option<StretchReceptor<f64, ()>>,
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
@@ -65,14 +60,9 @@ impl LiveReceptor {
     /// needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
         let receptor = Receptor::new(calibration)?;
-        let without_rate = match calibration.spec().model.needs_signal_only() {
-            true => Some(StretchReceptor::with_rate(calibration, ())?),
-            false => None,
-        };
         Ok(Self {
             memory: receptor.memory(),
             receptor,
-            without_rate,
             cadence: Runner::new(Cadence::new(
                 calibration.spec().sample_rate_hz,
                 JITTER_TOLERANCE,
@@ -100,13 +90,7 @@ impl LiveReceptor {
             Arrival::Jitter { .. } => self.faults.jittered += 1,
             _ => {}
         }
-        let reading = self.receptor.step(&mut self.memory, Volts(signal));
-        match (reading, &self.without_rate) {
-            (Err(Withheld::Warming), Some(receptor)) => {
-                Ok(Reading { rate: f64::NAN, ..receptor.at(Branch::Inflation, 0.0, signal) })
-            }
-            _ => reading,
-        }
+        self.receptor.step(&mut self.memory, Volts(signal))
     }
 
     /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.

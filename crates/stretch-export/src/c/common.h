@@ -1,6 +1,6 @@
 /* How a reading came about: stretch_reading.status. */
 #define STRETCH_OK 0      /* estimate, branch and domain hold */
-#define STRETCH_WARMING 1 /* the rate has not seen enough samples yet */
+#define STRETCH_WARMING 1 /* the rate has not seen enough samples yet, and the model needs it */
 #define STRETCH_MISSING 2 /* the sample did not come */
 
 /* Missing samples in a row that are bridged; one more forgets the stream. */

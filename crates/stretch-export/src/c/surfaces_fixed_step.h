@@ -19,10 +19,16 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
     }
     sample = (uint32_t)code * STRETCH_ALIGN;
     s->missing = 0;
+@if static
+    /* the estimate needs no rate: 0 until the window is full */
+    rate = stretch_slide(s, sample) ? stretch_rate(s) : 0;
+@end
+@if moving
     if (!stretch_slide(s, sample)) {
         return stretch_answer(STRETCH_WARMING, s->branch, STRETCH_INSIDE, 0);
     }
     rate = stretch_rate(s);
+@end
     /* outside the dead band, in one comparison, the sign of the target's rate */
     if ((uint32_t)rate + band > 2u * band) {
         s->branch = (uint8_t)(((uint32_t)rate ^ STRETCH_MIRROR) >> 31);

@@ -17,9 +17,17 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
     }
     s->missing = 0;
     s->last = volts;
+@if static
+    /* the estimate needs no rate: 0 until the window is full */
+    if (!stretch_rate(s, volts, &rate)) {
+        rate = 0.0f;
+    }
+@end
+@if moving
     if (!stretch_rate(s, volts, &rate)) {
         return stretch_answer(STRETCH_WARMING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
     }
+@end
     s->last_rate = rate;
     if (rate > STRETCH_DEAD_BAND) {
         s->branch = STRETCH_RISING;

@@ -43,18 +43,18 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             if *falling { u32::MAX } else { 0 },
             "all ones where a rising signal means a falling target",
         );
-    let (model, surface) = match surfaces {
+    let (model, surface, has) = match surfaces {
         CodeMap::Line(ranged) => {
             let Scaled { of, thousandths } = ranged.surface;
             let (intercept, slope) = <(i32, i32)>::from(of);
             let signal = span(&ranged.signal);
             let line = [thousandths, intercept, slope].map(|n| n.c()).join(", ");
             constants.surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
-            ("linear", include_str!("../c/line_fixed.h"))
+            ("linear", include_str!("../c/line_fixed.h"), "static")
         }
         CodeMap::Poly13([inflation, deflation]) => {
             constants.surfaces(&[poly13_fixed(inflation), poly13_fixed(deflation)]);
-            ("poly13", include_str!("../c/poly13_fixed.h"))
+            ("poly13", include_str!("../c/poly13_fixed.h"), "moving")
         }
     };
     Part {
@@ -66,7 +66,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             surface,
             include_str!("../c/surfaces_fixed_step.h"),
         ],
-        has: Vec::new(),
+        has: vec![has],
     }
 }
 
@@ -155,7 +155,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             include_str!("../c/surfaces_float_step.h"),
             include_str!("../c/float_end.h"),
         ],
-        has: Vec::new(),
+        has: vec![if calibration.spec().model.needs_signal_only() { "static" } else { "moving" }],
     })
 }
 

@@ -171,7 +171,12 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         side: &mut SideBit,
         sample: u16,
     ) -> Option<CodeReading<A::Estimate>> {
-        let rate = Self::RATE.step(&mut memory.window, sample)?;
+        let rate = match (Self::RATE.step(&mut memory.window, sample), &self.surfaces) {
+            (Some(rate), _) => rate,
+            // a line needs no rate
+            (None, CodeMap::Line(_)) => 0,
+            (None, CodeMap::Poly13(_)) => return None,
+        };
         let now = self.side(*side, rate);
         *side = now;
         let branch = now.branch();

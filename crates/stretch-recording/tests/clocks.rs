@@ -183,6 +183,9 @@ fn a_rate_replaces_a_column_of_time() {
     assert_eq!(rows.next_row().unwrap().unwrap().time_s, 0.02);
 }
 
+/// Stamps in which a stream looks for the ticks of its clock.
+const LOOKED_AT: usize = 64;
+
 /// Times of a stream, and its notes.
 fn live(text: &str) -> (Vec<f64>, Vec<String>) {
     live_as(text, ReadOptions::new())
@@ -231,6 +234,38 @@ fn a_stream_has_the_same_clock() {
 
 /// A stamp of a time in seconds.
 type Stamp = fn(f64) -> f64;
+
+/// A clock of 15.6 ms on which no stamp of 50 samples a second repeats.
+#[test]
+fn a_stream_with_coarse_stamps_has_the_usual_rate() {
+    let usual = || ReadOptions::new().untimed_hz(RATE_HZ);
+    for tick_s in [0.015_6, 0.015_625, 0.016] {
+        let ticks = |t: f64| (t / tick_s + 1e-9).floor() * tick_s;
+        let (times, notes) = live_as(&table("time_s", |_, t| format!("{:.6}", ticks(t))), usual());
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        assert!(note.contains("ticks of") && note.contains("50 a second"), "{note}");
+        for (i, time_s) in times.iter().enumerate() {
+            let late_s = i as f64 / RATE_HZ - time_s;
+            assert!((-tick_s..=tick_s).contains(&late_s), "{tick_s}, sample {i}: {late_s}");
+        }
+        for pair in times[LOOKED_AT..].windows(2) {
+            assert!((pair[1] - pair[0] - 1.0 / RATE_HZ).abs() < 1e-6, "{tick_s}: {pair:?}");
+        }
+        // a lost sample stays one
+        let lost =
+            table("time_s", |i, t| format!("{:.6}", ticks(if i < 200 { t } else { t + 0.02 })));
+        let (times, _) = live_as(&lost, usual());
+        assert!((times[399] - 8.0).abs() < tick_s, "{tick_s}: {}", times[399]);
+    }
+    // early and late samples are no ticks, and a clock of another rate is not bent to the usual one
+    let early = |i: usize, t: f64| format!("{:.4}", t + 0.001 * ((i * 7 % 5) as f64 - 2.0) + 1.0);
+    let (times, notes) = live_as(&table("time_s", early), usual());
+    assert_eq!((times[1], notes.len()), (1.02, 0), "{notes:?}");
+    let other =
+        table("time_s", |i, _| format!("{:.6}", (i as f64 * 0.024 / 0.0156).floor() * 0.0156));
+    let (times, notes) = live_as(&other, usual());
+    assert!(notes.is_empty() && (times[399] - 9.576).abs() < 0.0157, "{notes:?} {}", times[399]);
+}
 
 #[test]
 fn arrays_have_the_same_clock() {

@@ -2,8 +2,11 @@
 
 use crate::{
     ReadOptions, TimeUnit,
-    clock::{order, unit},
+    clock::{Steps, order, spread, unit},
 };
+
+/// Stamps in which the ticks of a coarse clock are looked for.
+const LOOKED_AT: usize = 64;
 
 /// The clock of a stream.
 #[derive(Debug, Clone, Default)]
@@ -27,6 +30,11 @@ pub(crate) struct LiveClock {
     ticks: u64,
     /// Samples since the stamp last rose.
     run: u64,
+    /// The first stamps, until they show whether the clock is coarse.
+    first: Vec<f64>,
+    /// The tick of a coarse clock, whose samples come at the usual rate; and the time of the newest sample, in counts.
+    coarse: Option<f64>,
+    even: f64,
     pub(crate) notes: Vec<String>,
 }
 
@@ -81,7 +89,9 @@ impl LiveClock {
         let stamp = count + self.added;
         if step > 0.0 {
             (self.tick, self.ticks, self.run) = (Some(step), self.ticks + 1, 0);
-            return Ok(stamp.max(self.after_first(step)) / per_second);
+            let at = self.evened(row, stamp, per_second).unwrap_or(stamp);
+            self.even = at.max(self.after_first(step));
+            return Ok(self.even / per_second);
         }
         let period = self.usual_hz.map(|hz| per_second / hz);
         if let Some(tick) = self.tick.or(period).filter(|_| step == 0.0) {
@@ -111,6 +121,24 @@ impl LiveClock {
             ..Self::default()
         };
         Err(NotRising { time_s: count / per_second, previous_s })
+    }
+
+    /// The time of a sample on a clock that is coarse, in counts: a usual period after the sample before, but within the tick of its stamp.
+    fn evened(&mut self, row: u64, stamp: f64, per_second: f64) -> Option<f64> {
+        let period = per_second / self.usual_hz?;
+        if self.coarse.is_none() && self.first.len() < LOOKED_AT {
+            self.first.push(stamp);
+            let tick = Steps::of(&self.first).and_then(|steps| spread::tick_of(&self.first, steps));
+            self.coarse = tick.filter(|tick| spread::is_even(&self.first, period, *tick));
+            if let Some(tick) = self.coarse {
+                self.notes.push(format!(
+                    "the clock has ticks of {} ms; from row {row} on the samples are spread evenly within them, {} a second",
+                    spread::rounded(1e3 * tick / per_second, 4),
+                    spread::rounded(per_second / period, 4)
+                ));
+            }
+        }
+        self.coarse.map(|tick| (self.even + period).clamp(stamp, stamp + tick))
     }
 
     /// The least count after the samples of the first stamp, which reach into the next where the usual rate is too low.

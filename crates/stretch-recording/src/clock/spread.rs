@@ -59,15 +59,21 @@ pub(super) fn spread(
     left_out
 }
 
+/// Whether an even clock of this step is nowhere farther from the stamps than a tick.
+pub(super) fn is_even(counts: &[f64], step: f64, tick: f64) -> bool {
+    let (least, greatest) = offsets(counts, step);
+    greatest - least <= (1.0 + ROUNDING) * tick
+}
+
 /// With one digit and so many more.
-fn rounded(value: f64, more: i32) -> f64 {
+pub(super) fn rounded(value: f64, more: i32) -> f64 {
     let scale = 10_f64.powi(more.saturating_sub(value.abs().log10().floor() as i32));
     let rounded = (value * scale).round() / scale;
     if rounded.is_finite() { rounded } else { value }
 }
 
 /// The tick of a clock without repeated stamps whose steps are now one number of ticks, now another.
-fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
+pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     if steps.repeated > 0 {
         return None;
     }

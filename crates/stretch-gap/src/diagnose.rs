@@ -38,14 +38,15 @@ use crate::{
         selection::{Found, Looked, Search},
     },
     verdict::{
+        answer::{Answer, Findings},
         coverage::{TooLittle, is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
+        note::Note,
         notes::{
-            detection_limit_note, extrapolation_notes, gross_error_notes, implausible_noise_notes,
-            swing_notes,
+            answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
+            implausible_noise_notes, lost_note, swing_notes,
         },
-        sentence::{Answer, cut_short, listed, tell},
     },
 };
 
@@ -185,26 +186,26 @@ impl<'a> Searched<'a> {
     }
 
     /// Effects of the catalogue that no fitted set holds.
-    fn not_looked_at(&self) -> Vec<&str> {
+    fn not_looked_at(&self) -> Vec<String> {
         let effects = self.problem.simulator().effects().iter().enumerate();
         let is_new = |e: &usize| self.tried.keys().all(|set| !set.contains(e));
-        effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.as_str()).collect()
+        effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.clone()).collect()
     }
 
     /// Those of them whose runs could not be simulated, and the effects of sets that were fitted and could not be judged.
-    fn lost(&self, weighed: &[Candidate]) -> Vec<&str> {
+    fn lost(&self, weighed: &[Candidate]) -> Vec<String> {
         let not_looked_at = self.not_looked_at();
         if self.is_lost {
             return not_looked_at;
         }
         let [not_fitted, not_judged] = self.problem.compare.runs.lost_effects();
         let is_weighed = |name: &String| weighed.iter().any(|c| c.effects.contains(name));
-        let is_lost = |name: &String| match not_looked_at.contains(&name.as_str()) {
+        let is_lost = |name: &String| match not_looked_at.contains(name) {
             true => not_fitted.contains(name),
             false => not_judged.contains(name) && !is_weighed(name),
         };
         let effects = self.problem.simulator().effects().iter().map(|spec| &spec.name);
-        effects.filter(|name| is_lost(name)).map(String::as_str).collect()
+        effects.filter(|name| is_lost(name)).cloned().collect()
     }
 }
 
@@ -400,41 +401,43 @@ fn report(
     let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
     let candidates =
         beside_unknown(candidates, evidence.gap, (posterior.unknown, posterior.function));
-    let answer = Answer {
-        judged: &judged,
-        gap: evidence.gap,
-        first: candidates.first(),
-        shares: &shares,
-        sanity: &sanity,
-        unexplained: unexplained.as_ref(),
-        gross: cause.gross,
-        null_band,
-    };
+    let answer = Answer::of(
+        Findings {
+            judged: &judged,
+            gap: evidence.gap,
+            first: candidates.first(),
+            shares: &shares,
+            unexplained: unexplained.as_ref(),
+            gross: cause.gross,
+            null_band,
+        },
+        simulator,
+        &evidence,
+    );
     let naming = judged.naming();
-    let mut text = tell(answer, simulator, &evidence);
-    text.notes.extend(gross_error_notes(cause.problem));
-    text.notes.extend(runs.lost_note());
-    let lost = searched.lost(&candidates);
-    let mut reservations = implausible_noise_notes(cause.problem, &sanity);
-    if !lost.is_empty() {
-        text.sentence = format!("Not looked at, because their runs failed: {}. ", listed(&lost))
-            + &text.sentence;
-        reservations.push(format!("not looked at, because their runs failed: {}", lost.join(", ")));
+    let mut notes = answer_notes(&answer, &sanity, simulator, &evidence);
+    notes.extend(gross_error_notes(cause.problem).into_iter().map(Note::from));
+    notes.extend(lost_note(runs));
+    let mut reservations: Vec<Note> =
+        implausible_noise_notes(cause.problem, &sanity).into_iter().map(Note::from).collect();
+    let not_examined = searched.lost(&candidates);
+    if !not_examined.is_empty() {
+        let because = "not looked at, because their runs failed: ";
+        reservations.push(Note::default().text(because).effects(&not_examined, ", "));
     }
-    text.notes.extend(reservations.iter().cloned());
-    text.notes.extend(searched.problem.starts.note());
-    text.notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
+    notes.extend(reservations.iter().cloned());
+    notes.extend(searched.problem.starts.note().map(Note::from));
+    notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // What another form of an effect leaves may look like a swing.
     if is_quiet || evidence.gap.left <= thresholds.unknown_excess {
-        text.notes.extend(swing_notes(cause.problem, &evidence));
+        notes.extend(swing_notes(cause.problem, &evidence).into_iter().map(Note::from));
     }
     let model_runs = runs.counted();
-    if let Some(note) = model_runs.and_then(|runs| runs.note()) {
-        text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
-        text.notes.push(note);
-    }
+    let spent = model_runs.and_then(|runs| runs.note());
+    let cut_short = spent.is_some().then(|| searched.not_looked_at());
+    notes.extend(spent.map(Note::from));
     let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
-    text.notes.extend(no_name.flatten());
+    notes.extend(no_name.flatten());
     let location = Where {
         stages: with_causes(location.stages, &shares, &naming.named, simulator),
         ..location
@@ -445,10 +448,13 @@ fn report(
         evidence.responses = if_possible(responses)?.unwrap_or_default();
     }
     let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         schema: 1,
         verdict: judged.kind,
-        sentence: text.sentence,
+        answer: Some(answer),
+        sentence: String::new(),
+        not_examined,
+        cut_short,
         tied: naming.tied(),
         named: naming.named,
         faint: naming.faint,
@@ -471,7 +477,7 @@ fn report(
             true => if_possible(simpler())?,
             false => None,
         },
-        notes: text.notes,
+        notes,
         reservations,
         rows_used: simulator.description().rows_used(),
         simulations,
@@ -480,6 +486,7 @@ fn report(
         starts: searched.problem.starts,
         candidates,
     };
+    diagnosis.sentence = diagnosis.in_sentences(&|p| format!("{p:.2}"));
     Ok((diagnosis, evidence))
 }
 

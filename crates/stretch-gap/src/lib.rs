@@ -56,6 +56,9 @@ pub use record::{
 pub use search::baselines::Baselines;
 pub use stretch_effects::EffectParameter;
 pub use verdict::{
+    answer::{Answer, Closed, MissingEffect},
+    coverage::TooLittle,
     diagnosis::{Diagnosis, NextExperiment, Transfer, TransferError, Unexplained, VerdictKind},
     next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment},
+    note::Note,
 };

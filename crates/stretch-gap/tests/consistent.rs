@@ -113,6 +113,8 @@ fn assert_numbers(told: &Diagnosis) {
     let object = json.as_object_mut().expect("an object");
     optional.iter().for_each(|key| drop(object.remove(*key)));
     object["identifiability"] = serde_json::Value::Null;
+    // errors of the record have as many numbers as they have
+    object["answer"].as_object_mut().expect("an answer").remove("errors");
     let null = object.iter().find(|(key, value)| *key != "identifiability" && holds_null(value));
     assert_eq!(null, None);
 }

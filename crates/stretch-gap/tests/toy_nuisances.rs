@@ -1,9 +1,9 @@
 //! Slow drift and offsets that a simulator describes are no effects, and other effects are still
 //! found.
 
-use stretch_gap::{Options, SlowDrift, VerdictKind};
+use stretch_gap::{Note, Options, SlowDrift, VerdictKind};
 
-use crate::toys::{Effect, Law, Toy, slow};
+use crate::toys::{Effect, Law, Toy, slow, texts};
 
 fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -28,8 +28,8 @@ fn a_drift_that_is_described_is_no_effect() {
     }
 }
 
-fn swings(notes: &[String]) -> Vec<&str> {
-    notes.iter().map(String::as_str).filter(|note| note.contains("swings")).collect()
+fn swings(notes: &[Note]) -> Vec<String> {
+    texts(notes).into_iter().filter(|note| note.contains("swings")).collect()
 }
 
 /// A swing that a drift could explain is no gap, but it is reported with its frequency and size.
@@ -44,7 +44,7 @@ fn a_drift_that_swings_is_told() {
         let begins = format!("{} swings at ", toy.parameters[1].name);
         let told = toy.measured(seed).diagnosed().0;
         assert!(told.named.is_empty(), "{}", told.sentence);
-        let [note] = swings(&told.notes)[..] else { panic!("one note: {:?}", told.notes) };
+        let [note] = &swings(&told.notes)[..] else { panic!("one note: {:?}", told.notes) };
         let rest = note.strip_prefix(&begins).expect(note);
         let number = |at: usize| rest.split(' ').nth(at).and_then(|x| x.parse().ok()).expect(note);
         // A trial of 10 s parts frequencies by half of a tenth, and the drift, a third as large, adds to a swing or takes from it.
@@ -133,7 +133,10 @@ fn a_drift_is_told_as_extrapolated() {
         let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(effect, &[size])]);
         let (told, _) = toy.measured(2).diagnosed();
         assert_eq!(told.named, [effect.name()], "{}", told.sentence);
-        told.notes.into_iter().filter(|note| note.contains("extrapolated")).collect::<Vec<_>>()
+        texts(&told.notes)
+            .into_iter()
+            .filter(|note| note.contains("extrapolated"))
+            .collect::<Vec<_>>()
     };
     let [note] = &notes(Effect::Drift, 0.003)[..] else { panic!("one note") };
     let begins = "drift is a law of session time: it was fitted from 0 to 130 s and extrapolated to the test trials, from 180 to 190 s";

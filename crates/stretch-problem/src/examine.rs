@@ -4,7 +4,7 @@ use std::{fmt, sync::atomic::AtomicUsize};
 
 use serde_json::{Value, json};
 use stretch_data::Trial;
-use stretch_gap::{Costly, Diagnosis, Evidence, GapError, Options, diagnose};
+use stretch_gap::{Costly, Diagnosis, Evidence, GapError, Note, Options, diagnose};
 use stretch_sim::{Quantity, Sketch};
 
 use crate::{
@@ -102,8 +102,9 @@ impl Problem {
         diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
         let families = source.families(&diagnosis);
         let notes = &mut diagnosis.notes;
-        notes.splice(0..0, source.notes());
-        notes.extend(families.iter().map(Agreed::sentence).chain(source.afterwards()));
+        notes.splice(0..0, source.notes().into_iter().map(Note::from));
+        notes.extend(families.iter().map(Agreed::note));
+        notes.extend(source.afterwards().into_iter().map(Note::from));
         Ok(Examined {
             name: self.name.clone(),
             seed: options.seed,
@@ -166,6 +167,6 @@ fn family(agreed: &Agreed) -> Value {
         "names": agreed.names,
         "range": agreed.range,
         "unit": agreed.unit,
-        "sentence": agreed.sentence(),
+        "sentence": agreed.note(),
     })
 }

@@ -100,7 +100,10 @@ fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
                     let runs = found.model_runs.unwrap();
                     assert!(runs.is_spent && calls == runs.count, "{budget}: {runs:?}");
                     let told = format!("the budget of {budget} model runs was spent");
-                    assert!(found.notes.iter().any(|note| note.contains(&told)), "{budget}");
+                    assert!(
+                        found.notes.iter().any(|note| note.to_string().contains(&told)),
+                        "{budget}"
+                    );
                     assert!(found.sentence.starts_with("The budget of runs was spent"));
                 }
                 Err(GapError::Spent { budget: told, least: needed }) => {

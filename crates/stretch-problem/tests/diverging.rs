@@ -95,7 +95,8 @@ fn what_diverges_ends_nothing_and_a_share_of_a_value_keeps_its_sign() {
         let (told, least) = diagnosed(tau);
         let told = told.expect("an answer");
         assert_eq!(told.named, ["output.skew"], "{}", told.sentence);
-        let note = told.notes.iter().find(|note| note.contains(" could not be simulated, "));
+        let mut notes = told.notes.iter().map(ToString::to_string);
+        let note = notes.find(|note| note.contains(" could not be simulated, "));
         let note = note.expect("a note on lost runs");
         assert!(note.contains("(asked for tau = "), "{note}");
         assert!(least >= bound && (bound > 0.0 || least < 0.0), "{least} {bound}");

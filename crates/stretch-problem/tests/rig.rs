@@ -225,7 +225,11 @@ fn without_test_trials_the_last_part_is_held_back() {
     let mut trials = session(&own_rig(), &EffectSet::new(), true, 6);
     trials.iter_mut().for_each(|t| t.split = Split::Fit);
     let diagnosis = run(trials, &[], &shallow());
-    assert!(diagnosis.notes.iter().any(|n| n.contains("no test trial")), "{:?}", diagnosis.notes);
+    assert!(
+        diagnosis.notes.iter().any(|n| n.to_string().contains("no test trial")),
+        "{:?}",
+        diagnosis.notes
+    );
     assert!(diagnosis.named.is_empty());
 }
 

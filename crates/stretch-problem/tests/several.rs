@@ -84,7 +84,7 @@ fn diagnosed(late_s: [f64; 3], tau_s: f64) -> (Diagnosis, Vec<String>) {
     });
     let bench = BlackBox::new(problem, Arc::new(plant));
     let found = diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
-    let families = agreed(bench.problem(), &found).iter().map(|a| a.sentence()).collect();
+    let families = agreed(bench.problem(), &found).iter().map(|a| a.note().to_string()).collect();
     (found, families)
 }
 

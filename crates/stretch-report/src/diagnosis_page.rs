@@ -419,7 +419,7 @@ fn numbers(page: &mut Page, d: &Diagnosis) {
         page.table(&baseline_table(said));
     }
     page.section("All numbers", "");
-    page.list(&d.notes);
+    page.list(&d.notes.iter().map(ToString::to_string).collect::<Vec<_>>());
     for stage in &d.location.stages {
         page.text(&format!("Noise of {}: {}.", stage.stage, stage.floor_source));
         if let Some(table) = slice_table(&d.location.slices, &stage.stage) {

@@ -2,7 +2,7 @@
 //! next step.
 
 use stretch_data::listed;
-use stretch_gap::{Diagnosis, Gross, VerdictKind};
+use stretch_gap::{Answer, Diagnosis, Gross, VerdictKind};
 use stretch_problem::effect_in_words;
 
 use super::{
@@ -13,29 +13,13 @@ use super::{
 /// The first words of a page: what is missing, where the answer is a name; what it closes and how sure it is stands right below.
 pub(crate) fn headline(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
-    match (d.verdict, d.sentence.split_once(LACKS)) {
-        (VerdictKind::Effect, Some((before, _))) => {
-            format!("{before}{LACKS}{}.", to_add(&d.named, &d.tied))
+    match &d.answer {
+        Some(Answer::Missing { .. }) => {
+            format!("{}The simulator lacks {}.", d.preface(), to_add(&d.named, &d.tied))
         }
-        _ => verdict(subject),
+        // a probability holds among the candidates, and is reported as such
+        _ => d.in_sentences(&|p| format!("{} {GIVEN}", percent(p))).replace(" %", "\u{a0}%"),
     }
-}
-
-/// How the sentence of a diagnosis begins that names effects, behind what it may have to say first.
-const LACKS: &str = "The simulator lacks ";
-
-/// The result in one sentence.
-fn verdict(subject: &Subject<'_>) -> String {
-    let d = subject.diagnosis;
-    let sentence = d.sentence.replace(" %", "\u{a0}%");
-    // a probability holds among the candidates, and is reported as such
-    let conditional = || {
-        let (before, after) = sentence.split_once("; probability ")?;
-        let (probability, rest) = after.split_at_checked("0.00".len())?;
-        let probability = percent(probability.parse().ok()?);
-        Some(format!("{before}; probability {probability} {GIVEN}{rest}"))
-    };
-    conditional().unwrap_or(sentence)
 }
 
 /// The condition of every probability.

@@ -68,7 +68,7 @@ impl Found {
         Told {
             candidates: diagnosis.candidates.iter().map(one).collect(),
             sentence: diagnosis.sentence,
-            notes: diagnosis.notes,
+            notes: diagnosis.notes.into_iter().map(String::from).collect(),
             seconds: self.examined.diagnosis.runtime_s,
             no_rig: self.examined.fix.as_ref().err().map(ToString::to_string),
         }

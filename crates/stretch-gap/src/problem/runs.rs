@@ -117,22 +117,11 @@ impl<'a> Runs<'a> {
         [lost.not_fitted.clone(), lost.not_judged.clone()]
     }
 
-    /// How many runs were lost, of which sets of effects, and why the first was.
-    pub(crate) fn lost_note(&self) -> Option<String> {
+    /// Sets of effects of which models could not be simulated, with the number of models, and what the first of them said.
+    pub(crate) fn lost_models(&self) -> Option<(BTreeMap<Vec<String>, usize>, String)> {
         let lost = self.lost();
-        let first = lost.first.as_ref()?;
-        let name = |set: &Vec<String>| match set.is_empty() {
-            true => "without effects".to_owned(),
-            false => format!("with {}", set.join(" + ")),
-        };
-        let sets = lost.models.iter().map(|(set, own)| format!("{} {}", own.len(), name(set)));
-        let count = lost.models.values().map(BTreeSet::len).sum::<usize>();
-        Some(format!(
-            "{count} model{} could not be simulated, and what asked for {} went on without: {}; the first: {first}",
-            if count == 1 { "" } else { "s" },
-            if count == 1 { "it" } else { "them" },
-            sets.collect::<Vec<_>>().join(", ")
-        ))
+        let first = lost.first.clone()?;
+        Some((lost.models.iter().map(|(set, own)| (set.clone(), own.len())).collect(), first))
     }
 
     fn names(&self, effects: impl Iterator<Item = usize>) -> impl Iterator<Item = String> {

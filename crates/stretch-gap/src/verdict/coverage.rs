@@ -8,6 +8,8 @@
 //! gap, within the interval of the first, is a tie with it, however the fitted samples weigh the
 //! two.
 
+use serde::{Deserialize, Serialize};
+
 use crate::problem::{
     record_facts::RowsUsed,
     sample_roles::{Role, SampleRoles},
@@ -21,13 +23,20 @@ const LEAST_TEST: f64 = 10.0;
 const LEAST_FIT: f64 = 20.0;
 
 /// Why a record cannot support a name.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum TooLittle {
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TooLittle {
     /// Most rows were left out.
     Rows(RowsUsed),
-    /// Too short, s: for fitting and for testing, and the length of a
-    /// [block](crate::SampleRoles::block).
-    Short { fit_s: f64, test_s: f64, block_s: f64 },
+    /// The record is too short.
+    Short {
+        /// Seconds for fitting.
+        fit_s: f64,
+        /// Seconds for testing.
+        test_s: f64,
+        /// Seconds of a [block](crate::SampleRoles::block).
+        block_s: f64,
+    },
 }
 
 impl TooLittle {

@@ -17,6 +17,7 @@ use crate::{
     problem::{record_facts::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
     search::baselines::Baselines,
+    verdict::{answer::Answer, note::Note},
 };
 
 /// The answers.
@@ -92,8 +93,17 @@ pub struct Diagnosis {
     pub schema: u32,
     /// The answer.
     pub verdict: VerdictKind,
-    /// The answer in one plain sentence.
+    /// The answer with its numbers; none in a diagnosis that a version without it has written.
+    #[serde(default)]
+    pub answer: Option<Answer>,
+    /// The answer in plain sentences.
     pub sentence: String,
+    /// Effects that were not examined because their runs failed.
+    #[serde(default)]
+    pub not_examined: Vec<String>,
+    /// Effects that were not examined because the budget of runs was spent; none if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_short: Option<Vec<String>>,
     /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
     pub named: Vec<String>,
     /// Effects that may stand in the place of one that is named: in the smallest sets that hold 95 % of the probability.
@@ -149,11 +159,11 @@ pub struct Diagnosis {
     pub next_experiment: Option<NextExperiment>,
     /// What simpler methods say.
     pub baselines: Option<Baselines>,
-    /// Sentences about what was noticed and assumed.
-    pub notes: Vec<String>,
+    /// What was noticed and assumed.
+    pub notes: Vec<Note>,
     /// Those of the notes that say why a gap may be there although none was found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub reservations: Vec<String>,
+    pub reservations: Vec<Note>,
     /// Rows that it stands on, of those that were read.
     #[serde(default)]
     pub rows_used: RowsUsed,
@@ -195,7 +205,7 @@ impl Diagnosis {
     /// fn check(diagnosis: &Diagnosis) {
     ///     let agrees = Diagnosis { verdict: VerdictKind::NoGap, reservations: Vec::new(), ..diagnosis.clone() };
     ///     assert!(agrees.is_agreement());
-    ///     let implausible = vec!["the noise of speed_mps is implausible".to_owned()];
+    ///     let implausible = vec!["the noise of speed_mps is implausible".to_owned().into()];
     ///     assert!(!Diagnosis { reservations: implausible, ..agrees }.is_agreement());
     /// }
     /// ```

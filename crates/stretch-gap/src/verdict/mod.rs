@@ -6,11 +6,13 @@
 //! diagnosis what to measure next.
 //! Imports: every folder but none of this one's callers.
 
+pub(crate) mod answer;
 pub(crate) mod coverage;
 pub(crate) mod diagnosis;
 pub(crate) mod judge;
 pub(crate) mod naming;
 pub(crate) mod next_experiment;
+pub(crate) mod note;
 pub(crate) mod notes;
 pub(crate) mod sentence;
 #[cfg(test)]

@@ -73,16 +73,6 @@ impl Naming {
         }
         tied
     }
-
-    /// The headline's names, each with its alternatives.
-    pub(crate) fn alternatives(&self) -> Vec<String> {
-        let one = |name: &String| {
-            let others = self.ties.iter().filter(|(own, _)| own == name).map(|(_, other)| other);
-            let all: Vec<&str> = std::iter::once(name).chain(others).map(String::as_str).collect();
-            all.join(" or ")
-        };
-        self.named.iter().map(one).collect()
-    }
 }
 
 #[cfg(test)]
@@ -123,19 +113,16 @@ mod tests {
             (naming.named.as_slice(), naming.faint.as_slice()),
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
         );
-        assert_eq!(naming.alternatives(), ["slack or saturation"]);
+        assert_eq!(naming.ties, [("slack".into(), "saturation".into())]);
         // On a short record a set that closes as much is a tie, whatever its probability.
         let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
         assert_eq!(short.ties.len(), 1);
         let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
         let alike = |is_short| {
             let shares = [share("slip", 0.9)];
-            Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).alternatives()
+            Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).ties
         };
-        assert_eq!(
-            (alike(false), alike(true)),
-            (vec!["slip".into()], vec!["slip or lowpass".into()])
-        );
+        assert_eq!((alike(false), alike(true)), (vec![], vec![("slip".into(), "lowpass".into())]));
         // If there is an effect it is named, however little it closes.
         let weak = Naming::of(
             &candidates,

@@ -5,11 +5,45 @@ use crate::{
     evidence::{detection_limit::DetectionLimit, gathered::Evidence, sanity::Sanity},
     fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
     problem::{
+        runs::Runs,
         sample_roles::{Role, SampleRoles},
         simulator::Simulator,
         spec::{EffectSpec, StageSpec},
     },
+    verdict::{answer::Answer, note::Note},
 };
+
+/// What the answer itself leaves to say: how it was tested, a channel that is not simulated, and what was seen before it was overridden.
+pub(crate) fn answer_notes(
+    answer: &Answer,
+    sanity: &Sanity,
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+) -> Vec<Note> {
+    let held = "there is no test trial: the last quarter of every trial is held back and tested on";
+    let held = evidence.roles.borrowed_test.then(|| Note::from(held.to_owned()));
+    let otherwise = match answer {
+        Answer::AtBounds { otherwise, .. } | Answer::TooLittle { otherwise, .. } => {
+            Some(Note::default().text("before that was seen: ").answer((**otherwise).clone()))
+        }
+        _ => None,
+    };
+    let gross = gross_misfit(sanity, simulator).map(Note::from);
+    held.into_iter().chain(gross).chain(otherwise).collect()
+}
+
+/// A channel that the simulator has little to do with: a warning, because causes may explain it all the same.
+fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
+    let left = sanity.left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
+    let spec = &simulator.stages()[stage];
+    Some(format!(
+        "{:.0} % of what {} does is not in the simulator of {}: is it the right rig, and is every column what its name says?",
+        100.0 * share.min(1.0),
+        spec.channel,
+        spec.name
+    ))
+}
 
 /// A note for each output of which some samples [are isolated](crate::fit::isolated_outliers).
 pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
@@ -28,6 +62,24 @@ pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
         })
     };
     stages.filter_map(note).collect()
+}
+
+/// How many models could not be simulated, of which sets of effects, and why the first was not.
+pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
+    let (models, first) = runs.lost_models()?;
+    let count: usize = models.values().sum();
+    let (s, it) = if count == 1 { ("", "it") } else { ("s", "them") };
+    let begin = Note::default().text(format!(
+        "{count} model{s} could not be simulated, and what asked for {it} went on without: "
+    ));
+    let one = |note: Note, (i, (set, own)): (usize, (&Vec<String>, &usize))| {
+        let note = note.text(if i == 0 { "" } else { ", " });
+        match set.is_empty() {
+            true => note.text(format!("{own} without effects")),
+            false => note.text(format!("{own} with ")).effects(set, " + "),
+        }
+    };
+    Some(models.iter().enumerate().fold(begin, one).text(format!("; the first: {first}")))
 }
 
 /// A note for each output whose noise is [implausible](crate::evidence::sanity): it hides gaps.
@@ -87,7 +139,7 @@ pub(crate) fn extrapolation_notes(
     simulator: &dyn Simulator,
     roles: &SampleRoles,
     named: &[String],
-) -> Vec<String> {
+) -> Vec<Note> {
     let drifts = |name: &&String| {
         simulator.effects().iter().any(|effect| effect.name == **name && effect.drifts)
     };
@@ -96,11 +148,11 @@ pub(crate) fn extrapolation_notes(
     let least = BEYOND * (fitted[1] - fitted[0]);
     let is_beyond = fitted[0] - tested[0] > least || tested[1] - fitted[1] > least;
     let note = |name: &String| {
-        format!(
-            "{name} is a law of session time: it was fitted from {:.0} to {:.0} s and extrapolated to the test trials, from {:.0} to {:.0} s; \
+        Note::default().effect(name).text(format!(
+            " is a law of session time: it was fitted from {:.0} to {:.0} s and extrapolated to the test trials, from {:.0} to {:.0} s; \
              a drift of another law is far off there",
             fitted[0], fitted[1], tested[0], tested[1]
-        )
+        ))
     };
     named.iter().filter(drifts).filter(|_| is_beyond).map(note).collect()
 }
@@ -127,7 +179,7 @@ const LISTED: usize = 6;
 pub(crate) fn detection_limit_note(
     limits: &[DetectionLimit],
     effects: &[EffectSpec],
-) -> Option<String> {
+) -> Option<Note> {
     let share = |limit: &DetectionLimit| {
         let spec = effects.iter().find(|spec| spec.name == limit.effect)?;
         let parameter = spec.parameters.iter().find(|p| *p.name == *limit.parameter)?;
@@ -137,18 +189,16 @@ pub(crate) fn detection_limit_note(
     let known = limits.iter().filter_map(|limit| Some((share(limit)?, limit)));
     let mut known: Vec<(f64, &DetectionLimit)> = known.collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let words = |(_, limit): &(f64, &DetectionLimit)| {
+    let one = |note: Note, (i, (_, limit)): (usize, &(f64, &DetectionLimit))| {
         let unit = if limit.unit == "1" { String::new() } else { format!(" {}", limit.unit) };
-        format!("{} {}{unit}", limit.effect, in_digits(limit.strength.unwrap_or(0.0)))
+        let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
+        note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0))))
     };
-    let listed: Vec<String> = known.iter().take(LISTED).map(words).collect();
+    let begin = Note::default().text("It would have been named if it were stronger than: ");
+    let listed = known.iter().take(LISTED).enumerate().fold(begin, one);
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
-    (!listed.is_empty()).then(|| {
-        format!(
-            "It would have been named if it were stronger than: {}{rest} (with probability 0.9, by linearised draws).",
-            listed.join(", ")
-        )
-    })
+    let how = format!("{rest} (with probability 0.9, by linearised draws).");
+    (!known.is_empty()).then(|| listed.text(how))
 }
 
 /// Two digits.
@@ -179,7 +229,7 @@ mod tests {
         let effects: Vec<EffectSpec> = (0..9).map(spec).collect();
         let limits: Vec<DetectionLimit> =
             (0..9).map(|i| limit(i, (i > 0).then(|| 0.1 * (10 - i) as f64))).collect();
-        let words = detection_limit_note(&limits, &effects).expect("limits");
+        let words = detection_limit_note(&limits, &effects).expect("limits").to_string();
         assert!(
             words.starts_with(
                 "It would have been named if it were stronger than: e8 0.2 V, e7 0.3 V, "

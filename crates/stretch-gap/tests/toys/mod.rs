@@ -19,8 +19,13 @@ pub(crate) use laboratory::levels;
 pub(crate) use laws::{Effect, Law};
 pub(crate) use simulator::Measured;
 use stretch_gap::{
-    Description, DescriptionSpec, Noise, ParameterSpec, RandomGenerator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Noise, Note, ParameterSpec, RandomGenerator, StageSpec, TrialSpec,
 };
+
+/// The text of each note.
+pub(crate) fn texts(notes: &[Note]) -> Vec<String> {
+    notes.iter().map(Note::to_string).collect()
+}
 
 /// A simulator and the bench beside it.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Families of wrappers that data do not tell apart, and what the members of a family agree on.
 
 use stretch_effects::Family;
-use stretch_gap::{Candidate, Diagnosis};
+use stretch_gap::{Candidate, Diagnosis, Note};
 
 use super::checked::Checked;
 
@@ -19,22 +19,16 @@ pub struct Agreed {
 }
 
 impl Agreed {
-    /// The family as a sentence.
-    pub fn sentence(&self) -> String {
+    /// The family as a note.
+    pub fn note(&self) -> Note {
         let [low, high] = self.range;
         let how = match self.family {
             Family::Late => "late by",
             Family::Loop => "behind after a turn by",
         };
-        format!(
-            "these data do not tell {} apart; what they agree on: {how} {} .. {} {}",
-            self.names.join(" from "),
-            digits(low),
-            digits(high),
-            self.unit
-        )
-        .trim_end()
-        .to_owned()
+        let range = format!("{how} {} .. {} {}", digits(low), digits(high), self.unit);
+        let names = Note::default().text("these data do not tell ").effects(&self.names, " from ");
+        names.text(format!(" apart; what they agree on: {}", range.trim_end()))
     }
 }
 

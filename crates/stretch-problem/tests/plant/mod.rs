@@ -304,7 +304,11 @@ fn a_budget_is_kept_and_what_was_cut_short_is_said() {
     let (cut, cut_runs) = diagnosed(problem(recorded(plant()), &MANY), Some(80));
     assert!(cut_runs <= 80 && cut_runs < runs, "{cut_runs} of {runs}");
     assert!(cut.model_runs.unwrap().is_spent);
-    assert!(cut.notes.iter().any(|note| note.contains("the budget of 80 model runs was spent")));
+    assert!(
+        cut.notes
+            .iter()
+            .any(|note| note.to_string().contains("the budget of 80 model runs was spent"))
+    );
 }
 
 #[test]
@@ -415,5 +419,5 @@ fn what_one_sine_cannot_part_is_told_as_a_family() {
     assert!(family.names.contains(&"output.lag".to_owned()), "{family:?}");
     let [low, high] = family.range;
     assert!(low < 0.122 && high > 0.118 && high - low < 0.02, "{family:?}");
-    assert!(family.sentence().contains("late by 0.1"), "{}", family.sentence());
+    assert!(family.note().to_string().contains("late by 0.1"), "{}", family.note());
 }

@@ -17,11 +17,12 @@ use crate::{
     record::gross::Gross,
     toys::{Effect, Law, Measured, Toy},
     verdict::{
+        answer::{Answer, Findings},
         coverage::TooLittle,
-        diagnosis::{Unexplained, VerdictKind},
+        diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Judged, Overruled},
         naming::Naming,
-        sentence::{Answer, cut_short, tell},
+        notes::answer_notes,
     },
 };
 
@@ -170,7 +171,11 @@ impl Case {
     }
 
     /// The sentence and the notes.
-    fn text(&self, simulator: &dyn Simulator, evidence: &Evidence) -> String {
+    fn text(
+        &self,
+        simulator: &dyn Simulator,
+        (plain, evidence): (&Diagnosis, &Evidence),
+    ) -> String {
         let judged = Judged {
             kind: if self.overruled.is_some() { VerdictKind::Unknown } else { self.seen },
             seen: self.seen,
@@ -179,12 +184,11 @@ impl Case {
             proposed: self.proposed.clone(),
         };
         let [raw, retuned, left] = self.gap;
-        let answer = Answer {
+        let findings = Findings {
             judged: &judged,
             gap: Excess { raw, retuned, left },
             first: Some(&self.first),
             shares: &self.shares,
-            sanity: &self.sanity,
             unexplained: self.unexplained.as_ref(),
             gross: &self.gross,
             null_band: 0.02,
@@ -192,21 +196,29 @@ impl Case {
         let mut evidence = evidence.clone();
         evidence.roles.borrowed_test = self.borrowed_test;
         evidence.best_effect = self.has_best.then_some(0);
-        let words = tell(answer, simulator, &evidence);
-        let notes = words.notes.iter().map(|note| format!("note: {note}\n"));
-        format!("{}\n{}", words.sentence, notes.collect::<String>())
+        let answer = Answer::of(findings, simulator, &evidence);
+        let notes = answer_notes(&answer, &self.sanity, simulator, &evidence);
+        let told =
+            Diagnosis { answer: Some(answer), proposed: self.proposed.clone(), ..plain.clone() };
+        let notes = notes.iter().map(|note| format!("note: {note}\n"));
+        format!("{}\n{}", told.in_sentences(&two_digits), notes.collect::<String>())
     }
 }
 
+/// A probability with two digits.
+fn two_digits(probability: f64) -> String {
+    format!("{probability:.2}")
+}
+
 /// A line with a lag behind it, which leaves most.
-fn line_and_lag() -> (Measured, Evidence) {
+fn line_and_lag() -> (Measured, Diagnosis, Evidence) {
     let toy = Toy { trials: vec![(600, false), (400, true)], ..Toy::of(&[Law::Line, Law::Lag]) };
     let measured = toy.may_lack(&[Effect::Quadratic]).measured(1);
-    let (_, mut evidence) = measured.diagnosed();
+    let (diagnosis, mut evidence) = measured.diagnosed();
     for (stage, excess) in evidence.stages.iter_mut().zip([0.5, 7.0]) {
         (stage.excess_retuned, stage.excess_after) = (excess, excess);
     }
-    (measured, evidence)
+    (measured, diagnosis, evidence)
 }
 
 fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
@@ -326,19 +338,15 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
 
 #[test]
 fn every_answer_has_its_words() {
-    let (measured, evidence) = line_and_lag();
+    let (measured, plain, evidence) = line_and_lag();
     let mut text = String::new();
     for (name, case) in cases(&measured) {
-        let _ = writeln!(text, "# {name}\n{}", case.text(&measured, &evidence));
+        let _ = writeln!(text, "# {name}\n{}", case.text(&measured, (&plain, &evidence)));
     }
-    let not_looked_at: &[&[&str]] = &[&[], &["lag"], &["a", "b", "c", "d", "e", "f", "g", "h"]];
-    for names in not_looked_at {
-        let _ = writeln!(
-            text,
-            "# budget spent, {} left\n{}\n",
-            names.len(),
-            cut_short(names).trim_end()
-        );
+    for rest in [&[][..], &["lag"], &["a", "b", "c", "d", "e", "f", "g", "h"]] {
+        let cut = Diagnosis { cut_short: Some(names(rest)), ..plain.clone() };
+        let _ =
+            writeln!(text, "# budget spent, {} left\n{}\n", rest.len(), cut.preface().trim_end());
     }
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests/sentences.txt");
     is_in_file(&file, &text);

@@ -1,0 +1,92 @@
+//! A remark about a diagnosis, in which effects can be called by other names.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::verdict::answer::Answer;
+
+/// A remark about a diagnosis: text in which the names of effects are kept apart, so that a report can call them by what they are.
+/// Its serde form is the text.
+///
+/// ```
+/// use stretch_gap::Note;
+/// let mut note = Note::from("not looked for: ".to_owned()).effect("input.lag");
+/// note.rename(&|_| "a lag at the input".to_owned());
+/// assert_eq!(note.to_string(), "not looked for: a lag at the input");
+/// ```
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(into = "String", from = "String")]
+pub struct Note(Vec<Piece>);
+
+#[derive(Debug, Clone, PartialEq)]
+enum Piece {
+    Text(String),
+    Effect(String),
+    Answer(Answer),
+}
+
+impl Note {
+    /// With more text behind it.
+    #[must_use]
+    pub fn text(self, text: impl Into<String>) -> Self {
+        self.and(Piece::Text(text.into()))
+    }
+
+    /// With the name of an effect behind it.
+    #[must_use]
+    pub fn effect(self, name: impl Into<String>) -> Self {
+        self.and(Piece::Effect(name.into()))
+    }
+
+    /// With the names of effects behind it.
+    #[must_use]
+    pub fn effects<'a>(self, names: impl IntoIterator<Item = &'a String>, separator: &str) -> Self {
+        names.into_iter().enumerate().fold(self, |note, (i, name)| match i {
+            0 => note.effect(name),
+            _ => note.text(separator).effect(name),
+        })
+    }
+
+    /// With an answer behind it.
+    pub(crate) fn answer(self, answer: Answer) -> Self {
+        self.and(Piece::Answer(answer))
+    }
+
+    fn and(mut self, piece: Piece) -> Self {
+        self.0.push(piece);
+        self
+    }
+
+    /// Calls every effect by another name.
+    pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
+        for piece in &mut self.0 {
+            match piece {
+                Piece::Text(_) => {}
+                Piece::Effect(name) => *name = rename(name),
+                Piece::Answer(answer) => answer.rename(rename),
+            }
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|piece| match piece {
+            Piece::Text(text) | Piece::Effect(text) => f.write_str(text),
+            Piece::Answer(answer) => f.write_str(&answer.in_sentences(&|p| format!("{p:.2}"))),
+        })
+    }
+}
+
+impl From<String> for Note {
+    fn from(text: String) -> Self {
+        Self::default().text(text)
+    }
+}
+
+impl From<Note> for String {
+    fn from(note: Note) -> Self {
+        note.to_string()
+    }
+}

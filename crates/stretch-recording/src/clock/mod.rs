@@ -183,7 +183,7 @@ pub(crate) fn read(
     let lost: Vec<usize> = (0..track.stamps.counts.len()).filter(not_finite).collect();
     leave_out(file, track, &lost, "is no number", options, notes)?;
     let stamps = &mut track.stamps;
-    let Some(steps) = Steps::of(&stamps.counts) else {
+    let Some(mut steps) = Steps::of(&stamps.counts) else {
         return match stamps.counts[..] {
             [] | [_] => {
                 stamps.per_second.get_or_insert(options.divisor(&stamps.name));
@@ -192,6 +192,7 @@ pub(crate) fn read(
             _ => Err(never_rises(file, stamps)),
         };
     };
+    let samples = stamps.counts.len();
     let per_second = unit::decide(file, stamps, steps, options, notes)?;
     stamps.per_second = Some(per_second);
     if steps.back > 0 {
@@ -203,9 +204,11 @@ pub(crate) fn read(
         let what = "is long before the others";
         leave_out(file, track, &(0..unset).collect::<Vec<_>>(), what, options, notes)?;
     }
-    let Some(steps) = Steps::of(&track.stamps.counts) else {
-        return Err(never_rises(file, &track.stamps));
-    };
+    // Most recordings are as they should be, and their steps are looked at once.
+    if steps.back > 0 || track.stamps.counts.len() < samples {
+        let anew = Steps::of(&track.stamps.counts);
+        steps = anew.ok_or_else(|| never_rises(file, &track.stamps))?;
+    }
     let copies = spread::spread(&mut track.stamps, steps, per_second, notes);
     leave_out(file, track, &copies, "is that of the row before", options, notes)?;
     unit::check_rate(file, &track.stamps, steps, options)

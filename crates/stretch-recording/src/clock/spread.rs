@@ -82,6 +82,11 @@ pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     if steps.tick > MOST_TICKS * least {
         return None;
     }
+    // Most clocks are even; that needs no division.
+    let is_other = |step: &f64| (step - steps.tick).abs() > 0.5 * least;
+    if all().filter(is_other).count() < FEWEST {
+        return None;
+    }
     let ones = all().filter(|step| *step <= (1.0 + WHOLE) * least);
     let (sum, one) = ones.fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
     let tick = sum / one as f64;

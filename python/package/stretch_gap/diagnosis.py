@@ -122,7 +122,7 @@ class Diagnosis:
 
     @property
     def families(self) -> list[dict[str, Any]]:
-        """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 .. 0.14 s"."""
+        """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 to 0.14 s"."""
         return list(self._answer.get("families", []))
 
     @property

@@ -195,9 +195,10 @@ fn alternatives(effect: &MissingEffect) -> String {
 
 /// An effect or its alternatives, with the share that it closes.
 fn with_share(effect: &MissingEffect) -> String {
-    let share = match effect.closes < LEAST_SHARE_IN_WORDS {
-        true => "below 1 %".to_owned(),
-        false => format!("{:.0} %", 100.0 * effect.closes),
+    let share = match effect.closes {
+        share if share <= 0.0 => "nothing on its own".to_owned(),
+        share if share < LEAST_SHARE_IN_WORDS => "less than 1 %".to_owned(),
+        share => format!("{:.0} %", 100.0 * share),
     };
     let end = if effect.at_bound { ", at the end of its range" } else { "" };
     format!("{} ({share}{end})", alternatives(effect))

@@ -22,11 +22,17 @@ impl Agreed {
     /// The family as a note.
     pub fn note(&self) -> Note {
         let [low, high] = self.range;
-        let how = match self.family {
-            Family::Late => "late by",
-            Family::Loop => "behind after a turn by",
+        let unit = &self.unit;
+        let by = |low: f64, high: f64| format!("by {} to {} {unit}", digits(low), digits(high));
+        let range = match self.family {
+            Family::Late if high < 0.0 => format!("early {}", by(-high, -low)),
+            Family::Late if low < 0.0 => {
+                let (early, late) = (digits(-low), digits(high));
+                format!("at most {early} {unit} early and at most {late} {unit} late")
+            }
+            Family::Late => format!("late {}", by(low, high)),
+            Family::Loop => format!("behind after a turn {}", by(low, high)),
         };
-        let range = format!("{how} {} .. {} {}", digits(low), digits(high), self.unit);
         let names = Note::default().text("these data do not tell ").effects(&self.names, " from ");
         names.text(format!(" apart; what they agree on: {}", range.trim_end()))
     }

@@ -41,7 +41,10 @@ pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<St
     }
     let hertz = |band: usize| {
         let f = 0.5 / dt_s / (1 << band) as f64;
-        if f < 1.0 { format!("{f:.1}") } else { format!("{}", (f * 10.0).round() / 10.0) }
+        // a decimal, and below 0.1 Hz the first digit that is not zero
+        let places = (-f.log10().floor()).clamp(1.0, 9.0) as usize;
+        let text = format!("{f:.places$}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
     };
     let labels = (0..BANDS)
         .map(|b| match b + 1 {
@@ -180,5 +183,7 @@ mod tests {
         let (labels, _) = cells(&whole(WINDOW), &vec![1.0; WINDOW], 0.01);
         assert_eq!(labels.len(), BANDS);
         assert_eq!((labels[0].as_str(), labels[7].as_str()), ("25 to 50 Hz", "below 0.4 Hz"));
+        let (labels, _) = cells(&whole(WINDOW), &vec![1.0; WINDOW], 1.0);
+        assert_eq!((labels[0].as_str(), labels[7].as_str()), ("0.2 to 0.5 Hz", "below 0.004 Hz"));
     }
 }

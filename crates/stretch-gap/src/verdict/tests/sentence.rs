@@ -265,6 +265,10 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
         ("mostly", mostly()),
         ("mostly, tied", mostly().tied(PLAY, LOOP)),
         ("mostly, with a proposal", Case { proposed: Some(proposed()), ..mostly() }),
+        (
+            "in part, one closes nothing",
+            part(0.3, vec![share(PLAY, 0.34, false), share(LAG, -0.04, false)]),
+        ),
         ("in part", part(0.3, vec![share(PLAY, 0.295, true), share(LAG, 0.005, false)])),
         ("unknown", unknown()),
         (

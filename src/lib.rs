@@ -39,7 +39,7 @@ use display::Volume;
 struct Cli {
     /// Say nothing but results and errors
     ///
-    /// Of a diagnosis say the verdict alone.
+    /// For a diagnosis, print only the verdict.
     #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     quiet: bool,
     /// Say also what is read and chosen

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::display::{Output, warn};
 
-/// Turn a trial's voltage into length, or a stream's as it comes
+/// Turn the voltages of a trial or of a live stream into lengths
 ///
 /// Writes time_s, the estimate, its rate, the branch and the domain, a line a
 /// sample. Where nothing can be said (the rate estimator warms up, a sample is

@@ -21,7 +21,7 @@ use super::{
 ///
 /// A column is NEW=OLD, NEW=OLD*FACTOR, or NEW=OLD*FACTOR+OFFSET.
 ///
-/// Of MCAP, ROS bags, MATLAB, HDF5 and Parquet the Python package makes an NPZ file first:
+/// The Python package first converts MCAP, ROS bags, MATLAB, HDF5 and Parquet to an NPZ file:
 ///
 ///   python -m stretch_gap convert run.mcap run.npz
 #[derive(clap::Args)]

@@ -32,7 +32,7 @@ const FAILED_ON: u8 = 3;
 /// Status of a diagnosis that stands on less than it asked for, because the budget of runs was spent.
 const SPENT: u8 = 4;
 
-/// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
+/// Say where a simulator and a measurement differ, which effect causes it, and how far the gap closes
 ///
 ///   stretch diagnose bench --report gap.html
 ///
@@ -42,13 +42,13 @@ const SPENT: u8 = 4;
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
-/// What is named can be written into a rig file, beside which nothing is missing any more, and
+/// The named effects can be written into a rig file, with which nothing is missing any more, and
 /// as code for a simulator of your own:
 ///
 ///   stretch diagnose bench --fix fixed.toml --snippets code
 ///   stretch diagnose bench --rig fixed.toml
 ///
-/// A simulator of your own, in any language, stands in a problem.toml with its parameters, the
+/// A simulator of your own, in any language, is described in a problem.toml with its parameters, the
 /// recordings, and what may wrap it (stretch init FOLDER writes a first one):
 ///
 ///   stretch diagnose problem.toml --fix fixed.toml
@@ -117,8 +117,8 @@ pub(crate) struct Args {
     no_next: bool,
     /// Fit every run by itself, too, and say which disagree
     ///
-    /// A run is a trial, or with the name of a column all samples in which it has one value, such as a load. It is also said in what
-    /// runs disagree, and which values the data tell.
+    /// A run is a trial, or with the name of a column all samples in which it has one value, such as a load. The output also says in
+    /// what the runs disagree, and which values the data determine.
     #[arg(long, value_name = "trial|COLUMN")]
     by: Option<By>,
     /// Say what simpler methods would have named, too

@@ -30,7 +30,7 @@ use super::shared::{give_stdout, say, tell};
 ///   stretch export --calibration cal.json --fixed cal.postcard --adc 12,0,3.3
 ///
 /// Every record carries a checksum, its seal. Without any other option the command says what a record is and
-/// whether its seal holds. Whoever edits a record in JSON by hand renews the seal:
+/// whether its seal holds. After you edit a record in JSON by hand, renew the seal:
 ///
 ///   stretch export --calibration cal.json
 ///   stretch export --calibration cal.json --seal

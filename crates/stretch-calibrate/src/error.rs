@@ -14,7 +14,7 @@ pub enum CalibrateError {
     NoTrials,
     /// No model can be judged on samples that were left out of its fit.
     #[error(
-        "no model can be judged on samples that are left out of its fit: these are too few; record more, or calibrate with one of them"
+        "no model can be judged on samples that are left out of its fit: these are too few; record more, or choose one model with --model"
     )]
     TooFewToJudge,
     /// The time stamps give no sample rate.

@@ -29,7 +29,7 @@ fn a_drift_that_is_described_is_no_effect() {
 }
 
 fn swings(notes: &[Note]) -> Vec<String> {
-    texts(notes).into_iter().filter(|note| note.contains("swings")).collect()
+    texts(notes).into_iter().filter(|note| note.contains("oscillates")).collect()
 }
 
 /// A swing that a drift could explain is no gap, but it is reported with its frequency and size.
@@ -41,7 +41,7 @@ fn a_drift_that_swings_is_told() {
             (std::f64::consts::TAU * 0.7 * toy.dt_s, 0.045 / toy.parameters[1].nominal);
         let swing = |(i, drift): (usize, &mut f64)| *drift += 0.045 * (turn * i as f64).sin();
         toy.courses[0].1.iter_mut().enumerate().for_each(swing);
-        let begins = format!("{} swings at ", toy.parameters[1].name);
+        let begins = format!("{} oscillates at ", toy.parameters[1].name);
         let told = toy.measured(seed).diagnosed().0;
         assert!(told.named.is_empty(), "{}", told.sentence);
         let [note] = &swings(&told.notes)[..] else { panic!("one note: {:?}", told.notes) };

@@ -159,7 +159,7 @@ pub enum RecordingError {
     },
     /// A date of which the day and the month may be exchanged.
     #[error(
-        "{at}: which number of \"{value}\" is the day is open; say it with --time {}:dmy or {}:mdy", .at.column, .at.column
+        "{at}: it is unclear which number of \"{value}\" is the day; say it with --time {}:dmy or {}:mdy", .at.column, .at.column
     )]
     DayOrMonth {
         /// Where.

@@ -109,7 +109,11 @@ pub(crate) fn joined(
     for track in &mut tracks {
         whole_channels(file, track, options, &mut left_out, &mut notes)?;
     }
-    note(&mut notes, "left out, not all of their values are finite numbers", &left_out);
+    note(
+        &mut notes,
+        "columns left out because not all of their values are finite numbers",
+        &left_out,
+    );
     if tracks.len() > 1 {
         tracks.retain(|t| !t.channels.is_empty() && t.stamps.counts.len() > 1);
     }

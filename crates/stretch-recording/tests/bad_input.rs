@@ -168,7 +168,7 @@ fn rows_and_time() {
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.5,1\n",
-        "t.csv, row 3, column time_s: time stands still at 0.5; the rate with --sample-rate HZ \
+        "t.csv, row 3, column time_s: time does not advance at 0.5; the rate with --sample-rate HZ \
          replaces a column of time",
     );
 }

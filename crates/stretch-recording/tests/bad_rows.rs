@@ -182,7 +182,7 @@ fn a_column_that_nobody_asks_for_keeps_its_numbers() {
         notes,
         [
             "a row is left out: row 22, column force: \"oops\" is not a number",
-            "left out, not all of their fields are numbers: state, rare",
+            "columns left out because not all of their fields are numbers: state, rare",
         ]
     );
 }
@@ -196,7 +196,7 @@ fn a_hole_beside_what_is_asked_for_costs_no_row() {
     let options = ReadOptions::new().require("bridge_v");
     let (times, notes) = read(&lines, &options).expect("30 rows");
     assert_eq!((times.len(), live(&lines, &options).len()), (30, 30));
-    assert_eq!(notes, ["left out, not all of their fields are numbers: length_mm"]);
+    assert_eq!(notes, ["columns left out because not all of their fields are numbers: length_mm"]);
     assert_eq!(read(&lines, &ReadOptions::new()).expect("29 rows").0.len(), 29);
 }
 

@@ -167,7 +167,7 @@ fn stale_rows_are_left_out() {
     assert!(read_as(&one, &strict).expect_err("strict").to_string().contains("--strict"));
     let still = table("time_s", |_, _| "5".to_owned());
     let error = read_as(&still, &ReadOptions::new()).expect_err("no clock").to_string();
-    assert!(error.contains("time stands still at 5"), "{error}");
+    assert!(error.contains("time does not advance at 5"), "{error}");
 }
 
 #[test]

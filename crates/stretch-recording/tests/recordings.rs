@@ -81,7 +81,7 @@ fn parquet() {
             [
                 "left out: word (no numbers)",
                 "the time is column time",
-                "left out, not all of their values are finite numbers: holes",
+                "columns left out because not all of their values are finite numbers: holes",
                 "time counts from the first sample, 2024-05-01T12:00:00Z",
             ]
         );

@@ -169,9 +169,9 @@ fn repeats(d: f64, minutes: f64) -> String {
     let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / nats).ceil() {
         n if n <= 1.0 => String::new(),
-        n if n <= 20.0 => format!(" Once will hardly do: plan {n} runs."),
+        n if n <= 20.0 => format!(" One run is probably not enough: plan {n} runs."),
         _ => {
-            " The rivals are so alike that none of the candidate experiments is likely to part them.".into()
+            " The rivals are so alike that none of the candidate experiments is likely to distinguish them.".into()
         }
     }
 }

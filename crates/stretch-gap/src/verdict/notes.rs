@@ -70,7 +70,7 @@ pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
     let count: usize = models.values().sum();
     let (s, it) = if count == 1 { ("", "it") } else { ("s", "them") };
     let begin = Note::default().text(format!(
-        "{count} model{s} could not be simulated, and what asked for {it} went on without: "
+        "{count} model{s} could not be simulated, and the diagnosis went on without {it}: "
     ));
     let one = |note: Note, (i, (set, own)): (usize, (&Vec<String>, &usize))| {
         let note = note.text(if i == 0 { "" } else { ", " });
@@ -115,7 +115,7 @@ pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) ->
             nominal => format!("{:.2} %", 100.0 * (swing.amplitude / nominal).abs()),
         };
         format!(
-            "{} swings at {:.2} Hz by {size} to either side, as stage {stage} tells with a probability of {:.2}: \
+            "{} oscillates at {:.2} Hz by {size} to either side, according to stage {stage} with a probability of {:.2}: \
              the diagnosis counts it as drift, and no effect is blamed for it",
             spec.name, swing.hertz, swing.probability
         )
@@ -150,7 +150,7 @@ pub(crate) fn extrapolation_notes(
     let note = |name: &String| {
         Note::default().effect(name).text(format!(
             " is a law of session time: it was fitted from {:.0} to {:.0} s and extrapolated to the test trials, from {:.0} to {:.0} s; \
-             a drift of another law is far off there",
+             if the drift follows another law, the extrapolation is far off",
             fitted[0], fitted[1], tested[0], tested[1]
         ))
     };

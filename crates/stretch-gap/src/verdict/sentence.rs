@@ -157,7 +157,7 @@ impl Answer {
                 )
             }
             Self::AtBounds { stage, parameters, left, .. } => format!(
-                "The parameters of {stage} do not fit within their tolerances: {} stand at the end of them, and {left:.1} times the noise is left \
+                "The parameters of {stage} do not fit within their tolerances: {} are at the end of them, and {left:.1} times the noise is left \
                  all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
                 parameters.join(", ")
             ),

@@ -257,7 +257,8 @@ fn goes_back(file: &str, stamps: &Stamps) -> Option<(Place, String)> {
 
 /// The error for stamps of which none rises.
 fn never_rises(file: &str, stamps: &Stamps) -> RecordingError {
-    let still = || (stamps.place(file, 1), format!("time stands still at {}", stamps.recorded(1)));
+    let still =
+        || (stamps.place(file, 1), format!("time does not advance at {}", stamps.recorded(1)));
     let (at, problem) = goes_back(file, stamps).unwrap_or_else(still);
     RecordingError::Stamps { at, problem }
 }

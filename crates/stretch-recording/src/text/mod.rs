@@ -190,7 +190,9 @@ impl<'a> Table<'a> {
         let missing: Vec<&str> = missing.map(|(_, name)| name.as_str()).collect();
         if !missing.is_empty() {
             let names = missing.join(", ");
-            notes.push(format!("left out, not all of their fields are numbers: {names}"));
+            notes.push(format!(
+                "columns left out because not all of their fields are numbers: {names}"
+            ));
         }
         joined(file, tracks, notes, options)
     }

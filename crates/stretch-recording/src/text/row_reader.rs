@@ -24,7 +24,7 @@ use crate::{
 ///
 /// The samples of a stream without a time are counted where the options say how many come a second; malformed rows count.
 ///
-/// A row whose time stands still or goes back is an error, too, but the clock goes on from
+/// A row whose time does not advance or goes back is an error, too, but the clock goes on from
 /// there: a logger that was restarted is lost for one row, not for good. Whoever keeps a
 /// memory over the rows should reset it when [`RecordingError::is_time`] holds.
 ///

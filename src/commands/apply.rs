@@ -28,7 +28,7 @@ use crate::display::{Output, warn};
 /// sample. Where nothing can be said (the rate estimator warms up, a sample is
 /// missing) the numbers are empty and the domain says why. Inputs outside the
 /// calibrated domain are clamped, and the domain says so. A line and a curve
-/// need no rate: they answer from the first sample, with a rate of 0 at first.
+/// need no rate: they answer from the first sample, with an empty rate at first.
 ///
 /// From standard input each line is answered as it comes; a malformed line is
 /// noted on standard error and passed over:

@@ -5,7 +5,7 @@ use stretch_core::{
     Seconds, Stage, Volts,
 };
 use stretch_data::Trial;
-use stretch_filter::{Arrival, Cadence};
+use stretch_filter::{Arrival, Cadence, RateFilter};
 use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{
@@ -18,6 +18,8 @@ const JITTER_TOLERANCE: f64 = 0.2;
 
 /// A receptor that checks the time stamps: missing ticks are stepped as missing samples, and a stamp that runs
 /// backwards resets the receptor.
+///
+/// Where a model answers before its rate is known ([`Model::needs_signal_only`]), that rate is NaN.
 ///
 /// ```
 /// use stretch_calibrate::LiveReceptor;
@@ -39,6 +41,9 @@ pub struct LiveReceptor {
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
+    /// The rate estimator of a model that answers without it, and how many samples in a row were missing.
+    rate: Option<Runner<RateFilter<f64>>>,
+    missing: u8,
 }
 
 /// Faults of a stream's time stamps.
@@ -60,7 +65,12 @@ impl LiveReceptor {
     /// needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
         let receptor = Receptor::new(calibration)?;
+        let spec = calibration.spec();
+        let rate = spec.model.needs_signal_only();
+        let rate = rate.then(|| RateFilter::new(spec.rate_estimator, spec.sample_rate_hz));
         Ok(Self {
+            rate: rate.transpose()?.map(Runner::new),
+            missing: 0,
             memory: receptor.memory(),
             receptor,
             cadence: Runner::new(Cadence::new(
@@ -80,17 +90,30 @@ impl LiveReceptor {
             Arrival::Gap { missing } => {
                 self.faults.missing += u64::from(missing);
                 for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
-                    let _ = self.receptor.step(&mut self.memory, Volts(f64::NAN));
+                    let _ = self.sample(f64::NAN);
                 }
             }
             Arrival::Backwards { .. } => {
                 self.faults.backwards += 1;
                 self.memory = self.receptor.memory();
+                self.rate.iter_mut().for_each(Runner::reset);
             }
             Arrival::Jitter { .. } => self.faults.jittered += 1,
             _ => {}
         }
-        self.receptor.step(&mut self.memory, Volts(signal))
+        self.sample(signal)
+    }
+
+    fn sample(&mut self, signal: f64) -> Result<Reading, Withheld> {
+        let reading = self.receptor.step(&mut self.memory, Volts(signal));
+        let Some(rate) = &mut self.rate else { return reading };
+        self.missing = if reading.is_ok() { 0 } else { self.missing.saturating_add(1) };
+        if self.missing > MAX_BRIDGED {
+            rate.reset();
+        }
+        let reading = reading?;
+        let known = rate.step(signal).map_or(f64::NAN, |_| reading.rate);
+        Ok(Reading { rate: known, ..reading })
     }
 
     /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.

@@ -15,6 +15,7 @@ use stretch_report::{Subject, diagnosis_page, transfer_in_words};
 use crate::support::{first_seconds, is_snapshot, section, text};
 
 const SENTENCES: &str = include_str!("../../stretch-gap/src/verdict/tests/sentences.txt");
+const ANSWERS: &str = include_str!("../../stretch-gap/src/verdict/tests/answers.json");
 const SAMPLES: usize = 400;
 const PLAY: &str = "lag.output.backlash";
 const LOOP: &str = "lag.output.bouc_wen";
@@ -92,19 +93,20 @@ fn trial(trial: usize) -> SessionTrial {
     SessionTrial { start_s: 60.0 * trial as f64, split, ..SessionTrial::new(recorded) }
 }
 
-/// What stretch-gap says of such an answer: the sentence and the notes.
-fn said(name: &str) -> (String, Vec<String>) {
+/// What stretch-gap says of such an answer: its value, the sentence and the notes.
+fn said(name: &str) -> (Value, String, Vec<String>) {
+    let answers: Value = serde_json::from_str(ANSWERS).expect("JSON");
     let mut blocks = SENTENCES.split("# ").map(str::lines);
     let mut lines = blocks.find_map(|mut lines| (lines.next()? == name).then_some(lines));
     let mut lines = lines.take().expect(name);
     let sentence = lines.next().expect("a sentence").to_owned();
     let notes = lines.filter_map(|line| line.strip_prefix("note: ")).map(str::to_owned);
-    (sentence, notes.collect())
+    (answers[name].clone(), sentence, notes.collect())
 }
 
 /// An answer without names.
 fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
-    let (sentence, notes) = said(name);
+    let (value, sentence, notes) = said(name);
     let agrees = matches!(verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     let lag = if agrees { [30.0, 0.004, 0.004] } else { [30.0, 8.0, 0.002] };
     let stage = |name: &str, channel: &str, share: f64, [raw, excess, after]: [f64; 3]| {
@@ -120,7 +122,7 @@ fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
         })
     };
     from_value(json!({
-        "schema": 1, "verdict": verdict, "sentence": sentence, "named": [], "ambiguous": [],
+        "schema": 1, "verdict": verdict, "answer": value, "sentence": sentence, "named": [], "ambiguous": [],
         "candidates": [], "least_gap": 0.05, "null_band": 0.02, "notes": notes, "runtime_s": 12.34,
         "where": {
             "stages": [
@@ -192,7 +194,7 @@ fn one_missing() -> Diagnosis {
 fn next_experiment<T: serde::de::DeserializeOwned>(minutes: f64) -> Option<T> {
     let next = json!({
         "name": "slow_triangle", "separates": [PLAY, LOOP], "d": 6.2, "minutes": minutes,
-        "why": format!("{PLAY} dwells at its turns, {LOOP} does not."),
+        "why": "Backlash dwells at its turns, smooth hysteresis does not.",
     });
     Some(from_value(next).expect("an experiment"))
 }

@@ -380,7 +380,10 @@ mod tests {
     fn runs_are_planned_where_one_will_hardly_do() {
         // A minute holds 120 blocks: d^2 of 0.05 gives 3 nats.
         assert_eq!(repeats(0.05_f64.sqrt() + 1e-9, 1.0), "");
-        assert_eq!(repeats(0.02_f64.sqrt() + 1e-9, 1.0), " Once will hardly do: plan 3 runs.");
+        assert_eq!(
+            repeats(0.02_f64.sqrt() + 1e-9, 1.0),
+            " One run is probably not enough: plan 3 runs."
+        );
         assert!(repeats(1e-3, 1.0).contains("so alike that none of the candidate experiments"));
         assert!(repeats(0.0, 1.0).contains("so alike that none of the candidate experiments"));
     }

@@ -1,4 +1,4 @@
-//! What is said of answers of every kind, each built from values: `sentences.txt` has them all.
+//! What is said of answers of every kind, each built from values: `sentences.txt` has them all, and `answers.json` their values.
 
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
@@ -170,12 +170,12 @@ impl Case {
         Self { overruled: Some(by), ..self }
     }
 
-    /// The sentence and the notes.
-    fn text(
+    /// A diagnosis with the answer and its notes.
+    fn told(
         &self,
         simulator: &dyn Simulator,
         (plain, evidence): (&Diagnosis, &Evidence),
-    ) -> String {
+    ) -> Diagnosis {
         let judged = Judged {
             kind: if self.overruled.is_some() { VerdictKind::Unknown } else { self.seen },
             seen: self.seen,
@@ -198,10 +198,8 @@ impl Case {
         evidence.best_effect = self.has_best.then_some(0);
         let answer = Answer::of(findings, simulator, &evidence);
         let notes = answer_notes(&answer, &self.sanity, simulator, &evidence);
-        let told =
-            Diagnosis { answer: Some(answer), proposed: self.proposed.clone(), ..plain.clone() };
-        let notes = notes.iter().map(|note| format!("note: {note}\n"));
-        format!("{}\n{}", told.in_sentences(&two_digits), notes.collect::<String>())
+        let proposed = self.proposed.clone();
+        Diagnosis { answer: Some(answer), proposed, notes, ..plain.clone() }
     }
 }
 
@@ -343,15 +341,22 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
 #[test]
 fn every_answer_has_its_words() {
     let (measured, plain, evidence) = line_and_lag();
-    let mut text = String::new();
+    let (mut text, mut values) = (String::new(), serde_json::Map::new());
     for (name, case) in cases(&measured) {
-        let _ = writeln!(text, "# {name}\n{}", case.text(&measured, (&plain, &evidence)));
+        let told = case.told(&measured, (&plain, &evidence));
+        let _ = writeln!(text, "# {name}\n{}", told.in_sentences(&two_digits));
+        text.extend(told.notes.iter().map(|note| format!("note: {note}\n")));
+        text.push('\n');
+        values.insert(name.into(), json!(told.answer));
     }
     for rest in [&[][..], &["lag"], &["a", "b", "c", "d", "e", "f", "g", "h"]] {
         let cut = Diagnosis { cut_short: Some(names(rest)), ..plain.clone() };
         let _ =
             writeln!(text, "# budget spent, {} left\n{}\n", rest.len(), cut.preface().trim_end());
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests/sentences.txt");
-    is_in_file(&file, &text);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests");
+    is_in_file(&folder.join("sentences.txt"), &text);
+    // The tests of reports read these.
+    let values = serde_json::to_string_pretty(&values).expect("written");
+    is_in_file(&folder.join("answers.json"), &(values + "\n"));
 }

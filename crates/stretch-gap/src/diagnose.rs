@@ -47,6 +47,7 @@ use crate::{
             answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
             implausible_noise_notes, lost_note, swing_notes,
         },
+        sentence::two_digits,
     },
 };
 
@@ -486,7 +487,7 @@ fn report(
         starts: searched.problem.starts,
         candidates,
     };
-    diagnosis.sentence = diagnosis.in_sentences(&|p| format!("{p:.2}"));
+    diagnosis.sentence = diagnosis.in_sentences(&two_digits);
     Ok((diagnosis, evidence))
 }
 

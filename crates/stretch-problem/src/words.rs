@@ -33,24 +33,7 @@ pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
 /// A diagnosis whose effects are called by what they are, to be shown: what is computed with, and what is stored, keeps the names.
 pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
     let mut out = diagnosis.clone();
-    let words = |name: &str| effect_in_words(name, diagnosis);
-    let lists = [&mut out.named, &mut out.tied, &mut out.faint, &mut out.ambiguous];
-    let names = lists.into_iter().flatten().chain(&mut out.not_examined);
-    let names = names.chain(out.cut_short.iter_mut().flatten());
-    let names = names.chain(out.candidates.iter_mut().flat_map(|c| &mut c.effects));
-    let names = names.chain(out.shares.iter_mut().map(|s| &mut s.effect));
-    let names = names.chain(out.stabilities.iter_mut().map(|s| &mut s.effect));
-    let names = names.chain(out.detection_limits.iter_mut().map(|l| &mut l.effect));
-    let simpler = out.baselines.iter_mut();
-    let simpler = simpler.flat_map(|b| [&mut b.largest_drop, &mut b.signature, &mut b.bic]);
-    let names = names.chain(simpler.flatten());
-    let names = names.chain(out.next_experiment.iter_mut().flat_map(|next| &mut next.separates));
-    names.for_each(|name| *name = words(name));
-    let values = out.candidates.iter_mut().flat_map(|c| &mut c.parameters);
-    values.for_each(|value| value.effect = words(&value.effect));
-    out.answer.iter_mut().for_each(|answer| answer.rename(&words));
-    out.notes.iter_mut().chain(&mut out.reservations).for_each(|note| note.rename(&words));
-    out.sentence = out.in_sentences(&|p| format!("{p:.2}"));
+    out.rename(&|name| effect_in_words(name, diagnosis));
     out
 }
 

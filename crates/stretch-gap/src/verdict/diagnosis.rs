@@ -17,7 +17,7 @@ use crate::{
     problem::{record_facts::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
     search::baselines::Baselines,
-    verdict::{answer::Answer, note::Note},
+    verdict::{answer::Answer, note::Note, sentence::two_digits},
 };
 
 /// The answers.
@@ -212,6 +212,36 @@ impl Diagnosis {
     pub fn is_agreement(&self) -> bool {
         let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
         agrees && self.reservations.is_empty()
+    }
+
+    /// Calls every effect by another name, in lists, notes and sentences alike.
+    ///
+    /// ```
+    /// use stretch_gap::Diagnosis;
+    /// fn check(diagnosis: &mut Diagnosis) {
+    ///     diagnosis.rename(&|name| name.to_uppercase());
+    ///     assert!(diagnosis.named.iter().all(|name| diagnosis.sentence.contains(name)));
+    /// }
+    /// ```
+    pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
+        let lists = [&mut self.named, &mut self.tied, &mut self.faint, &mut self.ambiguous];
+        let names = lists.into_iter().flatten().chain(&mut self.not_examined);
+        let names = names.chain(self.cut_short.iter_mut().flatten());
+        let names = names.chain(self.candidates.iter_mut().flat_map(|c| &mut c.effects));
+        let names = names.chain(self.shares.iter_mut().map(|s| &mut s.effect));
+        let names = names.chain(self.stabilities.iter_mut().map(|s| &mut s.effect));
+        let names = names.chain(self.detection_limits.iter_mut().map(|l| &mut l.effect));
+        let simpler = self.baselines.iter_mut();
+        let simpler = simpler.flat_map(|b| [&mut b.largest_drop, &mut b.signature, &mut b.bic]);
+        let names = names.chain(simpler.flatten());
+        let next = self.next_experiment.iter_mut();
+        let names = names.chain(next.flat_map(|next| &mut next.separates));
+        names.for_each(|name| *name = rename(name));
+        let values = self.candidates.iter_mut().flat_map(|c| &mut c.parameters);
+        values.for_each(|value| value.effect = rename(&value.effect));
+        self.answer.iter_mut().for_each(|answer| answer.rename(rename));
+        self.notes.iter_mut().chain(&mut self.reservations).for_each(|note| note.rename(rename));
+        self.sentence = self.in_sentences(&two_digits);
     }
 
     /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::verdict::answer::Answer;
+use crate::verdict::{answer::Answer, sentence::two_digits};
 
 /// A remark about a diagnosis: text in which the names of effects are kept apart, so that a report can call them by what they are.
 /// Its serde form is the text.
@@ -74,7 +74,7 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.iter().try_for_each(|piece| match piece {
             Piece::Text(text) | Piece::Effect(text) => f.write_str(text),
-            Piece::Answer(answer) => f.write_str(&answer.in_sentences(&|p| format!("{p:.2}"))),
+            Piece::Answer(answer) => f.write_str(&answer.in_sentences(&two_digits)),
         })
     }
 }

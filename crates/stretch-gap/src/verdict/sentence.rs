@@ -57,6 +57,11 @@ impl Diagnosis {
     }
 }
 
+/// A probability as sentences give it.
+pub(crate) fn two_digits(probability: f64) -> String {
+    format!("{probability:.2}")
+}
+
 /// The first names, and how many more there are.
 fn listed(names: &[String]) -> String {
     let first = names[..names.len().min(LISTED)].join(", ");

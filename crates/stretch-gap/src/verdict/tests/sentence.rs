@@ -23,6 +23,7 @@ use crate::{
         judge::{Judged, Overruled},
         naming::Naming,
         notes::answer_notes,
+        sentence::two_digits,
     },
 };
 
@@ -201,11 +202,6 @@ impl Case {
         let proposed = self.proposed.clone();
         Diagnosis { answer: Some(answer), proposed, notes, ..plain.clone() }
     }
-}
-
-/// A probability with two digits.
-fn two_digits(probability: f64) -> String {
-    format!("{probability:.2}")
 }
 
 /// A line with a lag behind it, which leaves most.

@@ -1,4 +1,4 @@
-"""Candidates around a stage, in the textbook form of `stretch effects --kinds`: each takes and gives a sampled signal."""
+"""Candidates around a stage, in the textbook form of `stretch effects kinds`: each takes and gives a sampled signal."""
 import numpy as np
 
 from plant import njit

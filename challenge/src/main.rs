@@ -5,8 +5,8 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Parser;
 use stretch_blind::{Disturbances, Family, Plan, PlantName, Protocol};
 use stretch_challenge::{
-    Asked, RunOptions, aligned, board, is_stopped, make_cases, make_open, on_ctrl_c, read_scores,
-    run_cases, say, score_answers, score_open, write_diagnosis,
+    Asked, RunOptions, aligned, board, is_stopped, make_cases, make_open, on_ctrl_c, run_cases,
+    say, score_answers, score_open, write_diagnosis,
 };
 
 /// Check the diagnosis on cases whose causes are sealed until it has answered
@@ -76,7 +76,7 @@ enum Step {
     },
     /// Diagnose one folder, as `run` does in a separate process
     #[command(hide = true)]
-    Diagnose(Diagnose),
+    Diagnose(Asked),
 }
 
 /// What is made, and where.
@@ -120,20 +120,6 @@ struct Make {
 /// Record of the seeds that are spent, in the folder that the program runs in.
 const SPENT: &str = "spent_seeds.csv";
 
-#[derive(clap::Args)]
-struct Diagnose {
-    folder: PathBuf,
-    #[arg(long)]
-    json: PathBuf,
-    #[arg(long)]
-    without: Vec<String>,
-    #[arg(long)]
-    baselines: bool,
-    /// No further experiment is ever looked for; `stretch diagnose` asks for that with this
-    #[arg(long)]
-    no_next: bool,
-}
-
 /// Most cases: a case is a megabyte or two, so that these fill a disk.
 const MOST_CASES: usize = 100_000;
 
@@ -142,16 +128,14 @@ fn count(text: &str) -> Result<usize, String> {
     cases.ok_or_else(|| format!("\"{text}\" is not a number of cases up to {MOST_CASES}"))
 }
 
-/// One family, or all in turn.
-#[derive(Clone, Copy)]
-struct Families(Option<Family>);
+/// One family, or all in turn: an alias, because an option of clap that is an `Option` has no default.
+type Families = Option<Family>;
 
 fn family(name: &str) -> Result<Families, String> {
     if name == "all" {
-        return Ok(Families(None));
+        return Ok(None);
     }
-    let family = name.parse().map_err(|known| format!("{known}, all"))?;
-    Ok(Families(Some(family)))
+    name.parse().map(Some).map_err(|known: String| format!("{known}, all"))
 }
 
 fn main() -> ExitCode {
@@ -180,15 +164,12 @@ fn run(args: Args) -> anyhow::Result<()> {
         }
         (Some(Step::Score { folder, no_oracle, .. }), _) => scored(&folder, !no_oracle),
         (Some(Step::Board { scores, out }), _) => {
-            let page = board(&read_scores(&scores)?)?;
+            let page = board(&scores)?;
             stretch_data::files::write_whole(&out, |file| file.write_all(page.as_bytes()))?;
             say(format!("wrote {}", out.display()));
             Ok(())
         }
-        (Some(Step::Diagnose(asked)), _) => {
-            let Diagnose { without, baselines, .. } = asked;
-            write_diagnosis(&asked.folder, &Asked { without, baselines }, &asked.json)
-        }
+        (Some(Step::Diagnose(asked)), _) => write_diagnosis(&asked),
         (None, Some(make)) => {
             made(&make)?;
             answered(&make.out, &args.options)?;
@@ -206,7 +187,7 @@ fn made(make: &Make) -> anyhow::Result<()> {
         say(format!("made {cases} cases in {out}; labels sealed in {out}-sealed, SHA-256 {hash}"));
         return Ok(());
     }
-    let Make { family: Families(family), disturbances, protocol, .. } = *make;
+    let Make { family, disturbances, protocol, .. } = *make;
     let plan = Plan { family, disturbances, protocol, ..Plan::of(make.cases) };
     let seal = make_cases(&make.out, make.seed, &plan)?;
     let (cases, out) = (make.cases, make.out.display());

@@ -1,10 +1,11 @@
-//! Cases in a new folder.
+//! Cases in a new folder, and the seeds of sets whose labels have been opened.
 
-use std::path::Path;
+use std::{fs, path::Path};
 
-use anyhow::ensure;
-use stretch_blind::{Plan, Seal, make};
-use stretch_data::files::write_folder;
+use anyhow::{Context, ensure};
+use serde::{Deserialize, Serialize};
+use stretch_blind::{FormFamily, OpenScore, Plan, PlantName, Seal, make, make_set, sealed_beside};
+use stretch_data::files::{write_folder, write_whole};
 
 use crate::text::Progress;
 
@@ -17,12 +18,76 @@ pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<Seal>
     let cases = plan.cases();
     ensure!(cases > 0, "--cases 0: there is nothing to make");
     let progress = Progress::new("making cases", cases);
-    let mut seal = None;
     write_folder(folder, false, |draft| {
-        seal = Some(make(draft, seed, plan, &|_| progress.step())?);
+        make(draft, seed, plan, &|_| progress.step())?;
         anyhow::Ok(())
     })?;
-    // the seal that was made names the folder in which the cases were made
-    ensure!(seal.is_some(), "no case was made");
     Ok(Seal::open(folder)?.0)
+}
+
+/// Makes a set of cases of a plant, completely or not at all; refuses a spent seed.
+///
+/// # Errors
+/// A spent seed, a folder that is not empty, a private family that cannot be read.
+pub fn make_open(
+    plant: PlantName,
+    set: &Path,
+    (cases, seed): (usize, u64),
+    private: Option<&Path>,
+    spent: &Path,
+) -> anyhow::Result<String> {
+    let is_spent = spent_seeds(spent)?.iter().any(|s| s.plant == plant.name() && s.seed == seed);
+    ensure!(
+        !is_spent,
+        "--seed {seed}: {} says that {} cases of it have been opened; take another",
+        spent.display(),
+        plant.name()
+    );
+    let private = private.map(FormFamily::read).transpose()?;
+    let (sealed, mut hash) = (sealed_beside(set), None);
+    let made = write_folder(set, false, |cases_draft| {
+        write_folder(&sealed, false, |labels_draft| {
+            let folders = (cases_draft, labels_draft);
+            hash = Some(make_set(plant, folders, cases, seed, private)?);
+            anyhow::Ok(())
+        })
+    });
+    if made.is_err() && hash.is_some() {
+        // labels have their name, their cases do not
+        let _ = fs::remove_dir_all(&sealed);
+    }
+    made?;
+    hash.context("no set was made")
+}
+
+/// A seed whose labels have been opened: a row of the record of them.
+#[derive(Debug, Serialize, Deserialize)]
+struct SpentSeed {
+    plant: String,
+    seed: u64,
+    sha256: String,
+    first_opened_for: String,
+}
+
+fn spent_seeds(path: &Path) -> anyhow::Result<Vec<SpentSeed>> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let read = || csv::Reader::from_path(path)?.deserialize().collect();
+    let rows: Result<_, csv::Error> = read();
+    rows.with_context(|| path.display().to_string())
+}
+
+/// Adds the seed of a set to the record, if it is not there.
+pub(crate) fn record_spent(path: &Path, score: &OpenScore) -> anyhow::Result<()> {
+    let mut spent = spent_seeds(path)?;
+    if spent.iter().any(|s| s.plant == score.plant && s.seed == score.seed) {
+        return Ok(());
+    }
+    let OpenScore { plant, seed, set, method, .. } = score.clone();
+    spent.push(SpentSeed { plant, seed, sha256: set, first_opened_for: method });
+    let mut rows = csv::Writer::from_writer(Vec::new());
+    spent.iter().try_for_each(|seed| rows.serialize(seed))?;
+    let text = rows.into_inner()?;
+    Ok(write_whole(path, |out| out.write_all(&text))?)
 }

@@ -9,33 +9,28 @@ use stretch_report::kit::{
 };
 
 use crate::{
-    answers::Answers,
     figures::{confusion_figure, reliability_figure, time_figure},
     goals::Goal,
+    score::Answers,
 };
 
 /// Ends of the classes of strength.
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
-/// What a blind check gave.
-#[derive(Debug, Clone, Copy)]
-pub struct Subject<'a> {
-    /// Every figure.
-    pub score: &'a Score,
-    /// The labels, their seal, and what was answered.
-    pub answers: &'a Answers,
-    /// Goals and what was reached.
-    pub goals: &'a [Goal],
-}
-
-/// The report as one HTML file.
-pub fn page(subject: &Subject<'_>) -> String {
-    let mut page = Page::new("Blind check of the diagnosis", &sentence(subject.score));
-    goals(&mut page, subject);
-    strength(&mut page, subject);
-    sets(&mut page, subject);
-    confusion(&mut page, subject.score);
-    misses(&mut page, subject.score);
+/// The report as one HTML file: every figure, the labels, their seal, and what was answered, and what was reached of
+/// the goals.
+pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String {
+    let mut page = Page::new("Blind check of the diagnosis", &sentence(score));
+    goals(&mut page, answers.seal.sha256(), reached);
+    methods(&mut page, score);
+    strength(&mut page, score, answers);
+    sets(&mut page, score, answers);
+    page.section("What was said for what", "");
+    page.figure(
+        &confusion_figure(score),
+        "Rows: what was there; columns: the first name given, or the verdict. On a phone: the wrong answers alone.",
+    );
+    misses(&mut page, score);
     page.finish()
 }
 
@@ -58,19 +53,18 @@ fn sentence(score: &Score) -> String {
     )
 }
 
-fn goals(page: &mut Page, subject: &Subject<'_>) {
+fn goals(page: &mut Page, sha256: &str, reached: &[Goal]) {
     page.section(
         "What was reached",
         "The cases come from a second simulator that shares no code with the catalogue and gives every effect another \
          form. Their labels were sealed before the diagnosis ran.",
     );
-    page.text(&format!("SHA-256 of the labels: {}", subject.answers.seal.sha256()));
+    page.text(&format!("SHA-256 of the labels: {sha256}"));
     page.table(&Table::new(
         "Goals; an excess of 1 means an error as large as the noise",
         &["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"],
-        subject.goals.iter().map(|goal| goal.cells().to_vec()),
+        reached.iter().map(|goal| goal.cells().to_vec()),
     ));
-    methods(page, subject.score);
 }
 
 /// What simpler methods would have said of the same cases.
@@ -83,15 +77,17 @@ fn methods(page: &mut Page, score: &Score) {
         "Each leaves one step out: the largest drop of the error does not re-tune the simulator, the signature fits \
          nothing, BIC counts every sample as independent and asks for no confirmation on other trials.",
     );
-    let top1 =
-        |(method, b): (&String, &Baseline)| rate_row(method_in_words(method), &b.top1, Ink::First);
-    let nulls = |(method, b): (&String, &Baseline)| {
-        rate_row(method_in_words(method), &b.false_names, Ink::First)
+    let ours = Baseline {
+        top1: score.singles.top1,
+        top1_above_10: score.singles.top1_above_10,
+        false_names: score.false_names,
     };
-    let mut right = vec![rate_row("this diagnosis", &score.singles.top1, Ink::Third)];
-    right.extend(score.baselines.iter().map(top1));
-    let mut wrong = vec![rate_row("this diagnosis", &score.false_names, Ink::Third)];
-    wrong.extend(score.baselines.iter().map(nulls));
+    let all = || {
+        let theirs = score.baselines.iter().map(|(name, b)| (method_in_words(name), b, Ink::First));
+        std::iter::once(("this diagnosis", &ours, Ink::Third)).chain(theirs)
+    };
+    let right: Vec<Row> = all().map(|(name, b, ink)| rate_row(name, &b.top1, ink)).collect();
+    let wrong: Vec<Row> = all().map(|(name, b, ink)| rate_row(name, &b.false_names, ink)).collect();
     page.figures(&[
         (
             narrow_bar_figure("First name right, by method", &right, Scale::Percent, "%"),
@@ -106,15 +102,9 @@ fn methods(page: &mut Page, score: &Score) {
         Some(share) => format!("{} ({} of {})", percent(share), rate.hits, rate.cases),
         None => "no case".to_owned(),
     };
-    let row = |name: &str, top1: &Rate, above: &Rate, nulls: &Rate| {
-        vec![name.to_owned(), cell(top1), cell(above), cell(nulls)]
-    };
-    let s = &score.singles;
-    let ours = row("this diagnosis", &s.top1, &s.top1_above_10, &score.false_names);
-    let theirs = |(name, b): (&String, &Baseline)| {
-        row(method_in_words(name), &b.top1, &b.top1_above_10, &b.false_names)
-    };
-    let rows = std::iter::once(ours).chain(score.baselines.iter().map(theirs));
+    let rows = all().map(|(name, b, _)| {
+        vec![name.to_owned(), cell(&b.top1), cell(&b.top1_above_10), cell(&b.false_names)]
+    });
     let head = ["Method", "First name right", "Above an excess of 10", "Names something on nulls"];
     page.table(&Table::new("The same cases, by method", &head, rows).highlight(0));
 }
@@ -129,11 +119,11 @@ fn rate_row(label: &str, rate: &Rate, ink: Ink) -> Row {
     Row { label: label.to_owned(), bars: vec![Bar { interval, text, ..Bar::new(ink, share) }] }
 }
 
-fn strength(page: &mut Page, subject: &Subject<'_>) {
+fn strength(page: &mut Page, score: &Score, answers: &Answers) {
     page.section("Accuracy against strength", "");
     let mut rates = vec![Rate::default(); STRENGTHS.len() + 1];
-    for verdict in &subject.answers.verdicts {
-        let Some(label) = subject.answers.truth.cases.get(&verdict.case) else { continue };
+    for verdict in &answers.verdicts {
+        let Some(label) = answers.truth.cases.get(&verdict.case) else { continue };
         if label.kind == CaseKind::Single {
             let class = STRENGTHS.iter().filter(|s| label.excess >= **s).count();
             rates[class].cases += 1;
@@ -156,12 +146,8 @@ fn strength(page: &mut Page, subject: &Subject<'_>) {
         &bar_figure("First name right, by strength", &rows, Scale::Percent, "%"),
         "First name right for one missing effect, by the excess that it causes, with Wilson's 95 % interval.",
     );
-    let by_effect: Vec<Row> = subject
-        .score
-        .by_effect
-        .iter()
-        .map(|(name, rate)| rate_row(name, rate, Ink::Third))
-        .collect();
+    let by_effect = score.by_effect.iter().map(|(name, rate)| rate_row(name, rate, Ink::Third));
+    let by_effect: Vec<Row> = by_effect.collect();
     page.folded("By effect", |page| {
         page.figure(
             &bar_figure("First name right, by effect", &by_effect, Scale::Percent, "%"),
@@ -170,11 +156,10 @@ fn strength(page: &mut Page, subject: &Subject<'_>) {
     });
 }
 
-fn sets(page: &mut Page, subject: &Subject<'_>) {
-    let score = subject.score;
+fn sets(page: &mut Page, score: &Score, answers: &Answers) {
     page.section("Are the probabilities honest?", "");
-    let labels = &subject.answers.truth.cases;
-    let labelled = subject.answers.verdicts.iter().filter_map(|v| Some((v, labels.get(&v.case)?)));
+    let labels = &answers.truth.cases;
+    let labelled = answers.verdicts.iter().filter_map(|v| Some((v, labels.get(&v.case)?)));
     let counted: Vec<(&Verdict, &Label)> = labelled
         .filter(|(_, l)| l.kind == CaseKind::Single && l.excess >= COUNTED_EXCESS)
         .collect();
@@ -204,18 +189,10 @@ fn sets(page: &mut Page, subject: &Subject<'_>) {
             ),
         ),
     ]);
-    let times: Vec<f64> = subject.answers.verdicts.iter().map(|v| v.runtime_s).collect();
+    let times: Vec<f64> = answers.verdicts.iter().map(|v| v.runtime_s).collect();
     page.figure(
         &time_figure(&times),
         "How long a diagnosis took: share of the cases that were done.",
-    );
-}
-
-fn confusion(page: &mut Page, score: &Score) {
-    page.section("What was said for what", "");
-    page.figure(
-        &confusion_figure(score),
-        "Rows: what was there; columns: the first name given, or the verdict. On a phone: the wrong answers alone.",
     );
 }
 

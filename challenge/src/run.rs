@@ -1,18 +1,26 @@
 //! Diagnoses every case in a process and a folder that hold no label.
 
 use std::{
-    fs,
+    fs, iter,
+    panic::resume_unwind,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering::SeqCst},
+    process::Command,
+    sync::atomic::{
+        AtomicBool, AtomicUsize,
+        Ordering::{Relaxed, SeqCst},
+    },
+    thread,
 };
 
 use anyhow::{Context, ensure};
 use stretch_data::files::{clean_up_and_exit, write_whole};
+use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
+use stretch_problem::{Problem, Reading, RigSimulator};
+use stretch_sim::Catalogue;
+use tempfile::TempDir;
 
 use crate::{
-    answers::{ANSWER, case_folders},
-    room::Room,
-    shared_out::{cores, shared_out},
+    score::{ANSWER, case_folders},
     text::Progress,
 };
 
@@ -76,11 +84,11 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
     let waiting: Vec<&(String, PathBuf)> =
         all.iter().filter(|(_, path)| options.again || !path.join(ANSWER).is_file()).collect();
     let progress = Progress::new("diagnosing", waiting.len());
-    let jobs = options.jobs.unwrap_or_else(cores).clamp(1, waiting.len().max(1));
+    let jobs = options.jobs.unwrap_or_else(cores);
     shared_out(jobs, waiting.len(), |at| {
         let (name, path) = waiting[at];
         ensure!(!is_stopped(), "interrupted");
-        answer(&program, path, jobs > 1, options).with_context(|| name.clone())?;
+        answer(&program, path, jobs == 1, options).with_context(|| name.clone())?;
         progress.step();
         Ok(())
     })?;
@@ -90,13 +98,13 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
 
 /// Diagnoses one case in a process that is given a copy of its data and nothing else.
 fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> anyhow::Result<()> {
-    let room = Room::of(case, &[ANSWER, REFUSAL, HINT])?;
+    let room = Room::of(case)?;
     let mut command = room.command(program);
     command.args(["diagnose", ".", &format!("--json={ANSWER}"), "--no-next"]);
-    for name in struck(case)? {
+    for name in without(case)? {
         command.args(["--without", &name]);
     }
-    if is_alone {
+    if !is_alone {
         command.env("RAYON_NUM_THREADS", "1");
     }
     if !options.no_baselines {
@@ -117,7 +125,12 @@ fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> 
 }
 
 /// Effects that a case's `hint.toml` takes out of the catalogue.
-fn struck(case: &Path) -> anyhow::Result<Vec<String>> {
+fn without(case: &Path) -> anyhow::Result<Vec<String>> {
+    #[derive(serde::Deserialize)]
+    struct Hint {
+        #[serde(default)]
+        without: Vec<String>,
+    }
     let path = case.join(HINT);
     if !path.is_file() {
         return Ok(Vec::new());
@@ -127,8 +140,184 @@ fn struck(case: &Path) -> anyhow::Result<Vec<String>> {
     Ok(hint.without)
 }
 
-#[derive(serde::Deserialize)]
-struct Hint {
-    #[serde(default)]
+/// A copy of one case's data in a new temporary folder, which is removed on drop.
+///
+/// The diagnosing process works in it: neither its working folder nor an argument nor its
+/// environment leads to the labels. A program that searched for them could still find them, as any
+/// program of the same user could.
+struct Room {
+    dir: TempDir,
+    folder: PathBuf,
+}
+
+impl Room {
+    /// Copies a case's data.
+    fn of(case: &Path) -> anyhow::Result<Self> {
+        let dir = TempDir::with_prefix("stretch-").context("temporary folder")?;
+        let name = case.file_name().map_or_else(|| "case".into(), ToOwned::to_owned);
+        let folder = dir.path().join(name);
+        let copied = || -> std::io::Result<()> {
+            fs::create_dir(&folder)?;
+            for entry in fs::read_dir(case)? {
+                let entry = entry?;
+                let name = entry.file_name();
+                // A link might lead out of the case.
+                if entry.file_type()?.is_file()
+                    && ![ANSWER, REFUSAL, HINT].iter().any(|w| name == *w)
+                {
+                    fs::copy(entry.path(), folder.join(name))?;
+                }
+            }
+            Ok(())
+        };
+        copied().with_context(|| format!("{}: it cannot be copied", case.display()))?;
+        Ok(Self { dir, folder })
+    }
+
+    /// A command that runs in the folder and knows of no other.
+    fn command(&self, program: &Path) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(&self.folder).env("PWD", &self.folder).env_remove("OLDPWD");
+        // The shell's record of the last command, which contains the folder's name.
+        command.env_remove("_");
+        command
+    }
+
+    /// A file that was written there.
+    fn read(&self, file: &str) -> anyhow::Result<String> {
+        let path = self.folder.join(file);
+        fs::read_to_string(&path).with_context(|| path.display().to_string())
+    }
+
+    /// Takes the folder away, and says why not.
+    fn close(self) -> anyhow::Result<()> {
+        let shown = self.dir.path().display().to_string();
+        self.dir.close().with_context(|| format!("{shown}: it cannot be removed"))
+    }
+}
+
+/// The results of `count` jobs, in order, by so many threads. These are not rayon's threads,
+/// because a diagnosis has its own pool, and a waiting rayon worker would begin the next job inside
+/// the first.
+///
+/// # Errors
+/// The error of the first failed job, in order; no job begins after one has failed.
+///
+/// ```
+/// let squares = stretch_challenge::shared_out(2, 4, |i| Ok(i * i))?;
+/// assert_eq!(squares, [0, 1, 4, 9]);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+pub fn shared_out<T: Send>(
+    workers: usize,
+    count: usize,
+    job: impl Fn(usize) -> anyhow::Result<T> + Sync,
+) -> anyhow::Result<Vec<T>> {
+    let next = AtomicUsize::new(0);
+    let work = || -> Vec<(usize, anyhow::Result<T>)> {
+        let jobs = iter::from_fn(|| Some(next.fetch_add(1, Relaxed)).filter(|at| *at < count));
+        let done = jobs.map(|at| {
+            let result = job(at);
+            if result.is_err() {
+                next.store(count, Relaxed);
+            }
+            (at, result)
+        });
+        done.collect()
+    };
+    let mut done: Vec<_> = thread::scope(|scope| {
+        let started: Vec<_> =
+            (0..workers.clamp(1, count.max(1))).map(|_| scope.spawn(work)).collect();
+        let ended = started.into_iter().map(|thread| thread.join());
+        ended.flat_map(|done| done.unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    done.sort_by_key(|(at, _)| *at);
+    done.into_iter().map(|(_, result)| result).collect()
+}
+
+/// As many as the machine has cores.
+pub(crate) fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What a diagnosis is asked.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Asked {
+    folder: PathBuf,
+    #[arg(long)]
+    json: PathBuf,
+    /// Effects that the catalogue must do without
+    #[arg(long)]
     without: Vec<String>,
+    /// Whether simpler methods are asked, too
+    #[arg(long)]
+    baselines: bool,
+    /// No further experiment is ever looked for; `stretch diagnose` asks for that with this
+    #[arg(long)]
+    no_next: bool,
+}
+
+/// Diagnoses the data set of a folder as `stretch diagnose FOLDER` does, and writes its JSON.
+///
+/// # Errors
+/// Data that the diagnosis refuses, a file that cannot be written.
+pub fn write_diagnosis(asked: &Asked) -> anyhow::Result<()> {
+    let reading = Reading { without: &asked.without, ..Reading::default() };
+    let problem = Problem::read(&asked.folder, &reading)?;
+    let options = Options { baselines: asked.baselines, ..Options::default() };
+    let examined = problem.examine(&options, false, &|_| (), &|| false)?;
+    let text = serde_json::to_string_pretty(&examined.to_json())? + "\n";
+    Ok(write_whole(&asked.json, |out| out.write_all(text.as_bytes()))?)
+}
+
+/// The diagnosis of a case in this process, by an engine with the given options: for tools that
+/// know the label.
+///
+/// # Errors
+/// Data that the diagnosis refuses, an effect to strike out that there is none.
+pub fn diagnosed(
+    folder: &Path,
+    without: &[impl AsRef<str>],
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> anyhow::Result<(Diagnosis, Evidence)> {
+    let catalogue = Catalogue::default().without(without)?;
+    let simulator = RigSimulator::read(folder, None, &catalogue, Default::default())?;
+    Ok(diagnose(&simulator, options, progress, &|| false)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holds_the_data_and_nothing_else() {
+        let check = tempfile::tempdir().unwrap();
+        let case = check.path().join("case-000");
+        fs::create_dir_all(check.path().join("sealed")).unwrap();
+        fs::create_dir(&case).unwrap();
+        fs::write(check.path().join("sealed/truth.json"), "{}").unwrap();
+        for file in ["dataset.toml", "a.csv", "diagnosis.json"] {
+            fs::write(case.join(file), file).unwrap();
+        }
+        #[cfg(unix)]
+        std::os::unix::fs::symlink("../sealed/truth.json", case.join("link.json")).unwrap();
+        let room = Room::of(&case).unwrap();
+        let listed = |folder: &Path| {
+            let entries = fs::read_dir(folder).unwrap();
+            let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(listed(&room.folder), ["a.csv", "dataset.toml"]);
+        // The case is the only entry of its folder, and no parent folder belongs to the check.
+        let above = room.folder.parent().unwrap();
+        assert_eq!(listed(above), ["case-000"]);
+        assert!(!room.folder.starts_with(check.path()));
+        assert_eq!(room.read("a.csv").unwrap(), "a.csv");
+        assert!(room.read("diagnosis.json").is_err());
+        let above = above.to_owned();
+        room.close().unwrap();
+        assert!(!above.exists());
+    }
 }

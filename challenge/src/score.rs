@@ -1,19 +1,74 @@
 //! Opens the seal: compares answers with labels and goals, and fits that know the labels.
 
-use std::{fmt::Write as _, path::Path};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
-use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score};
+use anyhow::{Context, ensure};
+use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score, Seal, Truth, Verdict};
 use stretch_data::files::Outputs;
 use stretch_gap::Options;
 
 use crate::{
-    answers::Answers,
-    diagnose::diagnosed,
     goals::{Goal, goals},
-    page::{Subject, page},
-    shared_out::{cores, shared_out},
+    page::page,
+    run::{cores, diagnosed, shared_out},
     text::Progress,
 };
+
+/// The answer in a case's folder.
+pub const ANSWER: &str = "diagnosis.json";
+
+/// What is scored.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Answers {
+    /// The seal of the labels, unbroken.
+    pub seal: Seal,
+    /// The labels.
+    pub truth: Truth,
+    /// What was answered; a case that was refused has none.
+    pub verdicts: Vec<Verdict>,
+}
+
+impl Answers {
+    /// Opens the labels and reads the answers.
+    ///
+    /// # Errors
+    /// A broken seal, a folder without a case, an invalid answer.
+    pub(crate) fn read(folder: &Path) -> anyhow::Result<Self> {
+        let (seal, truth) = Seal::open(folder)?;
+        let mut verdicts = Vec::new();
+        for (name, path) in case_folders(folder)? {
+            let file = path.join(ANSWER);
+            if let Ok(text) = fs::read_to_string(&file) {
+                let raw: serde_json::Value =
+                    serde_json::from_str(&text).with_context(|| file.display().to_string())?;
+                verdicts.push(Verdict::from_diagnosis(&name, &raw)?);
+            }
+        }
+        Ok(Self { seal, truth, verdicts })
+    }
+}
+
+/// Names and folders of the cases, in order.
+///
+/// # Errors
+/// A folder that cannot be read or holds no case.
+pub(crate) fn case_folders(folder: &Path) -> anyhow::Result<Vec<(String, PathBuf)>> {
+    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let mut cases = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        if entry.path().join("dataset.toml").is_file() {
+            cases.push((entry.file_name().to_string_lossy().into_owned(), entry.path()));
+        }
+    }
+    ensure!(!cases.is_empty(), "{}: there is no case in it", folder.display());
+    cases.sort();
+    Ok(cases)
+}
 
 /// Scores the answers of a folder, writes `score.json` and `report.html` into it, and returns the
 /// score as text.
@@ -30,11 +85,10 @@ pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String>
     }
     let score = Score::of(&answers.truth, &answers.verdicts)?;
     let goals = goals(&score);
-    let subject = Subject { score: &score, answers: &answers, goals: &goals };
     let json = serde_json::json!({ "score": score, "goals": goals });
     let mut outputs = Outputs::default();
     for (file, text) in [
-        ("report.html", page(&subject)),
+        ("report.html", page(&score, &answers, &goals)),
         ("score.json", serde_json::to_string_pretty(&json)? + "\n"),
     ] {
         outputs.file(folder.join(file), |out| out.write_all(text.as_bytes()))?;

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::disturbances::{Disturbances, Surroundings};
-use crate::effect::{Cause, Causes, Kind};
+use crate::effect::{Cause, Causes, Family, Kind};
 use crate::error::BlindError;
 use crate::excess::Yardstick;
-use crate::family::Family;
 use crate::plan::{Order, Plan};
 use crate::protocol::{RATE_HZ, Script, session, with_pauses};
 use crate::random::RandomGenerator;

@@ -1,42 +1,122 @@
-//! Drawn laws of the electrical side: knees, static laws, settling, softening, filters.
+//! Laws of the electrical side that are more than a curve: knees, clipping, softening.
 
 use crate::curve::Curve;
-use crate::effect::{Cause, Causes, Kind};
-use crate::family::Family;
-use crate::filter::LowPass;
-use crate::knee::Knee;
-use crate::laws::{bump, path, rising, settling};
+use crate::effect::{Cause, Family};
+use crate::laws::{Law, rising, settling};
 use crate::random::RandomGenerator;
 
-/// Length of a session that a drift is tabled for, s.
-const SESSION_S: f64 = 735.0;
-
-/// Drawn laws of the active causes; `None` if a cause is absent or written.
+/// max(x, floor), rounded off: a function that does not, or hardly, fall below a floor.
 #[derive(Debug, Clone)]
-pub(crate) struct Electric {
-    pub(crate) slack: Option<Knee>,
-    pub(crate) saturation: Option<Saturation>,
-    pub(crate) crosstalk: Option<Curve>,
-    pub(crate) nonlinearity: Option<Curve>,
-    pub(crate) drift: Option<Curve>,
-    pub(crate) heating: Option<Curve>,
-    pub(crate) softening: Option<Softening>,
-    pub(crate) lowpass: Option<LowPass>,
+pub(crate) enum Knee {
+    /// By a parabola of this half-width.
+    Parabola(f64),
+    /// The slope goes from a small rest to 1 over a width, as a drawn law rises.
+    Drawn {
+        /// Integral of the slope over -1..1 in units of the half-width (x = (u + 1) / 2).
+        turn: Curve,
+        /// Shift of the knee's middle with which the far line passes through the floor.
+        offset: f64,
+        width: f64,
+        /// Slope that is left below the floor.
+        rest: f64,
+    },
+}
+
+impl Knee {
+    /// The knee of a sleeve that goes slack, around a strain.
+    pub(crate) fn of_slack(c: &Cause) -> Self {
+        match (c.is_drawn(), c.form) {
+            (true, _) => Self::draw(c.family, 0.003, 0.04, c.strength, &mut c.random(1)),
+            (false, 0) => Self::Parabola(0.0),
+            (false, _) => Self::Parabola(0.012_f64.min(c.strength)),
+        }
+    }
+
+    /// A knee with a half-width log-uniform between `low` and `high`, and no wider than `most`.
+    fn draw(family: Family, low: f64, high: f64, most: f64, random: &mut RandomGenerator) -> Self {
+        let slope = rising(family, random);
+        // Twice: u runs over an interval of length 2.
+        let turn = slope.integral().times(2.0);
+        let offset = 1.0 - turn.at(1.0);
+        let rest = match family {
+            Family::RateLaws => random.between(0.0, 0.06),
+            Family::Asymmetric if random.unit() < 0.5 => random.between(0.01, 0.08),
+            _ => 0.0,
+        };
+        Self::Drawn { turn, offset, width: random.log_between(low, high).min(most), rest }
+    }
+
+    /// What is left of `x` over a floor.
+    pub(crate) fn at_least(&self, x: f64, floor: f64) -> f64 {
+        let above = x - floor;
+        match self {
+            Self::Parabola(width) if above >= *width => x,
+            Self::Parabola(width) if above <= -width => floor,
+            Self::Parabola(width) => floor + (above + width).powi(2) / (4.0 * width),
+            Self::Drawn { turn, offset, width, rest } => {
+                let u = above / width + offset;
+                let kept = if u >= 1.0 {
+                    above
+                } else if u <= -1.0 {
+                    0.0
+                } else {
+                    width * turn.at(0.5 * (u + 1.0))
+                };
+                floor + (1.0 - rest) * kept + rest * above
+            }
+        }
+    }
 }
 
 /// An amplifier that clips at the top, the bottom, or both.
 #[derive(Debug, Clone)]
 pub(crate) struct Saturation {
     knee: Knee,
-    /// Depth at top and bottom in units of the strength; `None` where it does not clip.
+    /// Depth at top and bottom, V; `None` where it does not clip.
     top: Option<f64>,
     bottom: Option<f64>,
+}
+
+impl Saturation {
+    pub(crate) fn of(c: &Cause) -> Self {
+        let strength = c.strength;
+        if !c.is_drawn() {
+            let width = if c.form == 1 { 0.05_f64.min(strength) } else { 0.0 };
+            let is_low = c.form == 2;
+            let (top, bottom) = ((!is_low).then_some(strength), is_low.then_some(strength));
+            return Self { knee: Knee::Parabola(width), top, bottom };
+        }
+        let mut random = c.random(1);
+        let knee = Knee::draw(c.family, 0.008, 0.15, 0.5 * strength, &mut random);
+        let both = if c.family == Family::Asymmetric { 0.5 } else { 0.15 };
+        let (top, bottom) = match random.unit() {
+            x if x < both => (Some(strength), Some(random.between(0.3, 0.9) * strength)),
+            x if x < both + 0.65 * (1.0 - both) => (Some(strength), None),
+            _ => (None, Some(strength)),
+        };
+        Self { knee, top, bottom }
+    }
+
+    /// A voltage whose range from `bottom` to `top` is clipped.
+    pub(crate) fn clip(&self, volts: f64, bottom: f64, top: f64) -> f64 {
+        let mut v = volts;
+        if let Some(depth) = self.top {
+            v = -self.knee.at_least(-v, depth - top);
+        }
+        if let Some(depth) = self.bottom {
+            v = self.knee.at_least(v, bottom + depth);
+        }
+        v
+    }
 }
 
 /// A gauge that gets weaker with travel.
 #[derive(Debug, Clone)]
 pub(crate) struct Softening {
-    law: Curve,
+    strength: f64,
+    law: Law,
+    /// Travel in which it softens, and the travel so far.
+    turn: f64,
     travel: f64,
     /// Weight of stretching; relaxing has the rest of 2.
     stretching: f64,
@@ -45,93 +125,84 @@ pub(crate) struct Softening {
 }
 
 impl Softening {
-    fn draw(family: Family, random: &mut RandomGenerator) -> Self {
-        let law = settling(family, random);
-        let stretching = match family {
-            Family::Asymmetric => 2.0 * f64::from(u8::from(random.unit() < 0.5)),
-            _ => 1.0,
+    pub(crate) fn of(c: &Cause) -> Self {
+        let written: [fn(f64) -> f64; 2] =
+            [|turns| 1.0 - (1.0 + turns / 0.8).powf(-0.8), |turns| turns / (0.6 + turns)];
+        let mut softening = Self {
+            strength: c.strength,
+            law: Law::Written(written[c.form]),
+            turn: c.log_aux(0, 0.5, 12.0),
+            travel: 0.0,
+            stretching: 1.0,
+            memory_s: f64::INFINITY,
         };
-        let memory_s = match family {
-            Family::RateLaws => random.log_between(500.0, 5000.0),
-            _ => f64::INFINITY,
-        };
-        Self { law, travel: 0.0, stretching, memory_s }
-    }
-
-    /// Share of the softening that is reached after a strain moved, `turn` being its scale.
-    pub(crate) fn push(&mut self, moved: f64, turn: f64, h: f64) -> f64 {
-        let counts = if moved > 0.0 { self.stretching } else { 2.0 - self.stretching };
-        self.travel += counts * moved.abs() - self.travel * h / self.memory_s;
-        self.law.at(-(-self.travel / turn).exp_m1())
-    }
-}
-
-impl Electric {
-    pub(crate) fn of(causes: &Causes) -> Self {
-        let find = |kind| causes.find(kind).filter(Cause::is_drawn);
-        Self {
-            slack: find(Kind::SleeveSlack)
-                .map(|c| Knee::draw(c.family, 0.003, 0.04, &mut c.random(1)).within(c.strength)),
-            saturation: find(Kind::AmplifierSaturation).map(saturation),
-            crosstalk: find(Kind::PressureCrosstalk).map(|c| rising(c.family, &mut c.random(1))),
-            nonlinearity: find(Kind::GaugeNonlinearity).map(|c| bump(c.family, &mut c.random(1))),
-            drift: find(Kind::ThermalDrift).map(|c| path(c.family, &mut c.random(1))),
-            heating: find(Kind::SelfHeating).map(|c| settling(c.family, &mut c.random(1))),
-            softening: find(Kind::GaugeSoftening)
-                .map(|c| Softening::draw(c.family, &mut c.random(1))),
-            lowpass: find(Kind::AmplifierLowpass)
-                .map(|c| LowPass::draw(c.family, c.strength, &mut c.random(1))),
+        if c.is_drawn() {
+            let mut random = c.random(1);
+            softening.law = Law::Drawn(settling(c.family, &mut random));
+            if c.family == Family::Asymmetric {
+                softening.stretching = 2.0 * f64::from(random.unit() < 0.5);
+            }
+            if c.family == Family::RateLaws {
+                softening.memory_s = random.log_between(500.0, 5000.0);
+            }
         }
-    }
-
-    /// The excitation is switched on.
-    pub(crate) fn power_up(&mut self) {
-        if let Some(filter) = &mut self.lowpass {
-            filter.reset();
-        }
+        softening
     }
 
     /// Travel counts from here.
     pub(crate) fn begin_session(&mut self) {
-        if let Some(softening) = &mut self.softening {
-            softening.travel = 0.0;
-        }
+        self.travel = 0.0;
     }
 
-    /// Drift so far, in seconds of a steady one.
-    pub(crate) fn drift(&self, session: f64) -> f64 {
-        self.drift.as_ref().map_or(0.0, |law| SESSION_S * law.at(session.max(0.0) / SESSION_S))
-    }
-
-    /// Share of the heating that is reached after this many time constants.
-    pub(crate) fn warmth(&self, times: f64) -> f64 {
-        self.heating.as_ref().map_or(0.0, |law| law.at(-(-times.max(0.0)).exp_m1()))
-    }
-
-    /// A voltage whose range is clipped by `strength`.
-    pub(crate) fn clip(&self, volts: f64, strength: f64, bottom: f64, top: f64) -> f64 {
-        let Some(Saturation { knee, top: above, bottom: below }) = &self.saturation else {
-            return volts;
-        };
-        let mut v = volts;
-        if let Some(depth) = above {
-            v = -knee.at_least(-v, depth * strength - top);
-        }
-        if let Some(depth) = below {
-            v = knee.at_least(v, bottom + depth * strength);
-        }
-        v
+    /// Share of its response that the gauge has lost after a strain moved in `h` s.
+    pub(crate) fn push(&mut self, moved: f64, h: f64) -> f64 {
+        let counts = if moved > 0.0 { self.stretching } else { 2.0 - self.stretching };
+        self.travel += counts * moved.abs() - self.travel * h / self.memory_s;
+        let turns = self.travel / self.turn;
+        self.strength
+            * match &self.law {
+                Law::Drawn(law) => law.at(-(-turns).exp_m1()),
+                Law::Written(law) => law(turns),
+            }
     }
 }
 
-fn saturation(c: Cause) -> Saturation {
-    let mut random = c.random(1);
-    let knee = Knee::draw(c.family, 0.008, 0.15, &mut random).within(0.5 * c.strength);
-    let both = if c.family == Family::Asymmetric { 0.5 } else { 0.15 };
-    let (top, bottom) = match random.unit() {
-        x if x < both => (Some(1.0), Some(random.between(0.3, 0.9))),
-        x if x < both + 0.65 * (1.0 - both) => (Some(1.0), None),
-        _ => (None, Some(1.0)),
-    };
-    Saturation { knee, top, bottom }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use testkit::tolerance::{BLIND_CURVE, F64_ROUNDING};
+
+    #[test]
+    fn knees_are_continuous_and_monotone_and_leave_what_is_far_above() {
+        let mut random = RandomGenerator::new(6, 1);
+        for family in Family::ALL {
+            for _ in 0..40 {
+                let knee = Knee::draw(family, 0.01, 0.1, 1.0, &mut random);
+                let mut last = knee.at_least(-1.0, 0.2);
+                assert!(last >= 0.2 - 0.08 * 1.2 - 1e-12);
+                for i in 1..=4000 {
+                    let x = -1.0 + f64::from(i) * 5e-4;
+                    let y = knee.at_least(x, 0.2);
+                    // A slope between 0 and 1.
+                    assert!(y >= last - 1e-12 && y <= last + 5e-4 + 1e-9, "{family} {x}");
+                    last = y;
+                }
+                assert_abs_diff_eq!(knee.at_least(0.9, 0.2), 0.9, epsilon = BLIND_CURVE);
+            }
+        }
+    }
+
+    #[test]
+    fn knee_is_the_greater_far_from_it() {
+        assert_eq!(Knee::Parabola(0.1).at_least(1.0, 0.0), 1.0);
+        assert_eq!(Knee::Parabola(0.1).at_least(-1.0, 0.0), 0.0);
+        assert_relative_eq!(
+            Knee::Parabola(0.1).at_least(0.0, 0.0),
+            0.025,
+            epsilon = 0.0,
+            max_relative = F64_ROUNDING
+        );
+        assert_eq!(Knee::Parabola(0.0).at_least(-0.5, 0.0), 0.0);
+    }
 }

@@ -44,39 +44,23 @@ pub enum BlindError {
         /// How many rigs were drawn.
         tries: usize,
     },
-    /// A verdict names a case that the labels do not have.
-    #[error("verdict on {case}, which is not among the sealed cases")]
-    UnknownCase {
-        /// Name in the verdict.
-        case: String,
-    },
-    /// More than one verdict on one case.
-    #[error("two verdicts on {case}")]
-    DuplicateCase {
-        /// Name in the verdicts.
-        case: String,
-    },
-    /// A field of a submission or of a family of forms is not what it should be.
+    /// A diagnosis, a field of a submission or of a family of forms is not what it should be.
     #[error("{field}: {reason}")]
     Field {
-        /// The field, with its place: `cases.case-003.probabilities`.
+        /// The case, or the field with its place: `cases.case-003.probabilities`.
         field: String,
         /// What is wrong with it, and what to do.
         reason: String,
-    },
-    /// A diagnosis lacks a field or holds an invalid number.
-    #[error("{case}: {reason}")]
-    BadVerdict {
-        /// Name of the case.
-        case: String,
-        /// What is wrong with it.
-        reason: &'static str,
     },
 }
 
 impl BlindError {
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_path_buf(), source }
+    }
+
+    pub(crate) fn field(field: &str, reason: impl Into<String>) -> Self {
+        Self::Field { field: field.to_owned(), reason: reason.into() }
     }
 
     pub(crate) fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> Self + '_ {

@@ -3,7 +3,7 @@
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
-use crate::family::Family;
+use crate::effect::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
@@ -41,6 +41,11 @@ impl Friction {
             true => Self::draw(cause.family, reach, sharp, &mut cause.random(2)),
             false => Self::written(cause.form, reach, cause.aux[1], sharp),
         }
+    }
+
+    /// The strength of a cause, and its loop with a reach in strain.
+    pub(crate) fn with_strength(cause: &Cause) -> (f64, Self) {
+        (cause.strength, Self::of(cause, 0.58 * cause.log_aux(0, 0.006, 0.05), false))
     }
 
     /// Form 0 is Dahl's (1968), 1 Bouc's and Wen's (1976), otherwise six slip elements; `reach` is

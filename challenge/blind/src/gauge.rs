@@ -1,14 +1,17 @@
 //! Sleeve, gauge, bridge and amplifier, and the potentiometer.
 
-use crate::curve::Curve;
-use crate::effect::{Cause, Causes, Kind, Stage};
-use crate::electric::Electric;
+use std::f64::consts::PI;
+
+use crate::effect::{Causes, Kind, Stage};
+use crate::electric::{Knee, Saturation, Softening};
 use crate::friction::Friction;
-use crate::knee::at_least;
-use crate::laws::bump;
+use crate::lags::Lags;
+use crate::laws::{Law, bump, path, rising, settling};
 use crate::random::RandomGenerator;
-use crate::relaxation::Relaxation;
 use crate::rig::{L_0, P_ATM, P_REF, Rig, V_STEP};
+
+/// Length of a session that a drift is tabled for, s.
+const SESSION_S: f64 = 735.0;
 
 /// One instant of the mechanics: contraction, absolute pressure, openings.
 #[derive(Debug, Clone, Copy)]
@@ -24,43 +27,76 @@ pub(crate) struct Gauge<'a> {
     rig: &'a Rig,
     causes: Causes,
     active: bool,
+    /// The floor of the strain over its least nominal one, and its knee.
+    slack: Option<(f64, Knee)>,
     slip: Option<Friction>,
+    crosstalk: Option<(f64, Law)>,
     hysteresis: Option<(f64, Friction)>,
-    relaxation: Option<(f64, Relaxation)>,
-    travel: f64,
-    last_strain: Option<f64>,
-    poles: Option<[f64; 2]>,
-    slewed: Option<f64>,
-    late: Vec<f64>,
-    pickup: (f64, (f64, f64)),
+    relaxation: Option<(f64, Lags)>,
+    softening: Option<Softening>,
+    nonlinearity: Option<(f64, Law)>,
+    drift: Option<(f64, Law)>,
+    /// Time constant in s, strength and law.
+    heating: Option<(f64, (f64, Law))>,
     contact: (bool, RandomGenerator),
-    drawn: Electric,
+    saturation: Option<Saturation>,
+    pickup: (f64, (f64, f64)),
+    lowpass: Option<Lags>,
+    last_strain: Option<f64>,
+    slewed: Option<f64>,
     /// Share of the nominal excitation.
     excitation: f64,
 }
 
 impl<'a> Gauge<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
-        let contact_seed = causes.find(Kind::IntermittentContact).map_or(0, |c| c.seed);
+        let find = |kind| causes.find(kind);
+        let contact_seed = find(Kind::IntermittentContact).map_or(0, |c| c.seed);
         Self {
             rig,
             active: causes.any_in(Stage::Sensing),
-            slip: causes.find(Kind::SleeveSlip).map(|c| Friction::of(&c, c.strength, true)),
-            hysteresis: causes.find(Kind::GaugeHysteresis).map(|c| {
-                let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-                (c.strength, Friction::of(&c, reach, false))
-            }),
-            relaxation: causes
-                .find(Kind::GaugeRelaxation)
-                .map(|c| (c.signed(), Relaxation::of(&c, c.log_aux(0, 0.03, 3.0), 0.2))),
-            travel: 0.0,
-            last_strain: None,
-            poles: None,
-            slewed: None,
-            late: Vec::new(),
-            pickup: (0.0, (0.0, 0.0)),
+            slack: find(Kind::SleeveSlack).map(|c| (c.strength, Knee::of_slack(&c))),
+            slip: find(Kind::SleeveSlip).map(|c| Friction::of(&c, c.strength, true)),
+            crosstalk: Law::find(
+                causes,
+                Kind::PressureCrosstalk,
+                rising,
+                [|x| (1.1 * x).tanh() / 1.1_f64.tanh(), |x| x.powf(1.35)],
+            ),
+            hysteresis: find(Kind::GaugeHysteresis).map(|c| Friction::with_strength(&c)),
+            relaxation: find(Kind::GaugeRelaxation)
+                .map(|c| (c.signed(), Lags::relaxation(&c, c.log_aux(0, 0.03, 3.0), 0.2))),
+            softening: find(Kind::GaugeSoftening).map(|c| Softening::of(&c)),
+            nonlinearity: Law::find(
+                causes,
+                Kind::GaugeNonlinearity,
+                bump,
+                [|x| (PI * x).sin(), |x| 4.0 * x * (1.0 - x) * (0.75 + 0.5 * x)],
+            ),
+            drift: Law::find(
+                causes,
+                Kind::ThermalDrift,
+                path,
+                [
+                    |t| 900.0 * (1.0 - (-t / 900.0).exp()),
+                    |t| SESSION_S * (t.max(0.0) / SESSION_S).powf(0.8),
+                ],
+            ),
+            heating: find(Kind::SelfHeating).map(|c| c.log_aux(0, 1.5, 30.0)).zip(Law::find(
+                causes,
+                Kind::SelfHeating,
+                settling,
+                [
+                    |times| 1.0 - 0.5 * (-2.0 * times).exp() - 0.5 * (-0.5 * times).exp(),
+                    |times| 1.0 - (-times.max(0.0).powf(0.65)).exp(),
+                ],
+            )),
             contact: (false, RandomGenerator::new(contact_seed, 7)),
-            drawn: Electric::of(causes),
+            saturation: find(Kind::AmplifierSaturation).map(|c| Saturation::of(&c)),
+            pickup: (0.0, (0.0, 0.0)),
+            lowpass: find(Kind::AmplifierLowpass).map(|c| Lags::low_pass(&c)),
+            last_strain: None,
+            slewed: None,
             excitation: 1.0,
             causes: causes.clone(),
         }
@@ -74,17 +110,18 @@ impl<'a> Gauge<'a> {
     /// Excitation on at a share of its nominal value: the amplifier settles, the travel counts on.
     pub(crate) fn power_up(&mut self, excitation: f64) {
         self.excitation = excitation;
-        self.drawn.power_up();
-        self.poles = None;
+        if let Some(lags) = &mut self.lowpass {
+            lags.reset();
+        }
         self.slewed = None;
-        self.late.clear();
         self.pickup = (0.0, (0.0, 0.0));
     }
 
     /// The session begins: travel counts from here.
     pub(crate) fn begin_session(&mut self) {
-        self.travel = 0.0;
-        self.drawn.begin_session();
+        if let Some(softening) = &mut self.softening {
+            softening.begin_session();
+        }
     }
 
     /// Analogue voltage after `h` seconds; `t` since the trial's, `session` since the session's
@@ -105,25 +142,15 @@ impl<'a> Gauge<'a> {
 
     fn gauge_strain(&mut self, now: Instant, h: f64) -> f64 {
         let mut e = self.rig.strain(now.k);
-        if let Some(c) = self.causes.find(Kind::SleeveSlack) {
+        if let Some((strength, knee)) = &self.slack {
             let least = self.rig.strain(self.rig.static_contraction(self.rig.p_s() + P_ATM));
-            let width = if c.form == 0 { 0.0 } else { 0.012_f64.min(c.strength) };
-            e = match &self.drawn.slack {
-                Some(knee) => knee.at_least(e, least + c.strength),
-                None => at_least(e, least + c.strength, width),
-            };
+            e = knee.at_least(e, least + strength);
         }
         if let Some(slip) = &mut self.slip {
             e -= slip.push(e, h);
         }
-        if let Some(c) = self.causes.find(Kind::PressureCrosstalk) {
-            let ratio = (now.p - P_ATM) / P_REF;
-            let shape = match &self.drawn.crosstalk {
-                Some(law) => law.at(ratio),
-                None if c.form == 0 => (1.1 * ratio).tanh() / 1.1_f64.tanh(),
-                None => ratio.powf(1.35),
-            };
-            e += c.signed() * shape;
+        if let Some((strength, law)) = &self.crosstalk {
+            e += strength * law.at((now.p - P_ATM) / P_REF);
         }
         if let Some((strength, memory)) = &mut self.hysteresis {
             e -= *strength * memory.push(e, h);
@@ -138,48 +165,29 @@ impl<'a> Gauge<'a> {
         let r0 = self.rig.r0();
         let mut ohm = r0 * (1.0 + e).powi(2);
         let moved = e - self.last_strain.replace(e).unwrap_or(e);
-        self.travel += moved.abs();
-        if let Some((c, law)) =
-            self.causes.find(Kind::GaugeSoftening).zip(self.drawn.softening.as_mut())
-        {
-            let done = law.push(moved, c.log_aux(0, 0.5, 12.0), h);
-            ohm = r0 + (ohm - r0) * (1.0 - c.strength * done);
-        } else if let Some(c) = self.causes.find(Kind::GaugeSoftening) {
-            let turns = self.travel / c.log_aux(0, 0.5, 12.0);
-            let done = match c.form {
-                0 => 1.0 - (1.0 + turns / 0.8).powf(-0.8),
-                _ => turns / (0.6 + turns),
-            };
-            ohm = r0 + (ohm - r0) * (1.0 - c.strength * done);
+        if let Some(softening) = &mut self.softening {
+            ohm = r0 + (ohm - r0) * (1.0 - softening.push(moved, h));
         }
-        if let Some(c) = self.causes.find(Kind::GaugeNonlinearity) {
-            let x = e / self.rig.e0();
-            let bump = match c.form {
-                _ if self.drawn.nonlinearity.is_some() => {
-                    self.drawn.nonlinearity.as_ref().map_or(0.0, |law| law.at(x))
-                }
-                0 => (std::f64::consts::PI * x).sin(),
-                _ => 4.0 * x * (1.0 - x) * (0.75 + 0.5 * x),
-            };
-            ohm *= 1.0 + c.signed() * bump;
+        if let Some((strength, law)) = &self.nonlinearity {
+            ohm *= 1.0 + strength * law.at(e / self.rig.e0());
         }
-        if let Some(c) = self.causes.find(Kind::ThermalDrift) {
-            let shape = match c.form {
-                _ if self.drawn.drift.is_some() => self.drawn.drift(session),
-                0 => 900.0 * (1.0 - (-session / 900.0).exp()),
-                _ => 735.0 * (session.max(0.0) / 735.0).powf(0.8),
-            };
-            ohm *= 1.0 + c.signed() * shape;
+        if let Some((strength, law)) = &self.drift {
+            ohm *= 1.0
+                + strength
+                    * match law {
+                        // In seconds of a steady drift.
+                        Law::Drawn(law) => SESSION_S * law.at(session.max(0.0) / SESSION_S),
+                        Law::Written(law) => law(session),
+                    };
         }
-        if let Some(c) = self.causes.find(Kind::SelfHeating) {
-            let tau = c.log_aux(0, 1.5, 30.0);
-            let warm = match c.form {
-                _ if self.drawn.heating.is_some() => self.drawn.warmth(t / tau),
-                0 => 1.0 - 0.5 * (-t / (0.5 * tau)).exp() - 0.5 * (-t / (2.0 * tau)).exp(),
-                _ => 1.0 - (-(t.max(0.0) / tau).powf(0.65)).exp(),
+        if let Some((tau, (strength, law))) = &self.heating {
+            let times = t / tau;
+            let warm = match law {
+                Law::Drawn(law) => law.at(-(-times.max(0.0)).exp_m1()),
+                Law::Written(law) => law(times),
             };
             // Heat is the square of the excitation.
-            ohm *= 1.0 + c.signed() * warm * self.excitation.powi(2);
+            ohm *= 1.0 + strength * warm * self.excitation.powi(2);
         }
         if let Some(c) = self.causes.find(Kind::IntermittentContact) {
             let (open, random) = &mut self.contact;
@@ -195,15 +203,9 @@ impl<'a> Gauge<'a> {
 
     fn amplify(&mut self, volts: f64, now: Instant, h: f64) -> f64 {
         let mut v = volts;
-        if let Some(c) = self.causes.find(Kind::AmplifierSaturation) {
+        if let Some(saturation) = &self.saturation {
             let full = self.rig.static_contraction(self.rig.p_s() + P_ATM);
-            let (bottom, top) = (self.rig.nominal_volts(0.0), self.rig.nominal_volts(full));
-            v = match c.form {
-                _ if self.drawn.saturation.is_some() => self.drawn.clip(v, c.strength, bottom, top),
-                0 => v.min(top - c.strength),
-                1 => -at_least(-v, c.strength - top, 0.05_f64.min(c.strength)),
-                _ => v.max(bottom + c.strength),
-            };
+            v = saturation.clip(v, self.rig.nominal_volts(0.0), self.rig.nominal_volts(full));
         }
         if let Some(c) = self.causes.find(Kind::CapacitivePickup) {
             let (spike, last) = &mut self.pickup;
@@ -212,11 +214,8 @@ impl<'a> Gauge<'a> {
             *spike = *spike * (-h / (0.01 + 0.05 * c.aux[0])).exp() + c.strength * edge;
             v += *spike;
         }
-        if let Some(c) = self.causes.find(Kind::AmplifierLowpass) {
-            v = match &mut self.drawn.lowpass {
-                Some(filter) => filter.push(v, h),
-                None => self.low_pass(v, c, h),
-            };
+        if let Some(lags) = &mut self.lowpass {
+            v = lags.push(v, h);
         }
         if let Some(c) = self.causes.find(Kind::AmplifierSlew) {
             let last = self.slewed.unwrap_or(v);
@@ -226,27 +225,6 @@ impl<'a> Gauge<'a> {
             self.slewed = Some(v);
         }
         v
-    }
-
-    fn low_pass(&mut self, v: f64, c: Cause, h: f64) -> f64 {
-        let poles = self.poles.get_or_insert([v; 2]);
-        if c.form == 0 {
-            let shares = [0.7, 0.3];
-            let mut x = v;
-            for (z, share) in poles.iter_mut().zip(shares) {
-                *z += (x - *z) * (1.0 - (-h / (share * c.strength)).exp());
-                x = *z;
-            }
-            return x;
-        }
-        poles[0] += (v - poles[0]) * (1.0 - (-h / (0.85 * c.strength)).exp());
-        self.late.push(poles[0]);
-        // The value of 0.15 tau ago, interpolated; the first one before that.
-        let last = self.late.len() - 1;
-        let at = (last as f64 - 0.15 * c.strength / h).max(0.0);
-        let low = at as usize;
-        let (early, next) = (self.late[low], self.late[(low + 1).min(last)]);
-        early + (next - early) * (at - low as f64)
     }
 }
 
@@ -281,7 +259,7 @@ pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
 #[derive(Debug, Clone)]
 pub(crate) struct Pot<'a> {
     rig: &'a Rig,
-    nonlinearity: Option<(Cause, Option<Curve>)>,
+    nonlinearity: Option<(f64, Law)>,
     backlash: Option<Friction>,
     stiction: Option<(f64, Option<f64>)>,
 }
@@ -290,9 +268,15 @@ impl<'a> Pot<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
         Self {
             rig,
-            nonlinearity: causes
-                .find(Kind::PotNonlinearity)
-                .map(|c| (c, c.is_drawn().then(|| bump(c.family, &mut c.random(1))))),
+            nonlinearity: Law::find(
+                causes,
+                Kind::PotNonlinearity,
+                bump,
+                [
+                    |y| (PI * y).sin() + 0.12 * (2.0 * PI * y).sin(),
+                    |y| 4.0 * y * (1.0 - y) * (0.8 + 0.4 * y),
+                ],
+            ),
             backlash: causes.find(Kind::PotBacklash).map(|c| Friction::of(&c, c.strength, true)),
             stiction: causes.find(Kind::PotStiction).map(|c| (c.strength, None)),
         }
@@ -301,15 +285,8 @@ impl<'a> Pot<'a> {
     /// Shown length in mm at a contraction, `h` seconds after the last.
     pub(crate) fn step(&mut self, k: f64, h: f64) -> f64 {
         let mut length = L_0 * (1.0 - k);
-        if let Some((c, law)) = &self.nonlinearity {
-            let y = k / self.rig.k_max();
-            let pi = std::f64::consts::PI;
-            length += c.signed()
-                * match c.form {
-                    _ if law.is_some() => law.as_ref().map_or(0.0, |law| law.at(y)),
-                    0 => (pi * y).sin() + 0.12 * (2.0 * pi * y).sin(),
-                    _ => 4.0 * y * (1.0 - y) * (0.8 + 0.4 * y),
-                };
+        if let Some((strength, law)) = &self.nonlinearity {
+            length += strength * law.at(k / self.rig.k_max());
         }
         if let Some(backlash) = &mut self.backlash {
             length -= backlash.push(length, h);

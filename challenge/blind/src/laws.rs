@@ -1,8 +1,41 @@
 //! Static laws drawn from function spaces: rising ones, bumps, paths, and damping.
 
 use crate::curve::{Curve, Wiggle, weights};
-use crate::family::Family;
+use crate::effect::{Causes, Family, Kind};
 use crate::random::RandomGenerator;
+
+/// A static law of a cause: a table if it is drawn, a formula if it is written.
+#[derive(Debug, Clone)]
+pub(crate) enum Law {
+    Drawn(Curve),
+    Written(fn(f64) -> f64),
+}
+
+impl Law {
+    /// The strength of a cause at work with its sign, and its law: drawn from its family by `draw`, or that of its
+    /// two written forms.
+    pub(crate) fn find(
+        causes: &Causes,
+        kind: Kind,
+        draw: fn(Family, &mut RandomGenerator) -> Curve,
+        written: [fn(f64) -> f64; 2],
+    ) -> Option<(f64, Self)> {
+        let c = causes.find(kind)?;
+        let law = match c.is_drawn() {
+            true => Self::Drawn(draw(c.family, &mut c.random(1))),
+            false => Self::Written(written[c.form]),
+        };
+        Some((c.signed(), law))
+    }
+
+    /// Value at `x`.
+    pub(crate) fn at(&self, x: f64) -> f64 {
+        match self {
+            Self::Drawn(curve) => curve.at(x),
+            Self::Written(formula) => formula(x),
+        }
+    }
+}
 
 /// A random sign.
 pub(crate) fn sign(random: &mut RandomGenerator) -> f64 {

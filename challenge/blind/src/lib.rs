@@ -24,7 +24,6 @@
 //! # }
 //! ```
 
-mod by_family;
 mod case;
 mod curve;
 mod disturbances;
@@ -32,49 +31,45 @@ mod effect;
 mod electric;
 mod error;
 mod excess;
-mod family;
-mod filter;
 mod friction;
 mod gauge;
-mod knee;
+mod lags;
 mod laws;
-mod leave_family_out;
 mod make;
+mod outcome;
 mod plan;
 mod plant;
 mod plants;
+mod pneumatics;
 mod protocol;
 mod random;
 mod rate;
-mod relaxation;
 mod rig;
 mod score;
 mod seal;
 mod session;
 mod submission;
-mod supply;
 mod table;
 mod timing;
 mod truth;
-mod valves;
 mod verdict;
 mod words;
-pub use by_family::FamilyRow;
 pub use disturbances::Disturbances;
-pub use effect::Stage;
+pub use effect::{Family, Stage};
 pub use error::BlindError;
-pub use family::Family;
 pub use make::make;
+pub use outcome::{Figures, Interval, OpenScore, Outcome};
 pub use plan::Plan;
 pub use plants::{
-    Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, make_set_apart,
-    sealed_beside,
+    Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, sealed_beside,
 };
 pub use protocol::{LOW_EXCITATION, Protocol};
 pub use rate::{Bin, Calibration, Rate};
-pub use score::{Baseline, COUNTED_EXCESS, Miss, STAND_IN, Score, Several, Singles, Struck};
+pub use score::{
+    Baseline, COUNTED_EXCESS, FamilyRow, Miss, STAND_IN, Score, Several, Singles, Struck,
+};
 pub use seal::Seal;
-pub use submission::{Answer, Believed, Figures, Interval, OpenScore, Outcome, Said, Submission};
+pub use submission::{Answer, Believed, Said, Submission};
 pub use table::method_in_words;
 pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};
 pub use verdict::Verdict;

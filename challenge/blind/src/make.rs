@@ -1,9 +1,11 @@
 //! Writes the cases, each in its folder, and seals their labels.
 
-use std::fmt::Write as _;
-use std::fs;
-use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::Path,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
 use rayon::prelude::*;
 
@@ -11,8 +13,8 @@ use crate::case::{Case, Recording};
 use crate::error::BlindError;
 use crate::plan::Plan;
 use crate::protocol::{RATE_HZ, Split};
-use crate::seal::Seal;
-use crate::truth::{CaseKind, Truth};
+use crate::seal::{MARK, Seal};
+use crate::truth::Truth;
 
 /// Makes the cases of a plan under `dir` and seals their labels.
 ///
@@ -42,10 +44,9 @@ pub fn make(
     plan: &Plan,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Seal, BlindError> {
-    if dir.join("seal.sha256").exists() || dir.join("sealed").exists() {
+    if dir.join(MARK).exists() || dir.join("sealed").exists() {
         return Err(BlindError::Occupied { path: dir.to_path_buf() });
     }
-    fs::create_dir_all(dir).map_err(BlindError::io(dir))?;
     let done = AtomicUsize::new(0);
     let orders = plan.orders(seed);
     let labels: Result<Vec<_>, BlindError> = orders
@@ -63,18 +64,22 @@ pub fn make(
     Seal::close(dir, &truth)
 }
 
+/// Writes a text, with the folders above it.
+pub(crate) fn write(path: &Path, text: &str) -> Result<(), BlindError> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
+    }
+    fs::write(path, text).map_err(BlindError::io(path))
+}
+
 fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> {
-    fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
-    let write = |file: &str, text: String| {
-        let path = folder.join(file);
-        fs::write(&path, text).map_err(BlindError::io(&path))
-    };
+    let write = |file: &str, text: &str| write(&folder.join(file), text);
     let mut index = format!("name = \"{name}\"\nrate_hz = {RATE_HZ}.0\n");
     if let Some([pressure, length, volts]) = case.noise {
         index.push_str("rig = \"rig.toml\"\n");
         write(
             "rig.toml",
-            format!(
+            &format!(
                 "[pneumatics]\nsigma_p = {{ value = {pressure:?} }}\n\n\
                  [sensing]\nsigma_v = {{ value = {volts:?} }}\n\n\
                  [reference]\nsigma_L = {{ value = {length:?} }}\n"
@@ -90,14 +95,13 @@ fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> 
         }
         let split = if script.split == Split::Fit { "fit" } else { "test" };
         let _ = writeln!(index, "start_s = {:?}\nsplit = \"{split}\"", script.start_s);
-        write(&script.file, csv(recording))?;
+        write(&script.file, &csv(recording))?;
     }
-    write("dataset.toml", index)?;
-    if case.label.kind == CaseKind::Struck {
-        let struck = case.label.struck.as_deref().unwrap_or_default();
-        write("hint.toml", format!("without = [\"{struck}\"]\n"))?;
+    write("dataset.toml", &index)?;
+    match &case.label.struck {
+        Some(struck) => write("hint.toml", &format!("without = [\"{struck}\"]\n")),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn csv(recording: &Recording) -> String {

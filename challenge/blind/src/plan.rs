@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::disturbances::Disturbances;
-use crate::effect::Kind;
-use crate::family::Family;
+use crate::effect::{Family, Kind};
 use crate::protocol::Protocol;
 use crate::random::RandomGenerator;
 use crate::truth::CaseKind;

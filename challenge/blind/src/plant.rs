@@ -3,14 +3,10 @@
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind};
 use crate::friction::Friction;
+use crate::lags::Lags;
 use crate::laws::{damping, rising};
-use crate::relaxation::Relaxation;
+use crate::pneumatics::{DeadBand, Delay, Q_REF, Sag};
 use crate::rig::{P_ATM, P_REF, R_T, RHO_0, Rig, V_0};
-use crate::supply::Sag;
-use crate::valves::{DeadBand, Delay};
-
-/// Flow at which the sag of the supply is scaled, kg/s.
-const Q_REF: f64 = 6e-4;
 
 /// Absolute pressure over (1 + theta), lagged contraction, contraction, its rate, sag of the
 /// supply in Pa, relative excess of the gas temperature.
@@ -29,34 +25,15 @@ pub(crate) struct Plant<'a> {
     travel: f64,
     last_static: Option<f64>,
     hysteresis: Option<(f64, Friction)>,
-    creep: Option<(f64, Relaxation)>,
+    creep: Option<(f64, Lags)>,
+    deadband: Option<(f64, DeadBand)>,
+    delay: Option<(f64, Delay)>,
     causes: Causes,
-    drawn: Drawn,
-}
-
-/// Laws that are drawn for the causes at work, and how the valves are delayed.
-#[derive(Debug, Clone)]
-struct Drawn {
+    /// Laws that are drawn.
     sag: Option<Sag>,
     leak: Option<Curve>,
     volume: Option<Curve>,
     damping: Option<Curve>,
-    deadband: Option<DeadBand>,
-    delay: Option<Delay>,
-}
-
-impl Drawn {
-    fn of(causes: &Causes) -> Self {
-        let find = |kind| causes.find(kind).filter(Cause::is_drawn);
-        Self {
-            sag: find(Kind::SupplySag).map(|c| Sag::draw(c.family, c.strength, &mut c.random(1))),
-            leak: find(Kind::Leak).map(|c| rising(c.family, &mut c.random(1))),
-            volume: find(Kind::ChamberVolume).map(|c| rising(c.family, &mut c.random(1))),
-            damping: find(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.random(1))),
-            deadband: find(Kind::ValveDeadband).map(|c| DeadBand::draw(c.family, &mut c.random(1))),
-            delay: causes.find(Kind::ValveDelay).as_ref().map(Delay::of),
-        }
-    }
 }
 
 /// Inputs of a step: conductance shares of the valves and the supply, Pa absolute.
@@ -69,13 +46,8 @@ struct Drive {
 
 impl<'a> Plant<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
-        let hysteresis = causes.find(Kind::MuscleHysteresis).map(|c| {
-            let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-            (c.strength, Friction::of(&c, reach, false))
-        });
-        let creep = causes
-            .find(Kind::MuscleCreep)
-            .map(|c| (c.strength, Relaxation::of(&c, c.log_aux(0, 0.7, 25.0), 0.16)));
+        let drawn = |kind| causes.find(kind).filter(Cause::is_drawn);
+        let law = |kind| drawn(kind).map(|c| rising(c.family, &mut c.random(1)));
         Self {
             rig,
             state: [P_ATM, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -86,9 +58,16 @@ impl<'a> Plant<'a> {
             snap: (false, 0.0),
             travel: 0.0,
             last_static: None,
-            hysteresis,
-            creep,
-            drawn: Drawn::of(causes),
+            hysteresis: causes.find(Kind::MuscleHysteresis).map(|c| Friction::with_strength(&c)),
+            creep: causes
+                .find(Kind::MuscleCreep)
+                .map(|c| (c.strength, Lags::relaxation(&c, c.log_aux(0, 0.7, 25.0), 0.16))),
+            deadband: causes.find(Kind::ValveDeadband).map(|c| (c.strength, DeadBand::of(&c))),
+            delay: causes.find(Kind::ValveDelay).map(|c| (c.strength, Delay::of(&c))),
+            sag: drawn(Kind::SupplySag).map(|c| Sag::draw(c.family, c.strength, &mut c.random(1))),
+            leak: law(Kind::Leak),
+            volume: law(Kind::ChamberVolume),
+            damping: drawn(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.random(1))),
             causes: causes.clone(),
         }
     }
@@ -113,27 +92,17 @@ impl<'a> Plant<'a> {
         self.state[0] = p;
         self.state[4] = 0.0;
         self.state[5] = 0.0;
-        if let Some(sag) = &mut self.drawn.sag {
+        if let Some(sag) = &mut self.sag {
             sag.reset();
         }
     }
 
     /// Conductance share of an opening, 0..1.
     fn share(&self, u: f64, side: usize) -> f64 {
-        let mut u = u;
-        if let Some((c, law)) =
-            self.causes.find(Kind::ValveDeadband).zip(self.drawn.deadband.as_ref())
-        {
-            u = law.pass(u, c.strength, side);
-        } else if let Some(c) = self.causes.find(Kind::ValveDeadband) {
-            // The two valves differ a little; the rest is not stretched.
-            let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
-            u = match c.form {
-                0 => (u - band).max(0.0),
-                // A spool that lifts gradually: the slowest ramp still passes.
-                _ => u - band * (1.0 - (-u / band).exp()),
-            };
-        }
+        let u = match &self.deadband {
+            Some((strength, law)) => law.pass(u, *strength, side),
+            None => u,
+        };
         if u <= 0.0 { 0.0 } else { self.rig.u_min() + (1.0 - self.rig.u_min()) * u }
     }
 
@@ -163,13 +132,13 @@ impl<'a> Plant<'a> {
     fn valve(&mut self, command: &impl Fn(f64) -> (f64, f64), t: f64, h: f64, side: usize) -> f64 {
         let late = |late| self.mean_share(command, t, h, late, side);
         let mut lag = self.valve_lag[side];
-        let mut share = match (self.causes.find(Kind::ValveDelay), &self.drawn.delay) {
-            (Some(c), Some(law)) => {
+        let mut share = match &self.delay {
+            Some((strength, law)) => {
                 let (inlet, outlet) = command(t + 1e-9);
                 let opening = if side == 0 { inlet } else { outlet };
-                law.share(c.strength, (side, opening, h), late, &mut lag)
+                law.share(*strength, (side, opening, h), late, &mut lag)
             }
-            _ => late(0.0),
+            None => late(0.0),
         };
         self.valve_lag[side] = lag;
         if let Some(c) = self.causes.find(Kind::ValveSticking) {
@@ -225,7 +194,7 @@ impl<'a> Plant<'a> {
 
     /// Flow that is lost at an absolute pressure, kg/s.
     fn leak_flow(&self, c: Cause, p: f64) -> f64 {
-        if let Some(law) = &self.drawn.leak {
+        if let Some(law) = &self.leak {
             return c.strength * P_REF * law.at((p - P_ATM) / P_REF);
         }
         match c.form {
@@ -241,7 +210,7 @@ impl<'a> Plant<'a> {
     fn acceleration(&self, c: Cause, y: &State) -> f64 {
         let omega = 1.0 / c.strength;
         let spring = omega * omega * (y[1] - y[2]);
-        if let Some(law) = &self.drawn.damping {
+        if let Some(law) = &self.damping {
             // Speeds count in tenths of the natural one.
             let u = y[3] / (0.1 * omega);
             return spring - 0.2 * omega * omega * law.at((u + 2.0) / 4.0);
@@ -280,7 +249,7 @@ impl<'a> Plant<'a> {
         let mut volume = V_0;
         if let Some(c) = self.causes.find(Kind::ChamberVolume) {
             let x = y[2] / rig.k_max();
-            let law = self.drawn.volume.as_ref();
+            let law = self.volume.as_ref();
             let (shape, slope) = match c.form {
                 _ if law.is_some() => law.map_or((0.0, 0.0), |v| (v.at(x), v.slope(x))),
                 0 => (1.35 * x - 0.35 * x * x, 1.35 - 0.7 * x),
@@ -331,10 +300,10 @@ impl<'a> Plant<'a> {
         }
         let drive = Drive { inlet, outlet, supply };
         let offset = self.offset(h);
-        if self.drawn.sag.is_some() {
+        if self.sag.is_some() {
             let conductance = self.rig.c_in() * inlet;
             let flow = self.rig.flow(conductance, supply - self.state[4], self.pressure());
-            self.state[4] = self.drawn.sag.as_mut().map_or(0.0, |sag| sag.push(flow, h));
+            self.state[4] = self.sag.as_mut().map_or(0.0, |sag| sag.push(flow, h));
         }
         let y = self.state;
         let add = |d: &State, s: f64| -> State { std::array::from_fn(|i| y[i] + s * d[i]) };

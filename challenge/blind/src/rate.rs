@@ -1,6 +1,7 @@
 //! Counts with their intervals, and the calibration of probabilities.
 
 use serde::{Deserialize, Serialize};
+use statrs::function::beta::inv_beta_reg;
 
 /// `hits` out of `cases`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -53,43 +54,20 @@ impl Rate {
     pub fn exact(&self) -> Option<(f64, f64)> {
         let Self { hits, cases } = *self;
         self.share()?;
-        // P(at least `hits`) rises with p, P(at most `hits`) falls.
-        let low = if hits == 0 { 0.0 } else { root(|p| 1.0 - at_most(hits - 1, cases, p) - 0.025) };
-        let high = if hits == cases { 1.0 } else { root(|p| 0.025 - at_most(hits, cases, p)) };
+        let (h, n) = (hits as f64, cases as f64);
+        let low = if hits == 0 { 0.0 } else { inv_beta_reg(h, n - h + 1.0, 0.025) };
+        let high = if hits == cases { 1.0 } else { inv_beta_reg(h + 1.0, n - h, 0.975) };
         Some((low, high))
     }
-}
 
-/// Zero in 0..1 of a rising function.
-fn root(f: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (0.0_f64, 1.0_f64);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if f(middle) < 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
+    /// As a cell of a table: its share in so many digits, and the counts; `none` without a case.
+    pub(crate) fn cell(&self, digits: usize, none: &str) -> String {
+        let Self { hits, cases } = self;
+        self.share().map_or_else(
+            || none.to_owned(),
+            |share| format!("{share:.digits$} ({hits} of {cases})"),
+        )
     }
-    0.5 * (low + high)
-}
-
-/// Probability of at most `hits` successes in `cases` trials of probability `p`.
-fn at_most(hits: usize, cases: usize, p: f64) -> f64 {
-    if p <= 0.0 {
-        return 1.0;
-    }
-    if p >= 1.0 {
-        return if hits >= cases { 1.0 } else { 0.0 };
-    }
-    let mut log_term = cases as f64 * (-p).ln_1p();
-    let odds = p.ln() - (-p).ln_1p();
-    let mut sum = log_term.exp();
-    for i in 1..=hits {
-        log_term += ((cases - i + 1) as f64 / i as f64).ln() + odds;
-        sum += log_term.exp();
-    }
-    sum.min(1.0)
 }
 
 /// One bin of a reliability diagram.
@@ -113,26 +91,23 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    pub(crate) fn of(outcomes: &[(f64, bool)]) -> Self {
-        let mut bins: Vec<Bin> = (0..10)
-            .map(|i| Bin {
-                range: (f64::from(i) / 10.0, f64::from(i + 1) / 10.0),
-                ..Bin::default()
-            })
-            .collect();
-        for &(probability, right) in outcomes {
+    pub(crate) fn of(outcomes: impl IntoIterator<Item = (f64, bool)>) -> Self {
+        let range = |i: i32| (f64::from(i) / 10.0, f64::from(i + 1) / 10.0);
+        let mut bins: Vec<Bin> =
+            (0..10).map(|i| Bin { range: range(i), ..Bin::default() }).collect();
+        for (probability, right) in outcomes {
             let bin = &mut bins[((probability * 10.0) as usize).min(9)];
             bin.stated += probability;
             bin.right.add(right);
         }
-        let mut error = 0.0;
-        for bin in bins.iter_mut().filter(|bin| bin.right.cases > 0) {
+        let (mut error, mut cases) = (0.0, 0);
+        for bin in &mut bins {
+            let Some(right) = bin.right.share() else { continue };
             bin.stated /= bin.right.cases as f64;
-            let right = bin.right.hits as f64 / bin.right.cases as f64;
             error += bin.right.cases as f64 * (bin.stated - right).abs();
+            cases += bin.right.cases;
         }
-        let ece = (!outcomes.is_empty()).then(|| error / outcomes.len() as f64);
-        Self { bins, ece }
+        Self { bins, ece: (cases > 0).then(|| error / cases as f64) }
     }
 }
 
@@ -155,7 +130,7 @@ mod tests {
     #[test]
     fn calibration_error_is_the_weighted_gap() {
         let outcomes = [(0.95, true), (0.95, true), (0.55, false), (0.55, true)];
-        let calibration = Calibration::of(&outcomes);
+        let calibration = Calibration::of(outcomes);
         // Half the cases are off by 0.05, half by 0.05.
         assert_relative_eq!(
             calibration.ece.expect("cases"),

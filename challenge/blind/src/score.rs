@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use crate::by_family::FamilyRow;
+use crate::effect::Family;
 use crate::error::BlindError;
-use crate::family::Family;
 use crate::rate::{Calibration, Rate};
 use crate::truth::{CaseKind, Label, Truth, are_twins};
 use crate::verdict::Verdict;
@@ -121,6 +120,37 @@ impl Baseline {
     }
 }
 
+/// Figures of the cases of one family; as in [`Score`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct FamilyRow {
+    /// Cases scored.
+    pub cases: usize,
+    /// Exactly the one effect named, a declared tie counted right.
+    pub exact: Rate,
+    /// First name right, a declared tie counted right.
+    pub top1: Rate,
+    /// Stage right.
+    pub stage: Rate,
+    /// The effect is in the 95 % set, an empty set counting as a miss.
+    pub set_covers_all: Rate,
+    /// Single effects called unknown.
+    pub false_unknown: Rate,
+    /// Two effects: both named.
+    pub both_named: Rate,
+    /// Two effects: one of them named.
+    pub one_named: Rate,
+    /// One strong effect and three weak ones: the strong one named.
+    pub strongest_named: Rate,
+    /// Nulls on which an effect was named, the gap was called unknown, or the record wrong.
+    pub false_alarms: Rate,
+    /// Causes outside the catalogue answered `unknown`: they are written in every family.
+    pub foreign_caught: Rate,
+    /// Cases whose entry was removed from the catalogue: answered `unknown` or with a known twin.
+    pub struck: Rate,
+    /// Expected calibration error.
+    pub ece: Option<f64>,
+}
+
 /// A case answered wrongly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Miss {
@@ -204,25 +234,21 @@ impl Score {
     /// Scores verdicts against the labels.
     ///
     /// # Errors
-    /// [`BlindError::UnknownCase`], [`BlindError::DuplicateCase`] if verdicts and labels do not
-    /// match.
+    /// [`BlindError::Field`] for a case that the labels do not have, or that has two verdicts.
     pub fn of(truth: &Truth, verdicts: &[Verdict]) -> Result<Self, BlindError> {
         let mut tally = Tally::default();
         let mut families: BTreeMap<Family, Tally> = BTreeMap::new();
         let mut seen = BTreeSet::new();
         for verdict in verdicts {
             let case = &verdict.case;
-            let label = truth
-                .cases
-                .get(case)
-                .ok_or_else(|| BlindError::UnknownCase { case: case.clone() })?;
-            if !seen.insert(case.clone()) {
-                return Err(BlindError::DuplicateCase { case: case.clone() });
+            let label = label_of(truth, case)?;
+            if !seen.insert(case) {
+                return Err(BlindError::field(case, "it is answered twice"));
             }
             tally.add(label, verdict);
             families.entry(label.family).or_default().add(label, verdict);
         }
-        let missing = truth.cases.keys().filter(|case| !seen.contains(*case));
+        let missing = truth.cases.keys().filter(|case| !seen.contains(case));
         tally.score.unanswered = missing.cloned().collect();
         let mut score = tally.finish();
         if families.len() > 1 {
@@ -230,6 +256,38 @@ impl Score {
             score.families = families.into_iter().map(row).collect();
         }
         Ok(score)
+    }
+
+    /// Scores every family by the run that was calibrated without it.
+    ///
+    /// `runs` holds, for each family, the verdicts of a diagnosis whose thresholds were calibrated
+    /// only on the other families; only the cases of that family count. The rows of
+    /// [`Score::families`] are then the leave-family-out table; the other figures pool them.
+    ///
+    /// # Errors
+    /// As [`Score::of`].
+    ///
+    /// ```
+    /// use std::collections::BTreeMap;
+    /// use stretch_blind::{Family, Score, Truth};
+    /// let truth = Truth { schema: 1, seed: None, cases: BTreeMap::new() };
+    /// let runs = BTreeMap::from([(Family::Splines, Vec::new())]);
+    /// assert_eq!(Score::leave_family_out(&truth, &runs)?.cases, 0);
+    /// # Ok::<(), stretch_blind::BlindError>(())
+    /// ```
+    pub fn leave_family_out(
+        truth: &Truth,
+        runs: &BTreeMap<Family, Vec<Verdict>>,
+    ) -> Result<Self, BlindError> {
+        let mut judged = Vec::new();
+        for (family, verdicts) in runs {
+            for verdict in verdicts {
+                if label_of(truth, &verdict.case)?.family == *family {
+                    judged.push(verdict.clone());
+                }
+            }
+        }
+        Self::of(truth, &judged)
     }
 
     /// What a table by family shows of it.
@@ -251,6 +309,11 @@ impl Score {
             ece: self.calibration.ece,
         }
     }
+}
+
+fn label_of<'a>(truth: &'a Truth, case: &str) -> Result<&'a Label, BlindError> {
+    let label = truth.cases.get(case);
+    label.ok_or_else(|| BlindError::field(case, "it is not among the sealed cases"))
 }
 
 /// A score in the making.
@@ -418,8 +481,8 @@ impl Tally {
 
     fn finish(mut self) -> Score {
         let score = &mut self.score;
-        score.calibration = Calibration::of(&self.outcomes);
-        score.calibration_unknown = Calibration::of(&self.unknowns);
+        score.calibration = Calibration::of(self.outcomes);
+        score.calibration_unknown = Calibration::of(self.unknowns);
         let mean = |x: &[f64]| (!x.is_empty()).then(|| x.iter().sum::<f64>() / x.len() as f64);
         score.singles.set_size = mean(&self.set_sizes);
         score.singles.tie_size = mean(&self.tie_sizes);

@@ -1,20 +1,21 @@
 //! Labels sealed by their hash: written before the diagnosis, opened after it.
 
-use std::fmt::Write as _;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::{fs, path::Path};
 
 use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 
-use crate::error::BlindError;
-use crate::truth::Truth;
+use crate::{error::BlindError, make::write, truth::Truth};
+
+/// The hash of the labels.
+pub(crate) const MARK: &str = "seal.sha256";
+/// Where the labels of a check lie in its folder.
+const LABELS: &str = "sealed/truth.json";
 
 /// The sealed labels of a set of cases: `sealed/truth.json` next to the case folders, and its
 /// SHA-256 in `seal.sha256`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seal {
-    path: PathBuf,
     sha256: String,
 }
 
@@ -24,13 +25,7 @@ impl Seal {
     /// # Errors
     /// [`BlindError::Io`] when a file cannot be written.
     pub fn close(dir: &Path, truth: &Truth) -> Result<Self, BlindError> {
-        let path = dir.join("sealed").join("truth.json");
-        let sha256 = close(&path, truth)?;
-        let mark = dir.join("seal.sha256");
-        // The layout of `sha256sum -c`.
-        fs::write(&mark, format!("{sha256}  sealed/truth.json\n"))
-            .map_err(BlindError::io(&mark))?;
-        Ok(Self { path, sha256 })
+        Ok(Self { sha256: close(dir, &dir.join(LABELS), LABELS, truth)? })
     }
 
     /// SHA-256 of the labels, 64 hexadecimal digits.
@@ -39,41 +34,40 @@ impl Seal {
         &self.sha256
     }
 
-    /// Where the labels lie.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Opens the labels under `dir`, if their hash has not changed.
     ///
     /// # Errors
     /// [`BlindError::SealBroken`] if it has; [`BlindError::Io`], [`BlindError::Json`] if a file is
     /// missing or invalid.
     pub fn open(dir: &Path) -> Result<(Self, Truth), BlindError> {
-        let path = dir.join("sealed").join("truth.json");
-        let (truth, sha256) = open(&path, &dir.join("seal.sha256"))?;
-        Ok((Self { path, sha256 }, truth))
+        let (truth, sha256) = open(&dir.join(LABELS), dir)?;
+        Ok((Self { sha256 }, truth))
     }
 }
 
-/// Writes labels to a file; hands back their SHA-256.
-pub(crate) fn close(path: &Path, labels: &impl Serialize) -> Result<String, BlindError> {
+/// Writes labels to a file, and its SHA-256 under its name to `seal.sha256` of the folder `set`, in the layout of
+/// `sha256sum -c`; returns the SHA-256.
+pub(crate) fn close(
+    set: &Path,
+    path: &Path,
+    name: &str,
+    labels: &impl Serialize,
+) -> Result<String, BlindError> {
     let text = serde_json::to_string_pretty(labels).map_err(BlindError::json(path))? + "\n";
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
-    }
-    fs::write(path, &text).map_err(BlindError::io(path))?;
-    Ok(sha256_hex(text.as_bytes()))
+    write(path, &text)?;
+    let sha256 = sha256_hex(text.as_bytes());
+    write(&set.join(MARK), &format!("{sha256}  {name}\n"))?;
+    Ok(sha256)
 }
 
-/// Labels, if their SHA-256 equals the one in `mark`; also returns the hash.
+/// Labels, if their SHA-256 equals the one in `seal.sha256` of the folder `set`; also returns the hash.
 pub(crate) fn open<T: DeserializeOwned>(
     path: &Path,
-    mark: &Path,
+    set: &Path,
 ) -> Result<(T, String), BlindError> {
+    let mark = set.join(MARK);
     let bytes = fs::read(path).map_err(BlindError::io(path))?;
-    let sealed = fs::read_to_string(mark).map_err(BlindError::io(mark))?;
+    let sealed = fs::read_to_string(&mark).map_err(BlindError::io(&mark))?;
     let sealed = sealed.split_whitespace().next().unwrap_or_default().to_owned();
     let found = sha256_hex(&bytes);
     if found != sealed {
@@ -82,11 +76,8 @@ pub(crate) fn open<T: DeserializeOwned>(
     Ok((serde_json::from_slice(&bytes).map_err(BlindError::json(path))?, found))
 }
 
-pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::with_capacity(64), |mut hex, byte| {
-        let _ = write!(hex, "{byte:02x}");
-        hex
-    })
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -107,7 +98,7 @@ mod tests {
         let seal = Seal::close(dir.path(), &truth).expect("closed");
         let (opened, read) = Seal::open(dir.path()).expect("unaltered");
         assert_eq!((opened, read), (seal.clone(), truth));
-        fs::write(seal.path(), "{ \"schema\": 1, \"cases\": {} }\n").expect("altered");
+        fs::write(dir.path().join(LABELS), "{ \"schema\": 1, \"cases\": {} }\n").expect("altered");
         assert!(matches!(Seal::open(dir.path()), Err(BlindError::SealBroken { .. })));
     }
 }

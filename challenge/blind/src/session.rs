@@ -296,8 +296,7 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{Cause, KINDS, Stage};
-    use crate::family::Family;
+    use crate::effect::{Cause, Family, KINDS, Stage};
     use crate::protocol::{Protocol, session};
     use approx::assert_abs_diff_eq;
     use testkit::tolerance::{

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use crate::by_family;
 use crate::rate::Rate;
 use crate::score::Score;
 
@@ -36,10 +35,7 @@ pub fn method_in_words(method: &str) -> &str {
 
 /// This diagnosis and the simpler methods on the same cases.
 fn methods(f: &mut fmt::Formatter<'_>, score: &Score) -> fmt::Result {
-    let cell = |rate: &Rate| match rate.share() {
-        Some(share) => format!("{share:.3} ({} of {})", rate.hits, rate.cases),
-        None => "no case".into(),
-    };
+    let cell = |rate: &Rate| rate.cell(3, "no case");
     writeln!(f, "\n| method | top-1 | above 10 | names something on nulls |")?;
     writeln!(f, "| --- | --- | --- | --- |")?;
     let mut row = |name: &str, top1: &Rate, above: &Rate, nulls: &Rate| {
@@ -50,6 +46,30 @@ fn methods(f: &mut fmt::Formatter<'_>, score: &Score) -> fmt::Result {
     score.baselines.iter().try_for_each(|(name, b)| {
         row(method_in_words(name), &b.top1, &b.top1_above_10, &b.false_names)
     })
+}
+
+/// The families of forms, a row each.
+fn families(f: &mut fmt::Formatter<'_>, score: &Score) -> fmt::Result {
+    writeln!(
+        f,
+        "\n| family | exactly the one named | first name | stage | set covers | both; one of two | \
+         dominant | alarms on nulls | foreign unknown | struck | ECE |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    )?;
+    for (family, row) in &score.families {
+        let cells = |rates: &[Rate]| rates.iter().map(|r| r.cell(2, "-")).collect::<Vec<_>>();
+        let singles = [row.exact, row.top1, row.stage, row.set_covers_all];
+        let others = [row.strongest_named, row.false_alarms, row.foreign_caught, row.struck];
+        writeln!(
+            f,
+            "| {family} | {} | {} | {} | {} |",
+            cells(&singles).join(" | "),
+            cells(&[row.both_named, row.one_named]).join("; "),
+            cells(&others).join(" | "),
+            row.ece.map_or_else(|| "-".to_owned(), |e| format!("{e:.3}")),
+        )?;
+    }
+    Ok(())
 }
 
 impl fmt::Display for Score {
@@ -120,7 +140,7 @@ impl fmt::Display for Score {
             methods(f, self)?;
         }
         if !self.families.is_empty() {
-            by_family::table(f, &self.families)?;
+            families(f, self)?;
         }
         if !self.unanswered.is_empty() {
             writeln!(f, "\nUnanswered: {}.", self.unanswered.join(", "))?;

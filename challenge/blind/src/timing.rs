@@ -2,7 +2,7 @@
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
-use crate::family::Family;
+use crate::effect::Family;
 use crate::random::RandomGenerator;
 
 /// Longest session for which a drifting skew is tabulated, s; it is constant afterwards.

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::Stage;
-use crate::family::Family;
+use crate::effect::{Family, Stage};
 use crate::words::worded;
 
 worded! {

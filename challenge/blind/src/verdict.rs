@@ -47,6 +47,41 @@ pub struct Verdict {
     pub baselines: BTreeMap<String, Option<String>>,
 }
 
+/// The scored part of a `diagnosis.json`.
+#[derive(Deserialize)]
+struct Diagnosis {
+    verdict: String,
+    named: Vec<String>,
+    ambiguous: Vec<String>,
+    tied: Option<Vec<String>>,
+    candidates: Option<Vec<Candidate>>,
+    #[serde(rename = "where")]
+    location: Option<Location>,
+    runtime_s: Option<f64>,
+    baselines: Option<BTreeMap<String, Option<String>>>,
+}
+
+#[derive(Deserialize)]
+struct Candidate {
+    effects: Vec<String>,
+    probability: f64,
+    gap_before: Option<f64>,
+    gap_after: Option<f64>,
+    closed: Option<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Location {
+    stages: Vec<StageShare>,
+}
+
+#[derive(Deserialize)]
+struct StageShare {
+    stage: String,
+    share: Option<f64>,
+}
+
 impl Verdict {
     /// Reads a `diagnosis.json`, schema 1, of a case.
     ///
@@ -55,65 +90,43 @@ impl Verdict {
     /// the first. `closed_oracle` is left empty.
     ///
     /// # Errors
-    /// [`BlindError::BadVerdict`] if the verdict, the names, or a probability are missing or out of
+    /// [`BlindError::Field`] if the verdict, the names, or a probability are missing or out of
     /// range.
     pub fn from_diagnosis(case: &str, diagnosis: &Value) -> Result<Self, BlindError> {
-        let bad = |reason| BlindError::BadVerdict { case: case.to_owned(), reason };
-        let names = |value: &Value| -> Option<Vec<String>> {
-            value.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
-        };
-        let verdict = diagnosis["verdict"].as_str().ok_or_else(|| bad("no verdict"))?.to_owned();
-        if !VERDICTS.contains(&verdict.as_str()) {
+        let bad = |reason: &str| BlindError::field(case, reason);
+        let read = Diagnosis::deserialize(diagnosis).map_err(|e| bad(&e.to_string()))?;
+        if !VERDICTS.contains(&read.verdict.as_str()) {
             return Err(bad("a verdict that the schema does not have"));
         }
-        let named = names(&diagnosis["named"]).ok_or_else(|| bad("no list of effects named"))?;
-        let commits = COMMITS.contains(&verdict.as_str());
-        if commits && named.is_empty() {
+        let commits = COMMITS.contains(&read.verdict.as_str());
+        if commits && read.named.is_empty() {
             return Err(bad("an effect without a name"));
         }
-        let ambiguous =
-            names(&diagnosis["ambiguous"]).ok_or_else(|| bad("no list of the 95 % set"))?;
-        let tied = match &diagnosis["tied"] {
-            Value::Null => Vec::new(),
-            some => names(some).ok_or_else(|| bad("ties that are no list of names"))?,
-        };
-        let none = Vec::new();
-        let listed = diagnosis["candidates"].as_array().unwrap_or(&none);
-        let mut candidates = Vec::with_capacity(listed.len());
-        for candidate in listed {
-            let effects =
-                names(&candidate["effects"]).ok_or_else(|| bad("a nameless candidate"))?;
-            let probability =
-                candidate["probability"].as_f64().ok_or_else(|| bad("no probability"))?;
-            if !(0.0..=1.0 + 1e-9).contains(&probability) {
-                return Err(bad("a probability outside 0..1"));
-            }
-            candidates.push((effects, probability));
+        let candidates = read.candidates.unwrap_or_default();
+        if candidates.iter().any(|c| !(0.0..=1.0 + 1e-9).contains(&c.probability)) {
+            return Err(bad("a probability outside 0..1"));
         }
-        let chosen = candidates.iter().position(|c| c.0 == named).unwrap_or(0);
-        let number = |field: &str| listed.get(chosen).and_then(|c| c[field].as_f64());
-        let shares = diagnosis["where"]["stages"].as_array().unwrap_or(&none);
-        let share = |s: &&Value| s["share"].as_f64().unwrap_or(0.0);
-        let placed = shares.iter().max_by(|a, b| share(a).total_cmp(&share(b)));
-        let placed = placed.and_then(|s| s["stage"].as_str()).map(str::to_owned);
-        let beside = diagnosis["baselines"].as_object().into_iter().flatten();
-        let baselines =
-            beside.map(|(method, said)| (method.clone(), said.as_str().map(str::to_owned)));
-        let known = named.first().filter(|_| commits).and_then(|n| Kind::named(n));
+        let chosen = candidates.iter().find(|c| c.effects == read.named).or(candidates.first());
+        let number = |field: fn(&Candidate) -> Option<f64>| chosen.and_then(field).unwrap_or(0.0);
+        let shares = read.location.unwrap_or_default().stages;
+        let placed = shares
+            .into_iter()
+            .max_by(|a, b| a.share.unwrap_or(0.0).total_cmp(&b.share.unwrap_or(0.0)));
+        let known = read.named.first().filter(|_| commits).and_then(|name| Kind::named(name));
         Ok(Self {
             case: case.to_owned(),
-            verdict,
-            named,
-            ambiguous,
-            tied,
-            candidates,
-            stage: known.map(|kind| kind.spec().stage.name().to_owned()).or(placed),
-            gap_before: number("gap_before").unwrap_or(0.0),
-            gap_after: number("gap_after").unwrap_or(0.0),
-            closed: number("closed").unwrap_or(0.0),
+            verdict: read.verdict,
+            ambiguous: read.ambiguous,
+            tied: read.tied.unwrap_or_default(),
+            stage: known.map(|k| k.spec().stage.name().to_owned()).or(placed.map(|s| s.stage)),
+            gap_before: number(|c| c.gap_before),
+            gap_after: number(|c| c.gap_after),
+            closed: number(|c| c.closed),
             closed_oracle: None,
-            runtime_s: diagnosis["runtime_s"].as_f64().unwrap_or(0.0),
-            baselines: baselines.collect(),
+            runtime_s: read.runtime_s.unwrap_or(0.0),
+            baselines: read.baselines.unwrap_or_default(),
+            named: read.named,
+            candidates: candidates.into_iter().map(|c| (c.effects, c.probability)).collect(),
         })
     }
 

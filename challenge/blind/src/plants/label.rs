@@ -1,14 +1,98 @@
-//! Labels of an open set: what is missing in each case, and the names that an answer may use.
+//! Labels of an open set: what is missing in each case, the names that an answer may use, and the
+//! families from which the forms of effects are drawn.
 
 use std::{
     collections::BTreeMap,
+    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::family::Form;
-use crate::{error::BlindError, seal, words::worded};
+use crate::{error::BlindError, random::RandomGenerator, seal, words::worded};
+
+/// Deviation of an effect from its textbook form; all 0 is the textbook's.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Form {
+    /// How round its corners are, 0 .. 1.
+    pub softness: f64,
+    /// How far its two directions differ, -0.5 .. 0.5.
+    pub asymmetry: f64,
+    /// How far its inner scales spread, 0 .. 0.9.
+    pub spread: f64,
+}
+
+/// Ranges from which forms and disturbances of a case are drawn, uniformly.
+///
+/// ```
+/// let names: Vec<String> = stretch_blind::FormFamily::published().into_iter().map(|f| f.name).collect();
+/// assert_eq!(names, ["sharp", "soft", "skewed"]);
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FormFamily {
+    /// Its name, in labels.
+    pub name: String,
+    /// Of [`Form::softness`].
+    pub softness: (f64, f64),
+    /// Of [`Form::asymmetry`].
+    pub asymmetry: (f64, f64),
+    /// Of [`Form::spread`].
+    pub spread: (f64, f64),
+    /// Correlation of the noise from sample to sample, 0 .. 0.9.
+    pub colour: (f64, f64),
+}
+
+impl FormFamily {
+    /// The three families that anybody may read.
+    #[must_use]
+    pub fn published() -> Vec<Self> {
+        let family = |name: &str, softness, asymmetry, spread, colour| Self {
+            name: name.to_owned(),
+            softness,
+            asymmetry,
+            spread,
+            colour,
+        };
+        vec![
+            family("sharp", (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)),
+            family("soft", (0.1, 0.4), (0.0, 0.0), (0.1, 0.4), (0.0, 0.0)),
+            family("skewed", (0.0, 0.2), (-0.3, 0.3), (0.2, 0.6), (0.0, 0.3)),
+        ]
+    }
+
+    /// Reads one from a JSON file of the same fields. The person who seals a set keeps this file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a field that is missing or out of its range.
+    pub fn read(path: &Path) -> Result<Self, BlindError> {
+        let text = fs::read_to_string(path).map_err(BlindError::io(path))?;
+        let family: Self = serde_json::from_str(&text).map_err(BlindError::json(path))?;
+        let ranges = [
+            ("softness", family.softness, 0.0, 1.0),
+            ("asymmetry", family.asymmetry, -0.5, 0.5),
+            ("spread", family.spread, 0.0, 0.9),
+            ("colour", family.colour, 0.0, 0.9),
+        ];
+        for (field, (low, high), least, most) in ranges {
+            if !(least <= low && low <= high && high <= most) {
+                let reason =
+                    format!("{low} .. {high} is no range within {least} .. {most}: correct it");
+                return Err(BlindError::field(field, reason));
+            }
+        }
+        Ok(family)
+    }
+
+    pub(super) fn form(&self, random: &mut RandomGenerator) -> Form {
+        let mut draw = |(low, high): (f64, f64)| random.between(low, high);
+        Form {
+            softness: draw(self.softness),
+            asymmetry: draw(self.asymmetry),
+            spread: draw(self.spread),
+        }
+    }
+}
 
 worded! {
     /// How hard a case is.
@@ -78,19 +162,32 @@ pub fn sealed_beside(set: &Path) -> PathBuf {
 }
 
 impl OpenTruth {
-    /// Writes the labels to `truth.json` of a folder; returns their SHA-256.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn seal(&self, folder: &Path) -> Result<String, BlindError> {
-        seal::close(&folder.join("truth.json"), self)
-    }
-
     /// Opens the labels of a set, if they match the hash in the set; also returns the hash.
     ///
     /// # Errors
     /// A broken seal, or a file that is missing or invalid.
     pub fn open(set: &Path) -> Result<(Self, String), BlindError> {
-        seal::open(&sealed_beside(set).join("truth.json"), &set.join("seal.sha256"))
+        seal::open(&sealed_beside(set).join("truth.json"), set)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_private_family_is_read_and_a_wrong_range_named() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("mine.json");
+        let text = |spread: &str| {
+            format!(
+                r#"{{"name":"mine","softness":[0,0.5],"asymmetry":[0,0],"spread":{spread},"colour":[0,0]}}"#
+            )
+        };
+        fs::write(&path, text("[0.1,0.2]")).expect("written");
+        assert_eq!(FormFamily::read(&path).expect("a family").spread, (0.1, 0.2));
+        fs::write(&path, text("[0.1,2]")).expect("written");
+        let error = FormFamily::read(&path).expect_err("out of range").to_string();
+        assert!(error.starts_with("spread: "), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! Operators in front of or behind a stage, on sampled signals, each in a form that need not be in
 //! the catalogue.
 
-use super::family::Form;
+use super::label::Form;
 
 /// y(t) = x(t - delay), with a part `softness` of it as a lag instead of a dead time.
 pub(super) fn delay(x: &[f64], delay_s: f64, form: &Form, dt_s: f64) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! A plant of two stages, the second driven by the output of the first: parameters, candidates,
 //! equations.
 
-use super::{family::Form, operators};
+use super::{label::Form, operators};
 
 /// A nominal parameter.
 #[derive(Debug)]

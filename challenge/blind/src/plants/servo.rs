@@ -2,7 +2,7 @@
 //!
 //! w' = (gain u - w)/tau and angle' = w/ratio, load' = (angle - load)/soft.
 
-use super::family::Form;
+use super::label::Form;
 use super::plant::{Action, Candidate, Parameter, PlantSpec, StageSpec};
 
 /// Dry friction in the drive, rad/s: f tanh(w/width), larger at small speeds if the spread is not

@@ -1,6 +1,6 @@
 //! A heated block and a probe in it: C T' = P - h (T - 20) and probe' = (T - probe)/tau.
 
-use super::family::Form;
+use super::label::Form;
 use super::plant::{Action, Candidate, Parameter, PlantSpec, StageSpec};
 
 /// Radiation, W: c (T^4 - 293^4)/1e9 with the absolute temperature T, in a power of 4 plus the softness.

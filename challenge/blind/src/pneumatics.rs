@@ -1,8 +1,8 @@
-//! Valves: openings that act late, and dead bands drawn of any shape.
+//! Laws of the pneumatics: openings that act late, dead bands of any shape, and a supply that sags under load.
 
 use crate::curve::{Curve, weights};
 use crate::effect::Cause;
-use crate::family::Family;
+use crate::effect::Family;
 use crate::laws::{rising, sign};
 use crate::random::RandomGenerator;
 
@@ -31,7 +31,7 @@ impl Delay {
     }
 
     /// Delays of a family, of mean 1.
-    pub(crate) fn draw(family: Family, random: &mut RandomGenerator) -> Self {
+    fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         match family {
             Family::Written => Self::Spread(vec![(1.0, 1.0)]),
             Family::Splines => {
@@ -93,16 +93,26 @@ impl Delay {
 
 /// A dead band: what of a small opening is lost.
 #[derive(Debug, Clone)]
-pub(crate) struct DeadBand {
-    /// Lost opening over opening, both in bands; table over 0..4, where it is 1.
-    lost: Curve,
-    /// Band of inlet and outlet, in units of the mean.
-    sides: [f64; 2],
+pub(crate) enum DeadBand {
+    /// Shifted, or a spool that lifts gradually, so that the slowest ramp still passes; band of inlet and outlet,
+    /// in units of the strength.
+    Written { is_gradual: bool, sides: [f64; 2] },
+    /// Lost opening over opening, both in bands, as a table over 0..4, where it is 1; band of inlet and outlet, in
+    /// units of the mean.
+    Drawn { lost: Curve, sides: [f64; 2] },
 }
 
 impl DeadBand {
-    /// A dead band of a family.
-    pub(crate) fn draw(family: Family, random: &mut RandomGenerator) -> Self {
+    /// The dead band of a cause.
+    pub(crate) fn of(c: &Cause) -> Self {
+        match c.is_drawn() {
+            true => Self::draw(c.family, &mut c.random(1)),
+            // The two valves differ a little.
+            false => Self::Written { is_gradual: c.form > 0, sides: [1.0, 0.8 + 0.4 * c.aux[0]] },
+        }
+    }
+
+    fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         let mut sides = [1.0, random.between(0.85, 1.15)];
         // Shut up to `begin` bands; from there on the slope rises to 1 as a drawn law does.
         let begin = if random.unit() < 0.6 { random.between(0.3, 0.85) } else { 0.0 };
@@ -121,13 +131,96 @@ impl DeadBand {
             z.min(begin) + long * (within - passed.at(within))
         });
         let end = lost.at(1.0);
-        Self { lost: lost.times(1.0 / end), sides }
+        Self::Drawn { lost: lost.times(1.0 / end), sides }
     }
 
     /// What is left of an opening.
     pub(crate) fn pass(&self, u: f64, band: f64, side: usize) -> f64 {
-        let band = band * self.sides[side];
-        (u - band * self.lost.at((u / (4.0 * band)).min(1.0))).max(0.0)
+        match self {
+            Self::Written { is_gradual: false, sides } => (u - band * sides[side]).max(0.0),
+            Self::Written { is_gradual: true, sides } => {
+                let band = band * sides[side];
+                u - band * (1.0 - (-u / band).exp())
+            }
+            Self::Drawn { lost, sides } => {
+                let band = band * sides[side];
+                (u - band * lost.at((u / (4.0 * band)).min(1.0))).max(0.0)
+            }
+        }
+    }
+}
+
+/// Flow at which the sag is scaled, kg/s.
+pub(crate) const Q_REF: f64 = 6e-4;
+
+/// Pressure missing behind the regulator.
+#[derive(Debug, Clone)]
+pub(crate) struct Sag {
+    /// Sag at rest under the reference flow, Pa.
+    scale: f64,
+    /// Sag over flow; table over 0 .. 2 of the reference flow.
+    load: Curve,
+    /// Share, time constants falling and recovering in s, state in Pa.
+    parts: Vec<(f64, f64, f64, f64)>,
+    /// Power of the sag that drives the recovery.
+    power: f64,
+}
+
+impl Sag {
+    /// A sag of `strength` Pa s/kg at the reference flow.
+    pub(crate) fn draw(family: Family, strength: f64, random: &mut RandomGenerator) -> Self {
+        let tau = random.log_between(0.25, 0.9);
+        let mut load = Curve::table(|x| 2.0 * x);
+        let mut parts = vec![(1.0, tau, tau, 0.0)];
+        let mut power = 1.0;
+        match family {
+            Family::Written => {}
+            Family::Splines => {
+                load = rising(family, random);
+                // 1 at the reference flow, the middle of the table.
+                let middle = load.at(0.5);
+                load = load.times(1.0 / middle);
+            }
+            Family::Spectra => {
+                let count = 2 + random.below(2);
+                let shares = weights(count, 0.6, random);
+                let part = |w| {
+                    let tau = random.log_between(0.08, 3.0);
+                    (w, tau, tau, 0.0)
+                };
+                parts = shares.into_iter().map(part).collect();
+            }
+            Family::RateLaws => power = random.log_between(0.5, 2.0),
+            Family::Asymmetric => {
+                let ratio = random.log_between(1.5, 4.0).powf(sign(random)).sqrt();
+                parts = vec![(1.0, tau / ratio, tau * ratio, 0.0)];
+            }
+        }
+        Self { scale: strength * Q_REF, load, parts, power }
+    }
+
+    /// No load for long.
+    pub(crate) fn reset(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.3 = 0.0);
+    }
+
+    /// Pressure missing after `h` s of a flow in kg/s, Pa.
+    pub(crate) fn push(&mut self, flow: f64, h: f64) -> f64 {
+        let drawn = self.scale * self.load.at(flow / (2.0 * Q_REF));
+        let mut sum = 0.0;
+        for (share, falling, recovering, at) in &mut self.parts {
+            let back = if self.power == 1.0 {
+                *at
+            } else {
+                // The root is straight below a thousandth: its slope there would be infinite.
+                let x = *at / self.scale;
+                self.scale * x * (x.abs() + 1e-3).powf(self.power - 1.0)
+            };
+            let tau = if drawn > *at { *falling } else { *recovering };
+            *at += (drawn - back) * h / (tau + 0.5 * h);
+            sum += *share * *at;
+        }
+        sum.max(0.0)
     }
 }
 
@@ -135,7 +228,7 @@ impl DeadBand {
 mod tests {
     use super::*;
     use approx::abs_diff_eq;
-    use testkit::tolerance::{BLIND_BAND, BLIND_BAND_OFF};
+    use testkit::tolerance::{BLIND_BAND, BLIND_BAND_OFF, BLIND_DRAWN};
 
     #[test]
     fn dead_bands_never_fall_and_lose_one_band_of_what_is_far_open() {
@@ -149,7 +242,8 @@ mod tests {
                     assert!(left >= last - 1e-12 && left >= 0.0, "{family} {i} {left} {last}");
                     last = left;
                 }
-                let open = 1.0 - 0.05 * band.sides[0];
+                let DeadBand::Drawn { sides, .. } = &band else { unreachable!("it is drawn") };
+                let open = 1.0 - 0.05 * sides[0];
                 assert!(abs_diff_eq!(last, open, epsilon = BLIND_BAND), "{family} {last}");
                 let off = band.pass(0.4, 1e-9, 1);
                 assert!(abs_diff_eq!(off, 0.4, epsilon = BLIND_BAND_OFF), "{family}: {off}");
@@ -177,6 +271,21 @@ mod tests {
                 let mut missing = missing;
                 let seconds = missing(0);
                 assert!((0.5 * 0.04..1.7 * 0.04).contains(&seconds), "{family} {seconds}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_steady_load_draws_down_what_the_strength_says_and_it_comes_back() {
+        let mut random = RandomGenerator::new(9, 4);
+        for family in Family::ALL {
+            for _ in 0..20 {
+                let mut sag = Sag::draw(family, 1e8, &mut random);
+                let drawn = (0..40_000).map(|_| sag.push(Q_REF, 1e-3)).last().expect("steps");
+                let settled = abs_diff_eq!(drawn, 6e4, epsilon = BLIND_DRAWN * 6e4);
+                assert!(settled, "{family} {drawn}");
+                let left = (0..60_000).map(|_| sag.push(0.0, 1e-3)).last().expect("steps");
+                assert!(left < 0.08 * drawn, "{family} {left}");
             }
         }
     }

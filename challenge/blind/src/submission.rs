@@ -79,7 +79,7 @@ pub struct Submission {
 /// Largest deviation from 1 of the sum of a case's probabilities.
 const SUM_TOLERANCE: f64 = 1e-6;
 /// Name of a cause that is no candidate.
-pub(super) const UNKNOWN: &str = "unknown";
+pub(crate) const UNKNOWN: &str = "unknown";
 
 impl Submission {
     /// Checks a submission against the set whose labels have the hash `hash`.
@@ -167,5 +167,5 @@ fn ensure(holds: bool, field: &str, reason: impl FnOnce() -> String) -> Result<(
     if holds {
         return Ok(());
     }
-    Err(BlindError::Field { field: field.to_owned(), reason: reason() })
+    Err(BlindError::field(field, reason()))
 }

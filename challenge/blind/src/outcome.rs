@@ -1,20 +1,27 @@
-//! What came of each case.
+//! What came of each case, and the figures of a method, each with an interval by bootstrap.
 
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::read::{Answer, Said, Submission, UNKNOWN};
 use crate::{
     error::BlindError,
     plants::{Level, OpenLabel, OpenTruth},
+    random::RandomGenerator,
+    rate::Calibration,
+    score::quantile,
+    submission::{Answer, Said, Submission, UNKNOWN},
 };
 
 /// Smallest probability in the logarithmic score: a true cause that was held impossible costs ln
 /// 1000.
-pub(super) const LEAST_PROBABILITY: f64 = 1e-3;
+const LEAST_PROBABILITY: f64 = 1e-3;
 /// Probability that a covering set reaches.
 const COVERED: f64 = 0.95;
+/// Draws of the bootstrap.
+const DRAWS: usize = 1000;
+/// Seed of the bootstrap.
+const SEED: u64 = 31;
 
 /// What came of one case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -161,5 +168,100 @@ impl Outcome {
             named,
             truth,
         }
+    }
+}
+
+/// A figure, its 95 % interval under resampling of cases, and the number of cases.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Interval {
+    /// The figure; absent where no case counts.
+    pub value: Option<f64>,
+    /// Its 2.5 % quantile.
+    pub low: f64,
+    /// Its 97.5 % quantile.
+    pub high: f64,
+    /// Cases.
+    pub count: usize,
+}
+
+/// The figures of a method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Each figure with its name, in the order of tables.
+    pub rows: Vec<(String, Interval)>,
+    /// Greatest probability of an answer against how often it was right.
+    pub reliability: Calibration,
+}
+
+impl Figures {
+    /// Figures of outcomes, of one plant or of several together.
+    #[must_use]
+    pub fn of(all: &[Outcome]) -> Self {
+        let some = |keep: &dyn Fn(&Outcome) -> bool| -> Vec<&Outcome> {
+            all.iter().filter(|o| keep(o)).collect()
+        };
+        let of_level = |level: Level| some(&|o| o.level == level);
+        let share = |cases: Vec<&Outcome>, hit: fn(&Outcome) -> bool| {
+            drawn(&cases, |o| mean(o.iter().map(|o| f64::from(hit(o)))))
+        };
+        let all = some(&|_| true);
+        let placed = some(&|o| o.is_place_right.is_some());
+        let closing = some(&|o| o.closed_of_oracle.is_some());
+        let log = |o: &&Outcome| -o.probability_of_truth.max(LEAST_PROBABILITY).ln();
+        let rows = [
+            ("exact", share(all.clone(), |o| o.is_exact)),
+            ("exact or tied", share(all.clone(), |o| o.is_exact_or_tied)),
+            ("one strong", share(of_level(Level::Strong), |o| o.is_exact)),
+            ("one faint", share(of_level(Level::Faint), |o| o.is_exact)),
+            ("two", share(of_level(Level::Two), |o| o.is_exact)),
+            ("nulls alarmed", share(of_level(Level::Nothing), |o| !o.is_exact)),
+            ("foreign: unknown", share(of_level(Level::Foreign), |o| o.is_exact)),
+            ("foreign: named", share(of_level(Level::Foreign), |o| o.verdict == Said::Effect)),
+            ("place", share(placed, |o| o.is_place_right == Some(true))),
+            ("set covers", share(all.clone(), |o| o.is_covered)),
+            ("set size", drawn(&all, |o| mean(o.iter().map(|o| o.set_size as f64)))),
+            ("calibration error", drawn(&all, |o| reliability(o).ece.unwrap_or(f64::NAN))),
+            ("log score, nats", drawn(&all, |o| mean(o.iter().map(log)))),
+            (
+                "closed, of oracle",
+                drawn(&closing, |o| mean(o.iter().filter_map(|o| o.closed_of_oracle))),
+            ),
+            (
+                "seconds, median",
+                drawn(&all, |o| {
+                    quantile(&mut o.iter().map(|o| o.seconds).collect(), 0.5).unwrap_or(f64::NAN)
+                }),
+            ),
+            ("simulations", drawn(&all, |o| mean(o.iter().map(|o| o.simulations as f64)))),
+        ];
+        let rows = rows.map(|(name, figure)| (name.to_owned(), figure)).into();
+        Self { rows, reliability: reliability(&all) }
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+    sum / n
+}
+
+fn reliability(cases: &[&Outcome]) -> Calibration {
+    Calibration::of(cases.iter().map(|o| (o.confidence, o.is_first_right)))
+}
+
+/// A figure of cases and its interval over sets of as many cases drawn from them.
+fn drawn(cases: &[&Outcome], figure: impl Fn(&[&Outcome]) -> f64) -> Interval {
+    if cases.is_empty() {
+        return Interval::default();
+    }
+    let mut random = RandomGenerator::new(SEED, 0);
+    let mut again =
+        || -> Vec<_> { cases.iter().map(|_| cases[random.below(cases.len())]).collect() };
+    let mut values: Vec<f64> = (0..DRAWS).map(|_| figure(&again())).collect();
+    values.sort_by(f64::total_cmp);
+    Interval {
+        value: Some(figure(cases)),
+        low: values[DRAWS / 40],
+        high: values[DRAWS - 1 - DRAWS / 40],
+        count: cases.len(),
     }
 }

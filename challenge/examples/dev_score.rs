@@ -46,6 +46,8 @@ fn main() -> anyhow::Result<()> {
             CaseKind::OutOfCatalogue | CaseKind::Struck => verdict.verdict == "unknown",
             _ => label.effects.iter().all(|e| verdict.answer().contains(e)),
         };
+        let named = diagnosis.candidates.iter().find(|c| c.effects == diagnosis.named);
+        let best = named.or(diagnosis.candidates.first());
         let forms: Vec<String> = label
             .acting
             .iter()
@@ -60,8 +62,8 @@ fn main() -> anyhow::Result<()> {
             label.excess,
             verdict.verdict,
             verdict.named,
-            verdict.gap_before,
-            verdict.gap_after,
+            best.map_or(0.0, |c| c.gap_before),
+            best.map_or(0.0, |c| c.gap_after),
             begun.elapsed().as_secs_f64(),
         );
         if !right || wanted.contains(name) {

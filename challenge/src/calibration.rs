@@ -23,6 +23,10 @@ const NULL: f64 = 3.0;
 const FACTORS: [f64; 3] = [2.0, 1.3, 1.1];
 const ROUNDS: usize = 8;
 
+/// The thresholds that are calibrated.
+const CALIBRATED: [fn(&mut Thresholds) -> &mut f64; 3] =
+    [|t| &mut t.unknown_excess, |t| &mut t.unknown_share, |t| &mut t.unknown_odds];
+
 /// A label, and what the diagnosis said of its case.
 pub type Case = (Label, Diagnosis);
 
@@ -53,7 +57,7 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
     eprintln!("mean ln P(truth) of {} kinds: {most:.4} as they are", kinds.len());
     for factor in FACTORS {
         for _ in 0..ROUNDS {
-            for threshold in [excess, share, odds] {
+            for threshold in CALIBRATED {
                 for factor in [factor, 1.0 / factor] {
                     let mut other = best;
                     *threshold(&mut other) *= factor;
@@ -66,23 +70,11 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
         }
     }
     eprintln!("mean ln P(truth): {most:.4} calibrated");
-    for threshold in [excess, share, odds] {
+    for threshold in CALIBRATED {
         let value = threshold(&mut best);
         *value = rounded(*value);
     }
     best
-}
-
-fn excess(t: &mut Thresholds) -> &mut f64 {
-    &mut t.unknown_excess
-}
-
-fn share(t: &mut Thresholds) -> &mut f64 {
-    &mut t.unknown_share
-}
-
-fn odds(t: &mut Thresholds) -> &mut f64 {
-    &mut t.unknown_odds
 }
 
 /// Whether a case contributes: its cause is visible and is one set of effects, and the record is

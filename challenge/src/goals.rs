@@ -54,30 +54,19 @@ fn is_telling(cases: usize, missed: usize, may_miss: f64) -> bool {
 /// The goals of a blind check, and its results.
 pub fn goals(score: &Score) -> Vec<Goal> {
     let s = &score.singles;
-    let least = |what, rate: Rate, least: f64| Goal {
-        what,
-        goal: format!(">= {least}"),
-        value: rate.share(),
-        rate: Some(rate),
-        met: rate
-            .share()
-            .map(|x| x >= least)
-            .filter(|_| is_telling(rate.cases, rate.cases - rate.hits, 1.0 - least)),
+    let goal = |what, sign: &str, bound: f64, value: Option<f64>, rate: Option<Rate>| {
+        let is_least = sign == ">=";
+        let is_telling = rate.is_none_or(|rate| match is_least {
+            true => is_telling(rate.cases, rate.cases - rate.hits, 1.0 - bound),
+            false => is_telling(rate.cases, rate.hits, bound),
+        });
+        let met = value.map(|x| if is_least { x >= bound } else { x <= bound });
+        let met = met.filter(|_| is_telling);
+        Goal { what, goal: format!("{sign} {bound}"), value, rate, met }
     };
-    let most = |what, rate: Rate, most: f64| Goal {
-        what,
-        goal: format!("<= {most}"),
-        value: rate.share(),
-        rate: Some(rate),
-        met: rate.share().map(|x| x <= most).filter(|_| is_telling(rate.cases, rate.hits, most)),
-    };
-    let below = |what, value: Option<f64>, most: f64| Goal {
-        what,
-        goal: format!("<= {most}"),
-        value,
-        rate: None,
-        met: value.map(|x| x <= most),
-    };
+    let least = |what, rate: Rate, bound| goal(what, ">=", bound, rate.share(), Some(rate));
+    let most = |what, rate: Rate, bound| goal(what, "<=", bound, rate.share(), Some(rate));
+    let below = |what, value, bound| goal(what, "<=", bound, value, None);
     let behind = score.closed_oracle.zip(score.closed_beside_oracle).map(|(o, c)| o - c);
     let time_s = |of: fn((f64, f64, f64)) -> f64| score.runtime_s.map(of);
     vec![

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod calibration;
-mod figures;
 mod goals;
 mod make;
 mod open;

@@ -1,18 +1,20 @@
 //! The report of a blind check: how often the diagnosis was right, and every case in which it was
 //! not.
 
+use plotters::{
+    prelude::*,
+    style::text_anchor::{HPos, VPos},
+};
 use stretch_blind::{
-    Baseline, COUNTED_EXCESS, CaseKind, Label, Miss, Rate, Score, Verdict, method_in_words,
+    Baseline, COUNTED_EXCESS, Calibration, CaseKind, Label, Miss, Rate, Score, Verdict,
+    method_in_words,
 };
 use stretch_report::kit::{
-    Bar, Ink, Page, Row, Scale, Table, bar_figure, fixed, narrow_bar_figure, number, percent,
+    Axes, Bar, Figure, FigureSize, Ink, Page, Row, Scale, Table, bar_figure, dot, fixed,
+    narrow_bar_figure, number, percent, plot, px, stroke, words,
 };
 
-use crate::{
-    figures::{confusion_figure, reliability_figure, time_figure},
-    goals::Goal,
-    score::Answers,
-};
+use crate::{goals::Goal, score::Answers};
 
 /// Ends of the classes of strength.
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
@@ -25,11 +27,7 @@ pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String
     methods(&mut page, score);
     strength(&mut page, score, answers);
     sets(&mut page, score, answers);
-    page.section("What was said for what", "");
-    page.figure(
-        &confusion_figure(score),
-        "Rows: what was there; columns: the first name given, or the verdict. On a phone: the wrong answers alone.",
-    );
+    confusion(&mut page, score);
     misses(&mut page, score);
     page.finish()
 }
@@ -189,11 +187,62 @@ fn sets(page: &mut Page, score: &Score, answers: &Answers) {
             ),
         ),
     ]);
-    let times: Vec<f64> = answers.verdicts.iter().map(|v| v.runtime_s).collect();
-    page.figure(
-        &time_figure(&times),
-        "How long a diagnosis took: share of the cases that were done.",
-    );
+}
+
+/// Stated probability against how often it came true, with Wilson's interval.
+fn reliability_figure(calibration: &Calibration) -> Figure {
+    let bins: Vec<_> = calibration.bins.iter().filter(|b| b.right.cases > 0).collect();
+    if bins.is_empty() {
+        return Figure::missing("No probability was stated.");
+    }
+    let labels = ["probability stated", "share that came true (below: number of cases)"];
+    // below the axis of no case there is room for the counts: none of them lies on a point
+    let axes = Axes::new(0.0..1.0, -0.13..1.0, labels);
+    Figure::new("Reliability diagram: probability stated against share that came true").draw(
+        FigureSize::NARROW,
+        |area| {
+            plot(area, &axes, |chart| {
+                let ideal = [(0.0, 0.0), (1.0, 1.0)];
+                chart.draw_series(LineSeries::new(ideal, stroke(Ink::Axis.color(), 1.2)))?;
+                for bin in &bins {
+                    let share = bin.right.share().unwrap_or(0.0);
+                    if let Some((low, high)) = bin.right.wilson() {
+                        let line = [(bin.stated, low), (bin.stated, high)];
+                        chart
+                            .draw_series(LineSeries::new(line, stroke(Ink::Third.color(), 1.6)))?;
+                    }
+                    let at = (bin.stated, share);
+                    chart.draw_series([Circle::new(at, px(3.0), dot(Ink::Third, 1.0))])?;
+                    let h = if bin.stated > 0.95 { HPos::Right } else { HPos::Center };
+                    let count = Text::new(
+                        bin.right.cases.to_string(),
+                        (0, 0),
+                        words(Ink::Text, h, VPos::Center),
+                    );
+                    chart.draw_series([EmptyElement::at((bin.stated, -0.07)) + count])?;
+                }
+                Ok(())
+            })
+        },
+    )
+}
+
+fn confusion(page: &mut Page, score: &Score) {
+    page.section("What was said for what", "");
+    let is_right = |truth: &str, said: &str| {
+        said == truth || truth == "null" && ["no_gap", "parameters"].contains(&said)
+    };
+    let rows = score.confusion.iter().map(|(truth, counts)| {
+        let (right, wrong): (Vec<_>, Vec<_>) =
+            counts.iter().partition(|(said, _)| is_right(truth, said));
+        let right: usize = right.iter().map(|(_, n)| **n).sum();
+        let wrong: Vec<String> =
+            wrong.iter().map(|(said, n)| format!("{n} \u{d7} {said}")).collect();
+        let cases: usize = counts.values().sum();
+        vec![truth.clone(), cases.to_string(), right.to_string(), wrong.join(", ")]
+    });
+    let head = ["There", "Cases", "Right", "First name given, or verdict, in the others"];
+    page.table(&Table::new("Single effects and nulls", &head, rows));
 }
 
 fn misses(page: &mut Page, score: &Score) {

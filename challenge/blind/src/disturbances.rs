@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::effect::worded;
 use crate::random::RandomGenerator;
 use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
-use crate::words::worded;
 
 worded! {
     /// How supply, noise, clock, pauses and start pressures of a case are determined.

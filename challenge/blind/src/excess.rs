@@ -93,16 +93,14 @@ impl<'a> Yardstick<'a> {
 
     /// Residual of the nominal rig in each channel, with every stage fed with its measured input.
     fn residual(&self, truth: &[Trace]) -> Channels {
-        let pressure = if self.pressure_column {
-            self.join(truth, self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i])
-        } else {
-            Vec::new()
+        let is_measured = self.pressure_column;
+        let pressure = match is_measured {
+            true => self.join(truth, self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i]),
+            false => Vec::new(),
         };
-        let length = if self.pressure_column {
-            self.join(truth, self.noise[1], |t, _, i| t.length[i] - t.shadow[i])
-        } else {
-            self.join(truth, self.noise[1], |t, n, i| t.length[i] - n.length[i])
-        };
+        let length = self.join(truth, self.noise[1], |t, n, i| {
+            t.length[i] - if is_measured { t.shadow[i] } else { n.length[i] }
+        });
         let volts = self.join(truth, self.noise[2], |t, _, i| {
             t.volts[i] - self.rig.volts(1.0 - t.length[i] / L_0, t.excitation)
         });
@@ -124,6 +122,8 @@ impl<'a> Yardstick<'a> {
     fn sensitivity(&mut self, index: usize, truth: &[Trace]) -> Channels {
         let parameter = &UNCERTAIN[index];
         let step = 0.25 * parameter.sd;
+        let samples = self.nominal.iter().map(|t| t.length.len()).sum();
+        let zero = || vec![0.0; samples];
         if parameter.stage == Stage::Sensing {
             let rig = self.rig.moved(index, step);
             let scale = 0.25 * self.noise[2];
@@ -131,8 +131,7 @@ impl<'a> Yardstick<'a> {
                 let k = 1.0 - t.length[i] / L_0;
                 rig.volts(k, t.excitation) - self.rig.volts(k, t.excitation)
             });
-            let zero = vec![0.0; volts.len()];
-            return [zero.clone(), zero, volts];
+            return [zero(), zero(), volts];
         }
         if self.moved[index].is_none() {
             let rig = self.rig.moved(index, step);
@@ -140,19 +139,15 @@ impl<'a> Yardstick<'a> {
             self.moved[index] = Some(traces);
         }
         let moved = self.moved[index].as_deref().unwrap_or_default();
-        let pressure = if self.pressure_column {
-            self.join(moved, 0.25 * self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i])
-        } else {
-            Vec::new()
+        let pressure = match self.pressure_column {
+            true => self.join(moved, 0.25 * self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i]),
+            false => zero(),
         };
-        let length = if self.pressure_column && parameter.stage == Stage::Pneumatics {
-            Vec::new()
-        } else {
-            self.join(moved, 0.25 * self.noise[1], |t, n, i| t.length[i] - n.length[i])
+        let length = match self.pressure_column && parameter.stage == Stage::Pneumatics {
+            true => zero(),
+            false => self.join(moved, 0.25 * self.noise[1], |t, n, i| t.length[i] - n.length[i]),
         };
-        let total = self.nominal.iter().map(|t| t.length.len()).sum();
-        let fill = |v: Vec<f64>| if v.is_empty() { vec![0.0; total] } else { v };
-        [fill(pressure), fill(length), vec![0.0; total]]
+        [pressure, length, zero()]
     }
 
     /// Shifts of the parameters, in standard deviations, that explain the residual of the fit

@@ -36,7 +36,6 @@ mod gauge;
 mod lags;
 mod laws;
 mod make;
-mod outcome;
 mod plan;
 mod plant;
 mod plants;
@@ -53,12 +52,10 @@ mod table;
 mod timing;
 mod truth;
 mod verdict;
-mod words;
 pub use disturbances::Disturbances;
 pub use effect::{Family, Stage};
 pub use error::BlindError;
 pub use make::make;
-pub use outcome::{Figures, Interval, OpenScore, Outcome};
 pub use plan::Plan;
 pub use plants::{
     Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, sealed_beside,
@@ -69,7 +66,7 @@ pub use score::{
     Baseline, COUNTED_EXCESS, FamilyRow, Miss, STAND_IN, Score, Several, Singles, Struck,
 };
 pub use seal::Seal;
-pub use submission::{Answer, Believed, Said, Submission};
+pub use submission::{Answer, Believed, Figures, Interval, OpenScore, Outcome, Said, Submission};
 pub use table::method_in_words;
 pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};
 pub use verdict::Verdict;

@@ -80,12 +80,20 @@ impl Plan {
     /// Cases in all.
     #[must_use]
     pub fn cases(&self) -> usize {
-        self.single
-            + self.null
-            + self.compound
-            + self.dominant
-            + self.out_of_catalogue
-            + self.struck
+        self.counts().map(|(_, count, _)| count).iter().sum()
+    }
+
+    /// How many cases of every kind, and the effects that come in turn in them.
+    fn counts(&self) -> [(CaseKind, usize, &'static [Kind]); 6] {
+        let known = Kind::catalogued();
+        [
+            (CaseKind::Single, self.single, known),
+            (CaseKind::Null, self.null, &[]),
+            (CaseKind::Compound, self.compound, known),
+            (CaseKind::Dominant, self.dominant, known),
+            (CaseKind::OutOfCatalogue, self.out_of_catalogue, Kind::foreign()),
+            (CaseKind::Struck, self.struck, known),
+        ]
     }
 
     /// What each case is to be, in random order; half of every kind with a pressure column, the
@@ -93,15 +101,7 @@ impl Plan {
     pub(crate) fn orders(&self, seed: u64) -> Vec<Order> {
         let mut random = RandomGenerator::new(seed, 0);
         let mut orders = Vec::with_capacity(self.cases());
-        let counts = [
-            (CaseKind::Single, self.single, Kind::catalogued()),
-            (CaseKind::Null, self.null, &[][..]),
-            (CaseKind::Compound, self.compound, Kind::catalogued()),
-            (CaseKind::Dominant, self.dominant, Kind::catalogued()),
-            (CaseKind::OutOfCatalogue, self.out_of_catalogue, Kind::foreign()),
-            (CaseKind::Struck, self.struck, Kind::catalogued()),
-        ];
-        for (kind, count, pool) in counts {
+        for (kind, count, pool) in self.counts() {
             // Every effect in turn; with and without a pressure column in turn for each.
             let mut pool = pool.to_vec();
             random.shuffle(&mut pool);

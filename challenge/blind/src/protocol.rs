@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::effect::worded;
 use crate::random::RandomGenerator;
-use crate::words::worded;
 
 /// Samples a second.
 pub(crate) const RATE_HZ: usize = 100;

@@ -241,7 +241,10 @@ impl Score {
         let mut seen = BTreeSet::new();
         for verdict in verdicts {
             let case = &verdict.case;
-            let label = label_of(truth, case)?;
+            let label = truth
+                .cases
+                .get(case)
+                .ok_or_else(|| BlindError::field(case, "it is not among the sealed cases"))?;
             if !seen.insert(case) {
                 return Err(BlindError::field(case, "it is answered twice"));
             }
@@ -256,38 +259,6 @@ impl Score {
             score.families = families.into_iter().map(row).collect();
         }
         Ok(score)
-    }
-
-    /// Scores every family by the run that was calibrated without it.
-    ///
-    /// `runs` holds, for each family, the verdicts of a diagnosis whose thresholds were calibrated
-    /// only on the other families; only the cases of that family count. The rows of
-    /// [`Score::families`] are then the leave-family-out table; the other figures pool them.
-    ///
-    /// # Errors
-    /// As [`Score::of`].
-    ///
-    /// ```
-    /// use std::collections::BTreeMap;
-    /// use stretch_blind::{Family, Score, Truth};
-    /// let truth = Truth { schema: 1, seed: None, cases: BTreeMap::new() };
-    /// let runs = BTreeMap::from([(Family::Splines, Vec::new())]);
-    /// assert_eq!(Score::leave_family_out(&truth, &runs)?.cases, 0);
-    /// # Ok::<(), stretch_blind::BlindError>(())
-    /// ```
-    pub fn leave_family_out(
-        truth: &Truth,
-        runs: &BTreeMap<Family, Vec<Verdict>>,
-    ) -> Result<Self, BlindError> {
-        let mut judged = Vec::new();
-        for (family, verdicts) in runs {
-            for verdict in verdicts {
-                if label_of(truth, &verdict.case)?.family == *family {
-                    judged.push(verdict.clone());
-                }
-            }
-        }
-        Self::of(truth, &judged)
     }
 
     /// What a table by family shows of it.
@@ -309,11 +280,6 @@ impl Score {
             ece: self.calibration.ece,
         }
     }
-}
-
-fn label_of<'a>(truth: &'a Truth, case: &str) -> Result<&'a Label, BlindError> {
-    let label = truth.cases.get(case);
-    label.ok_or_else(|| BlindError::field(case, "it is not among the sealed cases"))
 }
 
 /// A score in the making.

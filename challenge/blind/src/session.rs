@@ -1,7 +1,7 @@
 //! One session on a rig: every trial after the other, memories carried through the pauses.
 
 use crate::curve::hermite;
-use crate::disturbances::{Drawn, Surroundings};
+use crate::disturbances::Surroundings;
 use crate::effect::{Causes, Kind};
 use crate::gauge::{Gauge, Instant, Pot, spoil_samples};
 use crate::plant::Plant;
@@ -64,10 +64,6 @@ impl Conditions {
         random: &mut RandomGenerator,
     ) -> Self {
         let Some(drawn) = around.drawn else { return Self::plain(scripts, random) };
-        Self::of(scripts, &drawn, random)
-    }
-
-    fn of(scripts: &[Script], drawn: &Drawn, random: &mut RandomGenerator) -> Self {
         let supply = drawn.supply.knots(knots(scripts), KNOT_S, random);
         let error = |script: &Script| {
             if script.from_full { drawn.starts.full(random) } else { drawn.starts.empty(random) }

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{Family, Stage};
-use crate::words::worded;
+use crate::effect::{Family, Stage, worded};
 
 worded! {
     /// What kind of case it is.

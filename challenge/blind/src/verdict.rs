@@ -32,10 +32,6 @@ pub struct Verdict {
     pub candidates: Vec<(Vec<String>, f64)>,
     /// Stage that the gap was placed in.
     pub stage: Option<String>,
-    /// Excess of the re-tuned nominal simulator on the test trials, summed over channels.
-    pub gap_before: f64,
-    /// Excess with the effects named.
-    pub gap_after: f64,
     /// Closed-gap fraction of the effects named.
     pub closed: f64,
     /// Closed-gap fraction of a fit that knows the label, if one was made.
@@ -65,8 +61,6 @@ struct Diagnosis {
 struct Candidate {
     effects: Vec<String>,
     probability: f64,
-    gap_before: Option<f64>,
-    gap_after: Option<f64>,
     closed: Option<f64>,
 }
 
@@ -86,8 +80,8 @@ impl Verdict {
     /// Reads a `diagnosis.json`, schema 1, of a case.
     ///
     /// The stage is that of the first named effect if the catalogue knows it, otherwise the one
-    /// with the largest share of the gap. The gaps are those of the named candidate, otherwise of
-    /// the first. `closed_oracle` is left empty.
+    /// with the largest share of the gap. The share closed is that of the named candidate,
+    /// otherwise of the first. `closed_oracle` is left empty.
     ///
     /// # Errors
     /// [`BlindError::Field`] if the verdict, the names, or a probability are missing or out of
@@ -107,7 +101,6 @@ impl Verdict {
             return Err(bad("a probability outside 0..1"));
         }
         let chosen = candidates.iter().find(|c| c.effects == read.named).or(candidates.first());
-        let number = |field: fn(&Candidate) -> Option<f64>| chosen.and_then(field).unwrap_or(0.0);
         let shares = read.location.unwrap_or_default().stages;
         let placed = shares
             .into_iter()
@@ -119,9 +112,7 @@ impl Verdict {
             ambiguous: read.ambiguous,
             tied: read.tied.unwrap_or_default(),
             stage: known.map(|k| k.spec().stage.name().to_owned()).or(placed.map(|s| s.stage)),
-            gap_before: number(|c| c.gap_before),
-            gap_after: number(|c| c.gap_after),
-            closed: number(|c| c.closed),
+            closed: chosen.and_then(|c| c.closed).unwrap_or(0.0),
             closed_oracle: None,
             runtime_s: read.runtime_s.unwrap_or(0.0),
             baselines: read.baselines.unwrap_or_default(),
@@ -181,7 +172,7 @@ mod tests {
         let mut value: Value = serde_json::from_str(text).expect("JSON");
         let verdict = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(verdict.stage.as_deref(), Some("pneumatics"));
-        assert_eq!((verdict.gap_before, verdict.closed), (41.0, 0.96));
+        assert_eq!(verdict.closed, 0.96);
         assert_eq!(verdict.baselines["bic"].as_deref(), Some("supply_sag"));
         assert_eq!(verdict.baselines["signature"], None);
         value["verdict"] = "partial".into();

@@ -2,7 +2,7 @@
 
 use super::{
     label::{FormFamily, Level, OpenLabel},
-    plant::{Act, Candidate, Drive, PlantSpec},
+    plant::{Act, Candidate, Drive, Grid, PlantSpec},
 };
 use crate::random::RandomGenerator;
 
@@ -51,7 +51,7 @@ pub(super) fn draw(
         .iter()
         .map(|drive| {
             let first = plant.stage(0, &p, &acts, drive);
-            let second = Drive { input: first.clone(), ..drive.clone() };
+            let second = Drive { input: first.clone(), grid: drive.grid };
             let second = plant.stage(1, &p, &acts, &second);
             [first, second]
         })
@@ -161,7 +161,7 @@ fn drives(plant: &PlantSpec, random: &mut RandomGenerator) -> Vec<Drive> {
         .map(|input| {
             let (start, step) = (before as f64 / total as f64, 1.0 / total as f64);
             before += input.len();
-            Drive { input, start, step }
+            Drive { input, grid: Grid { dt_s: plant.dt_s, start, step } }
         })
         .collect()
 }
@@ -227,7 +227,7 @@ fn in_stage(plant: &PlantSpec, stage: usize, p: &[f64], acts: &[Act], drives: &[
         .iter()
         .map(|drive| match stage {
             0 => drive.clone(),
-            _ => Drive { input: plant.stage(0, p, acts, drive), ..drive.clone() },
+            _ => Drive { input: plant.stage(0, p, acts, drive), grid: drive.grid },
         })
         .collect();
     let run = |p: &[f64], acts: &[Act]| -> Vec<f64> {

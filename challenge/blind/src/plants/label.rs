@@ -9,7 +9,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{error::BlindError, random::RandomGenerator, seal, words::worded};
+use crate::{effect::worded, error::BlindError, random::RandomGenerator, seal};
 
 /// Deviation of an effect from its textbook form; all 0 is the textbook's.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -1,11 +1,10 @@
 //! Sets that strangers solve: makes folders of cases and sealed labels from a plant and a seed.
 //!
-//! `servo` and `thermal` are two plants of two stages; `plant` integrates them with `operators` around; `draw` makes a case;
+//! `servo` and `thermal` are two plants of two stages; `plant` integrates them with operators around; `draw` makes a case;
 //! `label` has the families that its form is drawn from, and its truth.
 
 mod draw;
 mod label;
-mod operators;
 mod plant;
 mod servo;
 mod thermal;
@@ -22,14 +21,13 @@ use self::{
     thermal::THERMAL,
 };
 use crate::{
-    effect::Kind,
+    effect::{Kind, worded},
     error::BlindError,
     make::{make, write},
     plan::Plan,
     protocol::Protocol,
     seal::{self, Seal},
     truth::CaseKind,
-    words::worded,
 };
 
 worded! {

@@ -1,7 +1,7 @@
 //! A plant of two stages, the second driven by the output of the first: parameters, candidates,
 //! equations.
 
-use super::{label::Form, operators};
+use super::label::Form;
 
 /// A nominal parameter.
 #[derive(Debug)]
@@ -36,25 +36,16 @@ impl Candidate {
     }
 }
 
-/// What an effect does, with its constants.
+/// An operator on a sampled signal, given the strength, the form and the place of the samples.
+pub(super) type Operator = fn(&[f64], f64, &Form, Grid) -> Vec<f64>;
+
+/// What an effect does.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Action {
-    /// In front of the stage: s.
-    Delay,
-    /// In front of the stage: half width.
-    DeadZone,
-    /// In front of the stage: limit.
-    Saturation,
-    /// Behind the stage: half width.
-    Backlash,
-    /// Behind the stage: s.
-    Lag,
-    /// Behind the stage: change over the session.
-    Drift,
-    /// Behind the stage: share; the time constant, s.
-    Relaxation(f64),
-    /// Behind the stage: share; the largest radius.
-    Hysteresis(f64),
+    /// In front of the stage.
+    Before(Operator),
+    /// Behind the stage.
+    Behind(Operator),
     /// Effect inside the differential equation: what it subtracts from the drive, given state,
     /// strength, form and input.
     Inside(fn(f64, f64, &Form, f64) -> f64),
@@ -68,12 +59,20 @@ pub(super) struct Act {
     pub(super) form: Form,
 }
 
-/// One trial: its input, its beginning in the session and its speed, as shares of the session.
+/// Where the samples of a trial are: their distance in s; its beginning in the session, and their distance as
+/// shares of the session.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    pub(super) dt_s: f64,
+    pub(super) start: f64,
+    pub(super) step: f64,
+}
+
+/// One trial.
 #[derive(Debug, Clone)]
 pub(super) struct Drive {
     pub(super) input: Vec<f64>,
-    pub(super) start: f64,
-    pub(super) step: f64,
+    pub(super) grid: Grid,
 }
 
 /// A stage: its output, its noise, and its equation x' = f(x, input, what the effects inside take).
@@ -122,16 +121,15 @@ impl PlantSpec {
         let acts: Vec<&Act> = acts.iter().filter(|a| a.candidate.stage == stage).collect();
         let mut input = drive.input.clone();
         for act in &acts {
-            input = match act.candidate.action {
-                Action::Delay => operators::delay(&input, act.strength, &act.form, self.dt_s),
-                Action::DeadZone => operators::dead_zone(&input, act.strength, &act.form),
-                Action::Saturation => operators::saturation(&input, act.strength, &act.form),
-                _ => input,
-            };
+            if let Action::Before(operator) = act.candidate.action {
+                input = operator(&input, act.strength, &act.form, drive.grid);
+            }
         }
         let mut out = self.integrated(spec, p, &acts, &input);
         for act in &acts {
-            out = self.behind(act, out, drive);
+            if let Action::Behind(operator) = act.candidate.action {
+                out = operator(&out, act.strength, &act.form, drive.grid);
+            }
         }
         out
     }
@@ -158,16 +156,146 @@ impl PlantSpec {
         }
         out
     }
+}
 
-    fn behind(&self, act: &Act, out: Vec<f64>, drive: &Drive) -> Vec<f64> {
-        let (s, form, dt) = (act.strength, &act.form, self.dt_s);
-        match act.candidate.action {
-            Action::Backlash => operators::backlash(&out, s, form),
-            Action::Lag => operators::lag(&out, s, form, dt),
-            Action::Drift => operators::drift(&out, s, drive.start, drive.step, form),
-            Action::Relaxation(tau_s) => operators::relaxation(&out, s, tau_s, form, dt),
-            Action::Hysteresis(scale) => operators::hysteresis(&out, s, scale, form),
-            _ => out,
+// Operators in front of or behind a stage, on sampled signals, each in a form that need not be in the catalogue.
+
+/// y(t) = x(t - delay), with a part `softness` of it as a lag instead of a dead time.
+pub(super) fn delay(x: &[f64], delay_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
+    let dead = delay_s * (1.0 - form.softness) / grid.dt_s;
+    let (whole, rest) = (dead.floor() as usize, dead.fract());
+    let at = |i: usize| x[i.saturating_sub(whole)];
+    let moved: Vec<f64> =
+        (0..x.len()).map(|i| at(i) * (1.0 - rest) + at(i.saturating_sub(1)) * rest).collect();
+    lag(&moved, delay_s * form.softness, &Form::default(), grid)
+}
+
+/// y follows x by two lags of the shares 1 - spread/2 and spread/2 of `tau_s`, exact between samples.
+pub(super) fn lag(x: &[f64], tau_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
+    let second = 0.5 * form.spread;
+    let mut out = x.to_vec();
+    for tau in [tau_s * (1.0 - second), tau_s * second] {
+        if tau < 1e-9 {
+            continue;
         }
+        let share = 1.0 - (-grid.dt_s / tau).exp();
+        let mut y = out[0];
+        for value in &mut out {
+            y += share * (*value - y);
+            *value = y;
+        }
+    }
+    out
+}
+
+/// Values nearer to zero than `width` do nothing; the corner is rounded by a softplus, and its two sides differ by the asymmetry.
+pub(super) fn dead_zone(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64> {
+    let corner = (form.softness * width).max(1e-9);
+    let rise = |z: f64| {
+        let z = z / corner;
+        corner * if z > 30.0 { z } else { z.exp().ln_1p() }
+    };
+    let (up, down) = (width * (1.0 + form.asymmetry), width * (1.0 - form.asymmetry));
+    x.iter().map(|&x| if width < 1e-12 { x } else { rise(x - up) - rise(-x - down) }).collect()
+}
+
+/// Values are limited to `limit` (and its negative): y = x (1 + |x/limit|^q)^(-1/q), q =
+/// 2/softness, and clamped at a softness of 0.
+pub(super) fn saturation(x: &[f64], limit: f64, form: &Form, _: Grid) -> Vec<f64> {
+    x.iter()
+        .map(|&x| {
+            let end = limit * if x > 0.0 { 1.0 } else { 1.0 - form.asymmetry.abs() };
+            if form.softness < 0.02 {
+                return x.clamp(-end, end);
+            }
+            let q = 2.0 / form.softness;
+            x * (1.0 + (x / end).abs().powf(q)).powf(-1.0 / q)
+        })
+        .collect()
+}
+
+/// One element with play: it is constant until x is further away than `radius`.
+fn play(x: &[f64], radius: f64) -> Vec<f64> {
+    let mut y = x[0];
+    x.iter()
+        .map(|&x| {
+            y = y.clamp(x - radius, x + radius);
+            y
+        })
+        .collect()
+}
+
+/// Mean of four plays whose radii spread around `width`.
+pub(super) fn backlash(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64> {
+    let steps = [-1.0, -0.3, 0.3, 1.0];
+    let plays = steps.map(|s| play(x, width * (1.0 + s * form.spread).max(0.0)));
+    let shift = form.asymmetry * width;
+    (0..x.len()).map(|i| plays.iter().map(|p| p[i]).sum::<f64>() / 4.0 + shift).collect()
+}
+
+/// x minus a share of what plays of the radii `scale` {1, 1/2, 1/4} hold back, weighted by the
+/// spread.
+pub(super) fn hysteresis(x: &[f64], share: f64, scale: f64, form: &Form) -> Vec<f64> {
+    let plays = [1.0, 0.5, 0.25].map(|r| play(x, scale * r));
+    let weights = [1.0, 1.0 + form.spread, 1.0 - 0.5 * form.spread];
+    let total: f64 = weights.iter().sum();
+    (0..x.len())
+        .map(|i| {
+            let held = (0..3).map(|k| weights[k] * (x[i] - plays[k][i])).sum::<f64>() / total;
+            x[i] - share * held
+        })
+        .collect()
+}
+
+/// x plus a share of its distance from a lagged copy: it overshoots a change, or creeps after it if
+/// the share is negative.
+pub(super) fn relaxation(x: &[f64], share: f64, tau_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
+    let spread = 1.0 + 3.0 * form.spread;
+    let [fast, slow] = [tau_s / spread, tau_s * spread].map(|s| lag(x, s, &Form::default(), grid));
+    (0..x.len()).map(|i| x[i] + share * (x[i] - 0.5 * (fast[i] + slow[i]))).collect()
+}
+
+/// The zero drifts by `change` from the start of the session to its end, bent by the softness.
+pub(super) fn drift(x: &[f64], change: f64, form: &Form, grid: Grid) -> Vec<f64> {
+    let bend = 3.0 * form.softness + 1e-9;
+    let shape = |t: f64| (1.0 - (-bend * t).exp()) / (1.0 - (-bend).exp());
+    x.iter()
+        .enumerate()
+        .map(|(i, x)| x + change * shape(grid.start + grid.step * i as f64))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { dt_s: 0.5, start: 0.0, step: 0.1 };
+    const X: [f64; 6] = [0.0, 1.0, 3.0, 2.0, -2.0, -3.0];
+
+    #[test]
+    fn sharp_forms_are_the_textbook_ones() {
+        let sharp = Form::default();
+        assert_eq!(delay(&X, 0.5, &sharp, GRID), [0.0, 0.0, 1.0, 3.0, 2.0, -2.0]);
+        assert_eq!(saturation(&X, 2.0, &sharp, GRID), [0.0, 1.0, 2.0, 2.0, -2.0, -2.0]);
+        assert_eq!(backlash(&X, 1.0, &sharp, GRID), [0.0, 0.0, 2.0, 2.0, -1.0, -2.0]);
+        let dead = dead_zone(&X, 1.0, &sharp, GRID);
+        for (found, expected) in dead.iter().zip([0.0, 0.0, 2.0, 1.0, -1.0, -2.0]) {
+            assert!((found - expected).abs() < 1e-6, "{dead:?}");
+        }
+    }
+
+    #[test]
+    fn effects_that_are_off_change_nothing() {
+        let form = Form { softness: 0.4, asymmetry: 0.2, spread: 0.5 };
+        let off = [
+            delay(&X, 0.0, &form, GRID),
+            lag(&X, 0.0, &form, GRID),
+            dead_zone(&X, 0.0, &form, GRID),
+            backlash(&X, 0.0, &form, GRID),
+            hysteresis(&X, 0.0, 1.0, &form),
+            relaxation(&X, 0.0, 2.0, &form, GRID),
+            drift(&X, 0.0, &form, GRID),
+        ];
+        off.iter().for_each(|y| assert_eq!(y, &X));
     }
 }

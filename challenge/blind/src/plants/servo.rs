@@ -3,7 +3,10 @@
 //! w' = (gain u - w)/tau and angle' = w/ratio, load' = (angle - load)/soft.
 
 use super::label::Form;
-use super::plant::{Action, Candidate, Parameter, PlantSpec, StageSpec};
+use super::plant::{
+    Action, Candidate, Parameter, PlantSpec, StageSpec, backlash, dead_zone, delay, drift, lag,
+    relaxation, saturation,
+};
 
 /// Dry friction in the drive, rad/s: f tanh(w/width), larger at small speeds if the spread is not
 /// zero.
@@ -66,13 +69,18 @@ pub(super) static SERVO: PlantSpec = PlantSpec {
     candidates: &[
         Candidate::new("friction", 0, Action::Inside(friction), (0.0, 30.0)),
         Candidate::new("drag", 0, Action::Inside(drag), (0.0, 60.0)),
-        Candidate::new("motor.input.delay", 0, Action::Delay, (0.0, 0.1)),
-        Candidate::new("motor.input.dead_zone", 0, Action::DeadZone, (0.0, 1.5)),
-        Candidate::new("motor.input.saturation", 0, Action::Saturation, (6.5, 2.0)),
-        Candidate::new("gear.output.backlash", 1, Action::Backlash, (0.0, 0.3)),
-        Candidate::new("gear.output.lag", 1, Action::Lag, (0.0, 0.15)),
-        Candidate::new("gear.output.drift", 1, Action::Drift, (0.0, 0.4)),
-        Candidate::new("gear.output.relaxation", 1, Action::Relaxation(0.6), (0.0, 0.4)),
+        Candidate::new("motor.input.delay", 0, Action::Before(delay), (0.0, 0.1)),
+        Candidate::new("motor.input.dead_zone", 0, Action::Before(dead_zone), (0.0, 1.5)),
+        Candidate::new("motor.input.saturation", 0, Action::Before(saturation), (6.5, 2.0)),
+        Candidate::new("gear.output.backlash", 1, Action::Behind(backlash), (0.0, 0.3)),
+        Candidate::new("gear.output.lag", 1, Action::Behind(lag), (0.0, 0.15)),
+        Candidate::new("gear.output.drift", 1, Action::Behind(drift), (0.0, 0.4)),
+        Candidate::new(
+            "gear.output.relaxation",
+            1,
+            Action::Behind(|x, s, f, g| relaxation(x, s, 0.6, f, g)),
+            (0.0, 0.4),
+        ),
     ],
     foreign: &[
         Candidate::new("supply_sag", 0, Action::Inside(sagging), (0.0, 0.5)),

@@ -1,7 +1,10 @@
 //! A heated block and a probe in it: C T' = P - h (T - 20) and probe' = (T - probe)/tau.
 
 use super::label::Form;
-use super::plant::{Action, Candidate, Parameter, PlantSpec, StageSpec};
+use super::plant::{
+    Action, Candidate, Parameter, PlantSpec, StageSpec, dead_zone, delay, drift, hysteresis, lag,
+    relaxation, saturation,
+};
 
 /// Radiation, W: c (T^4 - 293^4)/1e9 with the absolute temperature T, in a power of 4 plus the softness.
 fn radiation(t: f64, c: f64, form: &Form, _: f64) -> f64 {
@@ -63,13 +66,23 @@ pub(super) static THERMAL: PlantSpec = PlantSpec {
     candidates: &[
         Candidate::new("radiation", 0, Action::Inside(radiation), (0.0, 3.0)),
         Candidate::new("fan", 0, Action::Inside(fan), (0.0, 0.6)),
-        Candidate::new("block.input.delay", 0, Action::Delay, (0.0, 20.0)),
-        Candidate::new("block.input.dead_zone", 0, Action::DeadZone, (0.0, 15.0)),
-        Candidate::new("block.input.saturation", 0, Action::Saturation, (62.0, 25.0)),
-        Candidate::new("probe.output.hysteresis", 1, Action::Hysteresis(6.0), (0.0, 0.6)),
-        Candidate::new("probe.output.lag", 1, Action::Lag, (0.0, 30.0)),
-        Candidate::new("probe.output.drift", 1, Action::Drift, (0.0, 5.0)),
-        Candidate::new("probe.output.relaxation", 1, Action::Relaxation(80.0), (0.0, 0.4)),
+        Candidate::new("block.input.delay", 0, Action::Before(delay), (0.0, 20.0)),
+        Candidate::new("block.input.dead_zone", 0, Action::Before(dead_zone), (0.0, 15.0)),
+        Candidate::new("block.input.saturation", 0, Action::Before(saturation), (62.0, 25.0)),
+        Candidate::new(
+            "probe.output.hysteresis",
+            1,
+            Action::Behind(|x, s, f, _| hysteresis(x, s, 6.0, f)),
+            (0.0, 0.6),
+        ),
+        Candidate::new("probe.output.lag", 1, Action::Behind(lag), (0.0, 30.0)),
+        Candidate::new("probe.output.drift", 1, Action::Behind(drift), (0.0, 5.0)),
+        Candidate::new(
+            "probe.output.relaxation",
+            1,
+            Action::Behind(|x, s, f, g| relaxation(x, s, 80.0, f, g)),
+            (0.0, 0.4),
+        ),
     ],
     foreign: &[
         Candidate::new("melting", 0, Action::Inside(melting), (0.0, 0.8)),

@@ -40,7 +40,7 @@ pub(crate) fn best(methods: &[MethodErrors]) -> Option<usize> {
 }
 
 /// The paper's measures, one row for each method.
-pub(crate) fn method_table(
+pub fn method_table(
     caption: &str,
     methods: &[MethodErrors],
     names: &[String],
@@ -74,7 +74,7 @@ pub(crate) fn method_table(
 }
 
 /// Paired tests between methods.
-pub(crate) fn comparison_table(
+pub fn comparison_table(
     comparisons: &[Comparison],
     unit: &str,
     called: impl Fn(&str) -> String,
@@ -105,7 +105,7 @@ pub(crate) fn comparison_table(
 }
 
 /// Candidate signals, best first.
-pub(crate) fn signal_table(candidates: &[Candidate]) -> Table {
+pub fn signal_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
         let percent = c.cross_validated_rmse.map(|rmse| 100.0 * rmse);
         let text = c.problem.clone().unwrap_or_else(|| optional(percent, 3));
@@ -117,7 +117,7 @@ pub(crate) fn signal_table(candidates: &[Candidate]) -> Table {
 }
 
 /// The fitted order beside its neighbours.
-pub(crate) fn order_table(fit: &FitReport) -> Table {
+pub fn order_table(fit: &FitReport) -> Table {
     let row = |o: &stretch_calibrate::Order| {
         let mut remarks = Vec::new();
         if o.model == fit.model {

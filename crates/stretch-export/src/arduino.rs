@@ -37,83 +37,29 @@ pub fn arduino_library(header: &Header) -> Vec<File> {
 }
 
 fn properties(header: &Header) -> String {
-    let Header { model, form, .. } = header;
-    format!(
-        "name=StretchReceptor\nversion={}\nauthor=The stretch developers\nmaintainer=The stretch developers\n\
-         sentence=Length from a stretch sensor's voltage, by one calibration.\nparagraph=Model {model}, form \
-         {form}. Missing samples are bridged, and every reading says whether it is inside the calibrated \
-         domain. The same bits as on the computer.\ncategory=Sensors\nurl=\narchitectures=*\nincludes={HEADER}\n",
-        env!("CARGO_PKG_VERSION"),
-    )
+    include_str!("arduino/library.properties")
+        .replace("@VERSION@", env!("CARGO_PKG_VERSION"))
+        .replace("@MODEL@", &header.model)
+        .replace("@FORM@", &header.form.to_string())
+        .replace("@HEADER@", HEADER)
 }
 
+/// The words that the IDE colours, a tab between a word and its kind: those that the header has.
 fn keywords(header: &Header) -> String {
-    let kinds: [(&str, &[&str]); 3] = [
-        ("KEYWORD1", &["stretch_state", "stretch_reading"]),
-        (
-            "KEYWORD2",
-            &[
-                "stretch_init",
-                "stretch_step",
-                "stretch_lost",
-                "stretch_start_on",
-                "stretch_set_pressure",
-                "stretch_loss",
-                "stretch_readmit",
-                "stretch_self_test",
-            ],
-        ),
-        (
-            "LITERAL1",
-            &[
-                "STRETCH_OK",
-                "STRETCH_WARMING",
-                "STRETCH_MISSING",
-                "STRETCH_ALL_LOST",
-                "STRETCH_INFLATION",
-                "STRETCH_DEFLATION",
-                "STRETCH_INSIDE",
-                "STRETCH_SIGNAL_CLAMPED",
-                "STRETCH_RATE_CLAMPED",
-                "STRETCH_CHANNELS",
-                "STRETCH_SIGNALS",
-                "STRETCH_PERIOD_US",
-                "STRETCH_UNIT",
-            ],
-        ),
-    ];
-    // the IDE wants a tab between a word and its kind; a word that the header has not is none of the library's
-    let lines = |(kind, words): (&str, &[&str])| {
-        let there = words.iter().filter(|word| header.text.contains(**word));
-        there.map(|word| format!("{word}\t{kind}\n")).collect::<String>()
-    };
-    kinds.into_iter().map(lines).collect()
+    let lines = include_str!("arduino/keywords.txt").split_inclusive('\n');
+    let is_there = |line: &&str| line.split('\t').next().is_some_and(|w| header.text.contains(w));
+    lines.filter(is_there).collect()
 }
 
 fn live(header: &Header) -> String {
-    let example = include_str!("arduino/Live.ino");
-    if let Some(count) = header.array {
-        let pins: Vec<String> = (0..count).map(|k| format!("A{k}")).collect();
-        return kept(example, &["array"]).replace("@PINS@", &pins.join(", "));
-    }
-    let pressure = if header.pressure {
-        "  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw\n  \
-         stretch_set_pressure(&state, pressure);\n"
-    } else {
-        ""
+    let form = match (header.array, header.form) {
+        (Some(_), _) => "array",
+        (None, Form::Fixed) => "fixed",
+        (None, Form::Float) => "float",
     };
-    let (step, estimate) = match header.form {
-        Form::Fixed => (
-            "  stretch_reading reading = stretch_step(&state, analogRead(A0));".to_owned(),
-            "reading.estimate / 1000.0, 3",
-        ),
-        Form::Float => (
-            format!(
-                "{pressure}  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
-                 stretch_reading reading = stretch_step(&state, volts);"
-            ),
-            "reading.estimate, 3",
-        ),
-    };
-    kept(example, &["one"]).replace("@STEP@", &step).replace("@ESTIMATE@", estimate)
+    let mut has = vec![form];
+    has.extend(header.array.is_none().then_some("one"));
+    has.extend(header.pressure.then_some("pressure"));
+    let pins: Vec<String> = (0..header.array.unwrap_or(0)).map(|k| format!("A{k}")).collect();
+    kept(include_str!("arduino/Live.ino"), &has).replace("@PINS@", &pins.join(", "))
 }

@@ -1,9 +1,6 @@
 //! From a calibration to a header.
 
-use std::{
-    fmt::{self, Write},
-    str::FromStr,
-};
+use std::{fmt, str::FromStr};
 
 use stretch_calibrate::{
     CalibrateError, RecordNumbers, SpellingError, calibration_seal, fixed_record,
@@ -241,21 +238,33 @@ fn assembled(
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
     let branches = !has.contains(&"array");
-    let mut text = opening(source, form, &model, &has);
-    text.push_str(&frame(source, options));
-    text.push_str("\n/* ---- the record ---- */\n\n");
-    text.push_str(&constants);
+    let mut text = opening(source, form, &model, &has) + &frame(source, options);
+    text += "\n/* ---- the record ---- */\n\n";
+    text += &constants.into_text();
     text.push('\n');
-    text.push_str(include_str!("c/common.h"));
-    if branches {
-        text.push_str(include_str!("c/branches.h"));
-    }
-    step.iter().for_each(|part| text.push_str(&kept(part, &has)));
-    if branches {
-        text.push_str(include_str!("c/start_on.h"));
-    }
-    text.push_str(self_test);
-    text.push_str("\n#endif\n");
+    text += include_str!("c/common.h");
+    let (begin, reading, end) = match form {
+        Form::Fixed => (include_str!("c/fixed.h"), "", ""),
+        Form::Float => (
+            include_str!("c/float.h"),
+            include_str!("c/float_reading.h"),
+            include_str!("c/float_end.h"),
+        ),
+    };
+    let step = step.iter().copied();
+    let parts: Vec<&str> = if branches {
+        text += include_str!("c/branches.h");
+        [begin, reading]
+            .into_iter()
+            .chain(step)
+            .chain([end, include_str!("c/start_on.h")])
+            .collect()
+    } else {
+        [begin].into_iter().chain(step).chain([end]).collect()
+    };
+    parts.iter().for_each(|part| text += &kept(part, &has));
+    text += self_test;
+    text += "\n#endif\n";
     Header { text, form, model, pressure, array: None }
 }
 
@@ -272,32 +281,20 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
         (trials, date) if date.is_empty() => format!("{trials} trials"),
         (trials, date) => format!("{trials} trials, {date}"),
     };
-    let pressure = if has.contains(&"crosstalk") {
-        " *     stretch_set_pressure(&state, pressure);\n"
-    } else {
-        ""
-    };
-    let (sample, each) = if has.contains(&"array") {
-        ("samples", "One state an array of gauges; samples is an array of STRETCH_CHANNELS.")
-    } else {
-        ("sample", "One state a channel.")
-    };
     let libm = if has.contains(&"sd") { "of libm sqrtf alone (gcc wants -lm)" } else { "no libm" };
-    let mut text = String::new();
-    // writing to memory cannot fail
-    let _ = write!(
-        text,
-        "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
-         {form}: {taken} in,\n * {given} out; the same bits as on the computer.\n * Written by stretch \
-         {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
-         stretch_init(&state);\n *     then every period\n{pressure} *     reading = stretch_step(&state, {sample}); or \
-         stretch_lost(&state) where none came\n *\n * {each} C99 and C++11; no malloc, \
-         {libm}.\n * stretch_self_test() is 0 where the board computes as the computer does.\n */\n\
-         #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
-        period = source.sample_rate.period_s(),
-        version = env!("CARGO_PKG_VERSION"),
-    );
-    text
+    let mut of = has.to_vec();
+    of.extend((!has.contains(&"array")).then_some("one"));
+    kept(include_str!("c/opening.h"), &of)
+        .replace("@SIGNAL@", &signal)
+        .replace("@REFERENCE@", &reference)
+        .replace("@PERIOD@", &source.sample_rate.period_s().to_string())
+        .replace("@MODEL@", model)
+        .replace("@FORM@", &form.to_string())
+        .replace("@TAKEN@", taken)
+        .replace("@GIVEN@", &given)
+        .replace("@VERSION@", env!("CARGO_PKG_VERSION"))
+        .replace("@FROM@", &from)
+        .replace("@LIBM@", libm)
 }
 
 /// What a program around the step needs to know.

@@ -11,8 +11,8 @@ pub(crate) struct Part {
     /// As `linear`, `observer+rest`.
     pub(crate) model: String,
     /// The record.
-    pub(crate) constants: String,
-    /// The step, in the order of the file.
+    pub(crate) constants: Constants,
+    /// The step, in the order of the file, without what every step of its form begins and ends with.
     pub(crate) step: Vec<&'static str>,
     /// What of the step there is, where it has parts: the words behind its `@if`.
     pub(crate) has: Vec<&'static str>,
@@ -23,8 +23,7 @@ impl Part {
     pub(crate) fn with_zero(mut self, polarity: Polarity, turns: &Turns) -> Self {
         let watch = ZeroWatch::<f32>::new(polarity, turns);
         let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
-        let mut constants = Constants::default();
-        constants
+        self.constants
             .define("ZERO_LEVELS", Turns::MEDIAN_OF as i32, "that a median is taken of")
             .define("ZERO_SPAN", finder.least_span, "what the signal goes through in a movement")
             .define("ZERO_SIGN", sign, "-1 where the signal falls as the target rises")
@@ -37,10 +36,7 @@ impl Part {
             .define("ZERO_MOST", most, "what a level counts for at most in a zero that is followed")
             .define("ZERO_FOLLOW", watch.following(turns).follow, "the share by which it moves")
             .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
-        self.constants.push_str(&constants.into_text());
-        // the last part of a step ends the compiler's rules for floats
-        let last = self.step.len() - 1;
-        self.step.insert(last, include_str!("c/zero_float.h"));
+        self.step.push(include_str!("c/zero_float.h"));
         self
     }
 }

@@ -46,12 +46,27 @@ void loop() {
   }
   due_us += STRETCH_PERIOD_US;
 @if one
-@STEP@
+@if fixed
+  stretch_reading reading = stretch_step(&state, analogRead(A0));
+@end
+@if pressure
+  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw
+  stretch_set_pressure(&state, pressure);
+@end
+@if float
+  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);
+  stretch_reading reading = stretch_step(&state, volts);
+@end
   if (reading.status == STRETCH_WARMING) {
     Serial.println("warming");
     return;
   }
-  Serial.print(@ESTIMATE@);
+@if fixed
+  Serial.print(reading.estimate / 1000.0, 3);
+@end
+@if float
+  Serial.print(reading.estimate, 3);
+@end
   Serial.print(" " STRETCH_UNIT);
   Serial.print(reading.branch == STRETCH_INFLATION ? " inflation" : " deflation");
   Serial.println(reading.domain == STRETCH_INSIDE ? "" : " outside the calibrated domain");

@@ -1,3 +1,10 @@
+#define STRETCH_SELF_TEST @SAMPLES@
+
+typedef struct stretch_sample {
+    @FIELDS@
+    uint8_t flags;
+} stretch_sample;
+
 /* ---- self-test ---- */
 
 /* Runs the samples below, 0 when every answer is the computer's, bit for bit; else the number of the

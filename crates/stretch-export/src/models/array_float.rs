@@ -37,15 +37,14 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
         watched(&mut constants, numbers);
     }
     gains(&mut constants, numbers);
-    let mut step = vec![include_str!("../c/float.h"), include_str!("../c/array_float.h")];
+    let mut step = vec![include_str!("../c/array_float.h")];
     if let Some(watch) = ShiftWatch::<f32, N>::new(calibration) {
         shifts(&mut constants, &watch);
         step.push(include_str!("../c/shifts_float.h"));
     }
-    step.push(include_str!("../c/float_end.h"));
     Part {
         model: if count == 1 { "1 gauge".into() } else { format!("{count} gauges") },
-        constants: constants.into_text(),
+        constants,
         step,
         has,
     }

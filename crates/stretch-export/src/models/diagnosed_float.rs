@@ -44,13 +44,8 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     }
     Ok(Part {
         model: if model.rest.follows() { "diagnosed+rest" } else { "diagnosed" }.into(),
-        constants: constants.into_text(),
-        step: vec![
-            include_str!("../c/float.h"),
-            include_str!("../c/float_reading.h"),
-            include_str!("../c/diagnosed_float.h"),
-            include_str!("../c/float_end.h"),
-        ],
+        constants,
+        step: vec![include_str!("../c/diagnosed_float.h")],
         has,
     })
 }

@@ -61,8 +61,8 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     }
     Part {
         model: if follows { "observer+rest" } else { "observer" }.into(),
-        constants: constants.into_text(),
-        step: vec![include_str!("../c/fixed.h"), include_str!("../c/observer_fixed.h")],
+        constants,
+        step: vec![include_str!("../c/observer_fixed.h")],
         has: Vec::new(),
     }
 }
@@ -107,13 +107,8 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
     }
     Ok(Part {
         model: if follows { "observer+rest" } else { "observer" }.into(),
-        constants: constants.into_text(),
-        step: vec![
-            include_str!("../c/float.h"),
-            include_str!("../c/float_reading.h"),
-            include_str!("../c/observer_float.h"),
-            include_str!("../c/float_end.h"),
-        ],
+        constants,
+        step: vec![include_str!("../c/observer_float.h")],
         has: Vec::new(),
     })
 }

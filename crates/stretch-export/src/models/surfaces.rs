@@ -59,9 +59,8 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     };
     Part {
         model: model.into(),
-        constants: constants.into_text(),
+        constants,
         step: vec![
-            include_str!("../c/fixed.h"),
             include_str!("../c/surfaces_fixed.h"),
             surface,
             include_str!("../c/surfaces_fixed_step.h"),
@@ -146,14 +145,11 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     };
     Ok(Part {
         model: name.into(),
-        constants: constants.into_text(),
+        constants,
         step: vec![
-            include_str!("../c/float.h"),
-            include_str!("../c/float_reading.h"),
             include_str!("../c/surfaces_float.h"),
             surface,
             include_str!("../c/surfaces_float_step.h"),
-            include_str!("../c/float_end.h"),
         ],
         has: vec![if calibration.spec().model.needs_signal_only() { "static" } else { "moving" }],
     })

@@ -1,10 +1,11 @@
-//! What the program says, where whoever reads it may have gone: no work hangs on it.
+//! What the program says, how wide its lines are, and whether they have colours, where whoever reads it may have gone: no work hangs on it.
 //!
 //! Standard error is a courtesy: what cannot be written there is let go. Standard output may be
 //! what was asked for: the first failure is kept, the work goes on, its files are written, and
 //! [`lost`] tells the end of the program.
 
 use std::{
+    env,
     fmt::Display,
     io::{self, ErrorKind, Write},
     path::Path,
@@ -15,10 +16,12 @@ use std::{
     time::Instant,
 };
 
+use anstream::{AutoStream, ColorChoice, stream::RawStream};
 use anyhow::ensure;
+use clap::builder::styling::{AnsiColor, Style};
 use stretch_data::files::is_standard_output;
-
-use crate::terminal::{self, Ink, wrapped};
+use terminal_size::{Width, terminal_size};
+use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};
 
 /// How much is said beside results and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +93,7 @@ pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
     let text = wrapped(&plain(&text.to_string()));
     match TAKEN.load(SeqCst) {
         true => say_as_is(text),
-        false => write_out(&terminal::painted(&text, Ink::Strong, &io::stdout())),
+        false => write_out(&painted(&text, Style::new().bold(), &io::stdout())),
     }
 }
 
@@ -140,7 +143,7 @@ pub(crate) fn warn(text: impl Display) {
 pub(crate) fn fail(text: impl Display) {
     let text = wrapped(&plain(&format!("stretch: {text}")));
     let (name, rest) = text.split_at("stretch:".len());
-    write_err(&(terminal::painted(name, Ink::Alarm, &io::stderr()) + rest));
+    write_err(&(painted(name, AnsiColor::Red.on_default().bold(), &io::stderr()) + rest));
 }
 
 fn write_err(text: &str) {
@@ -193,5 +196,69 @@ impl Write for Output {
 
     fn flush(&mut self) -> io::Result<()> {
         kept(io::stdout().lock().flush())
+    }
+}
+
+/// No line is longer, on whatever terminal or none: beyond it the eye loses its row.
+const WIDEST: usize = 100;
+/// Narrower ones break what words there are.
+const NARROWEST: usize = 30;
+
+/// Columns of a line: those of `COLUMNS`, else of the terminal, never more than a hundred.
+pub(crate) fn width() -> usize {
+    let said = env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
+    let found = || terminal_size().map(|(Width(columns), _)| usize::from(columns));
+    said.or_else(found).unwrap_or(WIDEST).clamp(NARROWEST, WIDEST)
+}
+
+/// A text in lines that are not wider than that: broken between words, further in as the line began. Rows of tables are made
+/// as wide as there is room already, and a word is never cut.
+fn wrapped(text: &str) -> String {
+    wrapped_at(text, width())
+}
+
+fn wrapped_at(text: &str, width: usize) -> String {
+    let lines = text.split('\n').map(|line| {
+        if line.starts_with('|') || line.chars().count() <= width {
+            return line.to_owned();
+        }
+        let body = line.trim_start();
+        let marked = body.strip_prefix("- ").unwrap_or(body);
+        let indent = " ".repeat((line.len() - marked.len()).min(width / 2));
+        let options = Options::new(width)
+            .subsequent_indent(&indent)
+            .break_words(false)
+            .wrap_algorithm(WrapAlgorithm::FirstFit)
+            .word_separator(WordSeparator::AsciiSpace)
+            .word_splitter(WordSplitter::NoHyphenation);
+        textwrap::fill(line, options)
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// A text in a style, where a stream shows one: a terminal, unless `NO_COLOR` is set (or `CLICOLOR_FORCE` says all the same).
+fn painted(text: &str, style: Style, to: &impl RawStream) -> String {
+    match AutoStream::choice(to) {
+        ColorChoice::Never => text.to_owned(),
+        _ => format!("{style}{text}{style:#}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_break_between_words_and_stand_under_their_begin() {
+        let text = "- one two three four\n  five six seven\n| a table is as wide as it is |\nshort";
+        let wrapped = wrapped_at(text, 12);
+        assert_eq!(
+            wrapped,
+            "- one two\n  three four\n  five six\n  seven\n| a table is as wide as it is |\nshort"
+        );
+        let word = "a_path/that_is_longer/than_the_line.csv: there is no such file";
+        assert!(
+            wrapped_at(word, 20).starts_with("a_path/that_is_longer/than_the_line.csv:\nthere")
+        );
     }
 }

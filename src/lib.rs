@@ -9,15 +9,14 @@ mod display;
 mod old_names;
 mod paper;
 mod table;
-mod terminal;
 
 use std::{io::ErrorKind, process::ExitCode};
 
 use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
-    apply, calibrate, convert, demo, diagnose, effects, evaluate, export, init, json, listen, page,
-    predict, simulate, sleeve,
+    apply, calibrate, convert, demo, diagnose, effects, evaluate, export, json, listen, page,
+    problem, simulate, sleeve,
 };
 use display::Volume;
 
@@ -44,7 +43,7 @@ struct Cli {
     quiet: bool,
     /// Say also what is read and chosen
     ///
-    /// And how long it takes, on standard error; say every detail of a diagnosis.
+    /// And how long it takes, on standard error; say every detail of a diagnosis, and what simpler methods would have named.
     #[arg(short, long, global = true, display_order = 901)]
     verbose: bool,
     #[command(subcommand)]
@@ -74,8 +73,8 @@ enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
-    Predict(predict::Args),
-    Init(init::Args),
+    Predict(problem::PredictArgs),
+    Init(problem::InitArgs),
     Effects(effects::Args),
     Listen(listen::Args),
     Export(export::Args),
@@ -97,7 +96,7 @@ pub fn run() -> ExitCode {
         Err(answer) => return explain(&answer),
     };
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
-    let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
+    let _ = ctrlc::set_handler(|| commands::shared::on_ctrl_c(INTERRUPTED));
     display::begin(match (cli.quiet, cli.verbose) {
         (true, _) => Volume::Quiet,
         (_, true) => Volume::Verbose,
@@ -113,8 +112,8 @@ pub fn run() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
-        Command::Predict(args) => predict::run(args).map(|status| done = status),
-        Command::Init(args) => init::run(args),
+        Command::Predict(args) => problem::predict(args).map(|status| done = status),
+        Command::Init(args) => problem::init(args),
         Command::Effects(args) => effects::run(args),
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),

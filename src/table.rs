@@ -4,7 +4,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Wi
 
 pub(crate) use stretch_report::number;
 
-use crate::terminal::width;
+use crate::display::width;
 
 /// A cell of so many characters is not broken, where that is not more than a third of the line: it is a number, an interval
 /// or a name.
@@ -36,12 +36,12 @@ fn fitted(header: &[&str], rows: &[Vec<String>], width: usize) -> String {
         used += own + AROUND;
         groups.last_mut().into_iter().for_each(|group| group.push(i + 1));
     }
-    let drawn = groups.iter().map(|group| drawn(header, rows, group, &least, width));
-    drawn.collect::<Vec<_>>().join("\n")
+    let parts = groups.iter().map(|group| some_columns(header, rows, group, &least, width));
+    parts.collect::<Vec<_>>().join("\n")
 }
 
 /// The first column and some others.
-fn drawn(
+fn some_columns(
     header: &[&str],
     rows: &[Vec<String>],
     group: &[usize],
@@ -79,18 +79,26 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
+/// A table of a report with its caption.
+pub(crate) fn table_text(report: &stretch_report::Table) -> String {
+    format!("{}:\n{}", unbroken(&report.caption), drawn(report))
+}
+
+/// A table of a report without it.
+pub(crate) fn drawn(report: &stretch_report::Table) -> String {
+    let head: Vec<&str> = report.head.iter().map(String::as_str).collect();
+    let rows = report.rows.iter().map(|row| row.iter().map(|cell| unbroken(cell)).collect());
+    table(&head, rows)
+}
+
+/// A text of a page: its spaces are those of a terminal.
+pub(crate) fn unbroken(text: &str) -> String {
+    text.replace('\u{a0}', " ")
+}
+
 /// A number that may be missing.
 pub(crate) fn maybe(x: Option<f64>) -> String {
     x.map_or_else(|| "-".to_owned(), number)
-}
-
-/// A probability, down to the smallest.
-pub(crate) fn p_value(p: Option<f64>) -> String {
-    match p {
-        None => "-".to_owned(),
-        Some(p) if p < 1e-4 => "< 0.0001".to_owned(),
-        Some(p) => format!("{p:.4}"),
-    }
 }
 
 #[cfg(test)]

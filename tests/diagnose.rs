@@ -88,7 +88,7 @@ fn a_simulated_effect_is_named_and_reported() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let run = |threads: &str, json: &Path| {
         let mut command = diagnose(&folder);
-        command.arg(json_to(json)).arg("--baselines").env("RAYON_NUM_THREADS", threads);
+        command.arg(json_to(json)).arg("--verbose").env("RAYON_NUM_THREADS", threads);
         command
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));

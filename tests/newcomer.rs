@@ -32,14 +32,14 @@ fn own_columns_keep_their_units() {
     );
     let mut evaluate = stretch();
     let told = runs(evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&log));
-    assert!(told.contains("RMSE mm"), "{told}");
+    assert!(told.contains("RMSE, mm"), "{told}");
     // a unit is written as people write it
     let log = trial(&scratch, "force.csv", "time_s,force_n,gauge_v", 1.0);
     let record = scratch.path("force.json");
     runs(calibrate(&log, &record).args(["--reference", "force_n", "--signal", "gauge_v"]));
     let mut evaluate = stretch();
     let told = runs(evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&log));
-    assert!(told.contains("RMSE N") && !told.contains("RMSE n"), "{told}");
+    assert!(told.contains("RMSE, N") && !told.contains("RMSE, n"), "{told}");
 }
 
 #[test]

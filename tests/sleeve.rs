@@ -1,4 +1,4 @@
-//! Sensors that are put on again, by another, or broken: `stretch sleeve learn`, `calibrate --signals` and `--prior`, `sleeve renew`,
+//! Sensors that are put on again, by another, or broken: `stretch sleeve learn`, `calibrate --signal s1,s2` and `--prior`, `sleeve renew`,
 //! and `apply` with several gauges.
 
 use std::{fmt::Write, path::PathBuf};
@@ -61,7 +61,7 @@ impl Scratch {
                 "calibrate",
                 "--reference",
                 "angle_deg",
-                "--signals",
+                "--signal",
                 signals,
                 "--of",
                 &of,
@@ -149,7 +149,7 @@ fn several_references_get_a_record_each() {
     wrist("later.csv", 1.0);
     let asked =
         ["calibrate", "wrist.csv", "--reference", "bend_deg,turn_deg", "--out", "wrist.json"];
-    let said = runs(scratch.sleeve(&asked).args(["--signals", "all"]));
+    let said = runs(scratch.sleeve(&asked).args(["--signal", "all"]));
     for (angle, column) in [("bend_deg", 4), ("turn_deg", 5)] {
         assert!(said.contains(&format!("{angle} on s1, s2, s3: RMSE")), "{said}");
         let record = format!("wrist.{angle}.json");
@@ -158,15 +158,17 @@ fn several_references_get_a_record_each() {
         let (rmse_deg, count) = (root_mean_square(&errors), errors.len());
         assert!(count > 2000 && rmse_deg < 1.6, "{angle}: {rmse_deg} of {count}");
         // No angle knows of the other.
-        let alone = ["--reference", angle, "--signals", "s1,s2,s3", "--out", "alone.json"];
+        let alone = ["--reference", angle, "--signal", "s1,s2,s3", "--out", "alone.json"];
         runs(scratch.sleeve(&["calibrate", "wrist.csv"]).args(alone));
         let text = |name: &str| std::fs::read_to_string(scratch.path(name)).unwrap();
         assert_eq!(text("alone.json"), text(&record));
     }
-    fails(&mut scratch.sleeve(&asked), &["name these with --signals"]);
-    let also = ["--signals", "all", "--session", "s.json"];
+    fails(&mut scratch.sleeve(&asked), &["name these with --signal"]);
+    let model = ["--signal", "all", "--model", "auto"];
+    fails(scratch.sleeve(&asked).args(model), &["--model", "--signal auto:s1,s2"]);
+    let also = ["--signal", "all", "--session", "s.json"];
     fails(scratch.sleeve(&asked).args(also), &["of one reference"]);
-    let stdout = ["calibrate", "wrist.csv", "--signals", "all", "--out", "-"];
+    let stdout = ["calibrate", "wrist.csv", "--signal", "all", "--out", "-"];
     let both = ["--reference", "bend_deg,turn_deg"];
     fails(scratch.sleeve(&stdout).args(both), &["name a file with --out"]);
 }
@@ -217,7 +219,7 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
         "knee.csv",
         "--reference",
         "angle_deg",
-        "--signals",
+        "--signal",
         "all",
         "--out",
         "cal.json",
@@ -267,7 +269,7 @@ fn priors_refuse_what_they_have_not_seen() {
             |row| (row[0], row[1]) = (1.0 - row[0], 1.0 - row[1]),
             &["swap the wires"],
         ),
-        ("copies.csv", SHORT, |row| row[1] = row[0], &["copies", "--signals"]),
+        ("copies.csv", SHORT, |row| row[1] = row[0], &["copies", "--signal"]),
     ];
     for (name, worn, change, says) in cases {
         scratch.worn(name, worn, change);
@@ -282,10 +284,7 @@ fn priors_refuse_what_they_have_not_seen() {
         command.args(more);
         command
     };
-    fails(
-        &mut with(&["--signals", "s1", "plain.csv"]),
-        &["2 channels", "1 were named", "--signals"],
-    );
+    fails(&mut with(&["--signal", "s1", "plain.csv"]), &["2 channels", "1 were named", "--signal"]);
     let radian = scratch.path("radian.csv");
     let text = std::fs::read_to_string(scratch.path("plain.csv")).unwrap();
     std::fs::write(&radian, text.replace("angle_deg", "angle_rad")).unwrap();
@@ -334,7 +333,7 @@ fn sessions_of_different_kinds_make_no_prior() {
         k.set(k.get() + 1);
         row[2] = if k.get() > 2300 { f64::NAN } else { row[2] };
     });
-    let fit = ["calibrate", "early.csv", "--reference", "angle_deg", "--signals", "s1,s2", "--out"];
+    let fit = ["calibrate", "early.csv", "--reference", "angle_deg", "--signal", "s1,s2", "--out"];
     let mut command = scratch.sleeve(&fit);
     fails(command.arg("e.json"), &["early.csv", "row 2302", "angle_deg", "fill it in or remove"]);
 }

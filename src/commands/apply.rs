@@ -2,7 +2,7 @@
 
 use std::{
     io::{self, BufRead, BufReader, BufWriter, Read, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use stretch_calibrate::{Applied, Reach, not_its_own, pressure_column};
@@ -11,16 +11,19 @@ use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
 use stretch_receptor::{Domain, Reading, Withheld};
 use stretch_recording::{ReadOptions, Recording, RowReader};
-use stretch_sleeve::{AppliedGauge, GaugeCalibration, LiveGauge, SleeveCalibration, apply_gauge};
+use stretch_sleeve::{
+    AppliedGauge, GaugeCalibration, LiveGauge, SleeveCalibration, Turns, Zero, apply_gauge,
+};
 
 use super::{
     apply_several::apply_several,
-    pace::Pace,
-    reading::{Recorded, read_recording, with_notes_printed},
-    stop::RecordedInput,
-    zero::Told,
+    reading::{Pace, Recorded, read_recording, with_notes_printed},
+    shared::RecordedInput,
 };
-use crate::display::{Output, warn};
+use crate::{
+    display::{Output, warn},
+    table::number,
+};
 
 /// Turn the voltages of a trial or of a live stream into lengths
 ///
@@ -100,21 +103,25 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let applied = apply_gauge(&gauge, &trial, follow)?;
     let mut pace = Pace::of(calibration);
     let warning = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
-    match args.out.as_ref().filter(|path| !is_standard_output(path)) {
-        Some(path) => {
-            write_whole(path, |out| write_all(calibration, &trial, &applied.applied, out))?;
-        }
-        None => {
-            let mut out = BufWriter::new(Output);
-            write_all(calibration, &trial, &applied.applied, &mut out)?;
-            out.flush()?;
-        }
-    }
+    write_out(args.out.as_deref(), |out| write_all(calibration, &trial, &applied.applied, out))?;
     report(&gauge, &trial, &applied);
     if let Some(warning) = warning {
         warn(format!("stretch: {}: {warning}", trial.name));
     }
     Ok(())
+}
+
+/// Writes rows into a file, whole or not at all, or to standard output where no other is named.
+pub(super) fn write_out(
+    path: Option<&Path>,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> anyhow::Result<()> {
+    if let Some(path) = path.filter(|path| !is_standard_output(path)) {
+        return Ok(write_whole(path, |out| write(out))?);
+    }
+    let mut out = BufWriter::new(Output);
+    write(&mut out)?;
+    Ok(out.flush()?)
 }
 
 /// The calibration at another sample rate, where its estimates need none.
@@ -139,9 +146,9 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
         faults.jittered,
     ));
     seen.doubt();
-    let mut told = Told::of(gauge, &trial.name);
-    found.zeros.iter().for_each(|(time_s, zero)| told.take(*time_s, zero));
-    told.end();
+    let mut zero_watch = ZeroWatch::of(gauge, &trial.name);
+    found.zeros.iter().for_each(|(time_s, zero)| zero_watch.take(*time_s, zero));
+    zero_watch.end();
 }
 
 /// What came of the samples.
@@ -214,7 +221,7 @@ fn live(
     };
     say(rows.take_notes());
     let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));
-    let mut told = Told::of(gauge, "");
+    let mut zero_watch = ZeroWatch::of(gauge, "");
     let mut pace = Pace::of(calibration);
     while let Some(row) = rows.next_row() {
         match row {
@@ -225,7 +232,7 @@ fn live(
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading, row.values[0]);
                 if let Some(zero) = receptor.zero() {
-                    told.take(row.time_s, &zero);
+                    zero_watch.take(row.time_s, &zero);
                 }
                 if let Some(warning) = pace.take(row.time_s) {
                     warn(format!("stretch: {warning}"));
@@ -241,7 +248,7 @@ fn live(
         say(rows.take_notes());
     }
     seen.doubt();
-    told.end();
+    zero_watch.end();
     Ok(())
 }
 
@@ -302,4 +309,68 @@ pub(super) fn estimates_csv(
     let mut text = Vec::new();
     write_all(calibration, trial, applied, &mut text)?;
     Ok(text)
+}
+
+/// Tells when a zero has shifted, once until it is back.
+struct ZeroWatch {
+    turns: Option<Turns>,
+    period_s: f64,
+    unit: String,
+    /// The name of the trial, with a colon; empty of a stream.
+    trial: String,
+    shifted: bool,
+    needs_signal_only: bool,
+    last: Option<Zero<f64>>,
+}
+
+impl ZeroWatch {
+    fn of(gauge: &GaugeCalibration, trial: &str) -> Self {
+        let calibration = gauge.calibration();
+        Self {
+            turns: gauge.turns().copied(),
+            period_s: calibration.spec().sample_rate_hz.period_s(),
+            unit: unit(calibration.spec().reference.as_str()).unwrap_or_default().to_string(),
+            trial: if trial.is_empty() { String::new() } else { format!("{trial}: ") },
+            shifted: false,
+            needs_signal_only: calibration.spec().model.needs_signal_only(),
+            last: None,
+        }
+    }
+
+    /// What a movement said that ended at a time.
+    fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
+        if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
+            let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
+            warn(format!(
+                "stretch: {}put on again? The zero is {} {unit} off since {:.2} s; usual is up to {} {unit} over five movements and {} {unit} over \
+                 some twenty, with {} false alarms an hour. Calibrate again",
+                self.trial,
+                number(zero.off_reference.abs()),
+                time_s - f64::from(zero.since_samples) * self.period_s,
+                usual(turns.limit),
+                usual(turns.mean_limit),
+                turns.false_alarms_an_hour,
+                unit = self.unit,
+            ));
+        }
+        self.shifted = zero.has_shifted;
+        self.last = Some(*zero);
+    }
+
+    /// How far the zero was followed, and that a record tells no shifts.
+    fn end(&self) {
+        let Some(turns) = self.turns else {
+            // a load cell need not move
+            if self.needs_signal_only {
+                return;
+            }
+            return warn(
+                "the calibration does not hold where movements turn: whether the gauge was put on again is not told",
+            );
+        };
+        if let Some(zero) = self.last.filter(|zero| zero.followed != 0.0) {
+            let followed = number(zero.followed * turns.reference_per_signal);
+            warn(format!("the zero was followed, by {followed} {} at the end", self.unit));
+        }
+    }
 }

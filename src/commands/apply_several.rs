@@ -1,20 +1,16 @@
 //! `stretch apply` with a calibration of several gauges.
 
 use std::{
-    io::{self, BufWriter, Write},
+    io::{self, Write},
     path::Path,
 };
 
-use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
 use stretch_recording::ReadOptions;
 use stretch_sleeve::{AppliedArray, ArrayCalibration, MAX_CHANNELS, apply_array};
 
-use super::reading::read_recording;
-use crate::{
-    display::{Output, warn},
-    table::number,
-};
+use super::{apply::write_out, reading::read_recording};
+use crate::{display::warn, table::number};
 
 /// Writes time, estimate, standard deviation, the channels that are left out, and whether a state was clamped.
 pub(super) fn apply_several(
@@ -28,14 +24,7 @@ pub(super) fn apply_several(
     }
     let trial = read_recording(trial, &options)?;
     let applied = apply_array(calibration, &trial)?;
-    match out.filter(|path| !is_standard_output(path)) {
-        Some(path) => write_whole(path, |out| write_all(calibration, &trial, &applied, out))?,
-        None => {
-            let mut out = BufWriter::new(Output);
-            write_all(calibration, &trial, &applied, &mut out)?;
-            out.flush()?;
-        }
-    }
+    write_out(out, |out| write_all(calibration, &trial, &applied, out))?;
     for (channel, time_s, loss) in &applied.losses {
         let name = calibration.spec().channels[*channel].signal.as_str();
         warn(format!("stretch: {}: {name} is left out from {time_s:.2} s on: {loss}", trial.name));

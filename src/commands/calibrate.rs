@@ -1,30 +1,34 @@
 //! `stretch calibrate`: from logged trials to a calibration record.
 
-use std::path::PathBuf;
+use std::{
+    convert::Infallible,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
-use serde::Serialize;
+use serde::Deserialize;
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Candidate, FitReport, MODELS_IN_WORDS, Memory, ModelChoice,
-    ModelKind, ModelRow, Options, Robust, SpellingError, calibrate, choose_model, evaluate,
-    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
+    CalibrateError, Calibrated, Candidate, MODELS_IN_WORDS, Memory, ModelChoice, ModelKind,
+    Options, Robust, SpellingError, calibrate, choose_model, evaluate, explains_little,
+    explains_nothing, parse_rate, rank_signals, without_gross_errors,
 };
 use stretch_core::RateEstimator;
-use stretch_data::files::Outputs;
+use stretch_data::files::{Outputs, read_whole};
 use stretch_data::{Split, Trial};
-use stretch_problem::Causes;
+use stretch_gap::Diagnosis;
+use stretch_problem::{Causes, causes, name_of};
 use stretch_recording::{ReadOptions, RecordingError, tidy_column};
 use stretch_report::{Context, Judged, calibration_page};
 use stretch_sleeve::calibrate_gauge;
 
 use super::{
-    calibrate_sleeve::{Asked, Sleeve},
+    calibrate_sleeve,
     calibration_text::{print, print_models},
-    causes,
     json::Json,
-    reading::{Recorded, read_trials, with_columns_to_name},
-    shared::{detail, of_files, stage_text, tell},
+    reading::{Recorded, columns, read_trials, with_columns_to_name},
+    shared::{detail, of_files, spinner, stage_text, tell},
 };
 
 /// Fit a calibration to logged trials
@@ -39,87 +43,133 @@ use super::{
 ///   stretch calibrate ramps/*.csv --out cal.json --report cal.html
 ///   stretch calibrate knee.csv --reference angle_deg --signal auto --out cal.json
 ///   stretch calibrate weights.csv --reference load_g --signal raw --model curve --out cal.json
-///   stretch calibrate ramps/*.csv --paper --out published.json
+///   stretch calibrate ramps/*.csv --rate paper --out published.json
 ///   stretch calibrate ramps/*.csv --model observer --out cal.json
-///   stretch calibrate knee.csv --reference angle_deg --signals s1,s2,s3 --out cal.json
-///   stretch calibrate wrist.csv --reference bend_deg,turn_deg --signals all --out wrist.json
+///   stretch calibrate knee.csv --reference angle_deg --signal s1,s2,s3 --out cal.json
+///   stretch calibrate wrist.csv --reference bend_deg,turn_deg --signal all --out wrist.json
 ///   stretch calibrate --prior prior.json --of left/anna half_a_minute.csv --out cal.json
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Trials to fit, or a folder with a dataset.toml
     #[arg(required_unless_present = "prior", value_name = "TRIAL.csv")]
-    trials: Vec<PathBuf>,
+    pub(super) trials: Vec<PathBuf>,
     /// Where the record goes
     ///
     /// It is JSON, or postcard for a board when the name ends in .postcard.
     #[arg(long, value_name = "cal.json")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Where a report with pictures goes
-    #[arg(long, value_name = "r.html")]
+    #[arg(long, value_name = "r.html", conflicts_with_all = SLEEVE)]
     report: Option<PathBuf>,
     /// Trials that the report judges on [default: those that were fitted]
-    #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
+    #[arg(long, value_name = "TRIAL.csv", num_args = 1.., conflicts_with_all = SLEEVE)]
     test: Vec<PathBuf>,
-    /// linear, curve, polyIJ, observer, history, diagnosed, or auto
+    /// linear, curve, polyIJ, observer, history, diagnosed, or auto [default: poly13]
     ///
     /// curve is a polynomial of the signal alone, its degree by cross-validation; curve and linear also take a table of weights and
     /// readings without a time. polyIJ is of degree I in the rate and J in the signal. observer, history and diagnosed remember; +rest behind observer or
     /// history follows a drifting baseline. auto takes the best on trials left out.
-    #[arg(long, default_value = "poly13")]
-    model: Model,
+    #[arg(long, conflicts_with_all = SLEEVE)]
+    model: Option<Model>,
     /// Column of the reference, whose last part is the unit
     ///
-    /// `Pos (mm)` is pos_mm. With --signals several with commas, such as the angles of a wrist: each gets a record of its own.
+    /// `Pos (mm)` is pos_mm. Of several gauges several with commas, such as the angles of a wrist: each gets a record of its own.
     #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = columns)]
-    reference: String,
-    /// Column of the signal, or auto: the best of all columns
+    pub(super) reference: String,
+    /// Column of the signal, or of several gauges with commas [default: bridge_v]
     ///
-    /// Several with commas, too: the best of them by cross-validation.
-    #[arg(long, default_value = "bridge_v", value_name = "COL", value_parser = columns)]
-    signal: String,
+    /// auto is the best of all columns by cross-validation, auto:s1,s2 the best of these. s1,s2 are gauges that are calibrated
+    /// together, all takes every column but the references.
+    #[arg(long, value_name = "COL")]
+    signal: Option<Signal>,
     #[command(flatten)]
-    recorded: Recorded,
-    /// Estimator of the signal's rate
+    pub(super) recorded: Recorded,
+    /// Estimator of the signal's rate, or paper: the method as published [default: savgol:11,2]
     ///
-    /// savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in samples), difference:CUTOFF_HZ, tracker:INDEX, central.
-    #[arg(long, default_value = "savgol:11,2", value_parser = parse_rate)]
-    rate: RateEstimator,
-    /// The method as published
-    ///
-    /// Central differences, strain rate, a branch a trial, no dead band.
-    #[arg(long, conflicts_with = "rate")]
-    paper: bool,
+    /// savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in samples), difference:CUTOFF_HZ, tracker:INDEX, central. paper:
+    /// central differences, strain rate, a branch a trial, no dead band.
+    #[arg(long, conflicts_with_all = SLEEVE)]
+    rate: Option<Rate>,
     /// Weigh outliers down
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with_all = SLEEVE)]
     robust: Option<Loss>,
     /// Zero of the signal [default: 1.24 for bridge_v, else 0]
     ///
     /// It is subtracted before the signal is divided by its range.
-    #[arg(long, value_name = "X", allow_hyphen_values = true)]
+    #[arg(long, value_name = "X", allow_hyphen_values = true, conflicts_with_all = SLEEVE)]
     signal_zero: Option<f64>,
     /// Resting length, from which contraction is counted
     ///
     /// By default it is the greatest value of a reference called length...; any other reference is the target itself.
-    #[arg(long, value_name = "X")]
-    rest_length: Option<f64>,
+    #[arg(long, value_name = "X", conflicts_with = "prior")]
+    pub(super) rest_length: Option<f64>,
     /// Diagnosis whose effects --model diagnosed and auto build on
     ///
     /// `stretch diagnose --json=d.json` writes it. By default the trials are diagnosed as a gauge alone.
-    #[arg(long, value_name = "d.json")]
+    #[arg(long, value_name = "d.json", conflicts_with_all = SLEEVE)]
     from: Option<PathBuf>,
-    #[command(flatten)]
-    sleeve: Sleeve,
+    /// Prior that these trials update
+    ///
+    /// `stretch sleeve learn` writes it. Ten seconds to a minute of reference do; without a trial the calibration is the prior.
+    #[arg(long, value_name = "prior.json")]
+    pub(super) prior: Option<PathBuf>,
+    /// Sensor, wearer, what was done: left/anna
+    ///
+    /// As many steps as are known.
+    #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
+    pub(super) of: String,
+    /// Where the sums for stretch sleeve learn go
+    #[arg(long, value_name = "session.json")]
+    pub(super) session: Option<PathBuf>,
     /// Write a calibration that explains nothing, too
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = SLEEVE)]
     force: bool,
     #[command(flatten)]
-    json: Json,
+    pub(super) json: Json,
 }
 
-/// Several columns, with commas.
-fn columns(names: &str) -> Result<String, std::convert::Infallible> {
-    Ok(names.split(',').map(|name| tidy_column(name.trim())).collect::<Vec<_>>().join(","))
+/// Options of what `calibrate_sleeve` does, which takes none of those that only a calibration of one gauge without a prior has.
+const SLEEVE: [&str; 2] = ["prior", "session"];
+
+/// Columns of signals.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Signal {
+    One(String),
+    /// The best of these; of all where there is none.
+    Best(Vec<String>),
+    /// Gauges that are calibrated together; all where there is none.
+    Together(Vec<String>),
+}
+
+impl FromStr for Signal {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        let names = |text: &str| text.split(',').map(|name| tidy_column(name.trim())).collect();
+        Ok(match text.strip_prefix("auto:") {
+            Some(these) => Self::Best(names(these)),
+            None if text == "auto" => Self::Best(Vec::new()),
+            None if text == "all" => Self::Together(Vec::new()),
+            None if text.contains(',') => Self::Together(names(text)),
+            None => Self::One(tidy_column(text.trim())),
+        })
+    }
+}
+
+/// An estimator of the rate, or the published method as a whole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rate {
+    Paper,
+    Of(RateEstimator),
+}
+
+impl FromStr for Rate {
+    type Err = SpellingError;
+
+    fn from_str(text: &str) -> Result<Self, SpellingError> {
+        if text == "paper" { Ok(Self::Paper) } else { parse_rate(text).map(Self::Of) }
+    }
 }
 
 /// A model, or the choice of one.
@@ -129,7 +179,7 @@ enum Model {
     One(ModelKind),
 }
 
-impl std::str::FromStr for Model {
+impl FromStr for Model {
     type Err = SpellingError;
 
     fn from_str(text: &str) -> Result<Self, SpellingError> {
@@ -145,17 +195,53 @@ enum Loss {
 }
 
 impl Args {
+    /// The signal, or the signals that there are to choose from or to calibrate together.
+    pub(super) fn signal(&self) -> Signal {
+        self.signal.clone().unwrap_or_else(|| Signal::One("bridge_v".to_owned()))
+    }
+
+    /// Whether signals were named.
+    pub(super) fn names_signals(&self) -> bool {
+        self.signal.is_some()
+    }
+
+    fn model(&self) -> Model {
+        self.model.unwrap_or(Model::One(Options::default().model))
+    }
+
+    /// Whether several gauges, a prior or its sums are asked for.
+    fn is_sleeve(&self) -> anyhow::Result<bool> {
+        let is_together = matches!(self.signal(), Signal::Together(_));
+        let is_of_one = self.model.is_some()
+            || self.rate.is_some()
+            || self.robust.is_some()
+            || self.signal_zero.is_some()
+            || self.from.is_some()
+            || self.report.is_some()
+            || !self.test.is_empty()
+            || self.force;
+        ensure!(
+            !(is_together && is_of_one),
+            "--signal: several gauges are calibrated together, by one model and without a report: leave --model, --rate, --robust, \
+             --signal-zero, --from, --report, --test and --force out; --signal auto:s1,s2 takes the best of several columns"
+        );
+        Ok(is_together || self.prior.is_some() || self.session.is_some())
+    }
+
     fn options(&self) -> Options {
-        let base = if self.paper {
-            Options::paper()
-        } else {
-            Options { rate: self.rate, ..Options::default() }
+        let base = match self.rate {
+            Some(Rate::Paper) => Options::paper(),
+            Some(Rate::Of(rate)) => Options { rate, ..Options::default() },
+            None => Options::default(),
         };
         Options {
-            signal: self.signal.clone(),
+            signal: match self.signal() {
+                Signal::One(name) => name,
+                _ => String::new(),
+            },
             reference: self.reference.clone(),
             // a signal is ranked, and a model chosen, beginning from the published one
-            model: match self.model {
+            model: match self.model() {
                 Model::Auto => base.model,
                 Model::One(kind) => kind,
             },
@@ -181,8 +267,8 @@ impl Args {
             return Err(with_columns_to_name(error, own));
         }
         let models = [Model::Auto, Model::One(ModelKind::Linear), Model::One(ModelKind::Curve)];
-        anyhow::ensure!(
-            models.contains(&self.model),
+        ensure!(
+            models.contains(&self.model()),
             "{error}; weights and readings without a time are calibrated with --model curve or --model linear"
         );
         // the time of a table is the number of the row
@@ -190,87 +276,107 @@ impl Args {
         Ok((read_trials(&self.trials, Split::Fit, columns)?, true))
     }
 
-    /// What a diagnosis names, where the model asks for it.
+    /// What a diagnosis names, that was written before or is made of the trials as a gauge alone, where the model asks for it.
     fn causes(&self, trials: &[Trial], options: &Options) -> anyhow::Result<Causes> {
-        let is_asked = match self.model {
-            Model::Auto => true,
-            Model::One(kind) => {
-                matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. })
+        match (self.model(), &self.from) {
+            (Model::One(kind), _)
+                if !matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. }) =>
+            {
+                Ok(Causes::default())
             }
-        };
-        if let Some(path) = self.from.as_ref().filter(|_| is_asked) {
-            return causes::read(path, &self.trials);
+            (_, Some(path)) => read_causes(path, &self.trials),
+            (_, None) => {
+                let bar = spinner();
+                bar.set_message("diagnosing the gauge");
+                let show = |text: &str| bar.set_message(text.to_owned());
+                let causes = Causes::of(trials, options, &show, &|| false);
+                bar.finish_and_clear();
+                Ok(causes)
+            }
         }
-        match is_asked {
-            true => Ok(causes::of(trials, options)),
-            false => Ok(Causes::default()),
-        }
-    }
-
-    /// The signals to choose from; none when one was named.
-    fn candidates(&self, trials: &[Trial]) -> Vec<String> {
-        if self.signal == "auto" {
-            let channels = trials.first().map(|trial| trial.channels.as_slice()).unwrap_or(&[]);
-            let named = channels.iter().map(|channel| channel.name.clone());
-            return named.filter(|name| *name != self.reference).collect();
-        }
-        if self.signal.contains(',') {
-            return self.signal.split(',').map(|name| name.trim().to_owned()).collect();
-        }
-        Vec::new()
     }
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Output<'a> {
-    signal: &'a str,
-    candidates: &'a [Candidate],
-    models: &'a [ModelRow],
-    model: String,
-    why: Option<&'a str>,
-    fits: &'a [FitReport],
-    notes: &'a [String],
+/// The newest diagnosis that is read.
+const SCHEMA: u32 = 1;
+
+/// What is read of a diagnosis before the rest.
+#[derive(Deserialize)]
+struct Schema {
+    schema: u32,
+    data_set: Option<String>,
+}
+
+/// What a diagnosis names that was written, for some trials.
+fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
+    let name = || path.display().to_string();
+    let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
+    let schema: Schema = serde_json::from_str(&text).with_context(|| {
+        format!("{}: this is no diagnosis; make one with stretch diagnose --json=d.json", name())
+    })?;
+    ensure!(
+        schema.schema <= SCHEMA,
+        "{}: a diagnosis of schema {}, newer than this release reads ({SCHEMA}); use the release that wrote it",
+        name(),
+        schema.schema
+    );
+    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(name)?;
+    let found = causes(&diagnosis);
+    if found.is_empty() {
+        bail!(
+            "{}: no effect of the gauge or its reference is in this diagnosis, which says: {} Calibrate with --model observer or auto without --from",
+            name(),
+            diagnosis.sentence
+        );
+    }
+    let of =
+        schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
+    let mut notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
+    // Another rig of the same make may lack the same; whose names they are is said.
+    if let ([own], Some(set)) = (trials, &schema.data_set)
+        && name_of(own) != *set
+    {
+        notes.push(format!(
+            "the diagnosis is of {set} and these trials are of {}: where that is another rig, diagnose it, or leave --from out",
+            name_of(own)
+        ));
+    }
+    Ok(Causes { found, notes })
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let files = [Some(args.out.as_path()), args.report.as_deref()];
-    args.json.share_stdout(files.into_iter().chain([args.sleeve.file()]))?;
-    if args.sleeve.is_asked() {
-        return args.sleeve.run(&Asked {
-            trials: &args.trials,
-            signal: &args.signal,
-            reference: &args.reference,
-            rest_length: args.rest_length,
-            columns: args.recorded.options(),
-            out: &args.out,
-            json: &args.json,
-        });
+    let files = [Some(args.out.as_path()), args.report.as_deref(), args.session.as_deref()];
+    args.json.share_stdout(files)?;
+    if args.is_sleeve()? {
+        return calibrate_sleeve::run(&args);
     }
-    anyhow::ensure!(
+    ensure!(
         !args.reference.contains(','),
-        "--reference {}: several references are those of several gauges; name these with --signals",
+        "--reference {}: several references are those of several gauges; name these with --signal s1,s2",
         args.reference
     );
     let mut options = args.options();
-    let mut columns = args.recorded.options().require(&args.reference);
-    if args.signal != "auto" {
-        for signal in args.signal.split(',') {
-            columns = columns.require(signal.trim());
-        }
-    }
+    let signal = args.signal();
+    let named: &[String] = match &signal {
+        Signal::One(name) => std::slice::from_ref(name),
+        Signal::Best(names) | Signal::Together(names) => names,
+    };
+    let columns = args.recorded.options().require(&args.reference);
+    let mut columns = named.iter().fold(columns, |columns, name| columns.require(name));
     let (trials, is_table) = args.read(&mut columns)?;
     options.is_table = is_table;
     // signals that are only candidates may be anything, and the rows of a table may be far apart
-    let named = [args.reference.as_str(), args.signal.as_str()];
+    let named = [args.reference.as_str(), options.signal.as_str()];
     let named = if is_table { &[][..] } else { &named[..] };
     let (trials, gross_errors) = without_gross_errors(&trials, named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
-    let candidates = args.candidates(&trials);
-    let ranking = if candidates.is_empty() {
-        Vec::new()
-    } else {
-        rank_signals(&trials, &candidates, &options).map_err(named)?
+    let ranking = match signal {
+        Signal::Best(names) => {
+            let all = || other_columns(&trials, std::slice::from_ref(&args.reference));
+            let names = if names.is_empty() { all() } else { names };
+            rank_signals(&trials, &names, &options).map_err(named)?
+        }
+        _ => Vec::new(),
     };
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
@@ -281,7 +387,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         false => args.causes(&trials, &options)?.without_missing_pressure(&trials, &options),
     };
     options.causes.clone_from(&causes.found);
-    let choice = match args.model {
+    let choice = match args.model() {
         Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),
         Model::One(_) => None,
     };
@@ -314,18 +420,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let page = report(&args, &trials, &columns, fitted, (&ranking, choice.as_ref()), &options)?;
         stage_text(&mut outputs, path, &page)?;
     }
-    let answer = Output {
-        signal: &options.signal,
-        candidates: &ranking,
-        models: choice.as_ref().map_or(&[], |choice| &choice.rows),
-        model: options.model.to_string(),
-        why: choice.as_ref().map(|choice| choice.why.as_str()),
-        fits: &calibrated.fits,
-        notes: &calibrated.notes,
-    };
-    args.json.stage(&mut outputs, &answer)?;
-    outputs.keep()?;
-    args.json.say(&answer, || {
+    let answer = serde_json::json!({
+        "signal": options.signal,
+        "candidates": ranking,
+        "models": choice.as_ref().map_or(&[][..], |choice| &choice.rows),
+        "model": options.model.to_string(),
+        "why": choice.as_ref().map(|choice| &choice.why),
+        "fits": calibrated.fits,
+        "notes": calibrated.notes,
+    });
+    args.json.conclude(outputs, &answer, || {
         if let Some(choice) = &choice {
             print_models(choice, &options.reference)?;
         }
@@ -333,6 +437,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         tell(format!("wrote {}", args.out.display()))?;
         args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
     })
+}
+
+/// The columns of the first trial but some.
+pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> Vec<String> {
+    let channels = trials.first().into_iter().flat_map(|trial| &trial.channels);
+    channels.map(|channel| channel.name.clone()).filter(|name| !but.contains(name)).collect()
 }
 
 fn report(
@@ -367,4 +477,25 @@ fn report(
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
     Ok(calibration_page(&judged))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_is_one_column_the_best_of_some_or_gauges_together() {
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        for (text, signal) in [
+            ("Gauge (V)", Signal::One("gauge_v".to_owned())),
+            ("auto", Signal::Best(Vec::new())),
+            ("auto:s1, s2", Signal::Best(names(&["s1", "s2"]))),
+            ("all", Signal::Together(Vec::new())),
+            ("s1,s2", Signal::Together(names(&["s1", "s2"]))),
+        ] {
+            assert_eq!(text.parse(), Ok(signal), "{text}");
+        }
+        assert_eq!("paper".parse(), Ok(Rate::Paper));
+        assert_eq!("savgol:11,2".parse(), Ok(Rate::Of(RateEstimator::SAVGOL_11_2)));
+    }
 }

@@ -2,9 +2,10 @@
 
 use stretch_calibrate::{Calibrated, Candidate, FitReport, MODELS_IN_WORDS, ModelChoice, ModelRow};
 use stretch_data::unit_of;
+use stretch_report::{order_table, signal_table};
 
 use super::shared::{say, tell};
-use crate::table::{maybe, number, table};
+use crate::table::{maybe, number, table, table_text};
 
 /// What `auto` rests on.
 pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
@@ -72,12 +73,7 @@ pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::R
 /// How well each part was fitted.
 pub(super) fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     if !ranking.is_empty() {
-        say("Signals, by error on data left out of the fit (normalised):")?;
-        let row = |c: &Candidate| {
-            let shown = c.problem.clone().unwrap_or_else(|| maybe(c.cross_validated_rmse));
-            vec![c.signal.clone(), shown]
-        };
-        say(table(&["signal", "cross-validated RMSE"], ranking.iter().map(row)))?;
+        say(table_text(&signal_table(ranking)))?;
     }
     let row = |fit: &FitReport| {
         vec![
@@ -114,24 +110,7 @@ fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
         })
     });
     say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
-    // an order alone is beside nothing
-    if calibrated.fits.iter().any(|fit| fit.orders.len() > 1) {
-        say("Orders beside it (CV: on data left out of the fit):")?;
-        let rows = calibrated.fits.iter().flat_map(|fit| {
-            fit.orders.iter().map(|order| {
-                let chosen = Some(&order.model) == fit.recommended.as_ref();
-                vec![
-                    format!("{} {}", fit.name, order.model),
-                    order.terms.to_string(),
-                    order.r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),
-                    maybe(order.rmse.map(|x| 100.0 * x)),
-                    maybe(order.cross_validated_rmse.map(|x| 100.0 * x)),
-                    if chosen { "recommended".to_owned() } else { String::new() },
-                ]
-            })
-        });
-        let header = ["order", "terms", "R^2", "RMSE %", "CV RMSE %", ""];
-        say(table(&header, rows))?;
-    }
-    Ok(())
+    // an order alone has nothing to be compared with
+    let mut fits = calibrated.fits.iter().filter(|fit| fit.orders.len() > 1);
+    fits.try_for_each(|fit| say(table_text(&order_table(fit))))
 }

@@ -1,31 +1,34 @@
 //! `stretch demo`: the whole job, on the simulated rig or on measured sessions.
 
-mod job;
 mod published;
 mod sessions;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use stretch_calibrate::{MODELS_IN_WORDS, apply, write_calibration};
+use indicatif::{MultiProgress, ProgressBar};
+use stretch_calibrate::{
+    Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, MethodErrors, ModelChoice, ModelKind,
+    Options, apply, calibrate, choose_model, evaluate, rank_signals, write_calibration,
+};
 use stretch_data::files::write_folder;
 use stretch_data::{Trial, TrialKind, listed};
+use stretch_problem::{Examined, Problem};
 use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
 use super::{
     apply::estimates_csv,
     calibration_text::{print as print_calibration, print_fits, print_models, print_notes},
-    diagnose::print as print_diagnosis,
+    diagnose::{print as print_diagnosis, told_on},
     evaluate::print_errors,
     json::Json,
     reading::column,
-    shared::{or_force, say, tell, write_text},
+    shared::{or_force, say, spinner, tell, write_text},
     simulate,
 };
 use crate::display::is_verbose;
-use job::Job;
-use sessions::{Sessions, Wanted};
+use sessions::Sessions;
 
 /// The whole job: calibrate, judge, and say why simulator and rig disagree; one report
 ///
@@ -83,7 +86,7 @@ const SEED: u64 = 3;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if args.paper {
-        return super::paper::run(&args.out, args.force, SEED, &args.json);
+        return crate::paper::run(&args.out, args.force, SEED, &args.json);
     }
     let mut done = None;
     let written = write_folder(&args.out, args.force, |folder| {
@@ -113,9 +116,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
     let (title, sessions) = match &args.data {
         Some(path) => {
-            let wanted =
-                Wanted { reference: args.reference.as_deref(), signal: args.signal.as_deref() };
-            let sessions = Sessions::read(path, &wanted)?;
+            let (reference, signal) = (args.reference.as_deref(), args.signal.as_deref());
+            let sessions = Sessions::read(path, reference, signal)?;
             (format!("{}: {} from a stretch sensor", sessions.name, sessions.reference), sessions)
         }
         None => {
@@ -136,7 +138,7 @@ fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     let rig = demo_preset()?;
     let settings = RunSettings { seed: SEED, ..RunSettings::default() };
     simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(SEED))?;
-    let mut sessions = Sessions::read(folder, &Wanted::default())?;
+    let mut sessions = Sessions::read(folder, None, None)?;
     let in_words = |e: &ActiveEffect| {
         effect_named(e.name()).map_or(e.name(), |effect| effect.title).to_owned()
     };
@@ -188,6 +190,104 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     let subject = Subject::of(&job.problem, &job.examined);
     write_text(&file("report.html"), &demo_page(&judged, &subject))?;
     write_text(&file("estimate.svg"), &readme_picture(&shown, evaluation))
+}
+
+/// Everything that was found.
+struct Job {
+    /// Signals by error, the best first.
+    ranking: Vec<Candidate>,
+    problem: Problem,
+    examined: Examined,
+    calibrations: Calibrations,
+}
+
+/// The paper's two calibrations, the chosen one, and their errors on the test trials.
+struct Calibrations {
+    linear: Calibrated,
+    surfaces: Calibrated,
+    chosen: Calibrated,
+    choice: ModelChoice,
+    /// What the chosen one is called.
+    name: String,
+    evaluation: Evaluation,
+    /// Errors by kind of trial, where there are several.
+    kinds: Vec<(String, Vec<MethodErrors>)>,
+}
+
+impl Job {
+    /// # Errors
+    /// Trials that cannot be calibrated on or diagnosed.
+    fn of(sessions: &Sessions) -> anyhow::Result<Self> {
+        let bars = MultiProgress::new();
+        let [fitting, asking] = [(); 2].map(|()| bars.add(spinner()));
+        let options = Options { reference: sessions.reference.clone(), ..Options::default() };
+        let fit: Vec<Trial> = sessions.fit.iter().map(|(_, trial)| trial.clone()).collect();
+        let ranking = match &sessions.signals[..] {
+            [_] => Vec::new(),
+            several => rank_signals(&fit, several, &options)?,
+        };
+        let best = ranking.first().map(|best| &best.signal).or(sessions.signals.first());
+        let options = Options { signal: best.cloned().unwrap_or_default(), ..options };
+        // neither waits for the other
+        let (calibrations, examined) = std::thread::scope(|scope| {
+            let asked = scope.spawn(|| -> anyhow::Result<(Problem, Examined)> {
+                let problem = sessions.problem(&options.signal)?;
+                let options = stretch_gap::Options { responses: true, ..Default::default() };
+                let examined = problem.examine(&options, true, &told_on(&asking), &|| false)?;
+                asking.finish_and_clear();
+                Ok((problem, examined))
+            });
+            let calibrations = Calibrations::of(sessions, &fit, &options, &fitting);
+            fitting.finish_and_clear();
+            (calibrations, asked.join())
+        });
+        let (problem, examined) = match examined {
+            Ok(examined) => examined?,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        Ok(Self { ranking, problem, examined, calibrations: calibrations? })
+    }
+}
+
+impl Calibrations {
+    fn of(
+        sessions: &Sessions,
+        fit: &[Trial],
+        options: &Options,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<Self> {
+        bar.set_message("calibrating");
+        let ramps = sessions.ramps();
+        let linear = calibrate(&ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
+        let surfaces = calibrate(&ramps, options)?;
+        bar.set_message("choosing a model by cross-validation");
+        let choice = choose_model(fit, options)?;
+        let chosen = calibrate(fit, &Options { model: choice.model, ..options.clone() })?;
+        let name = format!("chosen ({})", choice.model);
+        bar.set_message("judging");
+        let methods = [
+            ("linear", &linear.calibration),
+            ("non-linear", &surfaces.calibration),
+            (name.as_str(), &chosen.calibration),
+        ];
+        let test: Vec<Trial> = sessions.test.iter().map(|(_, trial)| trial.clone()).collect();
+        let evaluation = evaluate(&methods, &test)?;
+        let mut names: Vec<TrialKind> = sessions.test.iter().map(|(kind, _)| *kind).collect();
+        names.sort();
+        names.dedup();
+        let mut kinds = Vec::new();
+        for kind in names.iter().filter(|_| names.len() > 1) {
+            let own = sessions.test.iter().filter(|(k, _)| k == kind);
+            let trials: Vec<Trial> = own.map(|(_, trial)| trial.clone()).collect();
+            kinds.push((kind.to_string(), evaluate(&methods, &trials)?.pooled));
+        }
+        Ok(Self { linear, surfaces, chosen, choice, name, evaluation, kinds })
+    }
+
+    /// By the names that the evaluation knows them by.
+    fn shown(&self) -> [(&str, &Calibrated); 3] {
+        [("linear", &self.linear), ("non-linear", &self.surfaces), (&self.name, &self.chosen)]
+    }
 }
 
 fn trials(count: usize) -> String {

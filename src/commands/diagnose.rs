@@ -7,17 +7,15 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
+use clap::builder::NonEmptyStringValueParser;
 use indicatif::ProgressBar;
 use stretch_data::files::{FileError, Outputs};
-use stretch_gap::{Diagnosis, Options};
+use stretch_gap::{Diagnosis, Options, VerdictKind};
 use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
 use stretch_report::{Subject, diagnosis_page};
 
 use super::{
-    by_trial::{By, print_by_trial},
-    diagnosis_files::{write_fix, write_snippets},
-    diagnosis_text::text,
-    fail_on::FailOn,
+    diagnosis_output::{print_by_trial, text, write_fix, write_snippets},
     json::Json,
     reading::{Rows, TimeColumn, column, columns},
     shared::{detail, say, say_first, spinner, stage_text, tell},
@@ -119,11 +117,8 @@ pub(crate) struct Args {
     ///
     /// A run is a trial, or with the name of a column all samples in which it has one value, such as a load. The output also says in
     /// what the runs disagree, and which values the data determine.
-    #[arg(long, value_name = "trial|COLUMN")]
-    by: Option<By>,
-    /// Say what simpler methods would have named, too
-    #[arg(long)]
-    baselines: bool,
+    #[arg(long, value_name = "trial|COLUMN", value_parser = NonEmptyStringValueParser::new())]
+    by: Option<String>,
     /// Exit with status 3 for these verdicts: gap, any, ...
     ///
     /// Several with commas: effect (one is named, wholly or in part),
@@ -138,6 +133,37 @@ pub(crate) struct Args {
         hide_possible_values = true
     )]
     fail_on: Vec<FailOn>,
+}
+
+/// What `stretch diagnose --fail-on` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum FailOn {
+    Effect,
+    Unknown,
+    Record,
+    Faint,
+    Parameters,
+    Gap,
+    Any,
+}
+
+impl FailOn {
+    /// Whether a diagnosis is one of those.
+    fn covers(self, diagnosis: &Diagnosis) -> bool {
+        use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
+        let verdict = diagnosis.verdict;
+        match self {
+            // a partial answer names an effect, and leaves what nothing explains
+            Self::Effect => matches!(verdict, Effect | Partial),
+            Self::Unknown => matches!(verdict, Unknown | Partial),
+            Self::Record => verdict == Record,
+            Self::Faint => diagnosis.is_faint(),
+            Self::Parameters => verdict == Parameters,
+            // what hides a gap is no agreement
+            Self::Gap => !diagnosis.is_agreement(),
+            Self::Any => verdict != NoGap || diagnosis.is_faint() || !diagnosis.is_agreement(),
+        }
+    }
 }
 
 /// Diagnoses, and says with which status the program ends.
@@ -162,11 +188,8 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         let is_empty = std::fs::read_dir(folder).is_ok_and(|mut held| held.next().is_none());
         ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
     }
-    let options = Options {
-        baselines: args.baselines,
-        responses: args.report.is_some(),
-        ..Options::default()
-    };
+    let options =
+        Options { baselines: is_verbose(), responses: args.report.is_some(), ..Options::default() };
     let bar = spinner();
     bar.set_message("reading; a simulator of your own is started");
     let shown = || args.data_set.display().to_string();
@@ -176,7 +199,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         strict: args.rows.strict,
         rig: args.rig.as_deref(),
         columns: args.reference.as_deref().zip(args.signal.as_deref()),
-        by: args.by.as_ref().and_then(By::column),
+        by: args.by.as_deref().filter(|by| *by != "trial"),
         without: &args.without,
         announce: Some(announce),
     };
@@ -198,9 +221,9 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let stop = &|| false;
     let examined =
         problem.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
-    let by_trial = args.by.as_ref().map(|by| match by {
-        By::Trial => problem.by_trial(&examined, &told_on(&bar), stop),
-        By::Column(name) => problem.by_column(name, &examined, &told_on(&bar), stop),
+    let by_trial = args.by.as_deref().map(|by| match by {
+        "trial" => problem.by_trial(&examined, &told_on(&bar), stop),
+        name => problem.by_column(name, &examined, &told_on(&bar), stop),
     });
     let by_trial = by_trial.transpose().with_context(|| format!("{}: --by", shown()))?;
     bar.finish_and_clear();
@@ -257,7 +280,6 @@ fn conclude(
     if let Some(by_trial) = by_trial {
         answer["by_trial"] = serde_json::to_value(by_trial)?;
     }
-    args.json.stage(&mut outputs, &answer)?;
     if let Some(path) = &args.report {
         let page = diagnosis_page(&Subject::of(problem, examined).by_trial(by_trial));
         stage_text(&mut outputs, path, &page)?;
@@ -269,8 +291,7 @@ fn conclude(
     if let Some(folder) = &args.snippets {
         said.push(write_snippets(&mut outputs, folder, &examined.implementations)?);
     }
-    outputs.keep()?;
-    args.json.say(&answer, || {
+    args.json.conclude(outputs, &answer, || {
         print(examined)?;
         by_trial.iter().try_for_each(|by_trial| print_by_trial(by_trial))?;
         said.iter().try_for_each(tell)

@@ -1,20 +1,23 @@
 //! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use stretch_effects::{
     Effect, EffectParameter, Extent, Grid, KINDS, Kind, Language, Quantity, Role, Signals, Sketch,
     kind_named,
 };
-use stretch_problem::notation;
+use stretch_gap::{Options, diagnose};
+use stretch_problem::{Reading, notation};
+use stretch_report::limit_table;
 use stretch_sim::{CATALOGUE, RATE_HZ, RigParams, SimError, effect_named};
 
 use super::{
-    detectable,
+    diagnose::{announce, open, told_on},
     json::Json,
-    shared::{say, say_as_is},
+    shared::{detail, say, say_as_is, spinner},
 };
+use crate::table::table_text;
 
 /// List the effects that can be added to the simulated rig
 ///
@@ -29,8 +32,8 @@ use super::{
 ///
 ///   stretch effects gauge_hysteresis --code python
 ///
-/// With --kinds the kinds that they are made of: what `wrap` in a problem file puts in
-/// front of or behind any simulator, with ranges for a channel from 0 to 1.
+/// `stretch effects kinds` lists the kinds that they are made of: what `wrap` in a problem file
+/// puts in front of or behind any simulator, with ranges for a channel from 0 to 1.
 ///
 /// With --data how strong each effect of a problem would have to be to be named on its data
 /// with probability 0.9, its simulator being right otherwise:
@@ -39,35 +42,24 @@ use super::{
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Effects to list [default: all]
+    /// Effects to list [default: all]; kinds, for any channel, behind the word kinds
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// List kinds, for any channel, in place of the rig's effects
-    #[arg(long)]
-    kinds: bool,
     /// List what would be named on these data instead: a folder with dataset.toml, a trial, or problem.toml
-    #[arg(long, value_name = "DATASET", conflicts_with_all = ["kinds", "code"])]
+    #[arg(long, value_name = "DATASET", conflicts_with = "code")]
     data: Option<PathBuf>,
     #[command(flatten)]
     json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
-    #[arg(
-        long,
-        value_enum,
-        value_name = "c|python|matlab",
-        hide_possible_values = true,
-        conflicts_with = "json",
-        requires = "names"
-    )]
-    code: Option<Code>,
+    #[arg(long, value_name = "c|python|matlab", value_parser = language, conflicts_with = "json",
+          requires = "names")]
+    code: Option<Language>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Code {
-    C,
-    Python,
-    #[value(alias = "octave")]
-    Matlab,
+fn language(name: &str) -> Result<Language, &'static str> {
+    let name = if name == "octave" { "matlab" } else { name };
+    let of_name = |language: &Language| language.name().eq_ignore_ascii_case(name);
+    Language::ALL.into_iter().find(of_name).ok_or("write c, python or matlab")
 }
 
 /// An effect of the rig, or a kind for any channel.
@@ -77,8 +69,8 @@ enum Entry {
 }
 
 impl Entry {
-    fn named(name: &str, kinds: bool) -> Result<Self, SimError> {
-        let effect = effect_named(name).filter(|_| !kinds).map(Self::Effect);
+    fn named(name: &str, is_kind: bool) -> Result<Self, SimError> {
+        let effect = effect_named(name).filter(|_| !is_kind).map(Self::Effect);
         effect.or_else(|| kind_named(name).map(Self::Kind)).ok_or_else(|| {
             let names = CATALOGUE.iter().map(|e| e.name).chain(KINDS.iter().map(|k| k.name));
             let nearest = stretch_data::nearest(name, names).map(str::to_owned);
@@ -124,24 +116,20 @@ const CHANNEL: Extent = Extent::between(0.0, 1.0);
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(data) = &args.data {
-        return detectable::run(data, &args.names, &args.json);
+        return list_limits(data, &args.names, &args.json);
     }
-    let chosen: Vec<Entry> = match (args.names.is_empty(), args.kinds) {
-        (true, true) => KINDS.iter().copied().map(Entry::Kind).collect(),
-        (true, false) => CATALOGUE.iter().copied().map(Entry::Effect).collect(),
-        (false, kinds) => {
-            args.names.iter().map(|name| Entry::named(name, kinds)).collect::<Result<_, _>>()?
-        }
+    let (are_kinds, names) = match args.names.split_first() {
+        Some((word, names)) if word == "kinds" => (true, names),
+        _ => (false, &args.names[..]),
     };
-    if let Some(code) = args.code {
-        let language = match code {
-            Code::C => Language::C,
-            Code::Python => Language::Python,
-            Code::Matlab => Language::Matlab,
-        };
-        return chosen
-            .iter()
-            .try_for_each(|entry| say_as_is(typical_code(entry, language)?.trim_end()));
+    let chosen: Vec<Entry> = match (names, are_kinds) {
+        ([], true) => KINDS.iter().copied().map(Entry::Kind).collect(),
+        ([], false) => CATALOGUE.iter().copied().map(Entry::Effect).collect(),
+        _ => names.iter().map(|name| Entry::named(name, are_kinds)).collect::<Result<_, _>>()?,
+    };
+    if let Some(language) = args.code {
+        let code = |entry: &Entry| typical_code(entry, language);
+        return chosen.iter().try_for_each(|entry| say_as_is(code(entry)?.trim_end()));
     }
     let answer: Vec<_> = chosen.iter().map(json).collect();
     args.json.answer(&answer, || list(&chosen))
@@ -214,4 +202,31 @@ fn json(entry: &Entry) -> serde_json::Value {
     serde_json::json!({
         "name": name, "words": words, "stage": place, "equation": equation, "parameters": parameters,
     })
+}
+
+/// Diagnoses the data and shows the detection limits of the effects with some names, of all without a name.
+fn list_limits(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()> {
+    ensure!(data.exists(), "{}: there is no such file or folder", data.display());
+    let bar = spinner();
+    bar.set_message("reading; a simulator of your own is started");
+    let problem = open(data, &Reading { announce: Some(announce), ..Reading::default() })?;
+    detail(format!("read {}", data.display()));
+    let options = Options { detection_limits: true, ..Options::default() };
+    let (diagnosis, _) = diagnose(problem.simulator(), &options, &told_on(&bar), &|| false)
+        .with_context(|| data.display().to_string())?;
+    bar.finish_and_clear();
+    let mut limits = diagnosis.detection_limits;
+    ensure!(
+        !limits.is_empty(),
+        "{}: these data carry no name, whatever the strength: {}",
+        data.display(),
+        diagnosis.sentence
+    );
+    for name in names {
+        let is_known = limits.iter().any(|limit| limit.effect == *name);
+        let all: Vec<&str> = limits.iter().map(|limit| limit.effect.as_str()).collect();
+        ensure!(is_known, "{name}: these data are not asked for it, only for {}", all.join(", "));
+    }
+    limits.retain(|limit| names.is_empty() || names.contains(&limit.effect));
+    json.answer(&limits, || say(table_text(&limit_table(&limits))))
 }

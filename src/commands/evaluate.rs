@@ -7,15 +7,15 @@ use stretch_calibrate::{
     off_throughout, read_calibration, worse_than_the_mean,
 };
 use stretch_data::Split;
+use stretch_report::{comparison_table, method_table};
 
 use super::{
     json::Json,
-    pace::Pace,
-    reading::{Recorded, read_trials, with_columns_to_name},
+    reading::{Pace, Recorded, read_trials, with_columns_to_name},
     shared::{say, short_name},
 };
 use crate::display::warn;
-use crate::table::{maybe, number, p_value, table};
+use crate::table::table_text;
 
 /// Judge calibrations on trials that have a reference
 ///
@@ -98,23 +98,8 @@ pub(super) fn print_errors(
     methods: &[MethodErrors],
     unit: &str,
 ) -> anyhow::Result<()> {
-    let rmse = format!("RMSE {unit}").trim_end().to_owned();
-    let header =
-        ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "outside"];
-    let row = |m: &MethodErrors| {
-        vec![
-            m.method.clone(),
-            number(m.average_error_percent),
-            number(m.average_error_percent_of_reference),
-            number(m.rmse),
-            number(m.rmse_percent),
-            format!("{:.4}", m.r_squared),
-            maybe(m.lag_s),
-            m.clamped.to_string(),
-        ]
-    };
-    say(format!("{title}:"))?;
-    say(table(&header, methods.iter().map(row)))
+    let names: Vec<String> = methods.iter().map(|errors| errors.method.clone()).collect();
+    say(table_text(&method_table(title, methods, &names, unit)))
 }
 
 /// The paper's table, a trial each and pooled.
@@ -127,26 +112,11 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
         print_errors("All trials", &evaluation.pooled, unit)?;
     }
     say(
-        "Average error: mean |reference - estimate| over the range of the estimate (the paper's), and over that of the \
-         reference. Lag: positive when the estimate runs behind. Outside: samples that the calibration had to hold at the ends of its range.",
+        "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Lag: positive when the estimate runs \
+         behind. Outside domain: samples that the calibration had to hold at the ends of its range.",
     )?;
-    if !evaluation.comparisons.is_empty() {
-        let mean = format!("difference of mean error, {unit}");
-        let mean = mean.trim_end_matches(", ");
-        let header = ["first - second", mean, "95 % interval", "P, samples", "P, blocks", "blocks"];
-        let rows = evaluation.comparisons.iter().map(|c| {
-            let interval = c.interval_95;
-            vec![
-                format!("{} - {}", c.first, c.second),
-                number(c.mean_difference),
-                interval.map_or("-".to_owned(), |(a, b)| format!("{} .. {}", number(a), number(b))),
-                p_value(c.p_samples),
-                p_value(c.p_blocks),
-                c.blocks.to_string(),
-            ]
-        });
-        say("Paired t tests of absolute errors:")?;
-        say(table(&header, rows))?;
+    if evaluation.comparisons.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    say(table_text(&comparison_table(&evaluation.comparisons, unit, str::to_owned)))
 }

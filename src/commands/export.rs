@@ -23,7 +23,7 @@ use super::shared::{give_stdout, say, tell};
 ///   stretch export --calibration cal.json --c StretchReceptor --arduino
 ///
 /// makes a folder for the libraries of the Arduino IDE, with an example that reads A0. Of several gauges
-/// (`stretch calibrate --signals`) a step takes a sample of each, and the example reads A0, A1 and so on.
+/// (`stretch calibrate --signal s1,s2`) a step takes a sample of each, and the example reads A0, A1 and so on.
 ///
 /// For a board with firmware in Rust and without floating point, as a record in postcard:
 ///

@@ -51,30 +51,20 @@ impl Json {
         give_stdout(files)
     }
 
-    /// Puts the JSON among the files of a command, where it is one of them.
+    /// Keeps all files of a command, the JSON among them, and says the result, as JSON or as text, once they are there.
     ///
     /// # Errors
     /// A file that cannot be written, a value that JSON cannot hold.
-    pub(crate) fn stage(
+    pub(crate) fn conclude(
         &self,
-        outputs: &mut Outputs,
-        value: &impl Serialize,
-    ) -> anyhow::Result<()> {
-        match self.file() {
-            Some(path) => stage_text(outputs, path, &(serde_json::to_string_pretty(value)? + "\n")),
-            None => Ok(()),
-        }
-    }
-
-    /// Says the result, as JSON or as text, once all files are there.
-    ///
-    /// # Errors
-    /// A value that JSON cannot hold.
-    pub(crate) fn say(
-        &self,
+        mut outputs: Outputs,
         value: &impl Serialize,
         text: impl FnOnce() -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
+        if let Some(path) = self.file() {
+            stage_text(&mut outputs, path, &(serde_json::to_string_pretty(value)? + "\n"))?;
+        }
+        outputs.keep()?;
         if self.is_printed() {
             return say_as_is(serde_json::to_string_pretty(value)?);
         }
@@ -82,19 +72,16 @@ impl Json {
         self.file().map_or(Ok(()), |path| tell(format!("wrote {}", path.display())))
     }
 
-    /// [`Json::stage`] and [`Json::say`] of a command that writes no other file.
+    /// [`Json::conclude`] of a command that writes no other file.
     ///
     /// # Errors
-    /// As those.
+    /// As that.
     pub(crate) fn answer(
         &self,
         value: &impl Serialize,
         text: impl FnOnce() -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let mut outputs = Outputs::default();
-        self.stage(&mut outputs, value)?;
-        outputs.keep()?;
-        self.say(value, text)
+        self.conclude(Outputs::default(), value, text)
     }
 }
 

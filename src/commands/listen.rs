@@ -1,9 +1,7 @@
 //! `stretch listen`: a board's live link, shown and recorded.
 
 mod port;
-mod status;
 mod trial_file;
-mod twin;
 mod view;
 
 use std::{
@@ -14,19 +12,21 @@ use std::{
 };
 
 use anyhow::Context;
-use stretch_calibrate::parse_adc;
+use stretch_calibrate::{BoardReceptor, parse_adc, read_calibration};
+use stretch_core::{Branch, Calibration, RateEstimator, Runner, Volts};
 use stretch_data::files::is_standard_output;
 use stretch_link::{Answer, Decoder, Event, TimeLine};
-use stretch_receptor::code::{Adc, AdcCode};
+use stretch_receptor::{
+    Receptor,
+    code::{Adc, AdcCode},
+};
 
 use self::{
     port::Heard,
-    status::Status,
     trial_file::{Sample, TrialFile},
-    twin::Twin,
-    view::View,
+    view::{Status, View},
 };
-use super::stop;
+use super::shared::{begin_recording, is_ended};
 use crate::display::warn;
 
 /// Show and record what a board sends over its serial port
@@ -53,18 +53,15 @@ use crate::display::warn;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Serial port, or - for standard input
-    #[arg(long, value_name = "PATH|-")]
-    port: PathBuf,
+    /// Serial port, with its speed behind a colon [default: 115200], or - for standard input
+    #[arg(long, value_name = "PATH:BAUD|-")]
+    port: String,
     /// Record from `stretch calibrate`, or from `stretch export --fixed`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
     /// Trial to record, a line a sample as it comes; must not exist; - for standard output
     #[arg(long, value_name = "trial.csv|-")]
     out: Option<PathBuf>,
-    /// Speed of the port
-    #[arg(long, default_value_t = 115_200, value_name = "BAUD")]
-    baud: u32,
     /// The board's converter: bits, and the signal at code 0 and at the last code
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
           value_parser = parse_adc)]
@@ -73,15 +70,15 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let twin = Twin::read(&args.calibration, args.adc.spec().bits)?;
-    let shown_port = args.port.display();
-    let heard = port::listen(&args.port, args.baud).with_context(|| format!("{shown_port}"))?;
+    let (shown_port, baud) = path_and_speed(&args.port);
+    let heard = port::listen(Path::new(shown_port), baud).with_context(|| shown_port.to_owned())?;
     let header = trial_file::header(&twin);
     // last of what can fail: a start that fails leaves nothing behind
     let out = args.out.as_deref();
     let file = out.filter(|out| !is_standard_output(out));
     let recording = file.map(|path| TrialFile::create(path, &header)).transpose();
     let mut recording = recording.with_context(|| cannot_record(file))?;
-    stop::record();
+    begin_recording();
     let has_rows = out.is_some_and(is_standard_output) || !io::stdout().is_terminal();
     let mut view = View::open(&header, has_rows, recording.is_none());
     if !twin.answers() {
@@ -89,7 +86,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let mut session = Samples::new(twin, args.adc);
     let mut result = Ok(());
-    while !stop::ended() {
+    while !is_ended() {
         let is_last = match heard.recv_timeout(Duration::from_millis(50)) {
             Ok(Heard::Bytes(bytes)) => {
                 let samples = session.take(&bytes);
@@ -132,6 +129,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ));
     }
     result.and(finished).with_context(|| cannot_record(file))
+}
+
+/// The path of a port and its speed, which may stand behind a colon; a path may have colons itself.
+fn path_and_speed(port: &str) -> (&str, u32) {
+    let parts = port.rsplit_once(':').filter(|_| !Path::new(port).exists());
+    let speed = parts.and_then(|(path, speed)| Some((path, speed.parse().ok()?)));
+    speed.unwrap_or((port, 115_200))
 }
 
 /// What came is recorded before it is shown.
@@ -232,5 +236,100 @@ impl Samples {
         self.status.counts = self.decoder.counts();
         self.status.connected = false;
         last
+    }
+}
+
+/// What a record says of the stream, and the receptor that it describes.
+pub(super) struct Twin {
+    /// Column of the signal.
+    pub signal: String,
+    /// Unit of the estimate; empty where the record does not say.
+    pub unit: String,
+    /// Seconds a sample, where the record says so.
+    pub period_s: Option<f64>,
+    receptor: Own,
+}
+
+enum Own {
+    Volts(Box<Runner<Receptor<f64>>>),
+    Codes(BoardReceptor),
+    /// A rate that looks a sample ahead: nothing can be answered live.
+    Silent,
+}
+
+impl Twin {
+    /// Any record of `stretch calibrate` or of `stretch export --fixed`.
+    pub(super) fn read(path: &Path, adc_bits: u8) -> anyhow::Result<Self> {
+        let Some(receptor) = BoardReceptor::read(path) else {
+            return Self::of(&read_calibration(path)?);
+        };
+        let bits = receptor.adc_bits();
+        anyhow::ensure!(
+            bits == adc_bits,
+            "{}: this record is for a converter of {bits} bits; name it with --adc {bits},ZERO_V,FULL_SCALE_V",
+            path.display()
+        );
+        Ok(Self {
+            signal: "signal".to_owned(),
+            unit: String::new(),
+            period_s: None,
+            receptor: Own::Codes(receptor),
+        })
+    }
+
+    fn of(calibration: &Calibration) -> anyhow::Result<Self> {
+        let receptor = match (Receptor::new(calibration), calibration.spec().rate_estimator) {
+            (Ok(receptor), _) => Own::Volts(Box::new(Runner::new(receptor))),
+            (Err(_), RateEstimator::CentralDifference) => Own::Silent,
+            (Err(error), _) => return Err(error.into()),
+        };
+        Ok(Self {
+            signal: calibration.spec().signal.as_str().to_owned(),
+            unit: calibration.spec().reference.unit().to_owned(),
+            period_s: Some(calibration.spec().sample_rate_hz.period_s()),
+            receptor,
+        })
+    }
+
+    /// Whether it answers at all.
+    pub(super) fn answers(&self) -> bool {
+        !matches!(self.receptor, Own::Silent)
+    }
+
+    /// Forgets the stream.
+    pub(super) fn reset(&mut self) {
+        match &mut self.receptor {
+            Own::Volts(receptor) => receptor.reset(),
+            Own::Codes(receptor) => receptor.reset(),
+            Own::Silent => {}
+        }
+    }
+
+    /// The estimate of a sample, in the reference's unit, and its branch.
+    pub(super) fn step(&mut self, code: AdcCode, signal: Option<f64>) -> Option<(f64, Branch)> {
+        match &mut self.receptor {
+            Own::Volts(receptor) => {
+                let reading = receptor.step(Volts(signal.unwrap_or(f64::NAN))).ok()?;
+                Some((reading.estimate, reading.branch))
+            }
+            Own::Codes(receptor) => {
+                let reading = receptor.step(code).ok()?;
+                Some((f64::from(reading.estimate) / 1000.0, reading.branch))
+            }
+            Own::Silent => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::path_and_speed;
+
+    #[test]
+    fn a_speed_stands_behind_the_port() {
+        assert_eq!(path_and_speed("-"), ("-", 115_200));
+        assert_eq!(path_and_speed("/dev/ttyACM0"), ("/dev/ttyACM0", 115_200));
+        assert_eq!(path_and_speed("/dev/ttyACM0:9600"), ("/dev/ttyACM0", 9600));
+        assert_eq!(path_and_speed("usb-0:1:1.0"), ("usb-0:1:1.0", 115_200));
     }
 }

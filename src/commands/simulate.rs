@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
+use clap::builder::BoolishValueParser;
 use stretch_data::files::{FileError, is_standard_output, write_folder};
 use stretch_data::{DataError, DataSet, RigFile, TrialEntry};
 use stretch_recording::{ReadOptions, Recording};
@@ -42,13 +43,13 @@ pub(crate) struct Args {
     /// paper: six inflations, six deflations, arbitrary, pulses, and three test trials. arbitrary: one minute of random segments.
     /// pulses: one minute of pulse pairs.
     #[arg(long, default_value = "paper", value_name = "NAME|trial.csv")]
-    protocol: Protocol,
+    protocol: String,
     /// Add an effect, as NAME:PARAMETER=VALUE,...
     #[arg(long = "effect", value_name = "NAME:P=X", value_parser = parse_effect)]
     effects: Vec<EffectArg>,
     /// Noise and converter rounding [default: the rig file's, or on]
-    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true)]
-    noise: Option<Switch>,
+    #[arg(long, value_name = "on|off", hide_possible_values = true, value_parser = BoolishValueParser::new())]
+    noise: Option<bool>,
     /// Seed of noise and random commands [default: the rig file's, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=RunSettings::MOST_SEED))]
     seed: Option<u64>,
@@ -61,32 +62,6 @@ pub(crate) struct Args {
     /// Print the stock rig as a rig file, with units and meanings, and simulate nothing
     #[arg(long, exclusive = true)]
     print_rig: bool,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Protocol {
-    Paper,
-    Arbitrary,
-    Pulses,
-    /// A trial, or a folder with a data set.
-    Recorded(PathBuf),
-}
-
-impl From<&str> for Protocol {
-    fn from(text: &str) -> Self {
-        match text {
-            "paper" => Self::Paper,
-            "arbitrary" => Self::Arbitrary,
-            "pulses" => Self::Pulses,
-            path => Self::Recorded(path.into()),
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Switch {
-    On,
-    Off,
 }
 
 /// An effect as it is written on the command line.
@@ -145,7 +120,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let mut settings = written.unwrap_or_default();
     settings.seed = args.seed.unwrap_or(settings.seed);
-    settings.noise = args.noise.map_or(settings.noise, |noise| noise == Switch::On);
+    settings.noise = args.noise.unwrap_or(settings.noise);
     give_stdout([Some(out)])?;
     let plans = plans(&args.protocol, &rig, settings.seed)?;
     if is_standard_output(out) {
@@ -183,12 +158,13 @@ fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> 
     Ok(())
 }
 
-fn plans(protocol: &Protocol, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
+fn plans(protocol: &str, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
     let path = match protocol {
-        Protocol::Paper => return Ok(TrialPlan::paper(seed)),
-        Protocol::Arbitrary => return Ok(vec![TrialPlan::arbitrary(1, seed)]),
-        Protocol::Pulses => return Ok(vec![TrialPlan::pulses(1, seed)]),
-        Protocol::Recorded(path) => path.as_path(),
+        "paper" => return Ok(TrialPlan::paper(seed)),
+        "arbitrary" => return Ok(vec![TrialPlan::arbitrary(1, seed)]),
+        "pulses" => return Ok(vec![TrialPlan::pulses(1, seed)]),
+        // a trial, or a folder with a data set
+        path => Path::new(path),
     };
     let named = |path: &Path| path.display().to_string();
     ensure!(

@@ -1,14 +1,29 @@
 //! `stretch sleeve`: sensors that are put on again.
 
-mod learn;
-mod renew;
+use std::path::PathBuf;
+
+use serde_json::json;
+use stretch_data::Split;
+use stretch_data::files::Outputs;
+use stretch_recording::ReadOptions;
+use stretch_sleeve::{Assumed, Expected, Prior, RenewOptions, Renewed, Session, SleeveCalibration};
+
+use super::{
+    json::Json,
+    reading::{read_trials, with_columns_to_name},
+    shared::{give_stdout, of_files, say, tell, write_text},
+};
+use crate::{
+    display::warn,
+    table::{maybe, number, table},
+};
 
 /// Sensors that are put on again: learn from earlier sessions, renew a calibration without a reference
 ///
-/// `stretch calibrate --signals` calibrates several gauges, and writes with --session what `learn` takes.
+/// `stretch calibrate --signal s1,s2` calibrates several gauges, and writes with --session what `learn` takes.
 /// `stretch calibrate --prior` needs ten seconds to a minute of reference more, or none.
 ///
-///   stretch calibrate monday.csv --reference angle_deg --signals s1,s2 --of left/anna --session s/monday.json --out a.json
+///   stretch calibrate monday.csv --reference angle_deg --signal s1,s2 --of left/anna --session s/monday.json --out a.json
 ///   stretch sleeve learn s/*.json --out prior.json
 ///   stretch calibrate --prior prior.json --of left/anna half_a_minute.csv --out cal.json
 ///   stretch sleeve renew --prior prior.json --of left/anna today.csv --out cal.json
@@ -21,13 +36,126 @@ pub(crate) struct Args {
 
 #[derive(clap::Subcommand)]
 enum Step {
-    Learn(learn::Args),
-    Renew(renew::Args),
+    Learn(LearnArgs),
+    Renew(RenewArgs),
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     match args.step {
-        Step::Learn(args) => learn::run(args),
-        Step::Renew(args) => renew::run(args),
+        Step::Learn(args) => learn(args),
+        Step::Renew(args) => renew(args),
     }
+}
+
+/// Learn what earlier sessions say of the next one
+///
+/// Each session is a file that `stretch calibrate --session` wrote. The prior holds mean and covariance of the
+/// coefficients of one model over sessions, sensors and wearers.
+///
+///   stretch sleeve learn s/*.json --out prior.json
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+struct LearnArgs {
+    /// Sessions, at least three
+    #[arg(required = true, value_name = "SESSION.json")]
+    sessions: Vec<PathBuf>,
+    /// Where the prior goes
+    #[arg(long, value_name = "prior.json")]
+    out: PathBuf,
+}
+
+fn learn(args: LearnArgs) -> anyhow::Result<()> {
+    give_stdout([Some(args.out.as_path())])?;
+    let sessions: Result<Vec<_>, _> =
+        args.sessions.iter().map(|path| Session::read(path)).collect();
+    let prior = Prior::learn(&sessions?)?;
+    write_text(&args.out, &prior.to_json()?)?;
+    print_prior(&prior)?;
+    tell(format!("wrote {}", args.out.display()))
+}
+
+fn print_prior(prior: &Prior) -> anyhow::Result<()> {
+    let unit = prior.unit();
+    say(format!(
+        "{} sessions of {}. Errors on the end of each of them when it is left out:",
+        prior.sessions,
+        prior.signals.join(", ")
+    ))?;
+    let header =
+        ["reference s", &format!("RMSE {unit}, seen before"), &format!("RMSE {unit}, new")];
+    let row = |e: &Expected| vec![number(e.seconds), maybe(e.rmse_known), maybe(e.rmse_new)];
+    say(table(&header, prior.expected.iter().map(row)))
+}
+
+/// Renew a calibration for a sensor that was put on again, without a reference
+///
+/// It assumes that the movement has the ends and the rest of earlier sessions, and believes a shift and a scale as far
+/// as earlier sessions differed by: what lies beyond is refused. It prints what it assumes. Ten seconds of reference say
+/// more (`stretch calibrate --prior`).
+///
+///   stretch sleeve renew --prior prior.json --calibration yesterday.json today.csv --out cal.json
+///   stretch sleeve renew --prior prior.json --of left/anna today.csv --out cal.json
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+struct RenewArgs {
+    /// Recordings of today, without a reference
+    #[arg(required = true, value_name = "TODAY.csv")]
+    trials: Vec<PathBuf>,
+    /// The prior (`stretch sleeve learn`), which says by how much sessions differ
+    #[arg(long, value_name = "prior.json")]
+    prior: PathBuf,
+    /// The calibration that is renewed, made by `stretch calibrate --prior` of the same prior [default: what the prior
+    /// knows of --of]
+    #[arg(long, value_name = "cal.json")]
+    calibration: Option<PathBuf>,
+    /// Sensor, wearer, what was done: left/anna, as many steps as are known
+    #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
+    of: String,
+    /// Where the record goes
+    #[arg(long, value_name = "cal.json")]
+    out: PathBuf,
+    #[command(flatten)]
+    json: Json,
+}
+
+fn renew(args: RenewArgs) -> anyhow::Result<()> {
+    args.json.share_stdout([Some(args.out.as_path())])?;
+    let prior = Prior::read(&args.prior)?;
+    let calibration = args.calibration.as_deref().map(SleeveCalibration::read).transpose()?;
+    let signals = prior.signals.clone();
+    let columns = signals.iter().fold(ReadOptions::new(), |all, name| all.require(name));
+    let trials = read_trials(&args.trials, Split::Fit, &columns);
+    let own = "they are those of the prior: stretch convert renames yours";
+    let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
+    let options =
+        RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };
+    let renewed = prior.renew(&trials, &options).map_err(|e| of_files(e, &args.trials))?;
+    let mut outputs = Outputs::default();
+    let record = renewed.calibration.bytes(&args.out)?;
+    outputs.file(&args.out, |out| out.write_all(&record))?;
+    let Renewed { summary, notes, .. } = &renewed;
+    let answer = json!({ "signals": signals, "renewal": summary, "notes": notes });
+    args.json.conclude(outputs, &answer, || {
+        print_renewal(&renewed, &prior.unit())?;
+        tell(format!("wrote {}", args.out.display()))
+    })
+}
+
+fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
+    let summary = &renewed.summary;
+    say("No reference: it is assumed that the movement is that of earlier sessions, with")?;
+    let header = ["", &format!("assumed {unit}"), "sd", "sessions", "before", "after"];
+    let row = |a: &Assumed| {
+        let [value, sd, before, after] = [a.reference, a.sd, a.before, a.after].map(number);
+        vec![a.landmark.clone(), value, sd, a.sessions.to_string(), before, after]
+    };
+    say(table(&header, summary.assumed.iter().map(row)))?;
+    say(format!(
+        "the estimate is shifted by {} {unit} and scaled by {:.3}; where the assumption holds, RMSE {} {unit} is expected",
+        number(summary.shift),
+        summary.scale,
+        number(summary.expected_rmse)
+    ))?;
+    renewed.notes.iter().for_each(|note| warn(format!("note: {note}")));
+    Ok(())
 }

@@ -1,25 +1,103 @@
-//! The paper's experiment end to end on the simulated rig, beside the figures that the paper prints.
+//! `stretch demo --paper`: the paper's experiment end to end on the simulated rig, beside the figures that the paper prints.
 //!
 //! The paper's recordings are not public; the preset of effects is one of several that come about as close, and never *the* explanation.
 //! Errors of trials depend on commands that the paper does not print: only their order of magnitude can be compared.
 
 mod experiment;
-mod frequency;
-mod gaps;
 mod page;
-mod pipeline;
-mod published;
+mod responses;
 mod tables;
 
-pub(crate) use experiment::Experiment;
-pub(crate) use page::paper_page;
-pub(crate) use pipeline::Pipeline;
-pub(crate) use published::PUBLISHED;
-pub(crate) use tables::{error_rows, fit_rows, verdicts};
+use std::path::Path;
+
+use stretch_data::files::write_folder;
+use stretch_sim::paper_preset;
+
+use crate::commands::{
+    json::Json,
+    shared::{or_force, progress, say, tell, write_text},
+};
+use crate::table::{number, table, table_text};
+use experiment::Experiment;
+use page::paper_page;
+use tables::{PUBLISHED, error_tables, fit_table, verdicts};
+
+pub(crate) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Result<()> {
+    let mut done = None;
+    let written = write_folder(out, force, |folder| {
+        let bar = progress("simulating, fitting, judging", 1);
+        let experiment = Experiment::run(&paper_preset()?, seed)?;
+        bar.finish_and_clear();
+        write_text(&folder.join("paper.html"), &paper_page(&experiment))?;
+        let text = serde_json::to_string_pretty(&experiment.to_json())?;
+        write_text(&folder.join("paper.json"), &text)?;
+        done = Some(experiment);
+        anyhow::Ok(())
+    });
+    written.map_err(or_force)?;
+    let Some(experiment) = done else { return Ok(()) };
+    json.answer(&experiment.to_json(), || print(&experiment, seed))?;
+    if json.is_printed() {
+        return Ok(());
+    }
+    tell(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
+}
+
+/// The paper's tables beside ours.
+fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
+    say(format!("The paper's experiment on the simulated rig, preset `paper`, seed {seed}"))?;
+    say(format!("\n{}", table_text(&fit_table(experiment))))?;
+    let surface = experiment.published.linear.fits[0].surface;
+    let (a, b) = (surface.coefficient(0, 1), surface.coefficient(0, 0));
+    say(format!(
+        "Line: strain = {a:.4} V + {b:.4}; paper: {} V + {}\n",
+        PUBLISHED.line.0, PUBLISHED.line.1
+    ))?;
+    error_tables(experiment).iter().try_for_each(|table| say(table_text(table)))?;
+    if let Some(test) = experiment.published.pulses.comparisons.last() {
+        say(format!(
+            "Linear against non-linear on pulses, paired t test: P {} on samples (the paper: < 0.0001), P {} on {} blocks of 0.5 s",
+            p_value(test.p_samples),
+            p_value(test.p_blocks),
+            test.blocks
+        ))?;
+    }
+    say("\nError against the gap between two pulses, RMSE in mm (non-linear):")?;
+    let rows = experiment.gaps.iter().map(|point| {
+        vec![
+            format!("{:.2}", point.gap_s),
+            number(point.ours_rmse_mm[0]),
+            number(point.published_rmse_mm[2]),
+            number(point.ours_rmse_mm[2]),
+            number(point.ours_rmse_mm[3]),
+        ]
+    });
+    say(table(&["gap s", "raw", "as published", "ours", "observer"], rows))?;
+    say("\nFrequency response of the sensor (3 mm about mid-stroke):")?;
+    let rows = experiment.frequency.iter().map(|point| {
+        vec![
+            number(point.frequency_hz),
+            number(1000.0 * point.gain_v_per_mm),
+            format!("{:.1}", point.lead_deg),
+        ]
+    });
+    say(table(&["Hz", "gain mV/mm", "lead deg"], rows))?;
+    say("\nWhat agrees and what does not:")?;
+    verdicts(experiment).iter().try_for_each(|sentence| say(format!("- {sentence}")))
+}
+
+/// A probability, down to the smallest.
+fn p_value(p: Option<f64>) -> String {
+    match p {
+        None => "-".to_owned(),
+        Some(p) if p < 1e-4 => "< 0.0001".to_owned(),
+        Some(p) => format!("{p:.4}"),
+    }
+}
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{experiment::Pipeline, *};
 
     #[test]
     fn what_the_paper_found_is_found_and_matched_rates_are_better() {

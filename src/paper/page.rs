@@ -1,17 +1,16 @@
 //! The paper's experiment as a page.
 
 use plotters::prelude::*;
-use stretch_report::kit::{Area, Axes, Drawn, Figure, FigureSize, Ink, Page, Table, plot, stroke};
+use stretch_report::kit::{Area, Axes, Drawn, Figure, FigureSize, Ink, Page, plot, stroke};
 
 use super::{
     experiment::Experiment,
-    gaps::GapPoint,
-    published::PUBLISHED,
-    tables::{error_rows, fit_rows, verdicts},
+    responses::GapPoint,
+    tables::{error_tables, fit_table, verdicts},
 };
 
 /// Tables beside the published ones, and the two figures that the paper asks for.
-pub(crate) fn paper_page(experiment: &Experiment) -> String {
+pub(super) fn paper_page(experiment: &Experiment) -> String {
     let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
     let verdict = format!(
         "On a simulated rig the published method is off by {:.2} mm on arbitrary actuation; the raw signal by {:.2} mm. \
@@ -25,40 +24,11 @@ pub(crate) fn paper_page(experiment: &Experiment) -> String {
     page.section("What agrees and what does not", "");
     page.list(&verdicts(experiment));
     page.section("Fits", "Six inflations and six deflations; R^2 and RMSE of normalised strain.");
-    page.table(&Table::new(
-        "As published, printed in the paper, and with our decisions",
-        &[
-            "Fit",
-            "R², published way",
-            "R², paper",
-            "RMSE %, published way",
-            "RMSE %, paper",
-            "R², ours",
-            "RMSE %, ours",
-        ],
-        fit_rows(experiment),
-    ));
+    page.table(&fit_table(experiment));
     page.section("Applied", "Average error over the range of the estimate, and RMSE.");
-    let head = [
-        "Method",
-        "Error %, published way",
-        "Error %, paper",
-        "RMSE mm, published way",
-        "RMSE mm, paper",
-        "Error %, ours",
-        "RMSE mm, ours",
-    ];
-    for (caption, paper, there, here) in [
-        (
-            "Arbitrary actuation",
-            &PUBLISHED.arbitrary,
-            &experiment.published.arbitrary,
-            &experiment.ours.arbitrary,
-        ),
-        ("Pulses", &PUBLISHED.pulses, &experiment.published.pulses, &experiment.ours.pulses),
-    ] {
-        page.table(&Table::new(caption, &head, error_rows(there, paper, here)));
-    }
+    error_tables(experiment).iter().for_each(|table| {
+        page.table(table);
+    });
     page.section(
         "What the paper asks for next",
         "How the error depends on the gap between two pulses, and what the sensor makes of sines.",

@@ -1,15 +1,72 @@
-//! The paper's experiment beside the published figures: rows and sentences, for a terminal and a page.
+//! The paper's experiment beside the figures that it prints: tables and sentences, for a terminal and a page.
 
-use stretch_calibrate::{Evaluation, FitReport, MethodErrors};
-use stretch_report::number;
+use stretch_calibrate::{Evaluation, FitReport};
+use stretch_report::{Table, number};
 
-use super::{
-    experiment::Experiment,
-    published::{PUBLISHED, PublishedErrors, PublishedFit},
+use super::experiment::Experiment;
+
+/// A fit as published.
+#[derive(Clone, Copy)]
+pub(super) struct PublishedFit {
+    /// Coefficient of determination.
+    pub(super) r_squared: f64,
+    /// RMSE in percent of normalised strain; none for the linear fit.
+    rmse_percent: Option<f64>,
+}
+
+/// A method's errors as published: average error in percent, RMSE in millimetres (the paper prints them as percent).
+struct PublishedErrors {
+    average_error_percent: f64,
+    rmse_mm: f64,
+}
+
+/// The figures that the paper prints (its sections 3.1 to 3.4).
+pub(super) struct PublishedFigures {
+    /// The linear fit.
+    pub(super) linear: PublishedFit,
+    /// Its slope and intercept.
+    pub(super) line: (f64, f64),
+    /// poly13 on inflations: next lower order, chosen, next higher.
+    inflation: [PublishedFit; 3],
+    /// poly13 on deflations: next lower order, chosen, next higher.
+    deflation: [PublishedFit; 3],
+    /// Raw, linear and non-linear on arbitrary actuation.
+    arbitrary: [PublishedErrors; 3],
+    /// Raw, linear and non-linear on pulses.
+    pulses: [PublishedErrors; 3],
+}
+
+const fn fit(r_squared: f64, rmse_percent: f64) -> PublishedFit {
+    PublishedFit { r_squared, rmse_percent: Some(rmse_percent) }
+}
+
+const fn errors(average_error_percent: f64, rmse_mm: f64) -> PublishedErrors {
+    PublishedErrors { average_error_percent, rmse_mm }
+}
+
+/// What the paper prints.
+pub(super) const PUBLISHED: PublishedFigures = PublishedFigures {
+    linear: PublishedFit { r_squared: 0.9680, rmse_percent: None },
+    line: (0.9744, 0.1757),
+    inflation: [fit(0.9806, 4.890), fit(0.9934, 2.851), fit(0.9938, 2.765)],
+    deflation: [fit(0.9895, 2.467), fit(0.9943, 1.821), fit(0.9945, 1.798)],
+    arbitrary: [errors(14.10, 2.169), errors(18.62, 3.807), errors(16.05, 2.777)],
+    pulses: [errors(5.180, 0.9266), errors(5.875, 1.845), errors(4.863, 1.550)],
 };
 
+/// Trials of one kind: its name, the errors of the published way, those that the paper prints, and ours.
+type Applied<'a> = (&'static str, &'a Evaluation, &'static [PublishedErrors; 3], &'a Evaluation);
+
+fn applied(experiment: &Experiment) -> [Applied<'_>; 2] {
+    let Experiment { published, ours, .. } = experiment;
+    [
+        ("arbitrary actuation", &published.arbitrary, &PUBLISHED.arbitrary, &ours.arbitrary),
+        ("pulses", &published.pulses, &PUBLISHED.pulses, &ours.pulses),
+    ]
+}
+
 /// A fit, what the paper prints, and the same fit with our decisions.
-pub(crate) fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
+pub(super) fn fit_table(experiment: &Experiment) -> Table {
     let (there, here) = (&experiment.published, &experiment.ours);
     let row = |name: String, a: (f64, f64), paper: PublishedFit, b: (f64, f64)| {
         vec![
@@ -42,103 +99,89 @@ pub(crate) fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
             rows.push(row(format!("  {model}"), order(a, model), paper, order(b, model)));
         }
     }
-    rows
+    let head = [
+        "Fit",
+        "R², published way",
+        "R², paper",
+        "RMSE %, published way",
+        "RMSE %, paper",
+        "R², ours",
+        "RMSE %, ours",
+    ];
+    Table::new(
+        "Fits, normalised: as published, printed in the paper, and with our decisions",
+        &head,
+        rows,
+    )
 }
 
-/// A method's errors, what the paper prints, and the same with our decisions.
-pub(crate) fn error_rows(
-    there: &Evaluation,
-    paper: &[PublishedErrors; 3],
-    here: &Evaluation,
-) -> Vec<Vec<String>> {
-    let row = |((a, paper), b): ((&MethodErrors, &PublishedErrors), &MethodErrors)| {
-        vec![
-            a.method.clone(),
-            number(a.average_error_percent),
-            number(paper.average_error_percent),
-            number(a.rmse),
-            number(paper.rmse_mm),
-            number(b.average_error_percent),
-            number(b.rmse),
-        ]
-    };
-    let beside = there.pooled.iter().zip(paper).zip(&here.pooled).map(row);
-    // what the paper has not
-    let alone = here.pooled[there.pooled.len()..].iter().map(|m| {
-        let mut cells = vec![format!("{} (not in the paper)", m.method)];
-        cells.extend(std::iter::repeat_n("-".to_owned(), 4));
-        cells.extend([number(m.average_error_percent), number(m.rmse)]);
-        cells
-    });
-    beside.chain(alone).collect()
+/// For each kind of trials, a method's errors, what the paper prints, and the same with our decisions.
+pub(super) fn error_tables(experiment: &Experiment) -> [Table; 2] {
+    let head = [
+        "Method",
+        "Error %, published way",
+        "Error %, paper",
+        "RMSE mm, published way",
+        "RMSE mm, paper",
+        "Error %, ours",
+        "RMSE mm, ours",
+    ];
+    applied(experiment).map(|(kind, there, paper, here)| {
+        let rows = here.pooled.iter().enumerate().map(|(method, ours)| {
+            let own = [ours.average_error_percent, ours.rmse].map(number);
+            let (name, others) = match there.pooled.get(method).zip(paper.get(method)) {
+                Some((a, paper)) => {
+                    let average = [a.average_error_percent, paper.average_error_percent];
+                    let [a_mm, paper_mm] = [a.rmse, paper.rmse_mm].map(number);
+                    let [average, paper_average] = average.map(number);
+                    (a.method.clone(), [average, paper_average, a_mm, paper_mm])
+                }
+                None => {
+                    (format!("{} (not in the paper)", ours.method), ["-"; 4].map(str::to_owned))
+                }
+            };
+            [name].into_iter().chain(others).chain(own).collect::<Vec<_>>()
+        });
+        Table::new(format!("Applied to {kind}"), &head, rows)
+    })
 }
 
 /// Plain sentences, each decided by the figures.
-pub(crate) fn verdicts(experiment: &Experiment) -> Vec<String> {
+pub(super) fn verdicts(experiment: &Experiment) -> Vec<String> {
     let there = &experiment.published;
     let mut said = Vec::new();
-    let mut judge = |holds: bool, agrees: &str, differs: &str| {
-        said.push(if holds {
-            format!("agrees: {agrees}")
-        } else {
-            format!("does not agree: {differs}")
-        });
+    let mut judge = |agrees: bool, what: String| {
+        said.push(format!("{}: {what}", if agrees { "agrees" } else { "does not agree" }));
     };
-    let r2 = there.linear.fits[0].r_squared;
-    judge(
-        (r2 - PUBLISHED.linear.r_squared).abs() < 0.01,
-        &format!(
-            "the line explains {r2:.3} of the variance, as in the paper ({:.3})",
-            PUBLISHED.linear.r_squared
-        ),
-        &format!(
-            "the line explains {r2:.3} of the variance, {:.3} in the paper",
-            PUBLISHED.linear.r_squared
-        ),
-    );
-    let ratios =
-        [("inflation", 0, PUBLISHED.inflation[1]), ("deflation", 1, PUBLISHED.deflation[1])].map(
-            |(name, i, paper)| {
-                let rmse = 100.0 * there.non_linear.fits[i].rmse;
-                (name, rmse, paper.rmse_percent.unwrap_or(f64::NAN))
-            },
+    let (r2, paper) = (there.linear.fits[0].r_squared, PUBLISHED.linear.r_squared);
+    let line = format!("the line explains {r2:.3} of the variance, {paper:.3} in the paper");
+    judge((r2 - paper).abs() < 0.01, line);
+    let branches = [("inflation", PUBLISHED.inflation[1]), ("deflation", PUBLISHED.deflation[1])];
+    for ((name, paper), fit) in branches.into_iter().zip(&there.non_linear.fits) {
+        let (rmse, paper) = (100.0 * fit.rmse, paper.rmse_percent.unwrap_or(f64::NAN));
+        let surface = format!(
+            "the surface of {name} fits with an RMSE of {rmse:.2} %, {paper:.2} % in the paper"
         );
-    let text = ratios
-        .map(|(name, rmse, paper)| format!("{name} {rmse:.2} % (paper {paper:.2} %)"))
-        .join(", ");
-    judge(
-        ratios.iter().all(|(_, rmse, paper)| (rmse / paper - 1.0).abs() < 0.35),
-        &format!("the surfaces fit about as well: RMSE {text}"),
-        &format!("the surfaces fit otherwise: RMSE {text}"),
-    );
-    let rmse = |evaluation: &Evaluation, method: usize| evaluation.pooled[method].rmse;
-    for (kind, evaluation, paper) in [
-        ("pulses", &there.pulses, PUBLISHED.pulses),
-        ("arbitrary actuation", &there.arbitrary, PUBLISHED.arbitrary),
-    ] {
-        let [raw, linear, non_linear] = [0, 1, 2].map(|m| rmse(evaluation, m));
-        judge(
-            non_linear < linear,
-            &format!(
-                "on {kind} the surfaces beat the line ({non_linear:.2} against {linear:.2} mm)"
-            ),
-            &format!(
-                "on {kind} the line beats the surfaces ({linear:.2} against {non_linear:.2} mm)"
-            ),
+        judge((rmse / paper - 1.0).abs() < 0.35, surface);
+    }
+    for (kind, evaluation, paper, _) in applied(experiment) {
+        let [raw, linear, non_linear] = [0, 1, 2].map(|method| evaluation.pooled[method].rmse);
+        let surfaces = format!(
+            "on {kind} the surfaces beat the line (RMSE {non_linear:.2} and {linear:.2} mm)"
         );
+        judge(non_linear < linear, surfaces);
         judge(
             raw < non_linear.min(linear),
-            &format!("on {kind} the raw signal has the lowest RMSE ({raw:.2} mm)"),
-            &format!("on {kind} the raw signal does not have the lowest RMSE ({raw:.2} mm)"),
+            format!("on {kind} the raw signal has the lowest RMSE ({raw:.2} mm)"),
         );
+        let ratios = [raw, linear, non_linear].into_iter().zip(paper);
         let worst =
-            (0..3).map(|m| (rmse(evaluation, m) / paper[m].rmse_mm).ln().abs()).fold(0.0, f64::max);
+            ratios.map(|(rmse, paper)| (rmse / paper.rmse_mm).ln().abs()).fold(0.0, f64::max);
+        let factor = worst.exp();
         judge(
             worst < 2f64.ln(),
-            &format!("on {kind} every RMSE is within a factor of two of the published one"),
-            &format!(
-                "on {kind} an RMSE is off from the published one by a factor of {:.1}",
-                worst.exp()
+            format!(
+                "on {kind} every RMSE is within a factor of two of the published one (at most {factor:.1})"
             ),
         );
     }

@@ -54,13 +54,13 @@ fn the_command_line_is_what_the_program_says() {
 
 #[test]
 fn the_effects_are_those_of_the_catalogue() {
-    let mut text = "# Effects\n\nThis page is what `stretch effects` and `stretch effects --kinds` print: name, meaning in words, equation,\n\
+    let mut text = "# Effects\n\nThis page is what `stretch effects` and `stretch effects kinds` print: name, meaning in words, equation,\n\
                     and the range of each parameter. A *form* is a detail of the shape that is fitted around its usual value, which\n\
                     stands in brackets, and does not count as a parameter.\n\n## In the rig, stage by stage\n\n"
         .to_owned();
     text += &block(&["effects"]);
     text += "\n## Around any simulator\n\n";
-    text += &block(&["effects", "--kinds"]);
+    text += &block(&["effects", "kinds"]);
     is_written_by_the_program("effects.md", &text);
 }
 

@@ -31,7 +31,7 @@ fn with_jsonschema_a_diagnosis_conforms_to_its_schema() {
         {
             let json = scratch.path(&format!("{}.json", documents.len()));
             let mut diagnose = stretch();
-            diagnose.args(["diagnose", "--quiet", "--baselines"]).arg(json_to(&json));
+            diagnose.args(["diagnose", "--verbose"]).arg(json_to(&json));
             runs(diagnose.arg(place).args(columns));
             documents.push(json);
         }

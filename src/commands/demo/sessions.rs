@@ -22,13 +22,6 @@ const SIGNAL: &str = "bridge_v";
 /// Columns that are neither.
 const OTHERS: [&str; 3] = ["inlet", "outlet", "pressure_kpa"];
 
-/// What the user says of measured sessions.
-#[derive(Debug, Default)]
-pub(super) struct Wanted<'a> {
-    pub(super) reference: Option<&'a str>,
-    pub(super) signal: Option<&'a str>,
-}
-
 /// Trials to fit and to test on.
 pub(super) struct Sessions {
     /// What the data are called.
@@ -53,7 +46,11 @@ impl Sessions {
     ///
     /// # Errors
     /// What cannot be read, has no session to test on, or needs naming.
-    pub(super) fn read(path: &Path, wanted: &Wanted<'_>) -> anyhow::Result<Self> {
+    pub(super) fn read(
+        path: &Path,
+        reference: Option<&str>,
+        signal: Option<&str>,
+    ) -> anyhow::Result<Self> {
         let (path, group) = match path.parent() {
             Some(folder) if !path.exists() && has_groups(folder) => (folder, path.file_name()),
             _ => (path, None),
@@ -71,10 +68,10 @@ impl Sessions {
         let has = |name: &str| columns.iter().any(|c| c.name == name);
         let usual = || REFERENCES.into_iter().find(|name| has(name));
         let named = || columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-        let Some(reference) = wanted.reference.or_else(usual).filter(|name| has(name)) else {
+        let Some(reference) = reference.or_else(usual).filter(|name| has(name)) else {
             bail!("{name}: name the reference with --reference; the columns are {}", named());
         };
-        let signals: Vec<String> = match wanted.signal {
+        let signals: Vec<String> = match signal {
             Some(signal) => vec![signal.to_owned()],
             None if has(SIGNAL) => vec![SIGNAL.to_owned()],
             None => columns
@@ -244,8 +241,7 @@ mod tests {
         }
         let published = folder.path().join("S15_16_HC90.csv");
         fs::write(&published, text).unwrap();
-        let [one, other] =
-            [&own, &published].map(|path| Sessions::read(path, &Wanted::default()).unwrap());
+        let [one, other] = [&own, &published].map(|path| Sessions::read(path, None, None).unwrap());
         assert_eq!((&one.reference, &one.signals), (&other.reference, &other.signals));
         for (a, b) in [(&one.fit, &other.fit), (&one.test, &other.test)] {
             assert_eq!((a.len(), b.len()), (1, 1));

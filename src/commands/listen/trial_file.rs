@@ -10,7 +10,7 @@ use stretch_data::push_number;
 use stretch_link::{Answer, Frame};
 use stretch_receptor::code::{Adc, AdcCode};
 
-use super::twin::Twin;
+use super::Twin;
 
 /// One sample as it is shown and recorded.
 #[derive(Debug, Clone, Copy)]

@@ -11,7 +11,7 @@ use stretch_filter::FilterError;
 pub enum SleeveError {
     /// More channels than a calibration can hold, or none.
     #[error(
-        "{asked} signals were named; a calibration takes 1 to {most}: name the columns of the gauges with --signals s1,s2"
+        "{asked} signals were named; a calibration takes 1 to {most}: name the columns of the gauges with --signal s1,s2"
     )]
     Channels {
         /// Number of named signals.
@@ -21,7 +21,7 @@ pub enum SleeveError {
     },
     /// Two channels are identical.
     #[error(
-        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signals"
+        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signal"
     )]
     Copies {
         /// The first.

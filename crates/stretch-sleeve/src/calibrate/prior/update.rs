@@ -227,7 +227,7 @@ impl Prior {
             |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if signals.len() != self.signals.len() {
             return problem(format!(
-                "it is of {} channels ({}), and {} were named: name as many with --signals, in its order, or learn a prior of these",
+                "it is of {} channels ({}), and {} were named: name as many with --signal, in its order, or learn a prior of these",
                 self.signals.len(),
                 self.signals.join(","),
                 signals.len()

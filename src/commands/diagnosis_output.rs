@@ -1,16 +1,24 @@
-//! A diagnosis as text on a terminal.
+//! What a diagnosis prints on a terminal, and writes: a file with what was found, and the code of what is named.
 
-use std::fmt::Write;
+use std::path::Path;
 
-use stretch_data::listed;
-use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
-use stretch_problem::{Implementation, effect_in_words, notation};
-use stretch_report::{
-    Table, baseline_table, candidate_numbers_table, candidate_table, stage_table, times,
-    transfer_in_words, transfer_table,
+use stretch_data::{
+    files::{Outputs, write_whole},
+    listed,
 };
+use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
+use stretch_problem::{ByTrial, Examined, Fixed, Implementation, effect_in_words, notation};
+use stretch_report::{
+    Table, baseline_table, candidate_numbers_table, candidate_table, difference_table, run_table,
+    stage_table, times, transfer_in_words, transfer_table,
+};
+use stretch_sim::Language;
 
-use crate::table::{number, table};
+use super::shared::{say, stage_text};
+use crate::{
+    display::is_quiet,
+    table::{drawn, number, table, table_text, unbroken},
+};
 
 /// Most slices that are listed.
 const SLICES: usize = 8;
@@ -24,20 +32,20 @@ pub(crate) fn text(
     implementations: &[Implementation],
     is_verbose: bool,
 ) -> String {
-    let mut out = String::new();
+    let mut out = Vec::new();
     for one in implementations {
-        put(&mut out, &format!("  {}: {}", named(one, diagnosis), one.words));
+        out.push(format!("  {}: {}", named(one, diagnosis), one.words));
     }
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
-        put(&mut out, &format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
+        out.push(format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
     }
     for gross in &diagnosis.gross {
-        put(&mut out, &format!("  {}; {}", gross.sentence, gross.hint));
+        out.push(format!("  {}; {}", gross.sentence, gross.hint));
     }
     let rows = diagnosis.rows_used;
     if rows.used < rows.read {
         let share = percent(rows.share());
-        put(&mut out, &format!("It stands on {} of {} rows ({share}).", rows.used, rows.read));
+        out.push(format!("It stands on {} of {} rows ({share}).", rows.used, rows.read));
     }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
@@ -46,24 +54,21 @@ pub(crate) fn text(
     identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations, diagnosis);
     transfer(&mut out, diagnosis);
-    baselines(&mut out, diagnosis);
+    diagnosis.baselines.iter().for_each(|said| put_table(&mut out, &baseline_table(said)));
     next(&mut out, diagnosis);
     if let Some(runs) = diagnosis.model_runs {
-        put(
-            &mut out,
-            &format!(
-                "\n{} model runs, {} simulations of stages.",
-                runs.count, diagnosis.simulations
-            ),
-        );
+        out.push(format!(
+            "\n{} model runs, {} simulations of stages.",
+            runs.count, diagnosis.simulations
+        ));
     }
     if !diagnosis.notes.is_empty() {
-        put(&mut out, "\nNoticed:");
+        out.push("\nNoticed:".to_owned());
         for note in &diagnosis.notes {
-            put(&mut out, &format!("- {note}"));
+            out.push(format!("- {note}"));
         }
     }
-    out.trim_end().to_owned()
+    out.join("\n").trim_end().to_owned()
 }
 
 /// What an effect is, and the name by which options and files call it.
@@ -74,56 +79,34 @@ fn named(one: &Implementation, diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn put(out: &mut String, line: &str) {
-    // a string takes every write
-    let _ = writeln!(out, "{line}");
-}
-
 /// A share as in the report.
 fn percent(share: f64) -> String {
     unbroken(&stretch_report::percent(share))
 }
 
-/// A text of a page: its spaces are those of a terminal.
-fn unbroken(text: &str) -> String {
-    text.replace('\u{a0}', " ")
-}
-
 /// A table of the report: the same words and numbers.
-fn put_table(out: &mut String, report: &Table) {
-    put(out, &format!("\n{}:", unbroken(&report.caption)));
-    put(out, &drawn(report));
+fn put_table(out: &mut Vec<String>, report: &Table) {
+    out.push(format!("\n{}", table_text(report)));
 }
 
-/// A table of a report with its caption.
-pub(super) fn table_text(report: &Table) -> String {
-    format!("{}:\n{}", unbroken(&report.caption), drawn(report))
-}
-
-fn drawn(report: &Table) -> String {
-    let head: Vec<&str> = report.head.iter().map(String::as_str).collect();
-    let rows = report.rows.iter().map(|row| row.iter().map(|cell| unbroken(cell)).collect());
-    table(&head, rows)
-}
-
-fn stages(out: &mut String, diagnosis: &Diagnosis) {
+fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Where { stages, end_to_end, .. } = &diagnosis.location;
     let mut report = stage_table(stages, !diagnosis.named.is_empty());
     report.head.push("Share".to_owned());
     for (row, stage) in report.rows.iter_mut().zip(stages) {
         row.push(percent(stage.share));
     }
-    put(out, "\nWhere, stage by stage on its measured input.");
-    put(out, &format!("{}; its share of the gap:", unbroken(&report.caption)));
-    put(out, &drawn(&report));
+    out.push("\nWhere, stage by stage on its measured input.".to_owned());
+    out.push(format!("{}; its share of the gap:", unbroken(&report.caption)));
+    out.push(drawn(&report));
     if !end_to_end.is_empty() {
         let shares = end_to_end.iter().map(|e| format!("{} {}", e.stage, percent(e.share)));
         let shares: Vec<String> = shares.collect();
-        put(out, &format!("Of the gap at the end, from the commands alone: {}.", listed(&shares)));
+        out.push(format!("Of the gap at the end, from the commands alone: {}.", listed(&shares)));
     }
 }
 
-fn slices(out: &mut String, diagnosis: &Diagnosis) {
+fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     // of those that agree one in twenty stands out by chance
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     if agrees && !diagnosis.is_faint() {
@@ -135,7 +118,7 @@ fn slices(out: &mut String, diagnosis: &Diagnosis) {
     if loud.is_empty() {
         return;
     }
-    put(out, "\nWhere it stands out, in multiples of the noise, re-tuned, all trials:");
+    out.push("\nWhere it stands out, in multiples of the noise, re-tuned, all trials:".to_owned());
     let left = |excess: f64| unbroken(&times(excess));
     let rows = loud.iter().take(SLICES).map(|s| {
         let [low, high] = s.excess_ci;
@@ -146,13 +129,13 @@ fn slices(out: &mut String, diagnosis: &Diagnosis) {
             format!("{} .. {}", left(low), left(high)),
         ]
     });
-    put(out, &table(&["Slice", "Share of the gap", "Left", "95 % interval"], rows));
+    out.push(table(&["Slice", "Share of the gap", "Left", "95 % interval"], rows));
     if loud.len() > SLICES {
-        put(out, &format!("({} more in the JSON and the report)", loud.len() - SLICES));
+        out.push(format!("({} more in the JSON and the report)", loud.len() - SLICES));
     }
 }
 
-fn candidates(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
+fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     let shown: Vec<&Candidate> =
         diagnosis.candidates.iter().filter(|c| !c.effects.is_empty()).collect();
     if shown.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
@@ -168,42 +151,42 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
     let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();
     match (named.as_slice(), rivals.as_slice()) {
         (_, []) | ([], [_]) => {}
-        ([], rivals) => put(
-            out,
-            &format!("Not told apart by these data, with 95 % probability: {}.", listed(rivals)),
-        ),
-        (named, rivals) => put(
-            out,
-            &format!(
-                "These data cannot tell {} from {} with 95 % probability.",
-                listed(named),
-                listed(rivals)
-            ),
-        ),
+        ([], rivals) => out.push(format!(
+            "Not told apart by these data, with 95 % probability: {}.",
+            listed(rivals)
+        )),
+        (named, rivals) => out.push(format!(
+            "These data cannot tell {} from {} with 95 % probability.",
+            listed(named),
+            listed(rivals)
+        )),
     }
 }
 
 /// What is named, as something to type.
-fn implement(out: &mut String, all: &[Implementation], diagnosis: &Diagnosis) {
+fn implement(out: &mut Vec<String>, all: &[Implementation], diagnosis: &Diagnosis) {
     if all.is_empty() {
         return;
     }
-    put(out, "\nTo implement (--snippets DIR or the report has the code in C, Python and MATLAB):");
+    out.push(
+        "\nTo implement (--snippets DIR or the report has the code in C, Python and MATLAB):"
+            .to_owned(),
+    );
     for one in all {
-        put(out, &format!("- {}: {}", named(one, diagnosis), one.equation()));
+        out.push(format!("- {}: {}", named(one, diagnosis), one.equation()));
         if let Some(sketch) = &one.sketch {
             for q in &sketch.inputs {
-                put(out, &format!("  {q}"));
+                out.push(format!("  {q}"));
             }
-            put(out, &format!("  state: {}", one.state()));
+            out.push(format!("  state: {}", one.state()));
         }
     }
     if let Some(words) = notation(all.iter().map(|one| one.formula.as_str())) {
-        put(out, words);
+        out.push(words.to_owned());
     }
 }
 
-fn parameters(out: &mut String, diagnosis: &Diagnosis) {
+fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let moved: Vec<_> = diagnosis
         .parameters
         .iter()
@@ -212,7 +195,7 @@ fn parameters(out: &mut String, diagnosis: &Diagnosis) {
     if moved.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
         return;
     }
-    put(out, "\nNominal parameters that moved by more than their tolerance:");
+    out.push("\nNominal parameters that moved by more than their tolerance:".to_owned());
     let rows = moved.iter().map(|p| {
         vec![
             p.name.clone(),
@@ -224,11 +207,11 @@ fn parameters(out: &mut String, diagnosis: &Diagnosis) {
     });
     let header =
         ["parameter", "as shipped", "re-tuned", "tolerances", "bent to, without the effect"];
-    put(out, &table(&header, rows));
+    out.push(table(&header, rows));
 }
 
 /// How many nominal parameters the data determine, and with every detail what is wrong with the others.
-fn identifiability(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
+fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     let all = &diagnosis.identifiability;
     if all.is_empty() {
         return;
@@ -240,15 +223,12 @@ fn identifiability(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
     } else {
         " -v says what is wrong with the others."
     };
-    put(
-        out,
-        &format!(
+    out.push(format!(
             "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.{more}",
             all.len()
-        ),
-    );
+        ));
     for sentence in others.iter().filter(|_| is_verbose) {
-        put(out, &format!("- {sentence}"));
+        out.push(format!("- {sentence}"));
     }
 }
 
@@ -259,30 +239,85 @@ fn bent(p: &stretch_gap::ParameterShift) -> f64 {
     if far.is_finite() { far } else { 0.0 }
 }
 
-fn transfer(out: &mut String, diagnosis: &Diagnosis) {
+fn transfer(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Some(transfer) = &diagnosis.transfer else { return };
     put_table(out, &transfer_table(transfer));
     if let Some(words) = transfer_in_words(transfer) {
-        put(out, &words);
+        out.push(words);
     }
 }
 
-fn baselines(out: &mut String, diagnosis: &Diagnosis) {
-    let Some(said) = &diagnosis.baselines else { return };
-    put_table(out, &baseline_table(said));
-}
-
-fn next(out: &mut String, diagnosis: &Diagnosis) {
+fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Some(next) = &diagnosis.next_experiment else { return };
-    put(
-        out,
-        &format!(
+    out.push(format!(
             "\nNext experiment: {} ({:.1} min) would tell {} apart: they differ by {} times the noise. {}",
             next.name,
             next.minutes,
             listed(&next.separates),
             number(next.d),
             next.why
-        ),
-    );
+        ));
+}
+
+/// Which runs disagree, and in what; every value unless the program is to be quiet.
+pub(super) fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
+    if is_quiet() {
+        return Ok(());
+    }
+    by_trial.sentences().iter().try_for_each(|sentence| say(format!("\n{sentence}")))?;
+    say(format!("\n{}", table_text(&difference_table(by_trial))))?;
+    say(format!("\n{}", table_text(&run_table(by_trial))))
+}
+
+/// Writes the rig file or the problem's file where there is something to write; says what it did.
+pub(super) fn write_fix(
+    outputs: &mut Outputs,
+    path: &Path,
+    examined: &Examined,
+) -> anyhow::Result<String> {
+    let shown = path.display();
+    let mut fix = match &examined.fix {
+        Err(why) => return Ok(format!("{shown} is not written: {why}")),
+        Ok(fix) => fix.clone(),
+    };
+    let Examined { name, seed, .. } = examined;
+    let from =
+        format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
+    fix.remarks.head.insert(0, from);
+    let is_there = path.exists();
+    stage_text(outputs, path, &fix.text(path))?;
+    let what = match fix.file {
+        Fixed::Rig(_) => "the rig",
+        Fixed::Problem(_) => "the problem",
+    };
+    let with = if fix.effects.is_empty() { "no effect".to_owned() } else { listed(&fix.effects) };
+    let replaced = if is_there { ", in place of the file that was there" } else { "" };
+    Ok(format!("wrote {shown}: {what} re-tuned, with {with}{replaced}"))
+}
+
+/// Writes the code of what is named where there is something; says what it did.
+pub(super) fn write_snippets(
+    outputs: &mut Outputs,
+    folder: &Path,
+    all: &[Implementation],
+) -> anyhow::Result<String> {
+    let shown = folder.display();
+    let mut files = Vec::new();
+    for one in all {
+        for language in Language::ALL {
+            let name = format!("{}.{}", one.name, language.ending());
+            files.extend(one.code(language).map(|code| (name, code)));
+        }
+    }
+    if files.is_empty() {
+        let why =
+            if all.is_empty() { "no effect is named" } else { "nobody has its code written down" };
+        return Ok(format!("{shown} is not written: {why}"));
+    }
+    outputs.folder(folder, false, |folder| {
+        files.iter().try_for_each(|(name, code)| {
+            write_whole(folder.join(name), |out| out.write_all(code.as_bytes()))
+        })
+    })?;
+    Ok(format!("wrote {shown}: {} files", files.len()))
 }

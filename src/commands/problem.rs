@@ -1,19 +1,51 @@
-//! `stretch predict`: what a fixed simulator predicts of recordings that were not fitted.
+//! `stretch init` and `stretch predict`: a first problem from recordings, and what a fixed one predicts of others.
 
 use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::ensure;
 use stretch_data::files::Outputs;
-use stretch_problem::{Prediction, Reading, predict};
+use stretch_problem::{Prediction, Reading, first_problem, predict as predict_new};
 use stretch_report::{predict_page, predict_table};
 
 use super::{
     diagnose::announce,
-    diagnosis_text::table_text,
     json::Json,
-    shared::{say, say_first, spinner, stage_text, tell},
+    shared::{say, say_first, spinner, stage_text, tell, write_text},
 };
 use crate::display::is_quiet;
+use crate::table::table_text;
+
+/// Write a first problem.toml from the recordings in a folder
+///
+///   stretch init bench
+///   stretch diagnose bench/problem.toml
+///
+/// It holds the columns with units and ranges, rates, the trials with a proposed split, and says in
+/// comments what was guessed: what drives the simulator, and what is held against it.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct InitArgs {
+    /// Folder of recordings
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Replace a problem.toml that is there
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn init(args: InitArgs) -> anyhow::Result<()> {
+    let path = args.folder.join("problem.toml");
+    ensure!(
+        args.force || !path.exists(),
+        "{}: it is there already; --force replaces it",
+        path.display()
+    );
+    write_text(&path, &first_problem(&args.folder)?)?;
+    tell(format!(
+        "wrote {}: read its comments, write the simulator, then stretch diagnose it",
+        path.display()
+    ))
+}
 
 /// Status if the error is above `--fail-above`.
 const FAILED_ABOVE: u8 = 3;
@@ -35,7 +67,7 @@ const FAILED_ABOVE: u8 = 3;
 /// A problem file is a program: its simulator runs with your rights, and is announced before it runs.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
-pub(crate) struct Args {
+pub(crate) struct PredictArgs {
     /// The problem's file that stretch diagnose --fix wrote
     #[arg(value_name = "fixed.toml")]
     fixed: PathBuf,
@@ -53,22 +85,20 @@ pub(crate) struct Args {
 }
 
 /// Predicts, and returns the status with which the program ends.
-pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub(crate) fn predict(args: PredictArgs) -> anyhow::Result<ExitCode> {
     let is_number = args.fail_above.is_none_or(|most| most.is_finite() && most > 0.0);
     ensure!(is_number, "--fail-above: give a number above 0, in multiples of the noise");
     args.json.share_stdout([args.report.as_deref()])?;
     let bar = spinner();
     bar.set_message("the new recordings are predicted");
     let reading = Reading { announce: Some(announce), ..Reading::default() };
-    let prediction = predict(&args.fixed, &args.new, &reading)?;
+    let prediction = predict_new(&args.fixed, &args.new, &reading)?;
     bar.finish_and_clear();
     let mut outputs = Outputs::default();
-    args.json.stage(&mut outputs, &prediction)?;
     if let Some(path) = &args.report {
         stage_text(&mut outputs, path, &predict_page(&prediction))?;
     }
-    outputs.keep()?;
-    args.json.say(&prediction, || {
+    args.json.conclude(outputs, &prediction, || {
         print(&prediction)?;
         args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
     })?;

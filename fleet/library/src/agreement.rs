@@ -10,7 +10,7 @@ use datafusion::{
         },
         datatypes::{DataType, Field, FieldRef, Fields},
     },
-    common::{Result, exec_datafusion_err, exec_err},
+    common::{Result, cast::as_float64_array, exec_datafusion_err, exec_err},
     logical_expr::{
         Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
         Volatility,
@@ -19,10 +19,7 @@ use datafusion::{
 };
 use stretch_metrics::{Agreement, AgreementSpec, Delta};
 
-use crate::{
-    columns::{bytes, floats},
-    one::One,
-};
+use crate::one::{One, state_of_each_row, states};
 
 const NAME: &str = "agreement";
 
@@ -113,7 +110,7 @@ impl GroupsAccumulator for Agreements {
         let [reference, estimate] = values else {
             return exec_err!("agreement takes a reference and an estimate");
         };
-        let (reference, estimate) = (floats(reference)?, floats(estimate)?);
+        let (reference, estimate) = (as_float64_array(reference)?, as_float64_array(estimate)?);
         for (row, &group) in groups.iter().enumerate() {
             if filter.is_some_and(|kept| !(kept.is_valid(row) && kept.value(row))) {
                 continue;
@@ -127,10 +124,10 @@ impl GroupsAccumulator for Agreements {
         Ok(())
     }
 
-    fn merge_batch(&mut self, states: &[ArrayRef], groups: &[usize], total: usize) -> Result<()> {
+    fn merge_batch(&mut self, stored: &[ArrayRef], groups: &[usize], total: usize) -> Result<()> {
         self.0.resize(total.max(self.0.len()), Agreement::new());
-        if let [states] = states {
-            for (state, &group) in bytes(states)?.zip(groups) {
+        if let [stored] = stored {
+            for (state, &group) in states(stored)?.iter().zip(groups) {
                 let Some(state) = state else { continue };
                 let other = read(state)
                     .ok_or_else(|| exec_datafusion_err!("agreement: a partial state is damaged"))?;
@@ -169,11 +166,7 @@ impl GroupsAccumulator for Agreements {
         values: &[ArrayRef],
         filter: Option<&BooleanArray>,
     ) -> Result<Vec<ArrayRef>> {
-        let mut each = Self::default();
-        let rows = values.first().map_or(0, |array| array.len());
-        let groups: Vec<usize> = (0..rows).collect();
-        each.update_batch(values, &groups, filter, rows)?;
-        each.state(EmitTo::All)
+        state_of_each_row(Self::default(), values, filter)
     }
 
     fn size(&self) -> usize {
@@ -192,17 +185,16 @@ fn write(agreement: &Agreement<f64>) -> Vec<u8> {
 fn read(bytes: &[u8]) -> Option<Agreement<f64>> {
     let (words, []) = bytes.as_chunks::<8>() else { return None };
     let [count, skipped, numbers @ ..] = words else { return None };
-    let numbers: [f64; 21] =
-        numbers.iter().map(|word| f64::from_le_bytes(*word)).collect::<Vec<_>>().try_into().ok()?;
-    let [e0, e1, e2, e3, e4, e5, e6, rest @ ..] = numbers;
-    let [t0, t1, t2, t3, t4, t5, rest @ ..] = rest;
-    let [s0, s1, s2, s3, s4, s5, p0, p1] = rest;
+    let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_le_bytes(*word)).collect();
+    let (errors, rest) = numbers.split_first_chunk()?;
+    let (truth, rest) = rest.split_first_chunk()?;
+    let (estimate, products) = rest.split_first_chunk()?;
     Agreement::from_spec(AgreementSpec {
         count: u64::from_le_bytes(*count),
         skipped: u64::from_le_bytes(*skipped),
-        errors: [e0, e1, e2, e3, e4, e5, e6],
-        truth: [t0, t1, t2, t3, t4, t5],
-        estimate: [s0, s1, s2, s3, s4, s5],
-        products: [p0, p1],
+        errors: *errors,
+        truth: *truth,
+        estimate: *estimate,
+        products: products.try_into().ok()?,
     })
 }

@@ -1,13 +1,14 @@
 //! `strain_estimate(record, rate, signal)`: a calibration over rows.
 
-use std::sync::Arc;
+use std::{iter::repeat_n, sync::Arc};
 
 use datafusion::{
     arrow::{
-        array::{Array, ArrayRef, AsArray, Float64Builder},
+        array::{Array, AsArray, Float64Array},
+        compute::cast,
         datatypes::DataType,
     },
-    common::{Result, ScalarValue, exec_datafusion_err, exec_err},
+    common::{Result, cast::as_float64_array, exec_datafusion_err, exec_err},
     logical_expr::{
         ColumnarValue, ScalarFunctionArgs, ScalarUDF, ScalarUDFImpl, Signature, TypeSignature,
         Volatility,
@@ -17,7 +18,7 @@ use stretch_calibrate::calibration_from_json;
 use stretch_core::{Branch, Model, RateEstimator};
 use stretch_receptor::StretchReceptor;
 
-use crate::{about::rate_estimator, columns::floats};
+use crate::about::rate_estimator;
 
 const NAME: &str = "strain_estimate";
 
@@ -55,64 +56,29 @@ impl ScalarUDFImpl for EstimateFunction {
             return exec_err!("{NAME} takes a record, a rate and a signal");
         };
         let (rate, signal) = (rate.to_array(rows)?, signal.to_array(rows)?);
-        let (rate, signal) = (floats(&rate)?, floats(&signal)?);
-        let mut map = Latest::new(estimator);
-        let mut out = Float64Builder::with_capacity(rows);
-        let mut row = |at: usize, record: Option<&str>| -> Result<()> {
-            let known = record.filter(|_| rate.is_valid(at) && signal.is_valid(at));
-            let estimate = match known {
-                Some(record) => map.of(record)?.at(rate.value(at), signal.value(at)),
-                None => None,
-            };
-            out.append_option(estimate);
-            Ok(())
-        };
-        match record {
+        let (rate, signal) = (as_float64_array(&rate)?, as_float64_array(&signal)?);
+        let texts;
+        let records: Box<dyn Iterator<Item = Option<&str>>> = match record {
             ColumnarValue::Scalar(record) => {
-                let record = record.try_as_str().flatten();
-                (0..rows).try_for_each(|at| row(at, record))?;
+                Box::new(repeat_n(record.try_as_str().flatten(), rows))
             }
             ColumnarValue::Array(records) => {
-                texts(records)?.enumerate().try_for_each(|(at, record)| row(at, record))?;
+                texts = cast(records, &DataType::Utf8View)?;
+                Box::new(texts.as_string_view().iter())
             }
-        }
-        let out = out.finish();
-        let are_scalars = args.args.iter().all(|arg| matches!(arg, ColumnarValue::Scalar(_)));
-        if are_scalars && rows == 1 {
-            return ScalarValue::try_from_array(&out, 0).map(ColumnarValue::Scalar);
-        }
-        Ok(ColumnarValue::Array(Arc::new(out)))
-    }
-}
-
-fn texts(array: &ArrayRef) -> Result<Box<dyn Iterator<Item = Option<&str>> + '_>> {
-    match array.data_type() {
-        DataType::Utf8 => Ok(Box::new(array.as_string::<i32>().iter())),
-        DataType::LargeUtf8 => Ok(Box::new(array.as_string::<i64>().iter())),
-        DataType::Utf8View => Ok(Box::new(array.as_string_view().iter())),
-        other => exec_err!("{NAME}: a record is text, not {other}"),
-    }
-}
-
-/// The record of the latest row, because rows of one sensor are adjacent.
-struct Latest {
-    estimator: Option<RateEstimator>,
-    known: Option<(String, Map)>,
-}
-
-impl Latest {
-    fn new(estimator: Option<RateEstimator>) -> Self {
-        Self { estimator, known: None }
-    }
-
-    fn of(&mut self, record: &str) -> Result<&Map> {
-        if self.known.as_ref().is_none_or(|(text, _)| text != record) {
-            self.known = Some((record.to_owned(), Map::new(record, self.estimator)?));
-        }
-        match &self.known {
-            Some((_, map)) => Ok(map),
-            None => exec_err!("{NAME}: no record"),
-        }
+        };
+        // the map of the latest row, because rows of one sensor are adjacent
+        let mut latest: Option<(&str, Map)> = None;
+        let estimates = records.enumerate().map(|(at, record)| {
+            let known = record.filter(|_| rate.is_valid(at) && signal.is_valid(at));
+            let Some(record) = known else { return Ok(None) };
+            if latest.as_ref().is_none_or(|(text, _)| *text != record) {
+                latest = Some((record, Map::new(record, estimator)?));
+            }
+            Ok(latest.as_ref().and_then(|(_, map)| map.at(rate.value(at), signal.value(at))))
+        });
+        let estimates: Float64Array = estimates.collect::<Result<_>>()?;
+        Ok(ColumnarValue::Array(Arc::new(estimates)))
     }
 }
 

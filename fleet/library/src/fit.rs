@@ -7,7 +7,7 @@ use datafusion::{
         array::{ArrayRef, BinaryBuilder, BooleanArray, RecordBatch},
         datatypes::{DataType, Field, FieldRef, Schema},
     },
-    common::{Result, ScalarValue, plan_datafusion_err},
+    common::{Result, ScalarValue, cast::as_float64_array, plan_datafusion_err},
     logical_expr::{
         Accumulator, AggregateUDF, AggregateUDFImpl, ColumnarValue, EmitTo, GroupsAccumulator,
         Signature, TypeSignature, Volatility,
@@ -19,9 +19,8 @@ use stretch_core::{Degree, MAX_DEGREE, MAX_TERMS};
 
 use crate::{
     about::About,
-    columns::{bytes, floats},
-    fitted::{answers, fields},
-    one::One,
+    answer::{answers, fields},
+    one::{One, state_of_each_row, states},
     triangles::{Outcome, Triangles},
 };
 
@@ -200,13 +199,13 @@ impl<const TERMS: usize> Fits<TERMS> {
 
     fn merge(
         &mut self,
-        states: &[ArrayRef],
+        stored: &[ArrayRef],
         groups: &[usize],
         filter: Option<&BooleanArray>,
         total: usize,
     ) -> Result<()> {
-        match states {
-            [states] => self.triangles.states(bytes(states)?, groups, filter, total),
+        match stored {
+            [stored] => self.triangles.states(states(stored)?.iter(), groups, filter, total),
             _ => self.triangles.states(std::iter::empty(), groups, filter, total),
         }
         Ok(())
@@ -224,7 +223,7 @@ impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
         if self.kind == Kind::Merge {
             return self.merge(values, groups, filter, total);
         }
-        let columns = values[self.kind.literals()..].iter().map(floats);
+        let columns = values[self.kind.literals()..].iter().map(|array| as_float64_array(array));
         let columns = match columns.collect::<Result<Vec<_>>>()?[..] {
             // a line has no rate: the signal takes its place and is multiplied by nothing
             [signal, reference] => [signal, signal, reference],
@@ -256,11 +255,8 @@ impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
         values: &[ArrayRef],
         filter: Option<&BooleanArray>,
     ) -> Result<Vec<ArrayRef>> {
-        let mut each = Self { kind: self.kind, triangles: self.triangles.of_no_group() };
-        let rows = values.first().map_or(0, |array| array.len());
-        let groups: Vec<usize> = (0..rows).collect();
-        each.update_batch(values, &groups, filter, rows)?;
-        each.state(EmitTo::All)
+        let empty = Self { kind: self.kind, triangles: self.triangles.of_no_group() };
+        state_of_each_row(empty, values, filter)
     }
 
     fn size(&self) -> usize {

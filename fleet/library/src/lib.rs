@@ -2,13 +2,10 @@
 
 mod about;
 mod agreement;
-mod calibration;
-mod columns;
+mod answer;
 mod estimate;
 mod fit;
-mod fitted;
 mod one;
-mod span;
 mod state;
 mod triangles;
 

@@ -1,12 +1,33 @@
-//! A query without groups is a query of one group.
+//! What the aggregates share: queries without groups, rows as groups, and arrays of stored states.
 
 use std::fmt;
 
 use datafusion::{
-    arrow::array::ArrayRef,
+    arrow::{
+        array::{ArrayRef, AsArray, BinaryArray, BooleanArray},
+        compute::cast,
+        datatypes::DataType,
+    },
     common::{Result, ScalarValue, not_impl_err},
     logical_expr::{Accumulator, EmitTo, GroupsAccumulator},
 };
+
+/// Stored states, whatever kind of binary the file had.
+pub(crate) fn states(array: &ArrayRef) -> Result<BinaryArray> {
+    Ok(cast(array, &DataType::Binary)?.as_binary::<i32>().clone())
+}
+
+/// The state of each row, by an accumulator of no group.
+pub(crate) fn state_of_each_row(
+    mut groups: impl GroupsAccumulator,
+    values: &[ArrayRef],
+    filter: Option<&BooleanArray>,
+) -> Result<Vec<ArrayRef>> {
+    let rows = values.first().map_or(0, |array| array.len());
+    let each: Vec<usize> = (0..rows).collect();
+    groups.update_batch(values, &each, filter, rows)?;
+    groups.state(EmitTo::All)
+}
 
 /// The accumulator of one group, by the one of many.
 pub(crate) struct One<G> {

@@ -13,8 +13,7 @@ use stretch_fit::{Factor, FitError, SurfaceAccumulator};
 
 use crate::{
     about::About,
-    span::Span,
-    state::{Partial, StateError, Stored, read, write, write_refusal},
+    state::{Partial, Span, StateError, Stored, read, write, write_refusal},
 };
 
 /// Rows of a group and branch that are collected before they are folded together.
@@ -26,7 +25,25 @@ const MOST: f64 = 1e15;
 /// Rows that wait: rates, signals, references.
 type Waiting = [[f64; ROWS]; 3];
 
-/// Partial fits, flat: a side is a branch of a group, and place `group * sides + side` holds it.
+/// A branch of a group, or its one line.
+#[derive(Debug, Clone, Copy)]
+struct Side<const TERMS: usize> {
+    factor: Factor<f64, TERMS>,
+    span: Span,
+    /// Rows that wait.
+    filled: u8,
+}
+
+/// What the sides of a group share.
+#[derive(Debug, Clone)]
+struct Group {
+    left_out: u64,
+    /// Metadata of the columns: of these rows, and of merged states.
+    about: Arc<str>,
+    refused: Option<Box<str>>,
+}
+
+/// Partial fits, flat: place `group * sides + side` holds a side of a group.
 ///
 /// A group costs a triangle and, once it receives rows, `3 ROWS` numbers a side: 7.4 kB for poly13,
 /// 14 kB for the widest surface. All groups share the block that folds.
@@ -36,15 +53,11 @@ pub(crate) struct Triangles<const TERMS: usize> {
     sides: usize,
     empty: Factor<f64, TERMS>,
     block: Box<SurfaceAccumulator<f64, TERMS, ROWS>>,
-    factors: Vec<Factor<f64, TERMS>>,
-    spans: Vec<Span>,
-    waiting: Vec<Waiting>,
-    filled: Vec<u8>,
-    left_out: Vec<u64>,
-    /// Metadata of the columns: of these rows, and of merged states.
     own: Arc<str>,
-    about: Vec<Arc<str>>,
-    refused: Vec<Option<Box<str>>>,
+    groups: Vec<Group>,
+    places: Vec<Side<TERMS>>,
+    /// Of the same places, but only where rows come.
+    waiting: Vec<Waiting>,
 }
 
 /// What a group came to.
@@ -59,14 +72,10 @@ impl<const TERMS: usize> Triangles<TERMS> {
             sides,
             empty: block.factor(),
             block,
-            factors: Vec::new(),
-            spans: Vec::new(),
-            waiting: Vec::new(),
-            filled: Vec::new(),
-            left_out: Vec::new(),
             own: about.text(),
-            about: Vec::new(),
-            refused: Vec::new(),
+            groups: Vec::new(),
+            places: Vec::new(),
+            waiting: Vec::new(),
         })
     }
 
@@ -75,13 +84,9 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Self {
             block: self.block.clone(),
             own: self.own.clone(),
-            factors: Vec::new(),
-            spans: Vec::new(),
+            groups: Vec::new(),
+            places: Vec::new(),
             waiting: Vec::new(),
-            filled: Vec::new(),
-            left_out: Vec::new(),
-            about: Vec::new(),
-            refused: Vec::new(),
             ..*self
         }
     }
@@ -92,14 +97,11 @@ impl<const TERMS: usize> Triangles<TERMS> {
 
     /// Room for so many groups.
     fn grow(&mut self, groups: usize) {
-        let places = groups * self.sides;
-        if self.factors.len() < places {
-            self.factors.resize(places, self.empty);
-            self.spans.resize(places, Span::EMPTY);
-            self.filled.resize(places, 0);
-            self.left_out.resize(groups, 0);
-            self.about.resize_with(groups, || self.own.clone());
-            self.refused.resize_with(groups, || None);
+        if self.groups.len() < groups {
+            let group = Group { left_out: 0, about: self.own.clone(), refused: None };
+            self.groups.resize(groups, group);
+            let side = Side { factor: self.empty, span: Span::EMPTY, filled: 0 };
+            self.places.resize(groups * self.sides, side);
         }
     }
 
@@ -137,7 +139,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
                 }
                 self.take(own, columns.map(|values| &values[row..end]))?;
             } else if is_row(row) {
-                let left_out = &mut self.left_out[groups[row]];
+                let left_out = &mut self.groups[groups[row]].left_out;
                 *left_out = left_out.saturating_add(1);
             }
             row = end;
@@ -148,14 +150,14 @@ impl<const TERMS: usize> Triangles<TERMS> {
     /// Takes a place's rows in.
     fn take(&mut self, place: usize, mut columns: [&[f64]; 3]) -> Result<()> {
         while !columns[0].is_empty() {
-            let filled = usize::from(self.filled[place]);
+            let filled = usize::from(self.places[place].filled);
             let some = columns[0].len().min(ROWS - filled);
             for (waiting, column) in self.waiting[place].iter_mut().zip(&mut columns) {
                 let (now, later) = column.split_at(some);
                 waiting[filled..filled + some].copy_from_slice(now);
                 *column = later;
             }
-            self.filled[place] += some as u8;
+            self.places[place].filled += some as u8;
             if filled + some == ROWS {
                 self.fold(place)?;
             }
@@ -165,21 +167,20 @@ impl<const TERMS: usize> Triangles<TERMS> {
 
     /// Folds what waits at a place.
     fn fold(&mut self, place: usize) -> Result<()> {
-        let filled = usize::from(mem::take(&mut self.filled[place]));
+        let side = &mut self.places[place];
+        let filled = usize::from(mem::take(&mut side.filled));
         if filled == 0 {
             return Ok(());
         }
-        let rows = &self.waiting[place];
-        for (column, values) in rows.iter().enumerate() {
-            self.spans[place].widen(column, &values[..filled]);
+        let rows = self.waiting[place].each_ref().map(|values| &values[..filled]);
+        for (column, values) in rows.into_iter().enumerate() {
+            side.span.widen(column, values);
         }
         let folded = |error| exec_datafusion_err!("rows of a fit: {error}");
-        self.block.exchange(self.factors[place]).map_err(folded)?;
         let [rates, signals, references] = rows;
-        let (rates, signals, references) =
-            (&rates[..filled], &signals[..filled], &references[..filled]);
+        self.block.exchange(side.factor).map_err(folded)?;
         self.block.push_columns(rates, signals, references).map_err(folded)?;
-        self.factors[place] = self.block.exchange(self.empty).map_err(folded)?;
+        side.factor = self.block.exchange(self.empty).map_err(folded)?;
         Ok(())
     }
 
@@ -196,7 +197,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         for (row, (state, &group)) in states.zip(groups).enumerate() {
             let dropped = filter.is_some_and(|kept| !(kept.is_valid(row) && kept.value(row)));
             let Some(state) = state.filter(|_| !dropped) else { continue };
-            let known = &self.about[group];
+            let known = &self.groups[group].about;
             let merged = match read(state, self.sides as u8, self.degree, known) {
                 Ok(Stored::Partial(partial)) => self.merge(group, &partial),
                 Ok(Stored::Refusal(sentence)) => Err(StateError::Refused { sentence }),
@@ -207,28 +208,29 @@ impl<const TERMS: usize> Triangles<TERMS> {
                     StateError::Refused { sentence } => sentence,
                     error => format!("a stored state cannot be merged: {error}"),
                 };
-                self.refused[group].get_or_insert(sentence.into());
+                self.groups[group].refused.get_or_insert(sentence.into());
             }
         }
     }
 
     fn merge(&mut self, group: usize, other: &Partial<TERMS>) -> Result<(), StateError> {
-        let mine = group * self.sides..(group + 1) * self.sides;
-        if *other.about != *self.about[group] {
+        let places = &mut self.places[group * self.sides..(group + 1) * self.sides];
+        let group = &mut self.groups[group];
+        if *other.about != *group.about {
             // the columns of a merge are states; the first one states its source columns
-            let fresh = self.factors[mine.clone()].iter().all(|factor| factor.samples() == 0);
-            if !fresh || self.left_out[group] > 0 {
-                let (found, expected) = (other.about.to_string(), self.about[group].to_string());
+            let is_fresh = places.iter().all(|side| side.factor.samples() == 0);
+            if !is_fresh || group.left_out > 0 {
+                let (found, expected) = (other.about.to_string(), group.about.to_string());
                 return Err(StateError::Columns { found, expected });
             }
-            self.about[group] = other.about.clone();
+            group.about = other.about.clone();
         }
-        self.left_out[group] = self.left_out[group].saturating_add(other.left_out);
-        for (place, side) in mine.zip(&other.sides) {
+        group.left_out = group.left_out.saturating_add(other.left_out);
+        for (mine, side) in places.iter_mut().zip(&other.sides) {
             if let Some((factor, span)) = side {
                 let kind = |_| StateError::Damaged { what: "its degree" };
-                self.factors[place].merge(factor).map_err(kind)?;
-                self.spans[place] = self.spans[place].joined(span);
+                mine.factor.merge(factor).map_err(kind)?;
+                mine.span = mine.span.joined(span);
             }
         }
         Ok(())
@@ -237,7 +239,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
     /// What the groups came to; they are gone then.
     pub(crate) fn outcomes(&mut self, emit: EmitTo) -> Result<Vec<Outcome<TERMS>>> {
         let groups = match emit {
-            EmitTo::All => self.left_out.len(),
+            EmitTo::All => self.groups.len(),
             EmitTo::First(groups) => groups,
         };
         for place in 0..groups * self.sides {
@@ -247,25 +249,26 @@ impl<const TERMS: usize> Triangles<TERMS> {
             EmitTo::All => EmitTo::All,
             EmitTo::First(groups) => EmitTo::First(groups * self.sides),
         };
-        let factors = places.take_needed(&mut self.factors);
-        let spans = places.take_needed(&mut self.spans);
-        places.take_needed(&mut self.filled);
         if !self.waiting.is_empty() {
             places.take_needed(&mut self.waiting);
         }
-        let both: Vec<_> = factors.into_iter().zip(spans).collect();
-        let groups = emit.take_needed(&mut self.left_out).into_iter();
-        let about = emit.take_needed(&mut self.about);
-        let refused = emit.take_needed(&mut self.refused);
-        let outcomes = groups.zip(about).zip(refused).zip(both.chunks(self.sides));
-        let outcome = |(((left_out, about), refused), sides): (_, &[(Factor<_, TERMS>, Span)])| {
-            let full = |side: usize| sides.get(side).copied().filter(|side| side.0.samples() > 0);
-            match refused {
+        let sides = places.take_needed(&mut self.places);
+        let groups = emit.take_needed(&mut self.groups);
+        let outcome = |(group, sides): (Group, &[Side<TERMS>])| {
+            let full = |side: usize| {
+                let side = sides.get(side).filter(|side| side.factor.samples() > 0)?;
+                Some((side.factor, side.span))
+            };
+            match group.refused {
                 Some(sentence) => Err(sentence),
-                None => Ok(Partial { left_out, about, sides: [full(0), full(1)] }),
+                None => Ok(Partial {
+                    left_out: group.left_out,
+                    about: group.about,
+                    sides: [full(0), full(1)],
+                }),
             }
         };
-        Ok(outcomes.map(outcome).collect())
+        Ok(groups.into_iter().zip(sides.chunks(self.sides)).map(outcome).collect())
     }
 
     /// The bytes of a group's outcome.
@@ -281,16 +284,12 @@ impl<const TERMS: usize> Triangles<TERMS> {
         fn of<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()
         }
-        let sentences = self.refused.iter().flatten().map(|s| s.len()).sum::<usize>();
+        let refused = self.groups.iter().filter_map(|group| group.refused.as_ref());
         size_of::<Self>()
             + size_of::<SurfaceAccumulator<f64, TERMS, ROWS>>()
-            + of(&self.factors)
-            + of(&self.spans)
+            + of(&self.groups)
+            + of(&self.places)
             + of(&self.waiting)
-            + of(&self.filled)
-            + of(&self.left_out)
-            + of(&self.about)
-            + of(&self.refused)
-            + sentences
+            + refused.map(|sentence| sentence.len()).sum::<usize>()
     }
 }

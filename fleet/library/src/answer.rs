@@ -1,4 +1,4 @@
-//! What a fit answers, a row a group.
+//! What a fit answers, a row a group: numbers, and the calibration that `stretch apply` takes.
 
 use std::sync::Arc;
 
@@ -6,14 +6,17 @@ use datafusion::arrow::{
     array::{ArrayRef, Float64Builder, ListBuilder, StringBuilder, StructArray, UInt64Builder},
     datatypes::{DataType, Field, Fields},
 };
-use stretch_core::{Degree, Polarity};
-use stretch_fit::{Factor, FitError};
+use stretch_calibrate::calibration_to_json;
+use stretch_core::{
+    BranchSurface, Calibration, CalibrationSpec, Degree, FitSummary, Interval, Label, LinearMap,
+    Model, Normalisation, Polarity, Provenance, Range, RangeSpec, RateEstimator, RateSource,
+    SampleRate, Schema, Surface, Target,
+};
+use stretch_fit::{Factor, Fit, FitError};
 
 use crate::{
     about::About,
-    calibration::{Side, Whole},
-    span::Span,
-    state::Partial,
+    state::{Partial, Span},
     triangles::Outcome,
 };
 
@@ -35,7 +38,8 @@ pub(crate) fn fields() -> Fields {
 }
 
 /// A fit's answer.
-struct Answer<const TERMS: usize> {
+#[derive(Default)]
+struct Answer {
     rows: u64,
     left_out: u64,
     rmse: Option<f64>,
@@ -81,27 +85,16 @@ pub(crate) fn answers<const TERMS: usize>(
     Arc::new(StructArray::new(fields(), arrays, None))
 }
 
-fn answer<const TERMS: usize>(
-    degree: Degree,
-    is_line: bool,
-    outcome: &Outcome<TERMS>,
-) -> Answer<TERMS> {
-    let nothing = Answer {
-        rows: 0,
-        left_out: 0,
-        rmse: None,
-        span: None,
-        coefficients: None,
-        record: None,
-        refused: None,
-    };
+fn answer<const TERMS: usize>(degree: Degree, is_line: bool, outcome: &Outcome<TERMS>) -> Answer {
     let partial = match outcome {
         Ok(partial) => partial,
-        Err(sentence) => return Answer { refused: Some(sentence.to_string()), ..nothing },
+        Err(sentence) => {
+            return Answer { refused: Some(sentence.to_string()), ..Answer::default() };
+        }
     };
     let sides = partial.sides.iter().flatten();
     let rows = sides.fold(0, |rows: u64, (factor, _)| rows.saturating_add(factor.samples()));
-    let counted = Answer { rows, left_out: partial.left_out, ..nothing };
+    let counted = Answer { rows, left_out: partial.left_out, ..Answer::default() };
     match fitted(degree, is_line, partial, rows) {
         Err(sentence) => Answer { refused: Some(sentence), ..counted },
         Ok((sides, polarity)) => {
@@ -187,4 +180,139 @@ fn polarity<const TERMS: usize>(
     let fit = all.fit_degree(Degree::LINE).map_err(sentence)?;
     let falls = fit.coefficients().get(1).is_some_and(|slope| *slope < 0.0);
     Ok(if falls { Polarity::Falling } else { Polarity::Rising })
+}
+
+/// A branch of a fit, or the one line.
+struct Side<const TERMS: usize> {
+    factor: Factor<f64, TERMS>,
+    span: Span,
+    fit: Fit<f64, TERMS>,
+}
+
+/// A complete fit: a line, or inflation and deflation.
+struct Whole<'a, const TERMS: usize> {
+    sides: &'a [Side<TERMS>],
+    polarity: Polarity,
+    /// Of all sides.
+    span: Span,
+}
+
+/// Everything of a record but its model's numbers.
+struct Frame {
+    sample_rate_hz: SampleRate,
+    rate_estimator: RateEstimator,
+    signal: Range,
+    target: Range,
+}
+
+const RATE: usize = 0;
+const SIGNAL: usize = 1;
+const REFERENCE: usize = 2;
+
+impl<const TERMS: usize> Whole<'_, TERMS> {
+    /// The record in JSON, sealed; `None` if it is unknown how the rates were estimated.
+    ///
+    /// Signal and target are normalised to 0..1 over the range of the rows, and the surfaces are
+    /// about the smallest signal, because coefficients about zero volts would cancel.
+    fn record(&self, about: &About) -> Result<Option<String>, String> {
+        let (Some(hz), Some(rate_estimator)) = (about.sample_rate_hz, about.rate_estimator) else {
+            return Ok(None);
+        };
+        let frame = Frame {
+            sample_rate_hz: SampleRate::new(hz).map_err(|e| e.to_string())?,
+            rate_estimator,
+            signal: range(Normalisation::MinMax, self.span, SIGNAL)?,
+            target: range(Normalisation::MinMax, self.span, REFERENCE)?,
+        };
+        let model = self.model(&frame)?;
+        let spec = CalibrationSpec {
+            schema: Schema::CURRENT,
+            signal: Label::new(&about.signal).map_err(|e| e.to_string())?,
+            reference: Label::new(&about.reference).map_err(|e| e.to_string())?,
+            sample_rate_hz: frame.sample_rate_hz,
+            target: Target::Direct,
+            polarity: self.polarity,
+            signal_range: frame.signal,
+            target_range: frame.target,
+            rate_estimator: frame.rate_estimator,
+            rate_source: RateSource::Voltage,
+            dead_band: 0.0,
+            model,
+            provenance: Provenance::new("", []),
+        };
+        let calibration = Calibration::new(spec).map_err(|e| e.to_string())?;
+        calibration_to_json(&calibration).map(Some).map_err(|e| e.to_string())
+    }
+
+    fn model(&self, frame: &Frame) -> Result<Model, String> {
+        match self.sides {
+            [line] => {
+                let surface = normalised(line, frame, 1.0)?;
+                Ok(Model::Linear(LinearMap {
+                    slope: surface.coefficient(0, 1),
+                    intercept: surface.coefficient(0, 0),
+                    signal_domain: extent(line.span, SIGNAL),
+                    fit: summary(line, frame),
+                }))
+            }
+            [up, down] => {
+                let inflation = self.branch(up, frame)?;
+                Ok(Model::Surfaces { inflation, deflation: self.branch(down, frame)? })
+            }
+            _ => Err("a fit has one side or two".to_owned()),
+        }
+    }
+
+    fn branch(&self, side: &Side<TERMS>, frame: &Frame) -> Result<BranchSurface, String> {
+        // the sign with which a positive rate means a rising target
+        let mut signed = side.span;
+        if self.polarity == Polarity::Falling {
+            (signed.least[RATE], signed.most[RATE]) =
+                (-side.span.most[RATE], -side.span.least[RATE]);
+        }
+        let rate_range = range(Normalisation::Range, signed, RATE)?;
+        Ok(BranchSurface {
+            rate_range,
+            surface: normalised(side, frame, self.polarity.sign() * rate_range.span())?,
+            signal_domain: extent(side.span, SIGNAL),
+            rate_domain: extent(signed, RATE),
+            fit: summary(side, frame),
+        })
+    }
+}
+
+/// The surface over normalised signal and rate, to the normalised target; `rate` is the factor from
+/// a normalised rate to one of the signal.
+fn normalised<const TERMS: usize>(
+    side: &Side<TERMS>,
+    frame: &Frame,
+    rate: f64,
+) -> Result<Surface, String> {
+    let (signal, target) = (frame.signal, frame.target);
+    let fit = side.factor.counted_from(signal.offset()).fit().map_err(|e| e.to_string())?;
+    let degree: Degree = fit.degree();
+    let power = |x: f64, n: u8| (0..n).fold(1.0, |power, _| power * x);
+    let scaled = degree.exponents().zip(fit.coefficients()).map(|((i, j), c)| {
+        let offset = if (i, j) == (0, 0) { target.offset() } else { 0.0 };
+        (c - offset) * power(rate, i) * power(signal.span(), j) / target.span()
+    });
+    let coefficients: Vec<f64> = scaled.collect();
+    Surface::new(degree, &coefficients).map_err(|e| e.to_string())
+}
+
+fn summary<const TERMS: usize>(side: &Side<TERMS>, frame: &Frame) -> FitSummary {
+    FitSummary {
+        samples: side.fit.samples(),
+        r_squared: side.fit.r_squared().unwrap_or(0.0),
+        rmse: side.fit.rmse().unwrap_or(0.0) / frame.target.span(),
+    }
+}
+
+fn extent(span: Span, column: usize) -> Interval {
+    Interval { min: span.least[column], max: span.most[column] }
+}
+
+fn range(mode: Normalisation, span: Span, column: usize) -> Result<Range, String> {
+    let Interval { min, max } = extent(span, column);
+    Range::new(RangeSpec { mode, zero: 0.0, min, max }).map_err(|e| e.to_string())
 }

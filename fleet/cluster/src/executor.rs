@@ -13,6 +13,7 @@ use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_
 use crate::{
     codec::{Marked, Release},
     ports::{address, address_towards, before_port, chosen, guard, say},
+    state_with_functions,
 };
 
 /// What an executor is started with.
@@ -80,13 +81,7 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     if let Some(version) = options.claim_release {
         release.version = version;
     }
-    let mut functions = BallistaFunctionRegistry::default();
-    for aggregate in stretch_fleet::aggregates() {
-        functions.aggregate_functions.insert(aggregate.name().to_owned(), aggregate);
-    }
-    for scalar in stretch_fleet::scalars() {
-        functions.scalar_functions.insert(scalar.name().to_owned(), scalar);
-    }
+    let functions = BallistaFunctionRegistry::from(&state_with_functions().build());
     // removed when the executor stops, but not when it is killed
     let temporary = tempfile::Builder::new().prefix("stretch-executor-").tempdir()?;
     let work_dir = options.work_dir.unwrap_or_else(|| temporary.path().to_owned());

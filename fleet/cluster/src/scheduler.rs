@@ -11,11 +11,12 @@ use ballista_core::{
 use ballista_scheduler::{
     cluster::BallistaCluster, config::SchedulerConfig, scheduler_process::start_server,
 };
-use datafusion::{execution::SessionStateBuilder, prelude::SessionConfig};
+use datafusion::prelude::SessionConfig;
 
 use crate::{
     codec::{Marked, Release},
     ports::{address, before_port, chosen, guard, say},
+    state_with_functions,
 };
 
 /// What a scheduler is started with.
@@ -57,10 +58,8 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
         expire_dead_executor_interval_seconds: (timeout / 2).max(1),
         no_executors_grace_period_seconds: timeout,
         override_config_producer: Some(Arc::new(SessionConfig::new_with_ballista)),
-        override_session_builder: Some(Arc::new(|config: SessionConfig| {
-            let state =
-                SessionStateBuilder::new().with_default_features().with_config(config).build();
-            Ok(with_functions(state))
+        override_session_builder: Some(Arc::new(|config| {
+            Ok(state_with_functions().with_config(config).build())
         })),
         override_logical_codec: Some(Marked::<BallistaLogicalExtensionCodec>::new(&release)),
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
@@ -69,19 +68,4 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
     say(format_args!("scheduler {} at df://{address}", release.version));
     let cluster = BallistaCluster::new_from_config(&config).await.map_err(|e| anyhow!("{e}"))?;
     start_server(cluster, address, Arc::new(config)).await.map_err(|e| anyhow!("{address}: {e}"))
-}
-
-/// A session's state, with our functions.
-pub(crate) fn with_functions(
-    mut state: datafusion::execution::SessionState,
-) -> datafusion::execution::SessionState {
-    use datafusion::execution::FunctionRegistry;
-    for aggregate in stretch_fleet::aggregates() {
-        // replaces one of the same name; there is none
-        let _ = state.register_udaf(aggregate);
-    }
-    for scalar in stretch_fleet::scalars() {
-        let _ = state.register_udf(scalar);
-    }
-    state
 }

@@ -7,14 +7,12 @@ use chrono::NaiveDate;
 use serde::Serialize;
 
 use crate::{
-    flat::{flat, table},
+    answers::{flat, table, write_records},
     lake::{Refused, write_parquet},
     lock::{Lock, RECORDS_DEPTH},
-    records::write_records,
-    session::in_order,
     show::{say, say_json, warn_of},
-    sql::On,
-    states::{bring_up, shared},
+    sql::{On, ask_in_shares},
+    states::bring_up,
 };
 
 /// Sensors that a table on the terminal shows.
@@ -71,19 +69,13 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
         )
     };
     // threads share the rigs, and merge the days of each in their order: the same bits in every run
-    let batches = match shares {
-        None => session.sql(&question("")).await?.collect().await?,
-        Some(shares) => {
-            let rigs: BTreeSet<[&str; 2]> =
-                lake.files.iter().map(|f| [f.place.site.as_str(), f.place.rig.as_str()]).collect();
-            let of = shared(rigs, shares).into_iter().map(|own| {
-                let names: Vec<String> =
-                    own.iter().map(|[site, rig]| format!("'{site}/{rig}'")).collect();
-                question(&format!(" and site || '/' || rig in ({})", names.join(", ")))
-            });
-            in_order(&session, of.collect()).await?
-        }
+    let rigs: BTreeSet<[&str; 2]> =
+        lake.files.iter().map(|f| [f.place.site.as_str(), f.place.rig.as_str()]).collect();
+    let condition = |own: &[[&str; 2]]| {
+        let names: Vec<String> = own.iter().map(|[site, rig]| format!("'{site}/{rig}'")).collect();
+        format!(" and site || '/' || rig in ({})", names.join(", "))
     };
+    let batches = ask_in_shares(&session, shares, rigs, question, condition).await?;
     ensure!(
         batches.iter().any(|batch| batch.num_rows() > 0),
         "there is no trial from {from} to {to}"

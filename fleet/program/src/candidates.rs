@@ -1,11 +1,11 @@
 //! Files that may become trials of a lake, and which of them are copies.
 
-use std::{collections::HashMap, path::Path};
+use std::{collections::HashMap, ffi::OsString, path::Path};
 
-use rayon::prelude::*;
+use rayon::{iter::Either, prelude::*};
 
 use crate::{
-    lake::{LakeFile, Place, digest_of_file},
+    lake::{Footer, LakeFile, Place, digest_of_file},
     sources::Source,
 };
 
@@ -20,15 +20,10 @@ pub(crate) struct Candidate<'a> {
 
 /// The files that can be read and whose place is known, and for the others the reason.
 pub(crate) fn candidates(sources: &[Source]) -> (Vec<Candidate<'_>>, Vec<(&Path, String)>) {
-    let all: Vec<Result<Candidate<'_>, String>> = sources.par_iter().map(candidate).collect();
-    let (mut found, mut refused) = (Vec::new(), Vec::new());
-    for (source, one) in sources.iter().zip(all) {
-        match one {
-            Ok(one) => found.push(one),
-            Err(why) => refused.push((source.path.as_path(), why)),
-        }
-    }
-    (found, refused)
+    sources.par_iter().partition_map(|source| match candidate(source) {
+        Ok(one) => Either::Left(one),
+        Err(why) => Either::Right((source.path.as_path(), why)),
+    })
 }
 
 fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
@@ -69,4 +64,49 @@ pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<St
         }
     };
     all.iter().map(why).collect()
+}
+
+/// Trials of a lake, those of the run that writes among them.
+#[derive(Debug, Default)]
+pub(crate) struct Known {
+    /// Where a trial came from, by the digest of its samples.
+    by_samples: HashMap<String, String>,
+    /// Where a trial came from, by its place and its name without ending.
+    by_name: HashMap<(Place, OsString), String>,
+}
+
+impl Known {
+    pub(crate) fn of(files: &[LakeFile]) -> Self {
+        let mut known = Self::default();
+        files.iter().for_each(|file| known.insert(&file.footer, &file.place));
+        known
+    }
+
+    /// Adds a trial that is about to be written, or says in which other file the lake already has
+    /// it.
+    pub(crate) fn claim(&mut self, footer: &Footer, place: &Place) -> Result<(), String> {
+        if let Some(other) = self.by_samples.get(&footer.samples) {
+            return Err(format!(
+                "its samples are those of {other}, which is in the lake already: a trial counted twice would weigh double"
+            ));
+        }
+        if let Some(other) = self.by_name.get(&name(footer, place)) {
+            return Err(format!(
+                "it is a second record of trial {} of {place}, with other samples than {other}, which stays: rename it if it is \
+                 another trial, or take that one out of the lake",
+                footer.trial
+            ));
+        }
+        self.insert(footer, place);
+        Ok(())
+    }
+
+    fn insert(&mut self, footer: &Footer, place: &Place) {
+        self.by_samples.entry(footer.samples.clone()).or_insert_with(|| footer.source.clone());
+        self.by_name.entry(name(footer, place)).or_insert_with(|| footer.source.clone());
+    }
+}
+
+fn name(footer: &Footer, place: &Place) -> (Place, OsString) {
+    (place.clone(), Path::new(&footer.trial).file_stem().unwrap_or_default().to_owned())
 }

@@ -19,9 +19,8 @@ use datafusion::{
 use stretch_data::{Channel, SessionTrial, Trial};
 
 use crate::{
-    lake::{Lake, LakeFile},
-    panics::caught,
-    sql::tell_unfit,
+    lake::{Lake, LakeFile, Refused},
+    show::{caught, warn_of},
 };
 
 const DAY_S: f64 = 86400.0;
@@ -43,7 +42,11 @@ pub(crate) type Name = [String; 4];
 /// A lake that holds trials; files that it cannot use are reported.
 pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
     let lake = Lake::open(folder)?;
-    tell_unfit(&lake);
+    let left_out = lake
+        .unfit
+        .iter()
+        .map(|file| Refused { file: file.path.display().to_string(), why: file.why.clone() });
+    warn_of("left out:", &left_out.collect::<Vec<_>>());
     ensure!(!lake.files.is_empty(), "{}: there is no trial in it", folder.display());
     Ok(lake)
 }

@@ -3,17 +3,14 @@
 use std::{path::PathBuf, sync::Arc};
 
 use anyhow::Context;
-use datafusion::arrow::{
-    array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array},
-    datatypes::{Field, Schema},
-};
+use datafusion::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
+    answers::table,
     data_sets::{By, Name, data_sets, lake_with_trials, read, trials},
-    flat::table,
     lake::{Lake, LakeFile, digest, write_parquet},
     lock::remove_abandoned,
     show::{bar, say, say_json},
@@ -174,8 +171,6 @@ fn row(
         ("sentence", text(diagnosis.map(|d| d.sentence.clone()))),
         ("refused", text(refused)),
     ];
-    let fields =
-        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true));
-    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-    Ok(RecordBatch::try_new(schema, columns.into_iter().map(|(_, array)| array).collect())?)
+    let columns = columns.into_iter().map(|(name, array)| (name, array, true));
+    Ok(RecordBatch::try_from_iter_with_nullable(columns)?)
 }

@@ -9,17 +9,16 @@ use anyhow::{Context, bail, ensure};
 use chrono::NaiveDate;
 use datafusion::arrow::{
     array::{ArrayRef, AsArray, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array},
-    compute::{cast, concat_batches},
-    datatypes::{DataType, Date32Type, Field, Schema},
+    compute::{cast, concat_batches, filter_record_batch},
+    datatypes::{DataType, Date32Type},
 };
 use rayon::prelude::*;
 
 use crate::{
-    false_discovery::q_values,
-    flat::table,
+    answers::table,
     lake::write_parquet,
     lock::remove_abandoned,
-    month_test::{Compared, Day, compare},
+    month_test::{Compared, Day, compare, q_values},
     show::{bar, say, say_json},
     sql::On,
     states::bring_up,
@@ -186,10 +185,8 @@ fn told(rows: &[Row], level: f64) -> anyhow::Result<RecordBatch> {
         ("moved", Arc::new(moved)),
         ("refused", Arc::new(refused)),
     ];
-    let fields =
-        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true));
-    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-    Ok(RecordBatch::try_new(schema, columns.into_iter().map(|(_, array)| array).collect())?)
+    let columns = columns.into_iter().map(|(name, array)| (name, array, true));
+    Ok(RecordBatch::try_from_iter_with_nullable(columns)?)
 }
 
 fn tell(args: &Args, rows: &[Row], batch: &RecordBatch) -> anyhow::Result<()> {
@@ -204,7 +201,7 @@ fn tell(args: &Args, rows: &[Row], batch: &RecordBatch) -> anyhow::Result<()> {
     let count = moved.count();
     let shown: BooleanArray =
         rows.iter().map(|row| Some(has_moved(&row) || row.compared.is_err())).collect();
-    let shown = datafusion::arrow::compute::filter_record_batch(batch, &shown)?;
+    let shown = filter_record_batch(batch, &shown)?;
     if shown.num_rows() > 0 {
         say(table(&shown)?)?;
     }

@@ -16,8 +16,7 @@ use stretch_data::{Trial, unit};
 use stretch_recording::ReadOptions;
 
 use crate::{
-    candidates::{Candidate, candidates, copies},
-    known::Known,
+    candidates::{Candidate, Known, candidates, copies},
     lake::{
         About, Footer, Lake, LakeFile, Refused, Samples, accept, digest, refuse, set_aside, write,
     },

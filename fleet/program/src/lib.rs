@@ -1,27 +1,142 @@
 //! Lakes of trials: what the program `stretch-fleet` does.
 
+mod answers;
 mod calibrate;
 mod candidates;
-mod command;
 mod data_sets;
 mod diagnose;
 mod drift;
-mod false_discovery;
-mod flat;
-mod from_path;
 mod ingest;
-mod known;
 mod lake;
 mod lock;
 mod make;
 mod month_test;
-mod panics;
 mod prior;
-mod records;
-mod session;
 mod show;
 mod sources;
 mod sql;
 mod states;
 
-pub use command::run;
+use std::{
+    any::Any,
+    ffi::OsString,
+    panic::{AssertUnwindSafe, catch_unwind},
+    process::ExitCode,
+};
+
+use clap::{Parser, Subcommand};
+
+use show::{message, tell_in_a_line, warn};
+
+/// Years of logs and thousands of sensors: a lake of trials, and queries of it.
+#[derive(Debug, Parser)]
+#[command(name = "stretch-fleet", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Ingest(ingest::Args),
+    Make(make::Args),
+    Sql(sql::Args),
+    Calibrate(calibrate::Args),
+    Drift(drift::Args),
+    Prior(prior::Args),
+    Diagnose(diagnose::Args),
+}
+
+/// Exit status if Ctrl-C ended the program.
+const INTERRUPTED: u8 = 130;
+
+/// The program `stretch-fleet`, called with its name and arguments.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = Cli::parse_from(words);
+    tell_in_a_line();
+    let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(e) => {
+            warn(format!("stretch-fleet: no thread can be started: {e}"));
+            return ExitCode::FAILURE;
+        }
+    };
+    runtime.spawn(async {
+        if tokio::signal::ctrl_c().await.is_ok() {
+            stretch_data::files::clean_up_and_exit(INTERRUPTED);
+        }
+    });
+    let work = async {
+        match cli.command {
+            Command::Ingest(args) => tokio::task::block_in_place(|| ingest::run(args)),
+            Command::Make(args) => tokio::task::block_in_place(|| make::run(args)),
+            Command::Sql(args) => sql::run(args).await,
+            Command::Calibrate(args) => calibrate::run(args).await,
+            Command::Drift(args) => drift::run(args).await,
+            Command::Prior(args) => tokio::task::block_in_place(|| prior::run(args)),
+            Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
+        }
+    };
+    // a panic of a query, for example on damaged rows, ends the command like any other error
+    let result = catch_unwind(AssertUnwindSafe(|| runtime.block_on(work)));
+    match result.unwrap_or_else(|panic| Err(gave_up(panic.as_ref()))) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            warn(format!("stretch-fleet: {}", sentence(&error)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
+    anyhow::anyhow!(
+        "a reader gave up: {}. Damaged rows of a file do this: ingest its trial again, or report a fault of the program",
+        message(panic)
+    )
+}
+
+/// The error and its causes; a cause that the text already contains is not repeated.
+fn sentence(error: &anyhow::Error) -> String {
+    let mut told = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !told.contains(&cause) {
+            told = format!("{told}: {cause}");
+        }
+    }
+    stretch_data::files::without_temporary_names(&told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The commands on the documentation pages are valid: words, options and values.
+    #[test]
+    fn every_command_of_the_pages_is_one() {
+        let pages = [
+            include_str!("../../README.md"),
+            include_str!("../../../book/src/tutorials/fleet.md"),
+            include_str!("../../../book/src/tutorials/sleeve.md"),
+            include_str!("prior.rs"),
+            include_str!("diagnose.rs"),
+            include_str!("calibrate.rs"),
+            include_str!("drift.rs"),
+            include_str!("make.rs"),
+        ];
+        let lines = pages.iter().flat_map(|page| page.lines());
+        let lines = lines.map(|line| line.trim_start_matches("///").trim());
+        let mut count = 0;
+        for line in lines.filter(|line| line.starts_with("stretch-fleet ") && !line.contains("..."))
+        {
+            let words = shlex::split(line).expect(line);
+            let asked = Cli::try_parse_from(&words);
+            assert!(
+                asked.is_ok(),
+                "{line}: {}",
+                asked.err().map(|e| e.to_string()).unwrap_or_default()
+            );
+            count += 1;
+        }
+        assert!(count >= 15, "{count} commands were found");
+    }
+}

@@ -4,8 +4,6 @@ use std::{
     fs::{self, File, TryLockError},
     io::ErrorKind,
     path::Path,
-    thread::sleep,
-    time::Duration,
 };
 
 use anyhow::Context;
@@ -14,9 +12,6 @@ use crate::{lake::below, show::warn};
 
 /// The file whose lock is held; it is empty and stays.
 const FILE: &str = ".stretch-lock";
-
-/// How long a waiting command sleeps between two tries.
-const TRY_AGAIN: Duration = Duration::from_millis(50);
 
 /// Depth of the records of a calibration below their folder: site, rig, sensor.
 pub(crate) const RECORDS_DEPTH: usize = 3;
@@ -42,21 +37,16 @@ impl Lock {
         let mut options = File::options();
         let file = options.read(true).write(true).create(true).truncate(false).open(&path);
         let file = file.with_context(told)?;
-        let mut is_told = false;
-        loop {
-            match file.try_lock() {
-                Ok(()) => break,
-                Err(TryLockError::Error(e)) => return Err(e).with_context(told),
-                Err(TryLockError::WouldBlock) if !is_told => {
-                    is_told = true;
-                    warn(format!(
-                        "{}: another command writes into it; this one goes on when that has ended",
-                        folder.display()
-                    ));
-                }
-                Err(TryLockError::WouldBlock) => {}
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::Error(e)) => return Err(e).with_context(told),
+            Err(TryLockError::WouldBlock) => {
+                warn(format!(
+                    "{}: another command writes into it; this one goes on when that has ended",
+                    folder.display()
+                ));
+                file.lock().with_context(told)?;
             }
-            sleep(TRY_AGAIN);
         }
         remove_abandoned(folder, depth)?;
         Ok(Self { _file: file })

@@ -1,7 +1,11 @@
-//! What is printed, and how far work is.
+//! What is printed: answers, warnings, how far work is, and panics in a line.
 
 use std::{
+    any::Any,
+    cell::Cell,
     io::{self, Write},
+    panic::{AssertUnwindSafe, catch_unwind, set_hook},
+    sync::Once,
     time::Duration,
 };
 
@@ -53,4 +57,59 @@ pub(crate) fn bar(what: &'static str, steps: usize) -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
+}
+
+thread_local! {
+    /// Whether the caller of this thread's work reports its panic as an error.
+    static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// From here on a panic is one line on standard error, without a backtrace, and nothing if
+/// [`caught`] makes it an error.
+pub(crate) fn tell_in_a_line() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        set_hook(Box::new(|info| {
+            if !IS_CAUGHT.get() {
+                let line = info.to_string().replace('\n', " ");
+                warn(format!("stretch-fleet: a thread {line}"));
+            }
+        }));
+    });
+}
+
+/// What a reader answers; its panic concerns only one file and is reported as its error.
+///
+/// The readers of Parquet and of the Arrow schema in its footer panic on some damaged files:
+/// `arrow-ipc` has an `unimplemented!` or an `unwrap` for invalid schemas. No option switches that
+/// off for every reader, because a query reads the embedded schema whatever the options of its
+/// table. Therefore a footer is read here before any query reads it, and a panic is caught.
+///
+/// # Errors
+/// The panic message. The reader's result is lost, so the reader must not change anything else.
+pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> anyhow::Result<T> {
+    let outer = IS_CAUGHT.replace(true);
+    let answer = catch_unwind(AssertUnwindSafe(read));
+    IS_CAUGHT.set(outer);
+    answer.map_err(|panic| anyhow::anyhow!("its reader gave up: {}", message(panic.as_ref())))
+}
+
+/// What a panic says.
+pub(crate) fn message(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or(panic.downcast_ref::<&str>().copied()).unwrap_or("it does not say why")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_error_with_its_words() {
+        assert_eq!(caught(|| 1).unwrap(), 1);
+        let words: [fn(); 2] = [|| panic!("no type"), || panic!("type {}", 133)];
+        let told = words.map(|word| caught(word).unwrap_err().to_string());
+        assert_eq!(told, ["its reader gave up: no type", "its reader gave up: type 133"]);
+        assert!(!IS_CAUGHT.get());
+    }
 }

@@ -3,13 +3,68 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    str::FromStr,
 };
 
 use anyhow::{Context, bail};
+use regex::Regex;
 use stretch_data::{DataSet, Split, TrialEntry, TrialKind};
 use stretch_recording::{ReadOptions, Recording, RecordingError};
 
-use crate::{from_path::Pattern, lake::Place};
+use crate::lake::{COLUMNS, Place};
+
+/// A pattern of the last parts of a path: `{site}/{rig}/{sensor}/{date}_*.csv`. `*` matches
+/// anything within a part. A name and `*` end where the text behind them first occurs.
+#[derive(Debug, Clone)]
+pub(crate) struct Pattern(Regex);
+
+impl FromStr for Pattern {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (mut pattern, mut rest, mut is_open) = ("(?:^|/)".to_owned(), text, false);
+        while let Some(next) = rest.find(['{', '*']) {
+            if next == 0 && is_open {
+                return Err(format!(
+                    "nothing stands between two of the names in {text:?}: where would one end?"
+                ));
+            }
+            pattern += &regex::escape(&rest[..next]);
+            is_open = true;
+            if let Some(behind) = rest[next..].strip_prefix('*') {
+                pattern += "[^/]*?";
+                rest = behind;
+                continue;
+            }
+            let (name, behind) = rest[next + 1..]
+                .split_once('}')
+                .ok_or_else(|| format!("a {{ of {text:?} has no }} behind it"))?;
+            if !COLUMNS.contains(&name) {
+                return Err(format!(
+                    "{{{name}}} is none of {{site}}, {{rig}}, {{sensor}} and {{date}}"
+                ));
+            }
+            let group = format!("(?<{name}>[^/]*?)");
+            if pattern.contains(&group) {
+                return Err(format!("{{{name}}} stands in it twice"));
+            }
+            pattern += &group;
+            rest = behind;
+        }
+        pattern += &regex::escape(rest);
+        Regex::new(&format!("{pattern}$")).map(Self).map_err(|e| e.to_string())
+    }
+}
+
+impl Pattern {
+    /// What a path says of site, rig, sensor and date; `None` if it does not match the pattern.
+    fn read(&self, path: &Path) -> Option<[Option<String>; 4]> {
+        let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy()).collect();
+        let path = parts.join("/");
+        let found = self.0.captures(&path)?;
+        Some(COLUMNS.map(|column| Some(found.name(column)?.as_str().to_owned())))
+    }
+}
 
 /// What is said of the places of all trials.
 #[derive(Debug, Clone, clap::Args)]
@@ -122,4 +177,36 @@ pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<S
         }
     }
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(pattern: &str, path: &str) -> Option<[Option<String>; 4]> {
+        pattern.parse::<Pattern>().unwrap().read(Path::new(path))
+    }
+
+    #[test]
+    fn a_path_says_where_a_trial_stands() {
+        let found =
+            read("{site}/{rig}/{sensor}/{date}_*.csv", "/logs/ulm/r2/0042/20260103_a_b.csv");
+        let told = ["ulm", "r2", "0042", "20260103"].map(|x| Some(x.to_owned()));
+        assert_eq!(found, Some(told));
+        let found = read("sleeve-{sensor}-{date}.csv", "sleeve-a-7-2026-01-03.csv").unwrap();
+        // the first occurrence of the text behind a name ends the name
+        assert_eq!(found[2].as_deref(), Some("a"));
+        assert_eq!(found[3].as_deref(), Some("7-2026-01-03"));
+        assert_eq!(read("{site}/{sensor}.csv", "ulm/7.npz"), None);
+        assert_eq!(read("{site}/{rig}/{sensor}.csv", "r2/7.csv"), None);
+    }
+
+    #[test]
+    fn a_pattern_that_cannot_be_read_says_why() {
+        let refused = |text: &str| text.parse::<Pattern>().unwrap_err();
+        assert!(refused("{sensr}.csv").contains("{sensr} is none of"));
+        assert!(refused("{sensor.csv").contains("has no }"));
+        assert!(refused("{sensor}{date}.csv").contains("where would one end"));
+        assert!(refused("{date}/{date}.csv").contains("twice"));
+    }
 }

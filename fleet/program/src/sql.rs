@@ -1,16 +1,21 @@
-//! `stretch-fleet sql`: any question of a lake.
+//! `stretch-fleet sql`: any question of a lake, and where questions are answered: here, or on a cluster.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, path::PathBuf, sync::Arc};
 
 use anyhow::{Context, ensure};
-use datafusion::{error::DataFusionError, execution::context::SQLOptions, prelude::SessionContext};
+use datafusion::{
+    arrow::array::RecordBatch,
+    error::DataFusionError,
+    execution::{context::SQLOptions, runtime_env::RuntimeEnvBuilder},
+    prelude::{SessionConfig, SessionContext},
+};
+use stretch_fleet_cluster::connect;
 
 use crate::{
-    flat::{csv, flat, table},
-    lake::{Lake, Refused, register},
+    answers::{csv, flat, table, write_records},
+    data_sets::lake_with_trials,
+    lake::{Lake, register},
     lock::{Lock, RECORDS_DEPTH},
-    records::write_records,
-    session::session,
     show::{say, warn, warn_of},
 };
 
@@ -60,10 +65,8 @@ impl On {
     /// Opens the lake, reports its problems, and returns it with a session in which it is the table
     /// `trials`. Nothing is written.
     pub(crate) async fn open(&self) -> anyhow::Result<(Lake, SessionContext)> {
-        let lake = Lake::open(&self.lake)?;
-        tell_unfit(&lake);
+        let lake = lake_with_trials(&self.lake)?;
         lake.notes.iter().for_each(|note| warn(format!("note: {note}")));
-        ensure!(!lake.files.is_empty(), "{}: there is no trial in it", self.lake.display());
         let session = session(self.cluster.as_deref(), self.threads).await?;
         register(&session, &lake)?;
         Ok((lake, session))
@@ -86,15 +89,6 @@ impl On {
     }
 }
 
-/// Says which files of a lake are left out.
-pub(crate) fn tell_unfit(lake: &Lake) {
-    let refused = lake
-        .unfit
-        .iter()
-        .map(|file| Refused { file: file.path.display().to_string(), why: file.why.clone() });
-    warn_of("left out:", &refused.collect::<Vec<_>>());
-}
-
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     let (lake, session) = args.on.open().await?;
     let writes = SQLOptions::new()
@@ -112,7 +106,7 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     let schema = answer.schema().inner().clone();
     let mut batches = answer.collect().await?;
     if batches.is_empty() {
-        batches.push(datafusion::arrow::array::RecordBatch::new_empty(schema));
+        batches.push(RecordBatch::new_empty(schema));
     }
     let answer = flat(&batches)?;
     if let Some(folder) = &args.records {
@@ -131,4 +125,72 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
 /// Whether a query was refused because it would write: DDL, DML, or a statement such as `set`.
 fn is_of_writing(error: &DataFusionError) -> bool {
     matches!(error.find_root(), DataFusionError::Plan(text) if text.contains("not supported: "))
+}
+
+/// Size of the cached listing of a lake: about a hundred bytes per file.
+const LISTING_BYTES: usize = 256 << 20;
+
+/// A session with the functions of the library.
+///
+/// # Errors
+/// A URL that names no scheduler. A scheduler that does not answer is an error of the first query.
+pub(crate) async fn session(
+    cluster: Option<&str>,
+    threads: Option<usize>,
+) -> anyhow::Result<SessionContext> {
+    // Statistics of a file ignore NaN: a column of one number and NaN would be read as that number
+    // throughout.
+    let mut config =
+        SessionConfig::new().with_information_schema(true).with_collect_statistics(false);
+    if let Some(threads) = threads {
+        config = config.with_target_partitions(threads.max(1));
+    }
+    let runtime = RuntimeEnvBuilder::new().with_object_list_cache_limit(LISTING_BYTES).build()?;
+    if let Some(url) = cluster {
+        return Ok(connect(url, config, Arc::new(runtime)).await?);
+    }
+    let session = SessionContext::new_with_config_rt(config, Arc::new(runtime));
+    stretch_fleet::register(&session);
+    Ok(session)
+}
+
+/// The answers to a question of all of `all`, which are in order.
+///
+/// On this machine one question a share of them is asked, and `question` has the condition of a
+/// share. A cluster answers one question of all.
+pub(crate) async fn ask_in_shares<T: Copy>(
+    session: &SessionContext,
+    shares: Option<usize>,
+    all: impl IntoIterator<Item = T>,
+    question: impl Fn(&str) -> String,
+    condition: impl Fn(&[T]) -> String,
+) -> anyhow::Result<Vec<RecordBatch>> {
+    let Some(shares) = shares else {
+        return Ok(session.sql(&question("")).await?.collect().await?);
+    };
+    let all: Vec<T> = all.into_iter().collect();
+    let shares = all.chunks(all.len().div_ceil(shares.max(1)).max(1));
+    in_order(session, shares.map(|own| question(&condition(own))).collect()).await
+}
+
+/// Answers of several questions, one behind the other.
+///
+/// Each query is answered by one thread, which takes files and rows in their order, and all queries
+/// run at once. Therefore sums have the same bits in every run, however many queries there are.
+async fn in_order(
+    session: &SessionContext,
+    questions: Vec<String>,
+) -> anyhow::Result<Vec<RecordBatch>> {
+    let mut state = session.state();
+    state.config_mut().options_mut().execution.target_partitions = 1;
+    let alone = SessionContext::new_with_state(state);
+    let tasks = questions.into_iter().map(|question| {
+        let alone = alone.clone();
+        tokio::spawn(async move { alone.sql(&question).await?.collect().await })
+    });
+    let mut batches = Vec::new();
+    for task in tasks.collect::<Vec<_>>() {
+        batches.extend(task.await??);
+    }
+    Ok(batches)
 }

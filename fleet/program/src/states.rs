@@ -11,7 +11,7 @@ use chrono::NaiveDate;
 use datafusion::{
     arrow::{
         array::RecordBatch,
-        compute::concat_batches,
+        compute::{cast, concat_batches},
         datatypes::{DataType, Field, Schema, SchemaRef},
     },
     parquet::file::metadata::KeyValue,
@@ -20,8 +20,8 @@ use datafusion::{
 
 use crate::{
     lake::{Lake, LakeFile, digest, metadata, register_folder, write_parquet},
-    session::in_order,
     show::bar,
+    sql::ask_in_shares,
 };
 
 /// The key of what a file of states was computed from.
@@ -77,28 +77,15 @@ impl Unit<'_> {
                 lake.about.target()
             )
         };
-        let batches = match shares {
-            None => session.sql(&question("")).await?.collect().await?,
-            Some(shares) => {
-                let sensors: BTreeSet<&str> =
-                    self.files.iter().map(|file| file.place.sensor.as_str()).collect();
-                let of = shared(sensors, shares).into_iter().map(|own| {
-                    let (first, last) = (own[0], own[own.len() - 1]);
-                    question(&format!(" and sensor between '{first}' and '{last}'"))
-                });
-                in_order(session, of.collect()).await?
-            }
-        };
+        let sensors: BTreeSet<&str> =
+            self.files.iter().map(|file| file.place.sensor.as_str()).collect();
+        let condition =
+            |own: &[&str]| format!(" and sensor between '{}' and '{}'", own[0], own[own.len() - 1]);
+        let batches = ask_in_shares(session, shares, sensors, question, condition).await?;
         let batch = plain(&batches)?;
         let sources = KeyValue::new(SOURCES.to_owned(), self.sources());
         write_parquet(&self.path, &batch, vec![sources], None)
     }
-}
-
-/// What is shared among threads, in order; no share is empty.
-pub(crate) fn shared<T: Copy>(all: impl IntoIterator<Item = T>, shares: usize) -> Vec<Vec<T>> {
-    let all: Vec<T> = all.into_iter().collect();
-    all.chunks(all.len().div_ceil(shares.max(1)).max(1)).map(<[T]>::to_vec).collect()
 }
 
 /// The states as this program stores them, whatever types the engine used for texts.
@@ -115,9 +102,8 @@ fn plain(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
     let whole = concat_batches(&first.schema(), batches)?;
     let schema = schema();
     let columns = whole.columns().iter().zip(schema.fields());
-    let columns = columns
-        .map(|(array, field)| datafusion::arrow::compute::cast(array, field.data_type()))
-        .collect::<Result<_, _>>()?;
+    let columns =
+        columns.map(|(array, field)| cast(array, field.data_type())).collect::<Result<_, _>>()?;
     Ok(RecordBatch::try_new(schema, columns)?)
 }
 

@@ -1,9 +1,23 @@
-//! Place of a trial: site, rig, sensor and date.
+//! Place of a trial: site, rig, sensor and date; and tables of a session, which have them from the folders of files.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use chrono::NaiveDate;
+use datafusion::{
+    arrow::datatypes::{DataType, SchemaRef},
+    datasource::{
+        file_format::parquet::ParquetFormat,
+        listing::{ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl},
+    },
+    prelude::{Expr, SessionContext, cast, col, ident, lit, not},
+};
+
+use super::Lake;
 
 /// Columns of the place, in the order of the folders.
 pub(crate) const COLUMNS: [&str; 4] = ["site", "rig", "sensor", "date"];
@@ -23,6 +37,16 @@ pub(crate) fn check_name(what: &str, name: &str) -> anyhow::Result<()> {
         "{name:?} cannot be a {what}: use letters, digits, -, _ and ., at most {MOST_LETTERS} of them"
     );
     Ok(())
+}
+
+/// What the folders `site=..`, `rig=..`, `sensor=..` and `date=..` say that a path begins with.
+fn folder_values(path: &Path) -> Option<[String; 4]> {
+    let mut parts = path.components().map(|c| c.as_os_str().to_string_lossy());
+    let mut values = [const { String::new() }; 4];
+    for (value, column) in values.iter_mut().zip(COLUMNS) {
+        *value = parts.next()?.strip_prefix(column)?.strip_prefix('=')?.to_owned();
+    }
+    Some(values)
 }
 
 /// The partition of a trial.
@@ -57,18 +81,9 @@ impl Place {
 
     /// The place that a path below `trials` names.
     pub(crate) fn of(path: &Path) -> anyhow::Result<Self> {
-        let mut folders = path.components().map(|c| c.as_os_str().to_string_lossy());
-        let mut values = [const { String::new() }; 4];
-        for (value, column) in values.iter_mut().zip(COLUMNS) {
-            let folder = folders.next().unwrap_or_default();
-            let named = folder.strip_prefix(column).and_then(|rest| rest.strip_prefix('='));
-            let Some(named) = named else {
-                bail!("it stands in no folder site=../rig=../sensor=../date=..")
-            };
-            *value = named.to_owned();
-        }
-        ensure!(folders.count() == 1, "it stands in no folder site=../rig=../sensor=../date=..");
-        Self::new([&values[0], &values[1], &values[2], &values[3]])
+        let named = folder_values(path).filter(|_| path.components().count() == COLUMNS.len() + 1);
+        let named = named.context("it stands in no folder site=../rig=../sensor=../date=..")?;
+        Self::new(named.each_ref().map(String::as_str))
     }
 
     /// The sensor, whatever the day.
@@ -85,4 +100,104 @@ impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}/{}/{} of {}", self.site, self.rig, self.sensor, self.date)
     }
+}
+
+/// Registers the lake's trials as the table `trials`, with site, rig, sensor and date from its
+/// folders; unfit files are left out.
+///
+/// # Errors
+/// An unfit file in a folder whose name a query cannot distinguish from others.
+pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<()> {
+    let folder = lake.folder.join("trials");
+    let urls = vec![folder_url(&folder)?];
+    let whole = listing(urls, &COLUMNS, lake.schema.clone())?;
+    if lake.unfit.is_empty() {
+        session.register_table("trials", whole)?;
+        return Ok(());
+    }
+    // Files in the folder of an unfit file are read one by one, all others as a folder.
+    let mut spoilt = BTreeSet::new();
+    for file in &lake.unfit {
+        spoilt.extend(partition(file.path.strip_prefix(&folder)?)?);
+    }
+    let is_of = |places: &[String; 4]| {
+        let values = COLUMNS.iter().zip(places);
+        values.map(|(name, text)| col(*name).eq(value(name, text))).reduce(Expr::and)
+    };
+    let mut frame = session.read_table(whole)?;
+    if let Some(is_spoilt) = spoilt.iter().filter_map(is_of).reduce(Expr::or) {
+        frame = frame.filter(not(is_spoilt))?;
+    }
+    for places in &spoilt {
+        let beside = lake.files.iter().filter(|file| {
+            partition(file.path.strip_prefix(&folder).unwrap_or(&file.path))
+                .is_ok_and(|own| own.as_ref() == Some(places))
+        });
+        let urls: Vec<_> = beside
+            .map(|file| ListingTableUrl::parse(file.path.display().to_string()))
+            .collect::<Result<_, _>>()?;
+        if urls.is_empty() {
+            continue;
+        }
+        let files = session.read_table(listing(urls, &[], lake.schema.clone())?)?;
+        let own = lake.schema.fields().iter().map(|field| ident(field.name()));
+        let places = COLUMNS.iter().zip(places).map(|(name, text)| value(name, text).alias(*name));
+        frame = frame.union(files.select(own.chain(places).collect::<Vec<_>>())?)?;
+    }
+    session.register_table("trials", frame.into_view())?;
+    Ok(())
+}
+
+/// The text of a folder as its column has it.
+fn value(column: &str, text: &str) -> Expr {
+    if column == "date" { cast(lit(text), DataType::Date32) } else { lit(text) }
+}
+
+/// The folder values that a query would give to a file's rows; `None` for a file that no query
+/// reads.
+fn partition(path: &Path) -> anyhow::Result<Option<[String; 4]>> {
+    let values = folder_values(path);
+    let is_place = |values: &[String; 4]| {
+        !values.iter().any(|value| value.contains('%')) && values[3].parse::<NaiveDate>().is_ok()
+    };
+    ensure!(
+        values.as_ref().is_none_or(is_place),
+        "{}: no query can leave it out, for its folders are no places; take it out of the lake",
+        path.display()
+    );
+    Ok(values)
+}
+
+/// Makes a folder of Parquet files a table; `places` are the names of its folders, `date` being a date.
+pub(crate) fn register_folder(
+    session: &SessionContext,
+    name: &str,
+    folder: &Path,
+    places: &[&str],
+    schema: SchemaRef,
+) -> anyhow::Result<()> {
+    let table = listing(vec![folder_url(folder)?], places, schema)?;
+    session.register_table(name, table)?;
+    Ok(())
+}
+
+fn folder_url(folder: &Path) -> anyhow::Result<ListingTableUrl> {
+    let folder = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    Ok(ListingTableUrl::parse(format!("{}/", folder.display()))?)
+}
+
+/// Parquet files as a table; `places` are the names of their folders, `date` being a date.
+fn listing(
+    urls: Vec<ListingTableUrl>,
+    places: &[&str],
+    schema: SchemaRef,
+) -> anyhow::Result<Arc<ListingTable>> {
+    let kind = |name: &str| if name == "date" { DataType::Date32 } else { DataType::Utf8 };
+    let partitions = places.iter().map(|name| ((*name).to_owned(), kind(name))).collect();
+    let options = ListingOptions::new(Arc::new(ParquetFormat::default()))
+        .with_file_extension(".parquet")
+        .with_table_partition_cols(partitions);
+    let config = ListingTableConfig::new_with_multi_paths(urls);
+    let config = config.with_listing_options(options).with_schema(schema);
+    Ok(Arc::new(ListingTable::try_new(config)?))
 }

@@ -3,10 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use datafusion::{
-    arrow::{
-        array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray},
-        datatypes::{DataType, Field, Schema},
-    },
+    arrow::array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray},
     parquet::{
         arrow::ArrowWriter,
         basic::Compression,
@@ -18,7 +15,7 @@ use datafusion::{
     },
 };
 
-use super::{Footer, footer::KEY};
+use super::{Footer, about::KEY};
 
 /// Largest row group: what one core reads at once.
 const GROUP_ROWS: usize = 1 << 20;
@@ -39,23 +36,19 @@ pub(crate) struct Samples {
 
 impl Samples {
     fn batch(self, trial: &str) -> anyhow::Result<RecordBatch> {
-        let number = |name: &str, values| {
-            let field = Field::new(name, DataType::Float64, true);
-            (field, Arc::new(Float64Array::from(values)) as ArrayRef)
-        };
+        let numbers = |values| Arc::new(Float64Array::from(values)) as ArrayRef;
         let names = StringArray::from_iter_values((0..self.time_s.len()).map(|_| trial));
         let mut columns = vec![
-            (Field::new("trial", DataType::Utf8, false), Arc::new(names) as ArrayRef),
-            number("time_s", self.time_s),
+            ("trial".to_owned(), Arc::new(names) as ArrayRef, false),
+            ("time_s".to_owned(), numbers(self.time_s), true),
         ];
-        columns.extend(self.channels.into_iter().map(|(name, values)| number(&name, values)));
-        let rate = Arc::new(Float64Array::from(self.rate));
-        columns.push((Field::new("rate", DataType::Float64, true), rate));
-        columns.extend(self.contraction.map(|values| number("contraction", values)));
+        columns
+            .extend(self.channels.into_iter().map(|(name, values)| (name, numbers(values), true)));
+        columns.push(("rate".to_owned(), Arc::new(Float64Array::from(self.rate)), true));
+        columns.extend(self.contraction.map(|x| ("contraction".to_owned(), numbers(x), true)));
         let bridged = Arc::new(BooleanArray::from(self.is_bridged));
-        columns.push((Field::new("is_bridged", DataType::Boolean, false), bridged));
-        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
-        Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
+        columns.push(("is_bridged".to_owned(), bridged, false));
+        Ok(RecordBatch::try_from_iter_with_nullable(columns)?)
     }
 }
 

@@ -8,7 +8,7 @@ use stretch_core::{RateEstimator, SampleRate};
 use stretch_data::{Split, TrialKind};
 
 use super::{About, Footer, Lake, Place, Samples, write};
-use crate::{panics::caught, session::session};
+use crate::{show::caught, sql::session};
 
 /// The folder of a lake with two trials of a place, and the paths of the two.
 fn lake() -> (tempfile::TempDir, [std::path::PathBuf; 2]) {

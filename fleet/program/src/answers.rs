@@ -1,16 +1,91 @@
-//! Records that `stretch apply` takes, from the fits of a query.
+//! Answers of a query: as plain columns, as a table, as CSV, and as records that `stretch apply` takes.
 
-use std::{collections::HashSet, path::Path};
+use std::{collections::HashSet, path::Path, sync::Arc};
 
 use anyhow::{Context, ensure};
-use datafusion::arrow::array::RecordBatch;
+use datafusion::arrow::{
+    array::{Array, ArrayRef, AsArray, RecordBatch},
+    compute::concat_batches,
+    datatypes::{DataType, Field, Schema},
+    util::{
+        display::{ArrayFormatter, FormatOptions},
+        pretty::pretty_format_batches,
+    },
+};
 use stretch_calibrate::{calibration_from_json, calibration_to_json};
 use stretch_core::{Calibration, Label, Provenance, Target};
 
-use crate::{
-    flat::{column, texts},
-    lake::{Lake, LakeFile, Refused, check_name},
-};
+use crate::lake::{Lake, LakeFile, Refused, check_name};
+
+/// Fields that are too long for a table.
+const LONG: [&str; 2] = ["record", "state"];
+
+/// Merges all batches into one without structs. A field keeps its name if the name is unique,
+/// otherwise its struct's name precedes it.
+pub(crate) fn flat(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
+    let first = batches.first().context("the query has no answer")?;
+    let whole = concat_batches(&first.schema(), batches)?;
+    let schema = whole.schema();
+    let is_struct = |field: &&Arc<Field>| matches!(field.data_type(), DataType::Struct(_));
+    let is_only = schema.fields().iter().filter(is_struct).count() == 1;
+    let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
+    for (field, array) in schema.fields().iter().zip(whole.columns()) {
+        let Some(parts) = array.as_struct_opt() else {
+            fields.push(field.as_ref().clone());
+            arrays.push(array.clone());
+            continue;
+        };
+        for (part, own) in parts.fields().iter().zip(parts.columns()) {
+            let is_taken = schema.column_with_name(part.name()).is_some();
+            let name = match is_only && !is_taken {
+                true => part.name().clone(),
+                false => format!("{}.{}", field.name(), part.name()),
+            };
+            fields.push(Field::new(name, part.data_type().clone(), true));
+            arrays.push(own.clone());
+        }
+    }
+    Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
+}
+
+/// The column whose name, or the last part of it, is this.
+fn column<'a>(batch: &'a RecordBatch, name: &str) -> Option<&'a ArrayRef> {
+    let schema = batch.schema();
+    let is_it = |own: &str| own == name || own.rsplit('.').next() == Some(name);
+    let place = schema.fields().iter().position(|field| is_it(field.name()))?;
+    Some(batch.column(place))
+}
+
+/// As a table; columns that are too long for one are left out if there is anything else.
+pub(crate) fn table(batch: &RecordBatch) -> anyhow::Result<String> {
+    let schema = batch.schema();
+    let is_short = |i: &usize| {
+        let name = schema.field(*i).name();
+        !LONG.contains(&name.rsplit('.').next().unwrap_or(name))
+            && !matches!(schema.field(*i).data_type(), DataType::Binary | DataType::LargeBinary)
+    };
+    let short: Vec<usize> = (0..batch.num_columns()).filter(is_short).collect();
+    let shown = if short.is_empty() { batch.clone() } else { batch.project(&short)? };
+    Ok(pretty_format_batches(&[shown])?.to_string())
+}
+
+/// As CSV, with a header line.
+pub(crate) fn csv(batch: &RecordBatch) -> anyhow::Result<String> {
+    let columns = batch.columns().iter().map(texts).collect::<anyhow::Result<Vec<_>>>()?;
+    let mut out = csv::Writer::from_writer(Vec::new());
+    out.write_record(batch.schema().fields().iter().map(|field| field.name()))?;
+    for row in 0..batch.num_rows() {
+        out.write_record(columns.iter().map(|column| &column[row]))?;
+    }
+    Ok(String::from_utf8(out.into_inner()?)?)
+}
+
+/// The texts of a column, empty where there is none.
+fn texts(array: &ArrayRef) -> anyhow::Result<Vec<String>> {
+    let options = FormatOptions::default();
+    let format = ArrayFormatter::try_new(array.as_ref(), &options)?;
+    (0..array.len()).map(|row| Ok(format.value(row).try_to_string()?)).collect()
+}
 
 /// Writes one record per row, in folders of site and rig if the answer has them; refused rows are
 /// returned with the reason.
@@ -73,7 +148,7 @@ pub(crate) fn write_records(
 ///
 /// Sums do not determine a dead band. It is the median of the dead bands of the trials, three
 /// standard deviations of their rate's noise, as calibrate takes it.
-pub(crate) fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<String> {
+fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<String> {
     let is_of = |file: &&LakeFile| {
         of.iter().all(|(key, value)| match *key {
             "site" => file.place.site == *value,

@@ -93,7 +93,7 @@ fn a_simulated_effect_is_named_and_reported() {
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
-    assert!(first.contains("the gauge's hysteresis"), "{text}");
+    assert!(first.contains("gauge_hysteresis"), "{text}");
     let read = |path: &Path| -> Value {
         let mut value: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
         assert!(value["runtime_s"].take().as_f64().unwrap() > 0.0);

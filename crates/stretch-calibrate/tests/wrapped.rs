@@ -41,6 +41,36 @@ fn a_reference_that_wraps_is_calibrated_and_judged_unwrapped() {
 }
 
 #[test]
+fn trials_on_both_sides_of_the_seam_are_calibrated_as_one_motion() {
+    let names = ["angle_deg", "bridge_v"];
+    let (whole, plain) = (trial(1.0, 360.0, names), trial(1.0, 1e6, names));
+    // neither part wraps by itself: the second lies wholly beyond the seam, between -170 and -130 deg
+    let part = |of: &Trial, name: &str, low: f64| {
+        let is_in = |n: &usize| (low..low + 40.0).contains(&plain.channels[0].values[*n]);
+        let kept: Vec<usize> = (0..of.time_s.len()).filter(is_in).take(100).collect();
+        let take = |all: &[f64]| kept.iter().map(|n| all[*n]).collect::<Vec<f64>>();
+        let channel = |c: &Channel| Channel { name: c.name.clone(), values: take(&c.values) };
+        let time_s = (0..kept.len()).map(|n| 0.01 * n as f64).collect();
+        Trial { name: name.into(), time_s, channels: of.channels.iter().map(channel).collect() }
+    };
+    let trials = |of: &Trial| [of.clone(), part(of, "b.csv", 112.0), part(of, "c.csv", 190.0)];
+    let options =
+        Options { reference: names[0].into(), signal: names[1].into(), ..Options::default() };
+    let rmse = |trials: &[Trial]| {
+        let made = calibrate(trials, &options).expect("a calibration");
+        let judged = evaluate(&[("own", &made.calibration)], trials).expect("errors");
+        (judged.pooled.iter().map(|m| m.rmse).collect::<Vec<_>>(), made.notes)
+    };
+    let (usual, _) = rmse(&trials(&plain));
+    let (found, notes) = rmse(&trials(&whole));
+    for (usual, found) in usual.iter().zip(&found) {
+        approx::assert_relative_eq!(usual, found, max_relative = 1e-6);
+    }
+    let says = "angle_deg begins in different turns: 1 of the trials' parts";
+    assert!(notes.iter().any(|note| note.starts_with(says)), "{notes:?}");
+}
+
+#[test]
 fn a_signal_that_wraps_is_refused() {
     let names = ["shaft_deg", "length_mm"];
     let of = |turn| {

@@ -131,12 +131,27 @@ pub fn evaluate(
     let mut pooled = vec![Tally::default(); names.len()];
     let mut tests = Tests::new(names.len(), first.spec().sample_rate_hz.hz());
     let mut rows = Vec::new();
+    let column = first.spec().reference.as_str();
+    let mut unwrapped = Vec::new();
     for trial in trials {
         trial.check_lengths()?;
-        let (reference, _) = trial.unwrapped(first.spec().reference.as_str())?;
-        let mut methods = vec![raw(first, trial)?];
+        unwrapped.push(trial.unwrapped(column)?);
+    }
+    let turn = unwrapped.iter().find_map(|(_, wrap)| wrap.map(|wrap| wrap.turn));
+    for (trial, (reference, _)) in trials.iter().zip(unwrapped) {
+        let mut reference = reference.into_owned();
+        let mut methods = vec![raw(first, trial, &reference)?];
         for (_, calibration) in calibrations {
             methods.push(estimates(calibration, trial)?);
+        }
+        if let Some(turn) = turn {
+            // an angle that wraps says nothing of its turn: it is taken in the turn of the first estimates
+            let off = reference.iter().zip(&methods[1].values).map(|(x, y)| y - x);
+            let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();
+            let shift =
+                turn * (known.iter().sum::<f64>() / known.len().max(1) as f64 / turn).round();
+            let all = [&mut reference, &mut methods[0].values];
+            all.into_iter().flatten().for_each(|x| *x += shift);
         }
         let rate_hz = sample_rate_hz(trial)?;
         let period_s = 1.0 / rate_hz;
@@ -156,7 +171,7 @@ pub fn evaluate(
             trial: trial.name.clone(),
             methods: errors,
             time_s: trial.time_s.clone(),
-            reference: reference.into_owned(),
+            reference,
             rates: methods.iter().map(|m| m.rates.clone()).collect(),
             estimates: methods.into_iter().map(|m| m.values).collect(),
         });
@@ -173,9 +188,12 @@ pub fn evaluate(
 }
 
 /// The uncalibrated signal: its extremes scaled onto the reference's.
-fn raw(calibration: &Calibration, trial: &Trial) -> Result<Estimates, CalibrateError> {
+fn raw(
+    calibration: &Calibration,
+    trial: &Trial,
+    reference: &[f64],
+) -> Result<Estimates, CalibrateError> {
     let signal = trial.require(calibration.spec().signal.as_str())?;
-    let reference = trial.require(calibration.spec().reference.as_str())?;
     let (seen, stroke) = (extent(signal.iter().copied()), extent(reference.iter().copied()));
     let together = polarity(signal.iter().copied().zip(reference.iter().copied()));
     let (start, end) = match together {

@@ -46,7 +46,7 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
-        let (sample_rate, Evened { pieces, rows, mut notes }) = Evened::of(trials, options)?;
+        let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
         notes.extend(rows.note());
         let target = target(options, &pieces)?;
         let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
@@ -139,6 +139,8 @@ struct Evened {
     pieces: Vec<Piece>,
     rows: Rows,
     notes: Vec<String>,
+    /// The turn by which the reference wraps in some trial, in its unit.
+    turn: Option<f64>,
 }
 
 impl Evened {
@@ -154,6 +156,15 @@ impl Evened {
         if evened.pieces.is_empty() {
             let (trial, samples) = (first.name.clone(), first.len());
             return Err(CalibrateError::TooShort { trial, samples });
+        }
+        if let Some(turn) = evened.turn
+            && let Some(moved) = align_turns(&mut evened.pieces, turn)
+        {
+            let column = &options.reference;
+            let signal = &options.signal;
+            evened.notes.push(format!(
+                "{column} begins in different turns: {moved} of the trials' parts were moved by whole turns to agree with {signal}"
+            ));
         }
         Ok((sample_rate, evened))
     }
@@ -179,6 +190,7 @@ impl Evened {
         let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
         let even = trial.even(&columns, spec)?;
         check_turns(&even, &trial.name, &columns[..1])?;
+        self.turn = self.turn.or(even.turns[1]);
         self.rows.add(even.rows);
         self.notes.extend(even.notes);
         self.pieces.extend(even.parts.into_iter().filter_map(|part| {
@@ -187,6 +199,42 @@ impl Evened {
         }));
         Ok(())
     }
+}
+
+/// Moves the reference of each part by whole turns to the line through the part with the widest signal, reference = a + b signal.
+///
+/// An angle that wraps says nothing of its turn, so a trial may begin on the other side of the seam. Returns the number of moved parts, or
+/// nothing if none had to be moved.
+fn align_turns(pieces: &mut [Piece], turn: f64) -> Option<usize> {
+    let width = |(_, [signal, ..]): &Piece| {
+        let seen = extent(signal.iter().copied());
+        seen.max - seen.min
+    };
+    let widest = pieces.iter().max_by(|a, b| width(a).total_cmp(&width(b)))?;
+    let [mean_signal, mean_reference, slope] = line(widest);
+    let mut moved = 0;
+    for piece in pieces {
+        let [signal, reference, _] = line(piece);
+        let off = mean_reference + slope * (signal - mean_signal) - reference;
+        let shift = turn * (off / turn).round();
+        if shift != 0.0 && shift.is_finite() {
+            piece.1[1].iter_mut().for_each(|x| *x += shift);
+            moved += 1;
+        }
+    }
+    (moved > 0).then_some(moved)
+}
+
+/// Means of signal and reference of a part, and the slope of the line through them by least squares.
+fn line((_, [signal, reference, _]): &Piece) -> [f64; 3] {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let [at_signal, at_reference] = [mean(signal), mean(reference)];
+    let (mut across, mut along) = (0.0, 0.0);
+    for (v, x) in signal.iter().zip(reference) {
+        across += (v - at_signal) * (x - at_reference);
+        along += (v - at_signal).powi(2);
+    }
+    [at_signal, at_reference, if along > 0.0 { across / along } else { 0.0 }]
 }
 
 /// Refuses signals that wrap; they come first among the columns of `even`.

@@ -57,8 +57,13 @@ impl Track {
 struct Timed {
     clock: String,
     time_s: Vec<f64>,
-    rate_hz: f64,
     channels: Vec<Channel>,
+}
+
+impl Timed {
+    fn rate_hz(&self) -> f64 {
+        rate_of(&self.time_s).unwrap_or(0.0)
+    }
 }
 
 /// One recording of tracks whose channels are called as their file calls them.
@@ -311,8 +316,7 @@ fn timed(
             let (previous_s, time_s) = (time_s[i], time_s[i + 1]);
             return Err(DataError::TimeNotRising { at: place(i + 1), time_s, previous_s }.into());
         }
-        let rate_hz = rate_of(&time_s).unwrap_or(0.0);
-        Ok(Timed { clock: label, time_s, rate_hz, channels })
+        Ok(Timed { clock: label, time_s, channels })
     });
     timed.collect()
 }
@@ -320,7 +324,7 @@ fn timed(
 fn fastest(timed: &[Timed]) -> usize {
     let rates = timed.iter().enumerate();
     // The first of equals.
-    rates.rev().max_by(|a, b| a.1.rate_hz.total_cmp(&b.1.rate_hz)).map_or(0, |(i, _)| i)
+    rates.rev().max_by(|a, b| a.1.rate_hz().total_cmp(&b.1.rate_hz())).map_or(0, |(i, _)| i)
 }
 
 /// Brings tracks to the stamps of the fastest, or to a rate, within the time that all of them cover.
@@ -398,7 +402,7 @@ fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, Re
 
 /// Takes instants out of the grid that stand where a track has a gap: a line across it would be invented.
 fn leave_gaps(grid: &mut Vec<f64>, track: &Timed) {
-    let longest_s = BRIDGED / track.rate_hz;
+    let longest_s = BRIDGED / track.rate_hz();
     let mut gaps = track.time_s.windows(2).filter(|t| t[1] - t[0] > longest_s).peekable();
     grid.retain(|t| {
         while gaps.next_if(|gap| gap[1] <= *t).is_some() {}
@@ -439,11 +443,11 @@ fn tell(
 ) {
     let moved = timed.iter().enumerate().filter(|(i, _)| grid_hz.is_some() || *i != own);
     let moved: Vec<String> =
-        moved.map(|(_, t)| format!("{} ({:.2} Hz)", t.clock, t.rate_hz)).collect();
+        moved.map(|(_, t)| format!("{} ({:.2} Hz)", t.clock, t.rate_hz())).collect();
     let moved: Vec<&str> = moved.iter().map(String::as_str).collect();
     let onto = match grid_hz {
         Some(rate_hz) => format!("a grid of {rate_hz} Hz"),
-        None => format!("the clock of {} ({:.2} Hz)", timed[own].clock, timed[own].rate_hz),
+        None => format!("the clock of {} ({:.2} Hz)", timed[own].clock, timed[own].rate_hz()),
     };
     let commands =
         if timed.iter().any(|t| t.channels.iter().any(|c| HELD.contains(&c.name.as_str()))) {
@@ -451,7 +455,7 @@ fn tell(
         } else {
             ""
         };
-    let slower = timed.iter().any(|t| grid_hz.is_some_and(|hz| hz < 0.99 * t.rate_hz));
+    let slower = timed.iter().any(|t| grid_hz.is_some_and(|hz| hz < 0.99 * t.rate_hz()));
     let unfiltered =
         if slower { "; nothing is filtered, so that what is faster folds down" } else { "" };
     notes.push(format!(

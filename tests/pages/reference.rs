@@ -65,7 +65,7 @@ fn the_effects_are_those_of_the_catalogue() {
 }
 
 #[test]
-fn the_keys_of_a_problem_are_those_that_its_reader_takes() {
+fn the_keys_of_problems_and_diagnoses_are_those_of_the_crates() {
     let mut text = "# problem.toml\n\nEvery key of a problem's file. `problem.schema.json` beside this page says the same to editors; what a worker is sent and\n\
                     what it may answer stands in [the worker protocol](worker.md).\n\n"
         .to_owned();
@@ -73,4 +73,6 @@ fn the_keys_of_a_problem_are_those_that_its_reader_takes() {
     is_written_by_the_program("problem.md", &text);
     let schema = serde_json::to_string_pretty(&stretch_problem::problem_schema()).expect("JSON");
     is_written_by_the_program("problem.schema.json", &(schema + "\n"));
+    let schema = serde_json::to_string_pretty(&stretch_problem::diagnosis_schema()).expect("JSON");
+    is_written_by_the_program("diagnosis.schema.json", &(schema + "\n"));
 }

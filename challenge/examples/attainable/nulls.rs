@@ -1,8 +1,8 @@
 //! Scatter of nulls: rigs without any effect, parameters within their tolerances.
 
-use std::{fmt::Write, ops::Range};
+use std::{fmt::Write, num::NonZeroUsize, ops::Range};
 
-use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
+use stretch_gap::{Diagnosis, Options, Thresholds, VerdictKind};
 
 use stretch_challenge::shared_out;
 
@@ -34,9 +34,11 @@ fn without_criteria() -> Thresholds {
 
 fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
     let source = Source { seed, effect: None };
-    let Diagnosis { gap, verdict, named, .. } =
-        source.diagnosed(protocol, 4, Thresholds::frozen())?;
-    let loose = source.diagnosed(protocol, 1, without_criteria())?;
+    let Diagnosis { gap, verdict, named, .. } = source.diagnosed(protocol, Options::default())?;
+    let loose = source.diagnosed(
+        protocol,
+        Options { depth: NonZeroUsize::MIN, thresholds: without_criteria(), ..Options::default() },
+    )?;
     // `unknown`, and the empty set where nothing was taken, are no effects.
     let singles =
         loose.candidates.iter().filter(|c| c.effects.len() == 1 && !c.parameters.is_empty());

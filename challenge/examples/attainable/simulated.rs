@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use stretch_data::{Channel, SessionTrial, Trial, TrialEntry};
-use stretch_gap::{Diagnosis, Options, Thresholds, diagnose};
+use stretch_gap::{Diagnosis, Options, diagnose};
 use stretch_problem::{RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Effect, Key, Rig, RunSettings, Session, TrialPlan};
 
@@ -81,14 +81,13 @@ impl Source {
     pub(crate) fn diagnosed(
         &self,
         protocol: Protocol,
-        depth: usize,
-        thresholds: Thresholds,
+        options: Options,
     ) -> anyhow::Result<Diagnosis> {
         let catalogue = Catalogue::default();
         let session = RigSession::new(&self.recorded(protocol)?)?;
         let setup = RigSetup { session, rig: Rig::default(), catalogue: &catalogue };
         // One thread each: the answers are the same, and sessions are shared out.
-        let options = Options { depth, threads: 1, thresholds, ..Options::default() };
+        let options = Options { threads: 1, ..options };
         Ok(diagnose(&RigSimulator::new(setup)?, &options, &|_| (), &|| false)?.0)
     }
 }

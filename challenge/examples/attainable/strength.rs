@@ -1,7 +1,7 @@
 //! How strong an effect has to be for a stated excess.
 
 use anyhow::Context;
-use stretch_gap::Thresholds;
+use stretch_gap::{Options, Thresholds};
 use stretch_sim::{Effect, EffectParameter};
 
 use crate::simulated::{Protocol, Source};
@@ -98,7 +98,8 @@ impl Strengths {
     fn excess(&self, share: f64) -> anyhow::Result<f64> {
         // Nothing counts as unknown, because only the excess is needed, not its cause.
         let thresholds = Thresholds { unknown_excess: f64::INFINITY, ..Thresholds::frozen() };
-        let diagnosis = self.source(share).diagnosed(Protocol::Paper, 0, thresholds)?;
+        let options = Options { examines_effects: false, thresholds, ..Options::default() };
+        let diagnosis = self.source(share).diagnosed(Protocol::Paper, options)?;
         Ok(diagnosis.gap.retuned.max(LEAST))
     }
 

@@ -5,7 +5,7 @@ use std::{
     ops::Range,
 };
 
-use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
+use stretch_gap::{Diagnosis, Options, VerdictKind};
 use stretch_sim::{Catalogue, Effect};
 
 use stretch_challenge::shared_out;
@@ -83,7 +83,8 @@ fn row(effect: &'static Effect, seed: u64) -> anyhow::Result<Row> {
     let cell = |aim| -> anyhow::Result<Cell> {
         let (source, excess) = strengths.near(aim)?;
         let one = |protocol: Protocol| -> anyhow::Result<Said> {
-            let diagnosis = source.diagnosed(protocol, 1, Thresholds::frozen())?;
+            let options = Options { depth: NonZeroUsize::MIN, ..Options::default() };
+            let diagnosis = source.diagnosed(protocol, options)?;
             let said = Said::of(effect.name, &diagnosis);
             let values = source.effect.as_ref().map(|e| &e.1[..]).unwrap_or(&[]);
             let (name, protocol) = (effect.name, protocol.name());

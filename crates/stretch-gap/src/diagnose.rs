@@ -1,4 +1,5 @@
-//! The flow: a problem is prepared, searched, the record doubted, the evidence gathered, judged, and put into words. Nothing flows back.
+//! The flow: a problem is prepared and searched, the record is doubted, the evidence is gathered and judged, and the answer is put into
+//! words.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -47,7 +48,6 @@ use crate::{
             answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
             implausible_noise_notes, lost_note, swing_notes,
         },
-        sentence::two_digits,
     },
 };
 
@@ -65,7 +65,8 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Diagnosis, Evidence), GapError> {
-    let task = Task { simulator, options, depth: options.depth, progress, stop };
+    let task =
+        Task { simulator, options, examines_effects: options.examines_effects, progress, stop };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
     match pool {
         Ok(pool) => pool.install(|| run(task)),
@@ -79,18 +80,25 @@ pub fn diagnose(
 struct Task<'a> {
     simulator: &'a dyn Simulator,
     options: &'a Options,
-    /// Most effects named at once; 0 where the columns alone say that effects mean nothing.
-    depth: usize,
+    /// Whether effects are examined: they mean nothing if the columns alone say that the record is wrong.
+    examines_effects: bool,
     progress: &'a (dyn Fn(&str) + Sync),
     stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Task<'_> {
+    /// Most effects that a set may have.
+    fn depth(&self) -> usize {
+        if self.examines_effects { self.options.depth.get() } else { 0 }
+    }
 }
 
 fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let begun = Stopwatch::start();
     let simulator = task.simulator;
-    // With a column that is copied or dead effects mean nothing.
     let columns = columns_alone(&simulator.columns(), simulator.trials(), simulator.dt_s());
-    let task = Task { depth: if columns.is_empty() { task.depth } else { 0 }, ..task };
+    let examines_effects = task.examines_effects && columns.is_empty();
+    let task = Task { examines_effects, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
     let is_limited = simulator.costly().is_some_and(|costly| costly.model_runs().budget.is_some());
@@ -139,8 +147,9 @@ fn concluded(
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let null_band = null_band(cause.problem, task.options.seed)?;
     let gathered = gather(task, cause, null_band)?;
-    let judged = decide(task, cause, &gathered)?;
-    report(task, searched, cause, (gathered, judged), begun)
+    let judged = decide(task, cause, &gathered);
+    let proposed = propose_rest(task, cause, &gathered, judged.kind)?;
+    report(task, searched, cause, (gathered, judged, proposed), begun)
 }
 
 /// The problem in which the records are likelier, of commands that switch at rows and between them, and the set of effects to go on from.
@@ -148,10 +157,10 @@ fn prepare<'a>(
     task: Task<'a>,
     between_rows: Option<&'a Altered<'a>>,
 ) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
-    let Task { simulator, options, depth, progress, stop } = task;
+    let Task { simulator, options, progress, stop, .. } = task;
     let at_rows = PreparedProblem::prepare(simulator, stop, options.seed, progress)?;
     let at_rows = at_rows.retuned_from_starts(options.thresholds.least_gap, options.seed)?;
-    let limits = (&options.thresholds, depth);
+    let limits = (&options.thresholds, task.depth());
     command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
 }
 
@@ -216,8 +225,8 @@ fn search<'a>(
     problem: PreparedProblem<'a>,
     from: &Hypothesis,
 ) -> Result<Searched<'a>, GapError> {
-    let Task { options, depth, progress, .. } = task;
-    let mut search = Search::new(&problem, &options.thresholds, depth).quick();
+    let Task { options, progress, .. } = task;
+    let mut search = Search::new(&problem, &options.thresholds, task.depth()).quick();
     let best = search.best(from, progress)?;
     let least_gap = options.thresholds.least_gap;
     if let Some(other) = problem.retuned_from(&best, least_gap, options.seed)? {
@@ -273,7 +282,7 @@ fn limits(
     null_band: f64,
 ) -> Result<Vec<DetectionLimit>, GapError> {
     let problem = &searched.problem;
-    if task.depth == 0 || problem.is_spent() {
+    if !task.examines_effects || problem.is_spent() {
         return Ok(Vec::new());
     }
     (task.progress)("detection limits");
@@ -354,7 +363,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
 }
 
 /// The verdict with its names.
-fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judged, GapError> {
+fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
     let Gathered { evidence, posterior, candidates, shares, sanity, .. } = gathered;
     let case = Case {
         gap: evidence.gap,
@@ -366,13 +375,23 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         too_little: gathered.too_little,
         is_short: is_short(&evidence.roles),
     };
-    let best = &cause.found.best;
-    let lacking = |names| {
-        let found =
-            propose_for(cause.problem, best, (names, gathered.proposed.as_ref()), task.progress);
-        Ok(if_possible(found)?.flatten())
-    };
-    judge(&case, &task.options.thresholds, lacking)
+    judge(&case, &task.options.thresholds)
+}
+
+/// Searches for what the catalogue lacks if a gap is left: in addition to the names of a partial answer, in place of names otherwise.
+fn propose_rest(
+    task: Task<'_>,
+    cause: Cause<'_>,
+    gathered: &Gathered,
+    verdict: VerdictKind,
+) -> Result<Option<Proposed>, GapError> {
+    let with_names = verdict == VerdictKind::Partial;
+    if !with_names && verdict != VerdictKind::Unknown {
+        return Ok(None);
+    }
+    let known = (with_names, gathered.proposed.as_ref());
+    let found = propose_for(cause.problem, &cause.found.best, known, task.progress);
+    Ok(if_possible(found)?.flatten())
 }
 
 /// The verdict in words and numbers.
@@ -380,7 +399,7 @@ fn report(
     task: Task<'_>,
     searched: &Searched<'_>,
     cause: Cause<'_>,
-    (gathered, judged): (Gathered, Judged),
+    (gathered, judged, proposed): (Gathered, Judged, Option<Proposed>),
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (options, thresholds) = (task.options, &task.options.thresholds);
@@ -415,7 +434,7 @@ fn report(
         simulator,
         &evidence,
     );
-    let naming = judged.naming();
+    let (naming, named) = (judged.naming(), answer.named());
     let mut notes = answer_notes(&answer, &sanity, simulator, &evidence);
     notes.extend(gross_error_notes(cause.problem).into_iter().map(Note::from));
     notes.extend(lost_note(runs));
@@ -457,11 +476,11 @@ fn report(
         not_examined,
         cut_short,
         tied: naming.tied(),
-        named: naming.named,
+        named,
         faint: naming.faint,
         least_gap: thresholds.least_gap,
         unexplained,
-        proposed: judged.proposed,
+        proposed,
         gross: cause.gross.to_vec(),
         ambiguous,
         shares,
@@ -487,7 +506,7 @@ fn report(
         starts: searched.problem.starts,
         candidates,
     };
-    diagnosis.sentence = diagnosis.in_sentences(&two_digits);
+    diagnosis.sentence = diagnosis.headline();
     Ok((diagnosis, evidence))
 }
 

@@ -1,12 +1,16 @@
 //! Options of a diagnosis.
 
+use std::num::NonZeroUsize;
+
 use crate::problem::thresholds::Thresholds;
 
 /// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
+    /// Whether missing effects are searched for; without a search the gap is measured, and nothing is named.
+    pub examines_effects: bool,
     /// Largest number of effects named at once.
-    pub depth: usize,
+    pub depth: NonZeroUsize,
     /// Number of threads; 0 uses all. The result does not depend on it.
     pub threads: usize,
     /// Seed of the bootstrap.
@@ -23,10 +27,14 @@ pub struct Options {
     pub thresholds: Thresholds,
 }
 
+/// Largest number of effects named at once if nothing is said.
+const DEPTH: NonZeroUsize = NonZeroUsize::MIN.saturating_add(3);
+
 impl Default for Options {
     fn default() -> Self {
         Self {
-            depth: 4,
+            examines_effects: true,
+            depth: DEPTH,
             threads: 0,
             seed: 1,
             baselines: false,

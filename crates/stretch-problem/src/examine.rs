@@ -2,9 +2,15 @@
 
 use std::{fmt, sync::atomic::AtomicUsize};
 
+use schemars::{
+    JsonSchema, Schema,
+    generate::SchemaSettings,
+    transform::{Transform, transform_subschemas},
+};
+use serde::Serialize;
 use serde_json::{Value, json};
-use stretch_data::Trial;
-use stretch_gap::{Costly, Diagnosis, Evidence, GapError, Note, Options, diagnose};
+use stretch_data::{RigFile, Trial};
+use stretch_gap::{Costly, Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose};
 use stretch_sim::{Quantity, Sketch};
 
 use crate::{
@@ -119,54 +125,150 @@ impl Problem {
 }
 
 impl Examined {
-    /// Everything as JSON: the diagnosis in its schema, its data set, seed and version, and what follows from the diagnosis.
-    ///
-    /// Beside the keys of the diagnosis stand `data_set`, `seed`, `version` (of this crate), `implement` (the named effects with equation,
-    /// numbers and initial state), `families`, and the fixed simulator as `fixed_rig` or `fixed_problem`; both are null where
-    /// there is no fix.
+    /// Everything as JSON, in the form of [`diagnosis_schema`]: the diagnosis, its data set, seed and version, and what follows from it.
     pub fn to_json(&self) -> Value {
-        // Every key of a diagnosis is a text, as JSON demands.
-        let mut value = serde_json::to_value(&self.diagnosis).unwrap_or_default();
         let fixed = self.fix.as_ref().ok().map(|fix| &fix.file);
-        value["implement"] = self.implementations.iter().map(implementation).collect();
-        value["families"] = self.families.iter().map(family).collect();
-        value["fixed_rig"] = match fixed {
-            Some(Fixed::Rig(rig)) => json!(rig),
-            _ => Value::Null,
+        let written = Written {
+            diagnosis: &self.diagnosis,
+            implement: self.implementations.iter().map(WrittenEffect::of).collect(),
+            families: self.families.iter().map(WrittenFamily::of).collect(),
+            fixed_rig: fixed.and_then(|file| match file {
+                Fixed::Rig(rig) => Some(rig),
+                Fixed::Problem(_) => None,
+            }),
+            fixed_problem: fixed.and_then(|file| match file {
+                Fixed::Rig(_) => None,
+                Fixed::Problem(file) => Some(file.to_toml()),
+            }),
+            data_set: &self.name,
+            seed: self.seed,
+            version: env!("CARGO_PKG_VERSION"),
         };
-        value["fixed_problem"] = match fixed {
-            Some(Fixed::Problem(file)) => json!(file.to_toml()),
-            _ => Value::Null,
-        };
-        value["data_set"] = self.name.clone().into();
-        value["seed"] = self.seed.into();
-        value["version"] = env!("CARGO_PKG_VERSION").into();
-        value
+        // Every key is a text, as JSON demands.
+        serde_json::to_value(written).unwrap_or_default()
     }
 }
 
-/// A named effect as JSON.
-fn implementation(one: &Implementation) -> Value {
-    let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
-    let sketch = one.sketch.as_ref();
-    json!({
-        "effect": one.name,
-        "words": one.words,
-        "stage": one.stage,
-        "equation": one.formula,
-        "numbers": one.numbers,
-        "inputs": sketch.map(|s| s.inputs.iter().map(quantity).collect::<Vec<_>>()),
-        "output": sketch.map(|s| quantity(&s.output)),
-        "state": sketch.and_then(Sketch::initial_state),
-    })
+/// The JSON Schema of what [`Examined::to_json`] writes.
+///
+/// ```
+/// let schema = stretch_problem::diagnosis_schema();
+/// assert_eq!(schema["properties"]["sentence"]["type"], "string");
+/// assert_eq!(schema["$defs"]["Closed"]["properties"]["share"]["type"][0], "null");
+/// ```
+pub fn diagnosis_schema() -> Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize().with_transform(NumbersMayBeNull);
+    settings.into_generator().into_root_schema_for::<Written<'_>>().to_value()
 }
 
-/// A family of effects as JSON.
-fn family(agreed: &Agreed) -> Value {
-    json!({
-        "names": agreed.names,
-        "range": agreed.range,
-        "unit": agreed.unit,
-        "sentence": agreed.note(),
-    })
+/// JSON has no number that is not finite: null stands for it.
+#[derive(Debug, Clone)]
+struct NumbersMayBeNull;
+
+impl Transform for NumbersMayBeNull {
+    fn transform(&mut self, schema: &mut Schema) {
+        transform_subschemas(self, schema);
+        schema.remove("format");
+        if schema.get("type").is_some_and(|kind| kind == "number") {
+            schema.insert("type".into(), json!(["null", "number"]));
+        }
+    }
+}
+
+/// A diagnosis as `stretch diagnose --json` writes it. A number that is not finite is written as null.
+#[derive(Serialize, JsonSchema)]
+#[schemars(title = "Diagnosis")]
+struct Written<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    /// The named effects with equation, numbers, meaning of input and output, and initial state.
+    implement: Vec<WrittenEffect<'a>>,
+    /// Families of effects of which these data cannot tell the members apart.
+    families: Vec<WrittenFamily<'a>>,
+    /// The rig file that `--fix` writes, or null.
+    #[schemars(with = "Option<serde_json::Map<String, Value>>")]
+    fixed_rig: Option<&'a RigFile>,
+    /// The text of the problem file that `--fix` writes, or null.
+    fixed_problem: Option<String>,
+    /// Name of the data set or recording.
+    data_set: &'a str,
+    /// Seed of the intervals.
+    seed: u64,
+    /// Version of the crate that wrote this.
+    version: &'a str,
+}
+
+/// A named effect, ready to be typed into a simulator.
+#[derive(Serialize, JsonSchema)]
+struct WrittenEffect<'a> {
+    /// Name of the effect.
+    effect: &'a str,
+    /// What the effect does.
+    words: &'a str,
+    /// The stage that the effect belongs to.
+    stage: &'a str,
+    /// Equation, in the names of the numbers.
+    equation: &'a str,
+    /// Parameters and forms, with intervals.
+    numbers: &'a [EffectValue],
+    /// What goes in; null for an effect that is not described as code.
+    inputs: Option<Vec<WrittenQuantity<'a>>>,
+    /// What comes out.
+    output: Option<WrittenQuantity<'a>>,
+    /// The initial state.
+    state: Option<String>,
+}
+
+/// A quantity that goes into an effect, or comes out of it.
+#[derive(Serialize, JsonSchema)]
+struct WrittenQuantity<'a> {
+    /// Name in the code.
+    name: &'a str,
+    /// Unit.
+    unit: &'a str,
+    /// What it is.
+    meaning: &'a str,
+}
+
+/// Effects that the data do not tell apart.
+#[derive(Serialize, JsonSchema)]
+struct WrittenFamily<'a> {
+    /// The effects, the most probable first.
+    names: &'a [String],
+    /// Range of the quantity that they agree on.
+    range: [f64; 2],
+    /// Unit of the range.
+    unit: &'a str,
+    /// The same in a sentence.
+    sentence: String,
+}
+
+impl<'a> WrittenEffect<'a> {
+    fn of(one: &'a Implementation) -> Self {
+        let sketch = one.sketch.as_ref();
+        Self {
+            effect: &one.name,
+            words: &one.words,
+            stage: &one.stage,
+            equation: &one.formula,
+            numbers: &one.numbers,
+            inputs: sketch.map(|s| s.inputs.iter().map(WrittenQuantity::of).collect()),
+            output: sketch.map(|s| WrittenQuantity::of(&s.output)),
+            state: sketch.and_then(Sketch::initial_state),
+        }
+    }
+}
+
+impl<'a> WrittenQuantity<'a> {
+    fn of(quantity: &'a Quantity) -> Self {
+        let Quantity { name, unit, meaning, .. } = quantity;
+        Self { name, unit, meaning }
+    }
+}
+
+impl<'a> WrittenFamily<'a> {
+    fn of(agreed: &'a Agreed) -> Self {
+        let Agreed { names, range, unit, .. } = agreed;
+        Self { names, range: *range, unit, sentence: agreed.note().to_string() }
+    }
 }

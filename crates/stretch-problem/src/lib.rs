@@ -28,7 +28,7 @@ pub use black_box::{
 pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit};
 pub use causes::{Causes, causes};
 pub use error::ProblemError;
-pub use examine::Examined;
+pub use examine::{Examined, diagnosis_schema};
 pub use file::{BuiltIn, SimulatorEntry, problem_reference, problem_schema};
 pub use fix::{Fix, Fixed, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};

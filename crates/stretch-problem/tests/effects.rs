@@ -163,7 +163,7 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     let catalogue = Catalogue::default().with(&CHARGER).unwrap();
     let simulator = simulator(&rig, 3, &catalogue);
     assert_eq!(simulator.description().effects.last().unwrap().name, "charger_ripple");
-    let options = Options { depth: 1, ..Options::default() };
+    let options = Options { depth: std::num::NonZeroUsize::new(1).unwrap(), ..Options::default() };
     let (diagnosis, _) = diagnose(&simulator, &options, &|_| (), &|| false).unwrap();
     assert_eq!(diagnosis.verdict, VerdictKind::Effect, "{}", diagnosis.sentence);
     assert_eq!(diagnosis.named, ["charger_ripple"]);

@@ -34,7 +34,7 @@ fn diagnosed(trials: &[SessionTrial], rig: Rig) -> Diagnosis {
     let catalogue = Catalogue::default();
     let session = RigSession::new(trials).expect("a session");
     let rig = RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue }).expect("a rig");
-    let options = Options { depth: 2, ..Options::default() };
+    let options = Options { depth: std::num::NonZeroUsize::new(2).unwrap(), ..Options::default() };
     diagnose(&rig, &options, &|_| (), &|| false).expect("a diagnosis").0
 }
 

@@ -36,7 +36,7 @@ fn run_of(simulator: &dyn Simulator) -> Evidence {
 }
 
 fn shallow() -> Options {
-    Options { depth: 1, ..Options::default() }
+    Options { depth: std::num::NonZeroUsize::new(1).unwrap(), ..Options::default() }
 }
 
 #[test]

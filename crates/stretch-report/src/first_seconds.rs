@@ -58,21 +58,7 @@ fn to_do(d: &Diagnosis) -> String {
             listed(&next.separates)
         )
     });
-    let now = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial if d.tied.is_empty() => {
-            "Put the code below into the simulator, then diagnose again."
-        }
-        VerdictKind::Effect | VerdictKind::Partial => {
-            "Run an experiment that tells them apart before you build on one."
-        }
-        _ if d.is_faint() => {
-            "Check whether the noise is larger than stated. If it is not, something small is missing."
-        }
-        VerdictKind::Parameters => "Set them, then diagnose again.",
-        VerdictKind::Record => "Put the record right, then diagnose again.",
-        VerdictKind::Unknown => "Look where the gap sits, below; give the catalogue what it lacks.",
-        VerdictKind::NoGap => "Nothing: use it.",
-    };
+    let now = d.next_step();
     match (experiment, d.verdict) {
         (Some(experiment), VerdictKind::Effect | VerdictKind::Partial) if d.tied.is_empty() => {
             format!("{now} {experiment}")
@@ -127,6 +113,8 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
                 d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
             let rest = if !d.tied.is_empty() {
                 format!("a tie with {}", listed(&d.tied))
+            } else if rivals.is_empty() && d.answer.as_ref().is_some_and(Answer::leaves_more_than_noise) {
+                "nothing else that was tried explains as much, and more than noise is left".to_owned()
             } else if rivals.is_empty() {
                 "nothing else explains these data as well".to_owned()
             } else {

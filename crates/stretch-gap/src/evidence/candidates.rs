@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use stretch_effects::EffectParameter;
@@ -27,7 +28,7 @@ use crate::{
 };
 
 /// A set of effects that was held against the data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
     /// Effects of the set, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
     pub effects: Vec<String>,
@@ -68,7 +69,7 @@ impl Candidate {
 }
 
 /// A fitted parameter of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectValue {
     /// Effect.
     pub effect: String,
@@ -89,7 +90,7 @@ pub struct EffectValue {
 }
 
 /// A nominal parameter, re-tuned.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterShift {
     /// Name.
     pub name: String,

@@ -5,6 +5,7 @@
 //! fitted and held-out samples, the noise was overestimated. Its variance is then X times the
 //! estimate, and every excess (reduced chi-square minus one) is relative to it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -50,7 +51,7 @@ pub struct StageEvidence {
 
 /// Excess (reduced chi-square minus one) summed over channels, as the verdict uses it: the larger
 /// of fitted and test trials.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Excess {
     /// Parameters as shipped, test trials only.
     pub raw: f64,

@@ -8,6 +8,7 @@
 //! The size of an effect is, like that of every gap, the larger of fitted and test trials, because
 //! an effect that acts only in long trials (a creep of half a minute) closes little in short ones.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -22,7 +23,7 @@ use crate::{
 };
 
 /// Share of the gap on test trials that one effect of the best set closes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectShare {
     /// Effect.
     pub effect: String,

@@ -8,6 +8,7 @@
 //! whose probabilities differ by less than a hundredth share a draw, so each of two twins has a
 //! half.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -34,7 +35,7 @@ const DRAWS: usize = 200;
 /// assert!(found.stability > 0.9);
 /// # Ok::<(), serde_json::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectStability {
     /// Effect.
     pub effect: String,

@@ -13,6 +13,7 @@
 //! 10.1093/bioinformatics/btp358, for the terms).
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -34,7 +35,7 @@ const BLURRED: f64 = 2.0;
 const AT_BOUND: f64 = 0.995;
 
 /// How well a parameter is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Knowledge {
     /// To a third of its tolerance or better.
@@ -48,7 +49,7 @@ pub enum Knowledge {
 }
 
 /// Information of the data about one nominal parameter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identified {
     /// Name of the parameter.
     pub name: String,

@@ -13,6 +13,7 @@
 //!
 //! A descent that ends [`LEARNT`] nats lower takes the place of the re-tuning.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -55,7 +56,7 @@ const ALIKE: f64 = 0.01;
 /// ));
 /// assert_eq!(Starts { tried: 1, agreed: 1 }.note(), None);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Starts {
     /// Places within the tolerances from which parameters were re-tuned; 1 where no other place came near what was found from the parameters as
     /// shipped, 0 in a diagnosis of an older version.

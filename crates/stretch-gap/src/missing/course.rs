@@ -12,6 +12,7 @@
 
 use std::f64::consts::TAU;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::missing::{jitter::jitter_sd_s, proposed::three_digits};
@@ -27,7 +28,7 @@ const TURNS: f64 = 3.0;
 const QUICKEST: f64 = 0.4;
 
 /// The course of a residual that no recorded signal explains, in the unit of its channel.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Course {
     /// Its time stamps jitter: the noise follows the rate of the channel.

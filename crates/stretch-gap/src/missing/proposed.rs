@@ -1,5 +1,6 @@
 //! The report of a sum of terms outside the catalogue.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::missing::{
@@ -9,7 +10,7 @@ use crate::missing::{
 };
 
 /// A signal of a proposal and its scale: x = (signal - offset)/scale, v = (dx/dt)/`rate_per_s`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SignalScale {
     /// Column; the stage's own channel means the simulator's output before the terms.
     pub name: String,
@@ -26,7 +27,7 @@ pub struct SignalScale {
 }
 
 /// One term with its coefficient.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProposedTerm {
     /// The term in words of the equation, dimensionless.
     pub name: String,
@@ -44,7 +45,7 @@ pub struct ProposedTerm {
 ///
 /// The sum can be computed from these fields alone: `channel += sum coefficient form`, memories at
 /// rest at the start of every trial.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Proposed {
     /// Stage with most of the remaining gap.
     pub stage: String,

@@ -5,13 +5,14 @@
 //! and read ([`serde`]) together with the scales of its signals, so that it can be added to a
 //! simulator.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
 
 use crate::missing::term_inputs::{Signal, TermInputs};
 
 /// A function of one signal's rate v.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RateForm {
     /// v
@@ -39,7 +40,7 @@ const SLIDING: f64 = 0.3;
 const TURN: f64 = 0.01;
 
 /// One factor of a term; `signal` is an index of the proposal's signals, x and v are scaled.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Factor {
@@ -86,7 +87,7 @@ pub enum Factor {
 }
 
 /// How a product of factors reaches the output.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Passage {
@@ -101,7 +102,7 @@ pub enum Passage {
 }
 
 /// A term.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Term {
     /// Factors that are multiplied; an empty product is 1.
     pub factors: Vec<Factor>,

@@ -1,5 +1,6 @@
 //! What is known of a record in addition to stages, parameters, effects and trials.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::{
@@ -191,7 +192,7 @@ impl RecordFacts {
 /// let rows = stretch_gap::RowsUsed { used: 120, read: 1000 };
 /// assert_eq!(rows.share(), 0.12);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct RowsUsed {
     /// Rows used.
     pub used: usize,

@@ -1,5 +1,6 @@
 //! Errors of the record and of the rig file as a diagnosis reports them, and how they are weighed against effects.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
 };
 
 /// What may be wrong with a record or a rig file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GrossKind {
     /// A column is too large by a factor.
@@ -33,7 +34,7 @@ pub enum GrossKind {
 }
 
 /// An error of the record or of the rig file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Gross {
     /// What is wrong.
     pub what: GrossKind,

@@ -1,5 +1,6 @@
 //! The answer of a diagnosis as a value: what was found, with its numbers. [`sentence`](super::sentence) puts it into words.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -24,7 +25,7 @@ const LEAST_PART: f64 = 0.05;
 /// What a diagnosis found.
 ///
 /// What is left is given in multiples of the noise, root mean square; shares are of the held-out gap.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Answer {
     /// Simulator and rig agree within the noise.
@@ -118,7 +119,7 @@ pub enum Answer {
 }
 
 /// An effect that is missing.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MissingEffect {
     /// Its name.
     pub name: String,
@@ -131,7 +132,7 @@ pub struct MissingEffect {
 }
 
 /// What a hypothesis closes of the held-out gap.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Closed {
     /// Share of the gap.
     pub share: f64,
@@ -245,6 +246,16 @@ impl Answer {
             (VerdictKind::Parameters, _) => {
                 Self::Retuned { shipped: multiple(gap.raw), left: multiple(gap.retuned), small }
             }
+        }
+    }
+
+    /// The effects that are named, in the order of the sentence.
+    pub(crate) fn named(&self) -> Vec<String> {
+        match self {
+            Self::Missing { effects, .. } | Self::Partly { effects, .. } => {
+                effects.iter().map(|effect| effect.name.clone()).collect()
+            }
+            _ => Vec::new(),
         }
     }
 

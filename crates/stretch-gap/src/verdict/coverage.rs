@@ -8,6 +8,7 @@
 //! gap, within the interval of the first, is a tie with it, however the fitted samples weigh the
 //! two.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::{
@@ -23,7 +24,7 @@ const LEAST_TEST: f64 = 10.0;
 const LEAST_FIT: f64 = 20.0;
 
 /// Why a record cannot support a name.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TooLittle {
     /// Most rows were left out.

@@ -1,5 +1,6 @@
 //! What a diagnosis says: its serde form is `diagnosis.json`, schema 1.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -17,11 +18,11 @@ use crate::{
     problem::{record_facts::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
     search::baselines::Baselines,
-    verdict::{answer::Answer, note::Note, sentence::two_digits},
+    verdict::{answer::Answer, note::Note},
 };
 
 /// The answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VerdictKind {
     /// Simulation and measurement agree within the noise.
@@ -39,7 +40,7 @@ pub enum VerdictKind {
 }
 
 /// What the named effects leave of the gap.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
     /// Share of the held-out gap.
     pub share: f64,
@@ -50,7 +51,7 @@ pub struct Unexplained {
 }
 
 /// What the gap costs a user.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Transfer {
     /// Straight line.
     pub linear: TransferError,
@@ -61,7 +62,7 @@ pub struct Transfer {
 }
 
 /// Error of a calibration trained in one place and applied to measured trials.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TransferError {
     /// Trained on measured trials.
     pub real: f64,
@@ -72,7 +73,7 @@ pub struct TransferError {
 }
 
 /// The experiment that would tell rivals apart.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NextExperiment {
     /// Name of the experiment.
     pub name: String,
@@ -87,7 +88,7 @@ pub struct NextExperiment {
 }
 
 /// The diagnosis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Diagnosis {
     /// Version of this schema: 1.
     pub schema: u32,
@@ -241,7 +242,7 @@ impl Diagnosis {
         values.for_each(|value| value.effect = rename(&value.effect));
         self.answer.iter_mut().for_each(|answer| answer.rename(rename));
         self.notes.iter_mut().chain(&mut self.reservations).for_each(|note| note.rename(rename));
-        self.sentence = self.in_sentences(&two_digits);
+        self.sentence = self.headline();
     }
 
     /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The

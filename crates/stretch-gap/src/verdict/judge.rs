@@ -23,8 +23,7 @@ use crate::{
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
-    missing::Proposed,
-    problem::{error::GapError, thresholds::Thresholds},
+    problem::thresholds::Thresholds,
     verdict::{coverage::TooLittle, diagnosis::VerdictKind, naming::Naming},
 };
 
@@ -56,8 +55,6 @@ pub(crate) struct Judged {
     pub(crate) overruled: Option<Overruled>,
     /// The names that would be reported if nothing overrode the verdict.
     pub(crate) seen_naming: Naming,
-    /// The cause outside the catalogue, if a gap is left.
-    pub(crate) proposed: Option<Proposed>,
 }
 
 impl Judged {
@@ -79,32 +76,19 @@ pub(crate) enum Overruled {
     TooLittle(TooLittle),
 }
 
-/// Judges. `lacking` searches for what the catalogue lacks: instead of names or, if called with
-/// `true`, in addition to them.
-pub(crate) fn judge(
-    case: &Case<'_>,
-    thresholds: &Thresholds,
-    lacking: impl FnOnce(bool) -> Result<Option<Proposed>, GapError>,
-) -> Result<Judged, GapError> {
+/// Judges.
+pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
     use VerdictKind::{Effect, Partial, Record, Unknown};
     if case.is_record {
-        return Ok(Judged {
-            kind: Record,
-            seen: Record,
-            overruled: None,
-            seen_naming: Naming::default(),
-            proposed: None,
-        });
+        let seen_naming = Naming::default();
+        return Judged { kind: Record, seen: Record, overruled: None, seen_naming };
     }
     let seen = seen(case, thresholds);
     let would_name = matches!(seen, Effect | Partial);
     let too_little = case.too_little.filter(|_| would_name).map(Overruled::TooLittle);
     let overruled = at_bounds(case).or(too_little);
     let kind = if overruled.is_some() { Unknown } else { seen };
-    let seen_naming = naming(case, seen, thresholds);
-    let is_left = matches!(kind, Partial | Unknown);
-    let proposed = if is_left { lacking(kind == Partial)? } else { None };
-    Ok(Judged { kind, seen, overruled, seen_naming, proposed })
+    Judged { kind, seen, overruled, seen_naming: naming(case, seen, thresholds) }
 }
 
 /// The names that go with a verdict.
@@ -218,7 +202,7 @@ mod tests {
             is_short: false,
         };
         change(&mut case);
-        judge(&case, &Thresholds::frozen(), |_| Ok(None)).unwrap()
+        judge(&case, &Thresholds::frozen())
     }
 
     /// Every row of the module's table from `unknown` on.
@@ -296,7 +280,7 @@ mod tests {
                 too_little: None,
                 is_short: false,
             };
-            judge(&case, &Thresholds::frozen(), |_| Ok(None)).unwrap().kind
+            judge(&case, &Thresholds::frozen()).kind
         };
         assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
         // Free parameters leave more than the effects do: the effects are kept.
@@ -313,33 +297,5 @@ mod tests {
         // Without a name there is nothing that a short record could not support.
         let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
         assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
-    }
-
-    #[test]
-    fn what_the_catalogue_lacks_is_asked_for_where_a_gap_is_left() {
-        let asked = |gap: [f64; 3], p: [f64; 3]| {
-            let (posterior, candidates) =
-                (posterior(p[0], p[1], p[2], gap[2]), [candidate(&["play"], p[0])]);
-            let case = Case {
-                gap: Excess { raw: gap[0], retuned: gap[1], left: gap[2] },
-                posterior: &posterior,
-                candidates: &candidates,
-                shares: &[],
-                sanity: &SOUND,
-                is_record: false,
-                too_little: None,
-                is_short: false,
-            };
-            let mut asked = None;
-            let lacking = |names| {
-                asked = Some(names);
-                Ok(None)
-            };
-            judge(&case, &Thresholds::frozen(), lacking).unwrap();
-            asked
-        };
-        assert_eq!(asked([20.0, 10.0, 0.1], [0.9, 0.0, 0.1]), None);
-        assert_eq!(asked([20.0, 10.0, 3.0], [0.6, 0.0, 0.4]), Some(true));
-        assert_eq!(asked([20.0, 10.0, 9.0], [0.1, 0.0, 0.9]), Some(false));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::verdict::{answer::Answer, sentence::two_digits};
@@ -15,7 +16,7 @@ use crate::verdict::{answer::Answer, sentence::two_digits};
 /// note.rename(&|_| "a lag at the input".to_owned());
 /// assert_eq!(note.to_string(), "not looked for: a lag at the input");
 /// ```
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "String", from = "String")]
 pub struct Note(Vec<Piece>);
 

@@ -21,18 +21,73 @@ const LEAST_SHARE_IN_WORDS: f64 = 0.01;
 const LISTED: usize = 6;
 
 impl Diagnosis {
-    /// The answer in plain sentences, probabilities by `probability`.
+    /// The answer in plain sentences, probabilities by `probability`, without the next step.
     ///
     /// ```
     /// use stretch_gap::Diagnosis;
     /// fn check(diagnosis: &Diagnosis) {
-    ///     assert_eq!(diagnosis.sentence, diagnosis.in_sentences(&|p| format!("{p:.2}")));
+    ///     let finding = diagnosis.in_sentences(&|p| format!("{p:.2}"));
+    ///     assert!(diagnosis.sentence.starts_with(&finding));
     /// }
     /// ```
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         let Some(answer) = &self.answer else { return self.sentence.clone() };
         let proposed = self.proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
         self.preface() + &answer.in_sentences(probability) + &proposed
+    }
+
+    /// What to do next, in a sentence; empty for a diagnosis without an [answer](Self::answer).
+    ///
+    /// ```
+    /// use stretch_gap::Diagnosis;
+    /// fn check(tied: &Diagnosis) {
+    ///     assert_eq!(tied.next_step(), "Run an experiment that tells them apart before you build on one.");
+    /// }
+    /// ```
+    pub fn next_step(&self) -> &'static str {
+        match &self.answer {
+            None => "",
+            Some(Answer::Agrees { .. }) => "Nothing has to change.",
+            Some(Answer::Retuned { .. }) => "Set the re-tuned parameters, then diagnose again.",
+            Some(Answer::Faint { .. }) => {
+                "Check whether the noise is larger than stated. If it is not, something small is missing."
+            }
+            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. })
+                if effects.iter().any(MissingEffect::is_tied) =>
+            {
+                "Run an experiment that tells them apart before you build on one."
+            }
+            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. })
+                if effects.len() == 1 =>
+            {
+                "Add it to the simulator, then diagnose again."
+            }
+            Some(Answer::Missing { .. } | Answer::Partly { .. }) => {
+                "Add them to the simulator, then diagnose again."
+            }
+            Some(Answer::WrongRecord { .. }) => "Put the record right, then diagnose again.",
+            Some(Answer::Unknown { .. }) if self.proposed.is_some() => {
+                "Add the proposed term to the simulator, then diagnose again."
+            }
+            Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => {
+                "Look where most is left, and give the catalogue what happens there."
+            }
+            Some(Answer::TooLittle { .. }) => "Record more, then diagnose again.",
+        }
+    }
+
+    /// The sentences of a diagnosis, and the next step where they do not say it.
+    pub(crate) fn headline(&self) -> String {
+        let finding = self.in_sentences(&two_digits);
+        match &self.answer {
+            Some(
+                Answer::Retuned { .. }
+                | Answer::Missing { .. }
+                | Answer::Partly { .. }
+                | Answer::Unknown { .. },
+            ) => format!("{finding} Next: {}", decapitalised(self.next_step())),
+            _ => finding,
+        }
     }
 
     /// What was not examined, which is said first: an answer from a part of the catalogue is no answer about the rest. Empty if
@@ -62,6 +117,12 @@ pub(crate) fn two_digits(probability: f64) -> String {
     format!("{probability:.2}")
 }
 
+/// A sentence that goes on behind a colon.
+fn decapitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
 /// The first names, and how many more there are.
 fn listed(names: &[String]) -> String {
     let first = names[..names.len().min(LISTED)].join(", ");
@@ -72,6 +133,15 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Answer {
+    /// Whether effects were found and more than noise is left with them.
+    pub fn leaves_more_than_noise(&self) -> bool {
+        match self {
+            Self::Missing { closes, .. } => closes.left > NOT_ALL,
+            Self::Partly { .. } => true,
+            _ => false,
+        }
+    }
+
     /// The answer in plain sentences, probabilities by `probability`.
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         match self {
@@ -191,6 +261,12 @@ fn left_with(closes: &Closed, probability: &dyn Fn(f64) -> String) -> String {
     )
 }
 
+impl MissingEffect {
+    fn is_tied(&self) -> bool {
+        !self.alternatives.is_empty()
+    }
+}
+
 /// An effect or its alternatives.
 fn alternatives(effect: &MissingEffect) -> String {
     let all: Vec<&str> =
@@ -220,7 +296,7 @@ fn too_small(small: &[String]) -> String {
 /// Ties and what is faint, behind the headline.
 fn below(effects: &[MissingEffect], faint: &[String]) -> String {
     let mut out = String::new();
-    if effects.iter().any(|effect| !effect.alternatives.is_empty()) {
+    if effects.iter().any(MissingEffect::is_tied) {
         out += " These data cannot tell which with 95 % probability.";
     }
     if !faint.is_empty() {

@@ -29,6 +29,7 @@ mod probes;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::{
@@ -61,7 +62,7 @@ const ROUNDS: usize = 4;
 /// assert_eq!(limit.strength, None); // these data do not show it at any strength that makes sense
 /// # Ok::<(), serde_json::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DetectionLimit {
     /// Effect.
     pub effect: String,

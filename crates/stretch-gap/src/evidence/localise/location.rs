@@ -1,9 +1,10 @@
 //! The location of the gap in a diagnosis.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Gap of one stage on the test trials, every stage on its measured input.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageGap {
     /// Stage.
     pub stage: String,
@@ -34,7 +35,7 @@ pub struct StageGap {
 }
 
 /// One slice of the gap; see [`SliceGap::by`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SliceGap {
     /// `regime`, `level`, `rate`, `time` (in the trial), `session` (time), `travel`, `trial` or `frequency`.
     pub by: String,
@@ -53,7 +54,7 @@ pub struct SliceGap {
 }
 
 /// Share of one stage when the stages run in a chain.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageShare {
     /// Stage.
     pub stage: String,
@@ -62,7 +63,7 @@ pub struct StageShare {
 }
 
 /// Location of the gap.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Where {
     /// Gap of every stage.
     pub stages: Vec<StageGap>,

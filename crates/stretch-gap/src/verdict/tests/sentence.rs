@@ -23,7 +23,6 @@ use crate::{
         judge::{Judged, Overruled},
         naming::Naming,
         notes::answer_notes,
-        sentence::two_digits,
     },
 };
 
@@ -182,7 +181,6 @@ impl Case {
             seen: self.seen,
             overruled: self.overruled.clone(),
             seen_naming: self.naming.clone(),
-            proposed: self.proposed.clone(),
         };
         let [raw, retuned, left] = self.gap;
         let findings = Findings {
@@ -340,7 +338,7 @@ fn every_answer_has_its_words() {
     let (mut text, mut values) = (String::new(), serde_json::Map::new());
     for (name, case) in cases(&measured) {
         let told = case.told(&measured, (&plain, &evidence));
-        let _ = writeln!(text, "# {name}\n{}", told.in_sentences(&two_digits));
+        let _ = writeln!(text, "# {name}\n{}", told.headline());
         text.extend(told.notes.iter().map(|note| format!("note: {note}\n")));
         text.push('\n');
         values.insert(name.into(), json!(told.answer));

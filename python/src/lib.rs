@@ -21,7 +21,7 @@ mod _stretch {
     #[pymodule_export]
     use crate::error::StretchError;
     #[pymodule_export]
-    use crate::problem::Entries;
+    use crate::problem::{Entries, FixedEntries};
     #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
     #[pymodule_export]

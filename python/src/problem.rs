@@ -17,7 +17,8 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Language, Problem, ProblemSpec, Source,
+    BlackBox, Checked, Examined, Fixed, Language, Prediction, Problem, ProblemSpec,
+    RecordedSession, Source, predict_with,
     worker::{Workers, WorkersSpec, session_header},
 };
 use stretch_report::{Subject, diagnosis_page};
@@ -32,7 +33,7 @@ use crate::{
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct How {
     name: String,
-    depth: usize,
+    depth: NonZeroUsize,
     seed: u64,
     threads: usize,
     baselines: bool,
@@ -58,11 +59,23 @@ fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
 #[derive(Debug)]
 pub(crate) struct Entries {
     checked: Checked,
+    /// The recordings as they came.
+    trials: Vec<SessionTrial>,
     /// The file that the problem was read from.
     file: Option<ProblemSpec>,
 }
 
-/// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the named effects, and the next experiment.
+/// A problem with the fix of a diagnosis in it.
+#[pyclass(frozen, module = "stretch_gap", name = "Fixed")]
+#[derive(Debug)]
+pub(crate) struct FixedEntries {
+    /// The fixed problem, with the recordings that were fitted.
+    spec: ProblemSpec,
+    file: Option<ProblemSpec>,
+}
+
+/// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the named effects, the next experiment, and
+/// the fixed problem.
 struct Answer {
     json: String,
     page: String,
@@ -70,11 +83,18 @@ struct Answer {
     /// Python functions of the named effects that have code, by effect.
     code: Vec<(String, String)>,
     experiment: Option<Trial>,
+    fixed: Option<ProblemSpec>,
 }
 
 /// An [`Answer`] as Python takes it.
-type PyAnswer<'py> =
-    (String, String, Bound<'py, PyDict>, Bound<'py, PyDict>, Option<Bound<'py, PyDict>>);
+type PyAnswer<'py> = (
+    String,
+    String,
+    Bound<'py, PyDict>,
+    Bound<'py, PyDict>,
+    Option<Bound<'py, PyDict>>,
+    Option<FixedEntries>,
+);
 
 #[pymethods]
 impl Entries {
@@ -84,7 +104,7 @@ impl Entries {
         let entries: serde_json::Value = serde_json::from_str(entries).map_err(said)?;
         let mut spec: ProblemSpec = serde_json::from_value(entries).map_err(said)?;
         spec.trials = recordings.iter().map(session_trial).collect();
-        Ok(Self { checked: Checked::new(spec).map_err(said)?, file: None })
+        Self::of(spec, None)
     }
 
     /// From a problem.toml; `is_driven` says whether altered inputs can drive the simulator.
@@ -95,7 +115,7 @@ impl Entries {
         if let Some(behind) = spec.only_behind().filter(|_| !is_driven) {
             spec = behind;
         }
-        Ok(Self { checked: Checked::new(spec).map_err(said)?, file: Some(file) })
+        Self::of(spec, Some(file))
     }
 
     /// Name of the problem.
@@ -136,24 +156,10 @@ impl Entries {
         how: &str,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<PyAnswer<'py>> {
-        let (main_thread, messages) = mpsc::channel();
-        let how: How = serde_json::from_str(how).map_err(said)?;
-        let batch = how.batch.max(1);
-        let workers = match (&self.file, simulator) {
-            (_, Some(_)) => None,
-            (Some(file), None) => file.workers(jobs(how.threads)).map_err(said)?,
-            (None, None) => None,
-        };
-        if simulator.is_none() && workers.is_none() {
-            return Err(said("there is no simulator; give one, or name it in the problem's file"));
-        }
-        let left = Arc::new(AtomicBool::new(false));
-        let (checked, file) = (self.checked.clone(), self.file.clone());
-        let work = Work { checked, file, workers, how, main_thread, left: left.clone() };
-        thread::Builder::new().name("stretch".into()).spawn(move || work.run())?;
-        let done = serve(py, messages, simulator, progress, batch)
-            .inspect_err(|_| left.store(true, SeqCst))?;
-        let Answer { json, page, curves, code, experiment } = done.map_err(said)?;
+        let (checked, trials) = (self.checked.clone(), self.trials.clone());
+        let job = move |work: &Work<Answer>| work.answered(checked, trials);
+        let done = self.worked(py, simulator, how, progress, job)?;
+        let Answer { json, page, curves, code, experiment, fixed } = done;
         let shown = PyDict::new(py);
         for (output, all) in curves {
             shown.set_item(output, all.map(|curve| PyArray1::from_vec(py, curve)))?;
@@ -168,45 +174,140 @@ impl Entries {
             }
             Ok(columns)
         };
-        Ok((json, page, shown, functions, experiment.map(columns).transpose()?))
+        let fixed = fixed.map(|spec| FixedEntries { spec, file: self.file.clone() });
+        Ok((json, page, shown, functions, experiment.map(columns).transpose()?, fixed))
+    }
+
+    /// Predicts the recordings from number `fitted` on, with the effects of the problem and without: the prediction as JSON, and by output
+    /// what was measured, predicted without and with them, over all of these recordings end to end.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        fitted: usize,
+        simulator: Option<&Bound<'py, PyAny>>,
+        how: &str,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(String, String, Bound<'py, PyDict>)> {
+        let (session, trials) = (self.checked.session().clone(), self.trials.clone());
+        let spec = ProblemSpec { trials, ..self.checked.spec().clone() };
+        let job = move |work: &Work<Prediction>| {
+            let source = work.source(&session)?;
+            predict_with(spec, fitted, source).map_err(|e| e.to_string())
+        };
+        let predicted = self.worked(py, simulator, how, progress, job)?;
+        let shown = PyDict::new(py);
+        let first = predicted.trials.first().map_or(0, |trial| trial.outputs.len());
+        for at in 0..first {
+            let outputs = || predicted.trials.iter().map(|trial| &trial.outputs[at]);
+            let all = [
+                outputs().flat_map(|o| o.measured.iter().copied()).collect::<Vec<_>>(),
+                outputs().flat_map(|o| o.without.iter().copied()).collect(),
+                outputs().flat_map(|o| o.with.iter().copied()).collect(),
+            ];
+            let column = &predicted.trials[0].outputs[at].column;
+            shown.set_item(column, all.map(|curve| PyArray1::from_vec(py, curve)))?;
+        }
+        let json = serde_json::to_string(&predicted).map_err(said)?;
+        Ok((json, predicted.sentence(), shown))
+    }
+}
+
+#[pymethods]
+impl FixedEntries {
+    /// The fixed problem: with the recordings that were fitted and some more, or with others alone.
+    fn problem(&self, recordings: Vec<Entry<'_>>, is_alone: bool) -> PyResult<Entries> {
+        let mut spec = self.spec.clone();
+        if is_alone {
+            spec.trials.clear();
+        }
+        spec.trials.extend(recordings.iter().map(session_trial));
+        Entries::of(spec, self.file.clone())
+    }
+
+    /// Number of recordings that were fitted, and the session time at which the last of them ended, s.
+    #[getter]
+    fn fitted(&self) -> (usize, f64) {
+        let ends_s = self.spec.trials.iter().map(|t| t.start_s + t.trial.duration_s());
+        (self.spec.trials.len(), ends_s.fold(0.0, f64::max))
+    }
+
+    /// Columns that the problem uses.
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        let trial = self.spec.trials.first().map(|t| &t.trial.channels);
+        trial.into_iter().flatten().map(|c| c.name.clone()).collect()
+    }
+}
+
+impl Entries {
+    fn of(spec: ProblemSpec, file: Option<ProblemSpec>) -> PyResult<Self> {
+        let trials = spec.trials.clone();
+        Ok(Self { checked: Checked::new(spec).map_err(said)?, trials, file })
+    }
+
+    /// Does a job on a thread of its own, while this one answers for the simulator.
+    fn worked<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        simulator: Option<&Bound<'_, PyAny>>,
+        how: &str,
+        progress: Option<&Bound<'_, PyAny>>,
+        job: impl FnOnce(&Work<T>) -> Result<T, String> + Send + 'static,
+    ) -> PyResult<T> {
+        let (main_thread, messages) = mpsc::channel();
+        let how: How = serde_json::from_str(how).map_err(said)?;
+        let batch = how.batch.max(1);
+        let workers = match (&self.file, simulator) {
+            (_, Some(_)) => None,
+            (Some(file), None) => file.workers(jobs(how.threads)).map_err(said)?,
+            (None, None) => None,
+        };
+        if simulator.is_none() && workers.is_none() {
+            return Err(said("there is no simulator; give one, or name it in the problem's file"));
+        }
+        let left = Arc::new(AtomicBool::new(false));
+        let work = Work { file: self.file.clone(), workers, how, main_thread, left: left.clone() };
+        thread::Builder::new().name("stretch".into()).spawn(move || {
+            let done = job(&work);
+            drop(work.main_thread.send(Message::Done(done)));
+        })?;
+        serve(py, messages, simulator, progress, batch)
+            .inspect_err(|_| left.store(true, SeqCst))?
+            .map_err(said)
     }
 }
 
 /// Everything that the working thread needs.
-struct Work {
-    checked: Checked,
+struct Work<T> {
     file: Option<ProblemSpec>,
     workers: Option<WorkersSpec>,
     how: How,
     /// Messages to the main thread.
-    main_thread: mpsc::Sender<Message<Result<Answer, String>>>,
+    main_thread: mpsc::Sender<Message<Result<T, String>>>,
     /// Whether the main thread has left, because the caller was interrupted.
     left: Arc<AtomicBool>,
 }
 
-impl Work {
-    fn run(&self) {
-        let answered = self.answered();
-        drop(self.main_thread.send(Message::Done(answered)));
+impl<T: Send + 'static> Work<T> {
+    /// The simulator of the caller, or the workers of the problem's file.
+    fn source(&self, session: &RecordedSession) -> Result<Arc<dyn Source>, String> {
+        if let Some(spec) = &self.workers {
+            let started = Workers::start(spec.clone(), session);
+            return Ok(Arc::new(started.map_err(|e| e.to_string())?));
+        }
+        let How { answers_all, batch, takes_inputs, .. } = self.how;
+        let main_thread = self.main_thread.clone();
+        Ok(Arc::new(Asked { main_thread, answers_all, batch, takes_inputs }))
     }
+}
 
-    fn answered(&self) -> Result<Answer, String> {
-        let Self { checked, file, workers, how, main_thread, left } = self;
-        let source: Arc<dyn Source> = match workers {
-            Some(spec) => {
-                let started = Workers::start(spec.clone(), checked.session());
-                Arc::new(started.map_err(|e| e.to_string())?)
-            }
-            None => {
-                let How { answers_all, batch, takes_inputs, .. } = *how;
-                let main_thread = main_thread.clone();
-                Arc::new(Asked { main_thread, answers_all, batch, takes_inputs })
-            }
-        };
+impl Work<Answer> {
+    fn answered(&self, checked: Checked, trials: Vec<SessionTrial>) -> Result<Answer, String> {
+        let Self { file, how, main_thread, left, .. } = self;
+        let source = self.source(checked.session())?;
         let budget =
             how.budget.or(file.as_ref().and_then(|file| file.budget).map(NonZeroUsize::get));
-        let own = BlackBox::within(checked.clone(), source, budget);
-        let problem = Problem::from(own).named(&how.name);
+        let problem = Problem::from(BlackBox::within(checked, source, budget)).named(&how.name);
         let options = Options {
             depth: how.depth,
             threads: how.threads,
@@ -218,7 +319,15 @@ impl Work {
         let progress = |words: &str| drop(main_thread.send(Message::Progress(words.to_owned())));
         let stop = || left.load(SeqCst);
         let examined = problem.examine(&options, how.experiment, &progress, &stop);
-        Ok(answer(&problem, examined.map_err(|e| e.to_string())?))
+        let examined = examined.map_err(|e| e.to_string())?;
+        let fixed = match &examined.fix {
+            Ok(fix) => match &fix.file {
+                Fixed::Problem(spec) => Some(ProblemSpec { trials, ..(**spec).clone() }),
+                Fixed::Rig(_) => None,
+            },
+            Err(_) => None,
+        };
+        Ok(Answer { fixed, ..answer(&problem, examined) })
     }
 }
 
@@ -247,5 +356,6 @@ fn answer(problem: &Problem, examined: Examined) -> Answer {
         curves,
         code: code.collect(),
         experiment: examined.experiment,
+        fixed: None,
     }
 }

@@ -55,6 +55,9 @@ def bent():
 
 def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
     assert bent.verdict == "effect" and bent.named == ["bend"]
+    assert bent.answer["kind"] == "missing" and bent.answer["effects"][0]["name"] == "bend"
+    assert bent.rivals == [] and bent.not_examined == []
+    assert repr(bent).splitlines()[0].startswith("The simulator lacks bend") and "bend: bend = 0.0" in repr(bent)
     assert bent.probabilities["bend"] > 0.9
     assert bent.effects["bend"]["bend"] == pytest.approx(0.02, rel=0.02)
     assert bent.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
@@ -131,6 +134,69 @@ def test_a_simulator_that_takes_inputs_is_driven_by_altered_ones():
     assert found.named == ["input.dead_zone"]
     assert found.effects["input.dead_zone"]["w"] == pytest.approx(2.0, rel=0.05)
     assert trials_seen == {("the recording",)}
+
+
+def test_a_simulator_that_takes_the_first_values_is_called_once_a_recording():
+    """A damped spring that starts elsewhere in each recording: begun at rest, the starts would look like an effect."""
+    parts = [(slice(0, 2500), 5.0), (slice(2500, FORCE.size), -40.0)]
+    lengths_seen, starts_seen = set(), set()
+
+    def relaxed(force, compliance, start):
+        out = np.empty(force.size)
+        out[0] = start
+        for i in range(1, force.size):
+            out[i] = out[i - 1] + 0.02 * (compliance * force[i - 1] - out[i - 1])
+        return out
+
+    def spring(params, effects, inputs, first):
+        lengths_seen.add(inputs["force_N"].size)
+        starts_seen.add(round(first["length_mm"]))
+        return relaxed(inputs["force_N"], params["compliance"], first["length_mm"])
+
+    recordings = [
+        stretch_gap.Trial({"force_N": FORCE[part], "length_mm": relaxed(FORCE[part], 2.1, start)}) for part, start in parts
+    ]
+    for one, (part, _) in zip(recordings, parts):
+        one.columns["length_mm"][1:] += noise(FORCE[part].size - 1)
+    found = stretch_gap.diagnose(
+        spring,
+        recordings,
+        output="length_mm",
+        inputs=["force_N"],
+        rate_hz=RATE_HZ,
+        parameters={"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")},
+        wrap=["input.delay", "output.backlash"],
+    )
+    assert found.verdict == "parameters" and found.named == []
+    assert found.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
+    assert lengths_seen == {2500, FORCE.size - 2500} and starts_seen == {5, -40}
+
+
+def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"] + effects["bend"] * inputs["force_N"] ** 2
+
+    def recording(force, seed):
+        late = np.interp(np.arange(force.size) - 6.0, np.arange(force.size), 2.1 * force + 0.02 * force**2)
+        return {"force_N": force, "length_mm": late + noise(force.size, seed)}
+
+    found = diagnose(spring, recording(FORCE, 0)["length_mm"], wrap=["output.delay", "output.backlash"])
+    assert sorted(found.named) == ["bend", "output.delay"]
+    fix = found.fix()
+    predicted = fix.predict(recording(load(20.0)[::-1].copy(), 1), rate_hz=RATE_HZ)
+    assert predicted.ratio < 0.1 and predicted.times_noise < 1.3
+    curves = predicted.curves("length_mm")
+    off = [np.std(curves[name] - curves["measured"]) for name in ("without", "with_effects")]
+    assert off[1] == pytest.approx(predicted.outputs[0]["rmse"], rel=0.05) and off[1] < 0.1 * off[0]
+    for again in (fix.diagnose(), fix.diagnose(recording(FORCE[::-1].copy(), 2), rate_hz=RATE_HZ)):
+        assert again.named == [] and again.verdict == "no_gap", again.sentence
+    with pytest.raises(stretch_gap.StretchError, match="there is no simulator to run"):
+        stretch_gap.Diagnosis.from_json(found.to_json()).fix().predict(recording(FORCE, 3))
+
+
+def test_no_effect_can_be_named_at_a_depth_of_0():
+    with pytest.raises(stretch_gap.StretchError, match="depth: 0 effects cannot be named; give 1 or more"):
+        diagnose(Spring(), BENT, depth=0)
 
 
 def test_two_outputs_come_as_a_dict():

@@ -14,7 +14,7 @@ from ._stretch import Reading, Receptor, Refused, StretchError, __version__
 from .calibration import Calibration, Estimate, calibrate
 from .diagnosis import Diagnosis, diagnose
 from .evaluation import Evaluation, evaluate
-from .fix import Fix
+from .fix import Fix, Prediction
 from .problem import Argument, Effect, Parameter, Stage, Trial
 from .reading import Recording, convert, read
 
@@ -27,6 +27,7 @@ __all__ = [
     "Evaluation",
     "Fix",
     "Parameter",
+    "Prediction",
     "Reading",
     "Receptor",
     "Recording",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
@@ -11,10 +12,13 @@ from typing import Any
 from . import _stretch, html, timeline
 from . import problem as entries
 from ._stretch import StretchError
-from .fix import Fix, fix
+from .fix import Again, Fix, fix
 from .frames import frame
 from .recordings import Array
 from .simulator import Asked
+
+SHOWN = 5
+"""Rows of each list that `repr` shows."""
 
 
 class Diagnosis:
@@ -28,6 +32,7 @@ class Diagnosis:
         functions: Mapping[str, str] | None = None,
         experiment: Mapping[str, Array] | None = None,
         session: Mapping[str, Any] | None = None,
+        again: Again | None = None,
     ) -> None:
         self._answer = answer
         self._page = page
@@ -35,6 +40,7 @@ class Diagnosis:
         self._functions = functions or {}
         self._experiment = experiment
         self._session = session or {}
+        self._again = again
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
@@ -55,6 +61,17 @@ class Diagnosis:
     def named(self) -> list[str]:
         """The effects that are missing, the strongest first; empty where none is named."""
         return list(self._answer["named"])
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """The finding as a value: `kind` (`agrees`, `retuned`, `faint`, `missing`, `partly`, `wrong_record`, `unknown`,
+        `at_bounds` or `too_little`) and its numbers."""
+        return dict(self._answer.get("answer") or {})
+
+    @property
+    def not_examined(self) -> list[str]:
+        """Effects that were not examined because all of their runs failed, or because the budget of runs was spent."""
+        return [*self._answer.get("not_examined", []), *(self._answer.get("cut_short") or [])]
 
     @property
     def probabilities(self) -> dict[str, float]:
@@ -117,8 +134,8 @@ class Diagnosis:
 
     @property
     def rivals(self) -> list[str]:
-        """Everything that these data cannot rule out, named or not."""
-        return list(self._answer["ambiguous"])
+        """Effects beside the named ones that these data cannot rule out."""
+        return [effect for effect in self._answer["ambiguous"] if effect not in self.named]
 
     @property
     def families(self) -> list[dict[str, Any]]:
@@ -163,11 +180,12 @@ class Diagnosis:
         return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
 
     def fix(self) -> Fix:
-        """The changes to the simulator: parameters re-tuned, and the named effects as Python code.
+        """The changes to the simulator: parameters re-tuned, and the named effects as Python code. The fix can
+        `predict` new recordings, and `diagnose` the fixed simulator.
 
-        A diagnosis that was read from text has equations and values in place of functions.
+        A diagnosis that was read from text has equations and values in place of functions, and runs nothing.
         """
-        return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions)
+        return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions, self._again)
 
     def apply(self, spec: Any) -> list[str]:
         """Writes what was found into a MuJoCo specification (`MjSpec`); gives the named effects that have no place in it, for
@@ -215,7 +233,14 @@ class Diagnosis:
         return self._page
 
     def __repr__(self) -> str:
-        return f"<Diagnosis {self.verdict}: {self.sentence}>"
+        lines = textwrap.wrap(self.sentence, 100)
+        shares = sorted(self.where.items(), key=lambda item: -item[1])[:SHOWN]
+        lines += ["", "share of the gap:"] + [f"  {channel:<40} {100 * share:3.0f} %" for channel, share in shares]
+        likely = sorted(self.probabilities.items(), key=lambda item: -item[1])[:SHOWN]
+        lines += ["probability:"] + [f"  {name:<40} {p:.2f}" for name, p in likely]
+        values = [f"{effect}: {name} = {x:.4g}" for effect, own in self.effects.items() for name, x in own.items()]
+        lines += ["values:"] * bool(values) + [f"  {value}" for value in values]
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         sentence = f"<p><b>{escape(self.sentence)}</b></p>"
@@ -257,9 +282,10 @@ def diagnose(
     `simulator` is an object with `simulate(params, effects) -> [n, samples]`, asked for n models at once: `params` is an
     array `[n, p]` in the order of `parameters`, `effects` `[n, e]` in that of theirs; both give a column by its name, too:
     `effects["delay_s"]`. Or it is a function of one model, `f(params, effects) -> [samples]`, with dicts of floats. With
-    several outputs it returns a dict of arrays by output. Two more arguments it may take by name: `inputs`, a dict of
-    columns that it is to be driven by (without it nothing is looked for on the input's side), and `trials`, the slices of
-    the recordings, which stand end to end; with `stage` by name it answers for one stage at a time. A method
+    several outputs it returns a dict of arrays by output. It may take more arguments by name: `inputs`, a dict of columns
+    that it is to be driven by (without it nothing is looked for on the input's side), and `first`, the measured first value
+    of each column; with one of these it is called once a recording. With `trials`, the slices of the recordings, it is
+    called once for all of them, end to end; with `stage` it answers for one stage at a time. A method
     `begin(session)` is called once with everything that stays the same. The same object can stand in a problem.toml. An
     exception of the simulator comes out as it is; `stretch_gap.Refused` says that values cannot be simulated.
 
@@ -275,6 +301,8 @@ def diagnose(
     experiment is looked for that would tell rivals apart, where the simulator takes `inputs`.
     `budget` is the most models that may be run.
     """
+    if depth < 1:
+        raise StretchError(f"depth: {depth} effects cannot be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
     if isinstance(data, (str, os.PathLike)):
@@ -310,9 +338,6 @@ def diagnose(
         }
         wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
         checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))
-    session = json.loads(checked.session)
-    if asked is not None:
-        asked.bind({**session, "columns": checked.columns})
     how = {
         "name": name,
         "depth": depth,
@@ -325,10 +350,25 @@ def diagnose(
         "takes_inputs": asked is None or asked.takes_inputs,
         "experiment": experiment,
     }
-    text, page, curves, functions, trial = checked.diagnose(asked, json.dumps(how), progress)
+    return run(checked, asked, how, progress, notes)
+
+
+def run(
+    checked: _stretch.Problem,
+    asked: Asked | None,
+    how: dict[str, Any],
+    progress: Callable[[str], Any] | None,
+    notes: list[str],
+) -> Diagnosis:
+    """Diagnoses a checked problem; `notes` stand before its own."""
+    session = json.loads(checked.session)
+    if asked is not None:
+        asked.bind({**session, "columns": checked.columns})
+    text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), progress)
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    return Diagnosis(answer, page, curves, functions, trial, session)
+    again = None if fixed is None else Again(fixed, asked, how)
+    return Diagnosis(answer, page, curves, functions, trial, session, again)
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:

@@ -131,6 +131,11 @@ impl Checked {
         })
     }
 
+    /// The problem without its recordings.
+    pub fn spec(&self) -> &ProblemSpec {
+        &self.spec
+    }
+
     /// The session that a source receives once, before the first run.
     pub fn session(&self) -> &RecordedSession {
         &self.session

@@ -1,10 +1,17 @@
 """How a simulator in Python is called: the wheel calls one that it was handed, a worker one that a problem's file names.
 
 An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, asked for many models at once (at most its
-attribute `batch`); a function takes two dicts for one model and returns `[samples]`. Both may take by keyword `inputs` (every
-column by name, those that drive the stage as they were altered), `trials` (name, slice and start_s of each that is asked for)
-and `stage`; `**kw` takes all of them. With several outputs a simulator that does not take `stage` returns a dict of arrays by
-output. A method `begin(session)` is called once with everything that stays the same.
+attribute `batch`); a function takes two dicts for one model and returns `[samples]`. Both may take by keyword
+
+- `inputs`: every column by name, those that drive the stage as they were altered,
+- `first`: the measured value of every column in the first sample of the trial, by name,
+- `trials`: name, slice, start_s and `first` of each trial that is asked for,
+- `stage`: the number of the stage that is asked for.
+
+A simulator that takes `inputs` or `first` is called once a trial. One that takes `trials` as well is called once for all of
+them, which stand end to end; so is one that takes none of these. `**kw` takes all. With several outputs a simulator that does
+not take `stage` returns a dict of arrays by output. A method `begin(session)` is called once with everything that stays the
+same.
 """
 
 from __future__ import annotations
@@ -66,6 +73,8 @@ class TrialSpan:
     samples: slice
     start_s: float
     """Session time of its first sample, s."""
+    first: Mapping[str, float]
+    """Every column's measured value in its first sample: where the machine stands when the trial begins."""
 
 
 class Asked:
@@ -87,7 +96,7 @@ class Asked:
 
     def _optional(self) -> set[str]:
         """Which of the arguments that may be left out the simulator takes."""
-        known = {"inputs", "trials", "stage"}
+        known = {"inputs", "first", "trials", "stage"}
         try:
             taken = inspect.signature(self.call).parameters
         except (TypeError, ValueError):  # a builtin
@@ -106,6 +115,11 @@ class Asked:
         """Whether it answers with all outputs at once, whichever stage is asked for."""
         return "stage" not in self.optional
 
+    @property
+    def is_called_once_a_trial(self) -> bool:
+        """Whether each trial is a call of its own."""
+        return "trials" not in self.optional and not self.optional.isdisjoint({"inputs", "first"})
+
     def bind(self, session: Mapping[str, Any]) -> None:
         """Notes what stays the same from one model to the next: columns on one grid, trials, names."""
         self.columns: dict[str, Array] = session["columns"]
@@ -117,7 +131,8 @@ class Asked:
         for trial in session["trials"]:
             first = self.samples(len(self.spans))
             samples = slice(first, first + trial["samples"])
-            self.spans.append(TrialSpan(trial["name"], samples, trial["start_s"]))
+            at_first = {name: float(values[first]) for name, values in self.columns.items()}
+            self.spans.append(TrialSpan(trial["name"], samples, trial["start_s"], at_first))
         begin = getattr(self.simulator, "begin", None)
         if callable(begin):
             begin(session)
@@ -144,26 +159,44 @@ class Asked:
         rows_by_name = dict(zip(self.inputs[stage], altered or ()))
         rows_by_name.update((self.inputs[other][at], rows) for other, at, rows in others)
         inputs = self._inputs(samples, models, rows_by_name)
-        more: dict[str, Any] = {}
-        if "trials" in self.optional:
-            more["trials"] = self.spans[:trials]
-        if "stage" in self.optional:
-            more["stage"] = stage
         outputs = self.outputs if self.answers_all else [self.outputs[stage]]
+        more: dict[str, Any] = {"stage": stage} if "stage" in self.optional else {}
+        if not self.is_called_once_a_trial:
+            if "trials" in self.optional:
+                more["trials"] = self.spans[:trials]
+            return np.concatenate(self._answers(params, effects, inputs, more, samples, outputs), axis=1)
+        parts = []
+        for span in self.spans[:trials]:
+            if "first" in self.optional:
+                more["first"] = span.first
+            own = inputs and {name: values[:, span.samples] for name, values in inputs.items()}
+            count = int(span.samples.stop - span.samples.start)
+            parts.append(self._answers(params, effects, own, more, count, outputs))
+        return np.concatenate([table for tables in zip(*parts) for table in tables], axis=1)
+
+    def _answers(
+        self,
+        params: Array,
+        effects: Array,
+        inputs: dict[str, Array] | None,
+        more: dict[str, Any],
+        samples: int,
+        outputs: Sequence[str],
+    ) -> list[Array]:
+        """A table `[n, samples]` for each output."""
+        models = params.shape[0]
         if self.many:
-            if inputs is not None:
-                more["inputs"] = inputs
-            answer = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
-            return self._table(answer, models, samples, outputs)
+            given = more if inputs is None else {**more, "inputs": inputs}
+            answer = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **given)
+            return self._tables(answer, models, samples, outputs)
         rows = []
         for model in range(models):
             one = dict(zip(self.parameters, params[model].tolist()))
             values = dict(zip(self.effects, effects[model].tolist()))
-            if inputs is not None:
-                more["inputs"] = {name: columns[model] for name, columns in inputs.items()}
-            answer = self.call(one, values, **more)
-            rows.append(self._table(_first_axis(answer), 1, samples, outputs))
-        return np.concatenate(rows)
+            own = {} if inputs is None else {"inputs": {name: columns[model] for name, columns in inputs.items()}}
+            answer = self.call(one, values, **more, **own)
+            rows.append(self._tables(_first_axis(answer), 1, samples, outputs))
+        return [np.concatenate(tables) for tables in zip(*rows)]
 
     def _inputs(self, samples: int, models: int, altered: Mapping[str, Sequence[Array]]) -> dict[str, Array] | None:
         """Every column by name, `[n, samples]`: those that were altered as they are now, the others as measured."""
@@ -172,10 +205,10 @@ class Asked:
         given = {name: np.broadcast_to(values[:samples], (models, samples)) for name, values in self.columns.items()}
         return {**given, **{name: np.stack(rows) for name, rows in altered.items()}}
 
-    def _table(self, answer: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
-        """What came back, checked; several outputs side by side."""
+    def _tables(self, answer: Any, models: int, samples: int, outputs: Sequence[str]) -> list[Array]:
+        """What came back, checked; a table for each output."""
         if len(outputs) == 1 and not isinstance(answer, dict):
-            return self._rows(answer, models, samples, outputs[0])
+            return [self._rows(answer, models, samples, outputs[0])]
         if not isinstance(answer, dict):
             raise StretchError(
                 f"the simulator returned a {type(answer).__name__}; with {len(outputs)} outputs it must return a dict of "
@@ -184,7 +217,7 @@ class Asked:
         missing = [output for output in outputs if output not in answer]
         if missing:
             raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, answer))}")
-        return np.concatenate([self._rows(answer[o], models, samples, o) for o in outputs], axis=1)
+        return [self._rows(answer[o], models, samples, o) for o in outputs]
 
     def _rows(self, answer: Any, models: int, samples: int, output: str) -> Array:
         try:
@@ -193,14 +226,17 @@ class Asked:
             raise StretchError(f"the simulator returned no numbers for {output}: {error}") from None
         if table.ndim == 1 and models == 1:
             table = table[np.newaxis]
-        whole = self.samples(len(self.spans))
+        whole = samples if self.is_called_once_a_trial else self.samples(len(self.spans))
         if table.ndim != 2 or table.shape[0] != models or table.shape[1] not in (samples, whole):
             form = f"({models}, {samples})" if self.many else f"({samples},)"
             also = f" or ({models}, {whole}), all trials end to end" if samples != whole and self.many else ""
             shape = table.shape if self.many else table.shape[1:]
+            each = "trial behind trial"
+            if self.is_called_once_a_trial:
+                each = "in this trial; a simulator that also takes the argument trials is called once for all of them"
             raise StretchError(
                 f"the simulator returned the shape {shape} for {output}; {form} was expected{also}: one sample for each that "
-                "was measured, trial behind trial"
+                f"was measured, {each}"
             )
         return np.ascontiguousarray(table[:, :samples])
 

@@ -214,7 +214,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     };
     detail(format!("read {}", beside()));
     // of a simulator whose runs cost the next experiment is looked for where it is asked for
-    let looks_on = match problem.simulator().costly() {
+    let looks_on = match problem.simulator().model_runs() {
         Some(_) => args.experiment.is_some(),
         None => !args.no_next,
     };

@@ -101,8 +101,8 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let task = Task { examines_effects, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
-    let is_limited = simulator.costly().is_some_and(|costly| costly.model_runs().budget.is_some());
-    let spare = simulator.costly().map(|_| Searched::without(problem.clone()));
+    let is_limited = simulator.model_runs().is_some_and(|runs| runs.budget.is_some());
+    let spare = simulator.model_runs().map(|_| Searched::without(problem.clone()));
     // What an answer without effects needs is run first: whatever a search spends, there is an answer.
     if let Some(spare) = spare.as_ref().filter(|_| is_limited) {
         gather(task, spare.cause(&columns), 0.0)?;

@@ -44,7 +44,7 @@ pub use problem::{
     noise::{Noise, WINDOW, noise_variance},
     record_facts::{Motion, MotionSpec, RecordFacts, Recorded, RowsUsed},
     sample_roles::{BLOCK_S, Role, SampleRoles, Segment},
-    simulator::{Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines},
+    simulator::{Model, ModelRuns, Run, Simulator},
     spec::{EffectSpec, ParameterSpec, SlowDrift, StageSpec, TrialSpec},
     spectral_line::Line,
     thresholds::Thresholds,

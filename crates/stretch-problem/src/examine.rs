@@ -10,7 +10,7 @@ use schemars::{
 use serde::Serialize;
 use serde_json::{Value, json};
 use stretch_data::{RigFile, Trial};
-use stretch_gap::{Costly, Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose};
+use stretch_gap::{Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose};
 use stretch_sim::{Quantity, Sketch};
 
 use crate::{
@@ -84,7 +84,7 @@ impl Problem {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Examined, GapError> {
         let source = self.source();
-        let report = |what: &str| match self.simulator().costly().map(Costly::model_runs) {
+        let report = |what: &str| match self.simulator().model_runs() {
             Some(runs) => progress(&format!("{what} ({} model runs)", runs.count)),
             None => progress(what),
         };
@@ -169,6 +169,11 @@ impl Transform for NumbersMayBeNull {
     fn transform(&mut self, schema: &mut Schema) {
         transform_subschemas(self, schema);
         schema.remove("format");
+        // examples in Rust help no reader of JSON
+        if let Some(Value::String(words)) = schema.get_mut("description") {
+            let end = words.find("\n\n```").unwrap_or(words.len());
+            *words = words[..end].replace('\n', " ");
+        }
         if schema.get("type").is_some_and(|kind| kind == "number") {
             schema.insert("type".into(), json!(["null", "number"]));
         }

@@ -105,11 +105,10 @@ impl Chain<'_> {
     ) -> Result<Option<Vec<f64>>, GapError> {
         // Only the sum is read, and only after the work is done, so that no memory order is needed.
         self.simulations.fetch_add(1, Ordering::Relaxed);
-        let Some(driven) = self.simulator.driven() else { return Ok(None) };
         let run = Run::exact(stage, model, self.evidence.roles.fit_trials);
         let mut out = vec![0.0; input.len()];
         let run = Run { step: self.evidence.step, ..run };
-        if !driven.simulate_on(run, input, &mut out)? {
+        if !self.simulator.simulate_on(run, input, &mut out)? {
             return Ok(None);
         }
         match out.iter().all(|x| x.is_finite()) {

@@ -147,7 +147,7 @@ pub(crate) fn held_out(
     let mut whole: Vec<f64> = apart.iter().zip(&metric.noise.sd).map(|(x, sd)| x / sd).collect();
     let mut residual = whole.clone();
     metric.clean(&compare.roles, &mut residual);
-    let lines = simulator.spectral_lines().map_or_else(Vec::new, |s| s.lines(stage, model));
+    let lines = simulator.lines(stage, model);
     for tested in compare.roles.of_role(Role::Test).map(|s| s.from..s.to) {
         let sd = &metric.noise.sd[tested.clone()];
         for line in &lines {

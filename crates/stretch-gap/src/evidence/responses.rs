@@ -115,7 +115,7 @@ fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) ->
     let mut turned = Vec::new();
     for &effect in &best.effects {
         let own = &simulator.effects()[effect];
-        let is_costly = simulator.costly().is_some_and(|c| c.is_costly(effect));
+        let is_costly = simulator.is_costly(effect);
         if !own.touches.contains(&stage) || own.is_found || is_costly {
             continue;
         }

@@ -125,7 +125,7 @@ impl Comparison<'_> {
             let has_moved = descent.step()?;
             descent.last_fall = before - descent.cost;
             let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
-            descent.is_settled = is_still && renew && self.simulator().costly().is_none();
+            descent.is_settled = is_still && renew && self.simulator().model_runs().is_none();
             // With old sensitivities a stand-still may only mean that they are old.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
@@ -141,10 +141,8 @@ impl Comparison<'_> {
         start: Model,
         effort: Effort,
     ) -> Result<Fitted, GapError> {
-        if let Some(costly) = self.simulator().costly() {
-            for &stage in stages {
-                costly.linearise(stage, &start, self.roles.fit_trials)?;
-            }
+        for &stage in stages {
+            self.simulator().linearise(stage, &start, self.roles.fit_trials)?;
         }
         self.fit(stages, start, &[], effort)
     }
@@ -299,8 +297,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         match coordinate {
             Coordinate::Nominal { .. } => false,
             Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
-                let costly = self.compare.simulator().costly();
-                costly.is_some_and(|c| c.is_costly(self.model.effects[slot].0))
+                self.compare.simulator().is_costly(self.model.effects[slot].0)
             }
         }
     }
@@ -342,7 +339,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
         };
         let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
-        let is_counted = self.compare.simulator().costly().is_some();
+        let is_counted = self.compare.simulator().model_runs().is_some();
         for _ in 0..TRIES {
             let mut damped = self.normal.clone();
             for i in 0..n {

@@ -82,7 +82,7 @@ impl<'a> PreparedProblem<'a> {
         let runs = Runs::new(simulator, stop)?;
         // Try twice the step, if the change from halving it stays within the limit. Not for counted
         // runs, because these may be an external program's.
-        if simulator.costly().is_none() {
+        if simulator.model_runs().is_none() {
             match Self::at(runs.at_step(LONGER), seed, progress) {
                 Err(GapError::Solver { .. }) => {}
                 prepared => return prepared,
@@ -397,9 +397,9 @@ impl<'a> PreparedProblem<'a> {
 
 /// Sensitivities of all stages around a model, if runs are costly.
 pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
-    let Some(costly) = compare.simulator().costly() else { return Ok(()) };
     let mut stages = 0..compare.metrics.len();
-    stages.try_for_each(|stage| costly.linearise(stage, model, compare.roles.fit_trials))
+    stages
+        .try_for_each(|stage| compare.simulator().linearise(stage, model, compare.roles.fit_trials))
 }
 
 /// Every stage re-tuned separately, stages that share a parameter together: without effects the

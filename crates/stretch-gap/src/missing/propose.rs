@@ -57,8 +57,7 @@ pub(crate) fn propose(
     let Some(stage) = largest else { return Ok(None) };
     let residue = Residue::of(&problem.compare, stage, &base.model)?;
     let choice = choice(&problem.compare.roles);
-    let is_commanded = simulator.driven().is_none_or(|d| d.input(stage).is_none())
-        && !residue.inputs.of_kind(true).is_empty();
+    let is_commanded = simulator.input(stage).is_none() && !residue.inputs.of_kind(true).is_empty();
     let sum = pursue(&residue, &choice, is_commanded);
     let estimated = estimate(&residue, &choice, &sum)?;
     let weighed = weigh(&residue, &choice, &sum, &estimated)?;

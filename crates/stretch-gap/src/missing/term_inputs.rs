@@ -141,7 +141,7 @@ fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
     }
     let fed = (1..simulator.stages().len()).filter_map(|stage| {
         let before = &simulator.stages()[stage - 1];
-        let input = simulator.driven()?.input(stage)?;
+        let input = simulator.input(stage)?;
         Some(Recorded::measured(&before.channel, &before.unit, input))
     });
     let fed: Vec<Recorded> = fed.collect();

@@ -4,10 +4,12 @@
 //! without a tolerance shows whether it could explain what effects are credited with.
 
 use crate::problem::{
+    column::Distortion,
     description::Description,
     error::GapError,
-    simulator::{Batch, Costly, Driven, Run, Simulator, SpectralLines},
+    simulator::{Model, ModelRuns, Run, Simulator},
     spec::ParameterSpec,
+    spectral_line::Line,
 };
 
 /// A simulator with other descriptions of its parameters: held, or free.
@@ -39,19 +41,39 @@ impl Simulator for Altered<'_> {
         self.simulator.simulate(run, out)
     }
 
-    fn batch(&self) -> Option<&dyn Batch> {
-        self.simulator.batch()
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        self.simulator.simulate_many(runs, outs)
     }
 
-    fn costly(&self) -> Option<&dyn Costly> {
-        self.simulator.costly()
+    fn model_runs(&self) -> Option<ModelRuns> {
+        self.simulator.model_runs()
     }
 
-    fn driven(&self) -> Option<&dyn Driven> {
-        self.simulator.driven()
+    fn is_costly(&self, effect: usize) -> bool {
+        self.simulator.is_costly(effect)
     }
 
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        self.simulator.spectral_lines()
+    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
+        self.simulator.linearise(stage, model, trials)
+    }
+
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        self.simulator.input(stage)
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        self.simulator.simulate_on(run, input, out)
+    }
+
+    fn corrected(
+        &self,
+        column: &str,
+        error: Distortion,
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        self.simulator.corrected(column, error)
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        self.simulator.lines(stage, model)
     }
 }

@@ -73,7 +73,7 @@ pub struct Column<'a> {
     pub values: Cow<'a, [f64]>,
     /// The stage whose output it is.
     pub output_of: Option<usize>,
-    /// Stages that it drives: [`Driven::corrected`](crate::Driven::corrected) can correct it for
+    /// Stages that it drives: [`Simulator::corrected`](crate::Simulator::corrected) can correct it for
     /// them.
     pub read_by: Vec<usize>,
     /// Whether it is a command. The only possible error of a command is a scale.

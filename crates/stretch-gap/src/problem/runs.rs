@@ -10,7 +10,7 @@ use std::{
 
 use crate::problem::{
     error::GapError,
-    simulator::{Model, ModelRuns, Run, Simulator, simulate_many},
+    simulator::{Model, ModelRuns, Run, Simulator},
     spec::EffectSpec,
 };
 
@@ -85,7 +85,7 @@ impl<'a> Runs<'a> {
 
     /// Whether the simulator's budget allows no more than what the answer itself needs; whoever asks goes no further then.
     pub(crate) fn is_spent(&self) -> bool {
-        let is_spent = self.simulator.costly().is_some_and(|c| c.model_runs().is_spent);
+        let is_spent = self.simulator.model_runs().is_some_and(|runs| runs.is_spent);
         self.was_cut.fetch_or(is_spent, Ordering::Relaxed);
         is_spent
     }
@@ -93,7 +93,7 @@ impl<'a> Runs<'a> {
     /// Runs that the simulator counts, and whether a search was cut short for want of them.
     pub(crate) fn counted(&self) -> Option<ModelRuns> {
         let is_spent = self.was_cut.load(Ordering::Relaxed);
-        self.simulator.costly().map(|costly| ModelRuns { is_spent, ..costly.model_runs() })
+        self.simulator.model_runs().map(|runs| ModelRuns { is_spent, ..runs })
     }
 
     fn lost(&self) -> MutexGuard<'_, Lost> {
@@ -172,7 +172,7 @@ impl<'a> Runs<'a> {
             Err(_) => return runs.iter().map(|_| Err(GapError::Stopped)).collect(),
         };
         let stepped: Vec<Run<'_>> = runs.iter().map(|run| self.stepped(*run)).collect();
-        let done = simulate_many(self.simulator, &stepped, &mut outs);
+        let done = self.simulator.simulate_many(&stepped, &mut outs);
         let each = runs.iter().zip(done).zip(outs);
         each.map(|((run, done), out)| {
             self.heard(*run, done.and_then(|()| self.finite(run.stage, out)))
@@ -183,8 +183,7 @@ impl<'a> Runs<'a> {
     /// One run on an input that was not measured; none where the stage cannot.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
-        let Some(driven) = self.simulator.driven() else { return Ok(None) };
-        let done = driven.simulate_on(self.stepped(run), input, &mut out);
+        let done = self.simulator.simulate_on(self.stepped(run), input, &mut out);
         let done = done.and_then(|is_there| match is_there {
             true => self.finite(run.stage, out).map(Some),
             false => Ok(None),

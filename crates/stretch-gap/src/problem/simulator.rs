@@ -1,5 +1,4 @@
-//! The trait through which every simulator is diagnosed, and the optional abilities of some
-//! simulators.
+//! The trait through which every simulator is diagnosed.
 
 use std::borrow::Cow;
 
@@ -61,7 +60,7 @@ pub struct Run<'a> {
     /// allows longer steps.
     pub step: f64,
     /// Nominal parameters near enough that the output may be computed from the run there and the
-    /// [linearisation](Costly::linearise), if a run costs more than that; `None` if the output has
+    /// [linearisation](Simulator::linearise), if a run costs more than that; `None` if the output has
     /// to be exact.
     pub near: Option<&'a [f64]>,
 }
@@ -103,13 +102,14 @@ impl ModelRuns {
 /// session.
 ///
 /// Three methods suffice: [`Simulator::description`], [`Simulator::measured`] and
-/// [`Simulator::simulate`]. Further abilities are small traits. The other methods return the
-/// simulator as such a trait: `Some(self)`.
+/// [`Simulator::simulate`]. The others are abilities of some simulators.
 pub trait Simulator: Sync {
     /// Stages, parameters, effects, trials, and facts about the record.
     fn description(&self) -> &Description;
+
     /// Measured output of a stage, all trials concatenated.
     fn measured(&self, stage: usize) -> &[f64];
+
     /// Simulates a stage on its measured input; effects of other stages in the model are ignored.
     ///
     /// `out` receives the samples of the first `run.trials` trials.
@@ -117,64 +117,29 @@ pub trait Simulator: Sync {
     /// # Errors
     /// The simulation is not possible with these values; the fit then rejects the step.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
-    /// Runs in batches, if a batch costs little more than a run; without it runs are parallel on
-    /// the available threads.
-    fn batch(&self) -> Option<&dyn Batch> {
-        None
-    }
-    /// The cost of runs, if each is costly enough to be counted and saved.
-    fn costly(&self) -> Option<&dyn Costly> {
-        None
-    }
-    /// Runs on unmeasured inputs, if a stage can be driven by them.
-    fn driven(&self) -> Option<&dyn Driven> {
-        None
-    }
-    /// Lines of unknown phase, if an effect leaves such lines.
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        None
-    }
-}
 
-/// A simulator for which a batch of runs costs little more than one run. This makes its diagnosis
-/// fast.
-pub trait Batch {
-    /// Several runs at once, each with the result of [`Simulator::simulate`].
+    /// Several runs at once, each with the result of [`Simulator::simulate`]: on the available
+    /// threads, unless a batch costs the simulator little more than a run.
     ///
     /// `outs` receives the samples of each run, and is as long as `runs`.
-    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>>;
-}
-
-/// Several runs at once, each with the result of [`Simulator::simulate`]: in one batch if the
-/// simulator supports batches, otherwise in parallel.
-pub(crate) fn simulate_many(
-    simulator: &dyn Simulator,
-    runs: &[Run<'_>],
-    outs: &mut [Vec<f64>],
-) -> Vec<Result<(), GapError>> {
-    match simulator.batch() {
-        Some(batch) => batch.simulate_many(runs, outs),
-        None => side_by_side(simulator, runs, outs),
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        let pairs = runs.par_iter().zip(outs);
+        pairs.map(|(run, out)| self.simulate(*run, out)).collect()
     }
-}
 
-/// Several runs on the available threads.
-pub(crate) fn side_by_side(
-    simulator: &dyn Simulator,
-    runs: &[Run<'_>],
-    outs: &mut [Vec<f64>],
-) -> Vec<Result<(), GapError>> {
-    let pairs = runs.par_iter().zip(outs);
-    pairs.map(|(run, out)| simulator.simulate(*run, out)).collect()
-}
+    /// Runs so far, if each is costly enough to be counted and saved. They are fewer than the
+    /// simulations of stages if a stored run is used again.
+    fn model_runs(&self) -> Option<ModelRuns> {
+        None
+    }
 
-/// A simulator with costly runs: they are counted, and may be limited.
-pub trait Costly {
-    /// Runs so far. They are fewer than the simulations of stages if a stored run is used again.
-    fn model_runs(&self) -> ModelRuns;
-    /// Whether each value of an effect needs a separate run. Sensitivities to the effect are then
-    /// renewed as seldom as those to the nominal parameters.
-    fn is_costly(&self, effect: usize) -> bool;
+    /// Whether each value of an effect needs a separate costly run. Sensitivities to the effect are
+    /// then renewed as seldom as those to the nominal parameters.
+    fn is_costly(&self, effect: usize) -> bool {
+        let _ = effect;
+        false
+    }
+
     /// Computes sensitivities of a stage to its nominal parameters around a model. From then on,
     /// runs that state what they are [near to](Run::near) may be answered with them. It is called
     /// between searches, never during one, so that the answer does not depend on the threads. By
@@ -186,18 +151,23 @@ pub trait Costly {
         let _ = (stage, model, trials);
         Ok(())
     }
-}
 
-/// A simulator whose stages can be driven by other inputs than the measured ones.
-pub trait Driven {
     /// Measured input of a stage as it is fed to the stage, all trials concatenated; `None` if the
     /// input is not the output of the previous stage.
-    fn input(&self, stage: usize) -> Option<Vec<f64>>;
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        let _ = stage;
+        None
+    }
+
     /// As [`Simulator::simulate`] on an unmeasured input; returns whether the stage supports this.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
-    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError>;
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        let _ = (run, input, out);
+        Ok(false)
+    }
+
     /// The same simulator driven by a record in which the error of one column is corrected; `None`
     /// if that column drives no stage. The measurements of the stages' outputs may stay unchanged.
     ///
@@ -207,14 +177,17 @@ pub trait Driven {
         &self,
         column: &str,
         error: Distortion,
-    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError>;
-}
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        let _ = (column, error);
+        Ok(None)
+    }
 
-/// A simulator with effects that leave a line of known strength and unknown phase in an output.
-pub trait SpectralLines {
-    /// Lines that a model leaves in the output of a stage on samples that are not fitted; see
-    /// [`Line`].
-    fn lines(&self, stage: usize, model: &Model) -> Vec<Line>;
+    /// Lines of known strength and unknown phase that the effects of a model leave in the output of
+    /// a stage on samples that are not fitted; see [`Line`].
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let _ = (stage, model);
+        Vec::new()
+    }
 }
 
 /// Shortcuts to the [description](Simulator::description) of any simulator.

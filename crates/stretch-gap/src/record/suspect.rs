@@ -7,15 +7,14 @@
 
 use std::{collections::VecDeque, sync::Mutex};
 
+use rayon::prelude::*;
+
 use crate::{
     problem::{
         column::{Column, Distortion},
         description::Description,
         error::GapError,
-        simulator::{
-            Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines, side_by_side,
-            simulate_many,
-        },
+        simulator::{Model, ModelRuns, Run, Simulator},
         spectral_line::Line,
     },
     record::fault::{Fault, Kind},
@@ -96,12 +95,11 @@ impl<'a> Suspect<'a> {
         }
         let one = &self.faults[fault];
         let column = one.column.map(|c| &self.columns[c]).filter(|c| !c.read_by.is_empty());
-        let made = match (column, self.simulator.driven()) {
-            (Some(column), Some(driven)) => {
-                driven.corrected(&column.name, one.distortion(size))?.map(Corrected::from)
-            }
-            _ => None,
+        let made = match column {
+            Some(column) => self.simulator.corrected(&column.name, one.distortion(size))?,
+            None => None,
         };
+        let made = made.map(Corrected::from);
         let mut kept = lock();
         kept.push_back((key.0, key.1, made.clone()));
         if kept.len() > KEPT {
@@ -154,56 +152,37 @@ impl Simulator for Suspect<'_> {
         Ok(())
     }
 
-    fn batch(&self) -> Option<&dyn Batch> {
-        self.simulator.batch().map(|_| self as &dyn Batch)
-    }
-
-    fn costly(&self) -> Option<&dyn Costly> {
-        self.simulator.costly().map(|_| self as &dyn Costly)
-    }
-
-    fn driven(&self) -> Option<&dyn Driven> {
-        self.simulator.driven().map(|_| self as &dyn Driven)
-    }
-
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        self.simulator.spectral_lines().map(|_| self as &dyn SpectralLines)
-    }
-}
-
-impl Batch for Suspect<'_> {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         match runs.iter().all(|run| run.model.effects.iter().all(|(e, _)| *e < self.first)) {
-            true => simulate_many(self.simulator, runs, outs),
-            false => side_by_side(self, runs, outs),
+            true => self.simulator.simulate_many(runs, outs),
+            false => {
+                let pairs = runs.par_iter().zip(outs);
+                pairs.map(|(run, out)| self.simulate(*run, out)).collect()
+            }
         }
     }
-}
 
-impl Costly for Suspect<'_> {
-    fn model_runs(&self) -> ModelRuns {
-        self.simulator.costly().map_or_else(ModelRuns::default, Costly::model_runs)
+    fn model_runs(&self) -> Option<ModelRuns> {
+        self.simulator.model_runs()
     }
 
     fn is_costly(&self, effect: usize) -> bool {
         // An error of the record costs as much as the simulator.
-        effect >= self.first || self.simulator.costly().is_some_and(|c| c.is_costly(effect))
+        let is_error = effect >= self.first;
+        is_error && self.model_runs().is_some() || self.simulator.is_costly(effect)
     }
 
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        self.simulator.costly().map_or(Ok(()), |c| c.linearise(stage, model, trials))
+        self.simulator.linearise(stage, model, trials)
     }
-}
 
-impl Driven for Suspect<'_> {
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        self.simulator.driven()?.input(stage)
+        self.simulator.input(stage)
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
         let model = self.without_errors(run.model);
-        let run = Run { model: &model, ..run };
-        self.simulator.driven().map_or(Ok(false), |d| d.simulate_on(run, input, out))
+        self.simulator.simulate_on(Run { model: &model, ..run }, input, out)
     }
 
     fn corrected(
@@ -211,13 +190,10 @@ impl Driven for Suspect<'_> {
         column: &str,
         error: Distortion,
     ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
-        self.simulator.driven().map_or(Ok(None), |d| d.corrected(column, error))
+        self.simulator.corrected(column, error)
     }
-}
 
-impl SpectralLines for Suspect<'_> {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let lines = |s: &dyn SpectralLines| s.lines(stage, &self.without_errors(model));
-        self.simulator.spectral_lines().map_or_else(Vec::new, lines)
+        self.simulator.lines(stage, &self.without_errors(model))
     }
 }

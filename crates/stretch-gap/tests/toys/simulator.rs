@@ -7,8 +7,8 @@ use std::sync::{
 
 use super::{Effect, Fails, Toy, laws::Plant};
 use stretch_gap::{
-    Column, Costly, Description, Diagnosis, Distortion, Driven, Evidence, GapError, ModelRuns,
-    MotionSpec, Options, RandomGenerator, RecordFacts, Recorded, Run, Simulator, diagnose,
+    Column, Description, Diagnosis, Distortion, Evidence, GapError, ModelRuns, MotionSpec, Options,
+    RandomGenerator, RecordFacts, Recorded, Run, Simulator, diagnose,
 };
 
 /// A toy beside its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
@@ -170,27 +170,15 @@ impl Simulator for Measured {
         Ok(())
     }
 
-    fn costly(&self) -> Option<&dyn Costly> {
-        self.toy.budget.map(|_| self as &dyn Costly)
-    }
-
-    fn driven(&self) -> Option<&dyn Driven> {
-        Some(self)
-    }
-}
-
-impl Costly for Measured {
-    fn model_runs(&self) -> ModelRuns {
-        let (count, budget) = (self.runs(), self.toy.budget);
-        ModelRuns { count, budget, is_spent: budget.is_some_and(|most| count >= most) }
+    fn model_runs(&self) -> Option<ModelRuns> {
+        let (count, budget) = (self.runs(), self.toy.budget?);
+        Some(ModelRuns { count, budget: Some(budget), is_spent: count >= budget })
     }
 
     fn is_costly(&self, _effect: usize) -> bool {
-        true
+        self.toy.budget.is_some()
     }
-}
 
-impl Driven for Measured {
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         (stage > 0).then(|| self.outputs[stage - 1].clone())
     }

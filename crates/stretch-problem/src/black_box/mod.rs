@@ -20,9 +20,7 @@ pub(crate) mod velocity;
 
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
-use stretch_gap::{
-    Batch, Costly, Description, GapError, Line, Model, ModelRuns, Run, Simulator, SpectralLines,
-};
+use stretch_gap::{Description, GapError, Line, Model, ModelRuns, Run, Simulator};
 
 use stretch_effects::{Find, Kind, Measured, Side};
 
@@ -252,20 +250,6 @@ impl Simulator for BlackBox {
         done
     }
 
-    fn batch(&self) -> Option<&dyn Batch> {
-        Some(self)
-    }
-
-    fn costly(&self) -> Option<&dyn Costly> {
-        Some(self)
-    }
-
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        Some(self)
-    }
-}
-
-impl Batch for BlackBox {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         let bases: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.base_of(run)).collect();
         let inner: Vec<Inner> = bases.iter().map(|(inner, _)| inner.clone()).collect();
@@ -282,9 +266,7 @@ impl Batch for BlackBox {
         })
         .collect()
     }
-}
 
-impl Costly for BlackBox {
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
         let run = Run::exact(stage, model, trials);
         let inner = self.inner(&run);
@@ -318,16 +300,14 @@ impl Costly for BlackBox {
         }
     }
 
-    fn model_runs(&self) -> ModelRuns {
+    fn model_runs(&self) -> Option<ModelRuns> {
         let (count, budget) = (self.runs.count(), self.runs.budget());
         let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
         // once parameters were re-tuned the noise is drawn anew
         let is_spent = budget.is_some_and(|budget| count + kept + self.draws() >= budget);
-        ModelRuns { count, budget, is_spent }
+        Some(ModelRuns { count, budget, is_spent })
     }
-}
 
-impl SpectralLines for BlackBox {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         let effects = &self.problem.description().effects;
         let is_here = |effect: usize| effects[effect].touches.contains(&stage);

@@ -9,7 +9,7 @@ mod source;
 use stretch_data::SessionTrial;
 use stretch_gap::{
     Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
-    SpectralLines, StageSpec, TrialSpec,
+    StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
@@ -216,12 +216,6 @@ impl Simulator for GaugeSimulator {
         Ok(self.signal(run, out)?)
     }
 
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        Some(self)
-    }
-}
-
-impl SpectralLines for GaugeSimulator {
     fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
         lines(&self.nominal.effects, &self.rows, model, self.spread)
     }

@@ -1,8 +1,6 @@
 //! The rig as the diagnosis sees it.
 
-use stretch_gap::{
-    Description, Distortion, Driven, GapError, Line, Model, Run, Simulator, SpectralLines,
-};
+use stretch_gap::{Description, Distortion, GapError, Line, Model, Run, Simulator};
 use stretch_sim::RigStage;
 
 use super::{RigSimulator, run};
@@ -21,16 +19,6 @@ impl Simulator for RigSimulator {
         Ok(run::simulate(self, run, None, out)?)
     }
 
-    fn driven(&self) -> Option<&dyn Driven> {
-        Some(self)
-    }
-
-    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
-        Some(self)
-    }
-}
-
-impl Driven for RigSimulator {
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         let smooth = match self.stage_kinds[stage] {
             RigStage::Muscle => &self.inputs.pressure,
@@ -56,9 +44,7 @@ impl Driven for RigSimulator {
         let rig = self.with_corrected(column, error);
         Ok(rig.map(|rig| Box::new(rig) as Box<dyn Simulator + Send>))
     }
-}
 
-impl SpectralLines for RigSimulator {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         match self.stage_kinds[stage] {
             RigStage::Sensing => lines(&self.effects, &self.rows, model, 1.0),

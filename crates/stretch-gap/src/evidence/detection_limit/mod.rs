@@ -107,7 +107,7 @@ pub(crate) fn detection_limits(
     let mut found = limits(inputs, &probes)?;
     // A limit far from its probe is probed again at its own strength. If runs are costly, the
     // linearisation has to suffice.
-    let rounds = if problem.simulator().costly().is_none() { ROUNDS } else { 0 };
+    let rounds = if problem.simulator().model_runs().is_none() { ROUNDS } else { 0 };
     for _ in 0..rounds {
         let moved = probes.moved(problem, &found, FAR)?;
         if moved.is_empty() {

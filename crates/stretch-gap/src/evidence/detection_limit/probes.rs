@@ -124,7 +124,7 @@ pub(super) fn easiest(
     let spec = &problem.simulator().effects()[effect];
     // A gap that counts in the mean: where its size alone decides, the limit lies there.
     let target = inputs.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
-    let is_costly = problem.simulator().costly().is_some();
+    let is_costly = problem.simulator().model_runs().is_some();
     let mut known: Vec<(usize, f64, f64, &Vec<f64>)> = Vec::new();
     for (values, size) in spec.starts.iter().zip(sizes) {
         let (Some((main, distance)), Some(size)) = (main_of(spec, values), size) else { continue };
@@ -187,7 +187,7 @@ impl Probes {
         starts: &[Vec<Start>],
     ) -> Result<Self, GapError> {
         let simulator = problem.simulator();
-        let trials = match simulator.costly() {
+        let trials = match simulator.model_runs() {
             Some(_) => problem.compare.roles.fit_trials,
             None => simulator.trials().len(),
         };

@@ -39,7 +39,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
         // Base of a correction: the measurement as it is fed to the next stage.
         let base = match stage + 1 {
             next if next == stages => Some(simulator.measured(stage).to_vec()),
-            next => simulator.driven().and_then(|d| d.input(next)),
+            next => simulator.input(next),
         };
         let Some(base) = base else { return Ok(Vec::new()) };
         let mut next = Vec::with_capacity(2 * variants.len());

@@ -33,7 +33,7 @@ const COMMANDS: [(&str, &str); 9] = [
 ];
 
 /// An option, and what to write instead.
-const OPTIONS: [(&str, &str); 24] = [
+const OPTIONS: [(&str, &str); 19] = [
     ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-full-scale-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
@@ -48,24 +48,24 @@ const OPTIONS: [(&str, &str); 24] = [
     ("--fixed", "write stretch export --calibration cal.json --fixed FILE"),
     ("--grid", "resample first: stretch convert LOG --grid HZ --out TRIAL.csv"),
     ("--jobs", "write jobs = N below [simulator] in the problem's file"),
-    ("--json-out", "write --json=FILE"),
-    ("--kinds", "write stretch effects kinds"),
     ("--normalise", "channels are divided by their range"),
     ("--paper", "write stretch calibrate --rate paper, or stretch demo --paper"),
-    ("--preset", "write --rig paper"),
     ("--rate-source", "--rate paper asks for the published method as a whole"),
     ("--sessions", "write --data FOLDER/GROUP"),
-    (
-        "--signals",
-        "write --signal s1,s2 or --signal all; --signal auto:s1,s2 takes the best of several columns",
-    ),
     ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same"),
-    ("--time-unit", "write it behind the column: --time COL:ms"),
 ];
 
 /// An option that has the same meaning under another name, and that name: scripts that use the old spelling go on working. The value
 /// stands where the braces are; without them there is none.
-const RENAMED: [(&str, &str); 2] = [("--baselines", "--verbose"), ("--sample-rate", "--time={}hz")];
+const RENAMED: [(&str, &str); 7] = [
+    ("--baselines", "--verbose"),
+    ("--json-out", "--json={}"),
+    ("--kinds", "kinds"),
+    ("--preset", "--rig={}"),
+    ("--sample-rate", "--time={}hz"),
+    ("--signals", "--signal={}"),
+    ("--time-unit", "--time=:{}"),
+];
 
 /// The arguments with today's names of renamed options.
 pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
@@ -93,7 +93,29 @@ pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Ve
         renamed.push(spelled);
     }
     renamed.extend(arguments);
-    renamed
+    with_unit_behind_column(renamed)
+}
+
+/// The arguments with a unit of the time behind the column that another argument names.
+fn with_unit_behind_column(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let find =
+        |prefix: &str| arguments.iter().position(|a| a.to_string_lossy().starts_with(prefix));
+    let (Some(unit), Some(column)) = (
+        find("--time=:"),
+        arguments.iter().position(|a| {
+            let text = a.to_string_lossy();
+            text == "--time" || (text.starts_with("--time=") && !text.starts_with("--time=:"))
+        }),
+    ) else {
+        return arguments;
+    };
+    let text = arguments.remove(unit).to_string_lossy().replace("--time=", "");
+    let column = column - usize::from(unit < column);
+    let value = if arguments[column] == "--time" { column + 1 } else { column };
+    if let Some(value) = arguments.get_mut(value) {
+        value.push(text);
+    }
+    arguments
 }
 
 /// What to write in place of a command or an option that is not there any more.
@@ -140,6 +162,15 @@ mod tests {
         assert_eq!(new("stretch diagnose --baselines rig"), "stretch diagnose --verbose rig");
         assert_eq!(new("stretch apply --sample-rate=50 a.csv"), "stretch apply --time=50hz a.csv");
         assert_eq!(new("stretch apply --sample-rate 5 a"), "stretch apply --time=5hz a");
+        assert_eq!(new("stretch effects --kinds"), "stretch effects kinds");
+        let several = "stretch calibrate --signals s1,s2 a.csv";
+        assert_eq!(new(several), "stretch calibrate --signal=s1,s2 a.csv");
+        let asked = "stretch diagnose rig --json-out d.json --quiet";
+        assert_eq!(new(asked), "stretch diagnose rig --json=d.json --quiet");
+        let unit = "stretch convert a.csv --time-unit us --time stamp --out b.csv";
+        assert_eq!(new(unit), "stretch convert a.csv --time stamp:us --out b.csv");
+        assert_eq!(new("stretch convert a.csv --time-unit ms"), "stretch convert a.csv --time=:ms");
+        assert_eq!(new("stretch simulate --preset paper"), "stretch simulate --rig=paper");
         assert_eq!(new("stretch apply -- --sample-rate 5"), "stretch apply -- --sample-rate 5");
     }
 }

@@ -67,6 +67,7 @@ impl FromStr for TimeColumn {
         if let Some((name, order)) = dated {
             return Ok(Self::Dated(name.to_owned(), order));
         }
+        let text = if text.starts_with(':') { format!("time_s{text}") } else { text.to_owned() };
         let split =
             text.rsplit_once(':').and_then(|(name, end)| Some((name, TimeUnit::abbreviated(end)?)));
         Ok(match split {

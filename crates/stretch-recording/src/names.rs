@@ -5,7 +5,7 @@ use stretch_data::spelt_unit;
 use crate::TimeUnit;
 
 /// Names that a time column has elsewhere, the likeliest first.
-const TIMES: [&str; 35] = [
+const TIMES: [&str; 39] = [
     "time_s",
     "time",
     "t",
@@ -41,6 +41,10 @@ const TIMES: [&str; 35] = [
     "zeit_ms",
     "ms",
     "us",
+    "zeitstempel",
+    "horodatage",
+    "fecha_hora",
+    "date",
 ];
 
 /// Words of which one in a name makes it a time if no other name has one; in German at the end of a word, too.
@@ -268,6 +272,7 @@ mod tests {
         for name in ["TimeUS", "elapsedTime", "timestampMs", "time_h", "Days", "t_min"] {
             assert!(time_rank(name).is_some(), "{name}");
         }
+        assert!(time_rank("Zeitstempel").is_some() && time_rank("date") > time_rank("time"));
         assert!(time_rank("d").is_none() && time_rank("current_ms").is_none());
         for name in ["time_seconds", "elapsed_ms", "Timestamp (us)", "X_Value", "zeit_sec"] {
             assert!(time_rank(name).is_some(), "{name}");

@@ -237,6 +237,26 @@ type Stamp = fn(f64) -> f64;
 
 /// A clock of 15.6 ms on which no stamp of 50 samples a second repeats.
 #[test]
+fn the_first_step_of_a_stream_shows_its_unit() {
+    for (unit, per_second, from) in [
+        ("milliseconds", 1e3, 5.0),
+        ("microseconds", 1e6, 777.0),
+        ("nanoseconds", 1e9, 1e3),
+        ("minutes", 1.0 / 60.0, 3.0),
+        ("days", 1.0 / 86_400.0, 45_000.25),
+        ("days", 1.0 / 86_400.0, 739_000.5),
+        ("", 1.0, 30_000.0),
+    ] {
+        let text = table("t", |_, t| format!("{:.12}", from + t * per_second));
+        let (times, notes) = live_as(&text, ReadOptions::new().untimed_hz(RATE_HZ));
+        assert_eq!(times.len(), SAMPLES, "{unit}");
+        assert!(times.windows(2).all(|t| (t[1] - t[0] - 0.02).abs() < 1e-4), "{unit}");
+        let by_steps = format!("by its steps, the time counts {unit}");
+        assert_eq!(notes.contains(&by_steps), !unit.is_empty(), "{unit}: {notes:?}");
+    }
+}
+
+#[test]
 fn a_stream_with_coarse_stamps_has_the_usual_rate() {
     let usual = || ReadOptions::new().untimed_hz(RATE_HZ);
     for tick_s in [0.015_6, 0.015_625, 0.016] {

@@ -13,6 +13,8 @@ const LOOKED_AT: usize = 64;
 pub(crate) struct LiveClock {
     /// Counts in a second, once they are known.
     per_second: Option<f64>,
+    /// Whether they are taken for seconds because nothing says otherwise: then the first step decides.
+    is_assumed: bool,
     /// Samples a second, if samples are counted.
     rate_hz: Option<f64>,
     /// Samples a second that are usual: they place the samples of the first stamp, before it has risen.
@@ -73,13 +75,28 @@ impl LiveClock {
         if let Some(rate_hz) = self.rate_hz {
             return Ok(sample as f64 / rate_hz);
         }
-        let usual = || unit::epoch(origin + count).unwrap_or(TimeUnit::Seconds).per_second();
-        let per_second = *self.per_second.get_or_insert_with(usual);
+        let mut per_second = self.per_second.unwrap_or_else(|| {
+            let epoch = unit::epoch(origin + count);
+            self.is_assumed = epoch.is_none();
+            epoch.unwrap_or(TimeUnit::Seconds).per_second()
+        });
+        self.per_second = Some(per_second);
         let Some(last) = self.last.replace(count) else {
             self.first_end = count;
             return Ok(count / per_second);
         };
         let mut step = count - last;
+        if step > 0.0
+            && std::mem::take(&mut self.is_assumed)
+            && let Some(other) = self.usual_hz.and_then(|usual_hz| unit::by_step(step, usual_hz))
+        {
+            self.notes.push(format!("by its steps, the time counts {}", other.plural()));
+            // the time goes on from that of the first sample
+            self.added = last * (other.per_second() / per_second - 1.0);
+            self.first_end = last + self.added;
+            per_second = other.per_second();
+            self.per_second = Some(per_second);
+        }
         if let Some(tick) = self.tick.filter(|_| step < 0.0)
             && let Some(modulus) = order::roll_over(step, tick, per_second)
         {

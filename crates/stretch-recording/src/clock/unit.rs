@@ -22,6 +22,9 @@ const DAYS_HZ: f64 = 1e4;
 /// Fewest samples that distinguish a slow recording from a wrong unit.
 const TELLING: usize = 50;
 
+/// A step's rate over the usual one, if its unit is right: stamps come early and late.
+const NEAR: RangeInclusive<f64> = 0.25..=4.0;
+
 /// Units of a count since 1970.
 const EPOCHS: [TimeUnit; 4] =
     [TimeUnit::Seconds, TimeUnit::Milliseconds, TimeUnit::Microseconds, TimeUnit::Nanoseconds];
@@ -82,6 +85,19 @@ fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<T
         None
     };
     other.filter(|other| *other != own)
+}
+
+/// The unit other than seconds in which a step is near that of a usual rate.
+pub(super) fn by_step(step: f64, usual_hz: f64) -> Option<TimeUnit> {
+    let is_near = |unit: TimeUnit| NEAR.contains(&(unit.per_second() / step / usual_hz));
+    let others = [
+        TimeUnit::Milliseconds,
+        TimeUnit::Microseconds,
+        TimeUnit::Nanoseconds,
+        TimeUnit::Minutes,
+        TimeUnit::Days,
+    ];
+    others.into_iter().find(|unit| is_near(*unit)).filter(|_| !is_near(TimeUnit::Seconds))
 }
 
 /// The unit in which a number is a time since 1970 of our days.

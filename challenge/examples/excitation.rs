@@ -9,11 +9,15 @@
 #[path = "attainable/simulated.rs"]
 mod simulated;
 
+use std::num::NonZeroUsize;
+
 use anyhow::Context;
 use simulated::{Protocol, Source};
-use stretch_gap::Thresholds;
+use stretch_gap::Options;
 use stretch_sim::{EffectParameter, effect_named};
 
+/// Effects named at once.
+const TWO: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1);
 /// Sessions of each effect.
 const EACH: u64 = 10;
 
@@ -39,7 +43,8 @@ fn main() -> anyhow::Result<()> {
         };
         let source = source(name, parameter, value, 20 + case)?;
         for (count, protocol) in counts.iter_mut().zip(Protocol::ALL) {
-            let found = source.diagnosed(protocol, 2, Thresholds::frozen())?;
+            let options = Options { depth: TWO, ..Options::default() };
+            let found = source.diagnosed(protocol, options)?;
             let is = |names: &[String]| names.iter().any(|n| n == name);
             let kind = match (is(&found.named), is(&found.tied), found.tied.is_empty()) {
                 (true, _, true) => 0,

@@ -29,7 +29,8 @@ fuzz_target!(|bytes: &[u8]| {
     // few bytes are a long log: what they say, again and again
     let often = 1 + usize::from(which >> 2 & 15);
     let trials = [SessionTrial::new(trial(&stream.repeat(often), &columns[..width], 1500))];
-    let mut options = Options { depth: 1, threads: 1, ..Options::default() };
+    let mut options =
+        Options { depth: std::num::NonZeroUsize::MIN, threads: 1, ..Options::default() };
     options.seed = u64::from(*which);
     let asked = AtomicUsize::new(0);
     let stop = || asked.fetch_add(1, Ordering::Relaxed) > ASKED;

@@ -2,6 +2,7 @@
 
 use std::{
     fmt::{Display, Formatter, Write},
+    num::NonZeroUsize,
     ops::Range,
 };
 

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Fixed, Language, Prediction, Problem, ProblemSpec,
+    BlackBox, Checked, Examined, Fixed, Language, PAUSE_S, Prediction, Problem, ProblemSpec,
     RecordedSession, Source, predict_with,
     worker::{Workers, WorkersSpec, session_header},
 };
@@ -224,11 +224,11 @@ impl FixedEntries {
         Entries::of(spec, self.file.clone())
     }
 
-    /// Number of recordings that were fitted, and the session time at which the last of them ended, s.
+    /// Number of recordings that were fitted, and the session time at which others may begin, s.
     #[getter]
     fn fitted(&self) -> (usize, f64) {
         let ends_s = self.spec.trials.iter().map(|t| t.start_s + t.trial.duration_s());
-        (self.spec.trials.len(), ends_s.fold(0.0, f64::max))
+        (self.spec.trials.len(), ends_s.fold(0.0, f64::max) + PAUSE_S)
     }
 
     /// Columns that the problem uses.

@@ -34,7 +34,7 @@ pub use fix::{Fix, Fixed, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use implement::Implementation;
 pub use init::first_problem;
-pub use predict::{PredictedOutput, PredictedTrial, Prediction, predict, predict_with};
+pub use predict::{PAUSE_S, PredictedOutput, PredictedTrial, Prediction, predict, predict_with};
 pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
 pub use sensors::sensors;

@@ -20,8 +20,8 @@ use crate::{
 
 /// How far a fitted range may be left before it counts, as a share of the range.
 const MARGIN: f64 = 0.025;
-/// Pause between recordings, s.
-const PAUSE_S: f64 = 15.0;
+/// Pause between recordings without a start, s: it matters for an effect that drifts.
+pub const PAUSE_S: f64 = 15.0;
 
 /// What a simulator predicts of new recordings, with a fix and without. Its serde form is the JSON of `stretch predict`, schema 2, without
 /// the traces.

@@ -14,9 +14,6 @@ from ._stretch import Fixed, StretchError
 from .recordings import Array
 from .simulator import Asked
 
-PAUSE_S = 15.0
-"""Time between the recordings that were fitted and the new ones, s: it matters for an effect that drifts."""
-
 
 @dataclass(frozen=True)
 class Again:
@@ -48,9 +45,9 @@ class Fix:
         `data` are as in `stretch_gap.diagnose`: they hold the inputs and the measured outputs.
         """
         again = self._runnable()
-        fitted, ended_s = again.fixed.fitted
+        fitted, begins_s = again.fixed.fitted
         recorded = entries.recorded(data, rate_hz, again.fixed.columns)
-        later = [(columns, ended_s + PAUSE_S + start_s, True) for columns, start_s, _ in recorded]
+        later = [(columns, begins_s + start_s, True) for columns, start_s, _ in recorded]
         checked = again.fixed.problem(later, False)
         if again.asked is not None:
             again.asked.bind({**json.loads(checked.session), "columns": checked.columns})

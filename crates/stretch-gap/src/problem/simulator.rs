@@ -123,8 +123,7 @@ pub trait Simulator: Sync {
     ///
     /// `outs` receives the samples of each run, and is as long as `runs`.
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        let pairs = runs.par_iter().zip(outs);
-        pairs.map(|(run, out)| self.simulate(*run, out)).collect()
+        on_all_threads(self, runs, outs)
     }
 
     /// Runs so far, if each is costly enough to be counted and saved. They are fewer than the
@@ -188,6 +187,16 @@ pub trait Simulator: Sync {
         let _ = (stage, model);
         Vec::new()
     }
+}
+
+/// Several runs on the available threads.
+pub(crate) fn on_all_threads<S: Simulator + ?Sized>(
+    simulator: &S,
+    runs: &[Run<'_>],
+    outs: &mut [Vec<f64>],
+) -> Vec<Result<(), GapError>> {
+    let pairs = runs.par_iter().zip(outs);
+    pairs.map(|(run, out)| simulator.simulate(*run, out)).collect()
 }
 
 /// Shortcuts to the [description](Simulator::description) of any simulator.

@@ -7,14 +7,12 @@
 
 use std::{collections::VecDeque, sync::Mutex};
 
-use rayon::prelude::*;
-
 use crate::{
     problem::{
         column::{Column, Distortion},
         description::Description,
         error::GapError,
-        simulator::{Model, ModelRuns, Run, Simulator},
+        simulator::{Model, ModelRuns, Run, Simulator, on_all_threads},
         spectral_line::Line,
     },
     record::fault::{Fault, Kind},
@@ -155,10 +153,7 @@ impl Simulator for Suspect<'_> {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         match runs.iter().all(|run| run.model.effects.iter().all(|(e, _)| *e < self.first)) {
             true => self.simulator.simulate_many(runs, outs),
-            false => {
-                let pairs = runs.par_iter().zip(outs);
-                pairs.map(|(run, out)| self.simulate(*run, out)).collect()
-            }
+            false => on_all_threads(self, runs, outs),
         }
     }
 

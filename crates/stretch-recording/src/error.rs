@@ -119,7 +119,7 @@ pub enum RecordingError {
     },
     /// A row with more or fewer fields than the header.
     #[error(
-        "{file}, row {row}: there are {found} fields where the header has {expected}; complete or remove that row"
+        "{file}, row {row}: the header has {expected} fields and this row has {found}; complete or remove that row"
     )]
     Ragged {
         /// The file.

@@ -62,6 +62,9 @@ const TIME_WORDS: [&str; 12] = [
     "czas",
     "uptime",
 ];
+/// Ends of the names of two columns that make up a stamp, as ROS writes it: whole seconds, and nanoseconds of the next one.
+const WHOLE_SECONDS: [&str; 3] = ["sec", "secs", "seconds"];
+const NANOSECONDS: [&str; 5] = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"];
 /// The time of a table that LabVIEW writes.
 const LABVIEW_TIME: &str = "x_value";
 
@@ -178,6 +181,16 @@ pub(crate) fn time_rank(name: &str) -> Option<usize> {
     known(&name)
         .or_else(|| known(of_unit()?).map(|rank| TIMES.len() + rank))
         .or_else(|| (name == LABVIEW_TIME || is_word()).then_some(2 * TIMES.len()))
+}
+
+/// Whether two columns make up a stamp, such as `header.stamp.secs` and `header.stamp.nsecs`.
+pub(crate) fn are_a_stamp(seconds: &str, nanoseconds: &str) -> bool {
+    let of = |name: &str, ends: &[&str]| {
+        let name = plain(name);
+        let (before, last) = name.rsplit_once('_').unwrap_or(("", &name));
+        ends.contains(&last).then(|| before.to_owned())
+    };
+    of(seconds, &WHOLE_SECONDS).is_some_and(|stamp| of(nanoseconds, &NANOSECONDS) == Some(stamp))
 }
 
 /// Whether a name has a word for the time in it.

@@ -27,9 +27,13 @@ pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, 
         Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
         _ => (None, text),
     };
-    let time = of_day(time);
+    let mut time = of_day(time);
     let unknown = |_| StampFault::Unknown;
     let Some(date) = date else {
+        // minutes and seconds alone: only seconds have a fraction
+        if time.contains('.') && time.matches(':').count() == 1 {
+            time = Cow::Owned(format!("00:{time}"));
+        }
         let time = time.parse::<Time>().map_err(unknown)?;
         return Ok(time.duration_since(Time::midnight()).as_nanos());
     };

@@ -129,7 +129,7 @@ fn what_is_around_a_table_is_no_row_of_it() {
     assert_eq!(times.len(), 60);
     assert_eq!(
         notes,
-        ["3 rows are left out (63, 64, 65): row 63: there are 1 fields where the header has 3"]
+        ["3 rows are left out (63, 64, 65): row 63: the header has 3 fields and this row has 1"]
     );
 }
 

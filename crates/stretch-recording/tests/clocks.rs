@@ -119,6 +119,79 @@ fn clocks_roll_over() {
 }
 
 #[test]
+fn samples_may_be_lost_where_a_clock_rolls_over() {
+    for (name, modulus, per_second) in [
+        ("time_us", 2_f64.powi(32), 1e6),
+        ("time_ms", 2_f64.powi(32), 1e3),
+        ("time_ms", 2_f64.powi(16), 1e3),
+        ("time_s", 86_400.0, 1.0),
+    ] {
+        // half a second is lost just there
+        let after = |i: usize, t: f64| if i < 200 { t } else { t + 0.5 };
+        let begin = modulus - 4.2 * per_second;
+        let stamp = |i, t| format!("{:.2}", (begin + after(i, t) * per_second) % modulus);
+        let Recording { trial, notes, .. } = read(&table(name, stamp));
+        assert!(
+            notes.iter().any(|note| note.contains("rolls over in row 202")),
+            "{name}: {notes:?}"
+        );
+        let is_step = |(i, t): (usize, &[f64])| {
+            let expected = if i == 199 { 0.52 } else { 0.02 };
+            (t[1] - t[0] - expected).abs() < 1e-6
+        };
+        assert!(trial.time_s.windows(2).enumerate().all(is_step), "{name}");
+    }
+    // a recording that begins again is none
+    let text = table("time_s", |i, t| format!("{:.2}", if i < 200 { 100.0 + t } else { t - 4.0 }));
+    assert!(read_as(&text, &ReadOptions::new()).unwrap_err().to_string().contains("split"));
+}
+
+#[test]
+fn seconds_and_nanoseconds_in_two_columns_are_one_stamp() {
+    for (seconds, nanoseconds) in [
+        ("sec", "nanosec"),
+        ("secs", "nsecs"),
+        ("header.stamp.secs", "header.stamp.nsecs"),
+        ("/joint_states/header/stamp/sec", "/joint_states/header/stamp/nanosec"),
+    ] {
+        // 2 ms early and late, which no spreading could show
+        let time_s = |i: usize| i as f64 / RATE_HZ + if i % 2 == 1 { 0.002 } else { 0.0 };
+        let row = |i: usize| {
+            let (ns, begin) = ((time_s(i) * 1e9).round() as u64, 1_700_000_000);
+            format!("{},{},{i}\n", begin + ns / 1_000_000_000, ns % 1_000_000_000)
+        };
+        let rows: String = (0..SAMPLES).map(row).collect();
+        let Recording { trial, notes } = read(&format!("{seconds},{nanoseconds},bridge_v\n{rows}"));
+        assert!(notes.iter().any(|n| n.contains("2023-11-14T22:13:20Z")), "{notes:?}");
+        let is_right = |(i, t): (usize, &f64)| (t - time_s(i)).abs() < 1e-9;
+        assert!(trial.time_s.iter().enumerate().all(is_right), "{seconds}: {notes:?}");
+        assert!(trial.channels.iter().all(|c| c.name == "bridge_v"), "{seconds}");
+    }
+}
+
+#[test]
+fn minutes_and_seconds_alone_are_a_stamp() {
+    let stamp = |_: usize, t: f64| {
+        format!("{:02}:{:06.3}", if t < 4.0 { 59 } else { 0 }, (56.0 + t) % 60.0)
+    };
+    is_at_50_hz(&read(&table("time", stamp)), 0, 1e-6, "3600 s are added");
+}
+
+#[test]
+fn a_terminal_puts_the_time_in_brackets() {
+    let day = |date: &str| {
+        let row = |i: usize| format!("[{date}12:00:{:06.3}] {i}|{}\n", i as f64 / RATE_HZ, 2 * i);
+        (0..SAMPLES).map(row).collect::<String>()
+    };
+    for (date, separator) in [("2024-05-01 ", ","), ("", ","), ("2024-05-01T", "\t"), ("", ";")] {
+        let text = day(date).replace('|', separator);
+        let options =
+            ReadOptions::new().require("bridge_v").columns(["time", "bridge_v", "length_mm"]);
+        is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-6, "");
+    }
+}
+
+#[test]
 fn repeated_and_coarse_stamps_are_spread() {
     let ticks = |tick_s: f64| {
         move |_: usize, t: f64| format!("{:.5}", (t / tick_s + 1e-9).floor() * tick_s)

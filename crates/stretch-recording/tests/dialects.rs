@@ -25,7 +25,7 @@ enum Units {
 }
 
 fn dialect() -> impl Strategy<Value = Dialect> {
-    let separators = prop::sample::select(vec![",", ";", "\t", " ", "  ", " ; ", ", "]);
+    let separators = prop::sample::select(vec![",", ";", "\t", " ", "  ", " ; ", ", ", "|", " | "]);
     let line_ends = prop::sample::select(vec!["\n", "\r\n", "\n\n"]);
     let comments = prop::sample::select(vec!["", "# rig 2, Monday\n", "% a\n\n% b; c\n", "// x\n"]);
     let units = prop::sample::select(vec![Units::InNames, Units::Brackets, Units::Row]);

@@ -98,7 +98,7 @@ impl LiveClock {
             self.per_second = Some(per_second);
         }
         if let Some(tick) = self.tick.filter(|_| step < 0.0)
-            && let Some(modulus) = order::roll_over(step, tick, per_second)
+            && let Some(modulus) = order::roll_over(origin + last, origin + count, tick, per_second)
         {
             (step, self.added) = (step + modulus, self.added + modulus);
             self.notes.push(order::note(row, modulus / per_second, 1));

@@ -13,7 +13,7 @@ use stretch_data::Place;
 use crate::{
     ReadOptions, RecordingError,
     grid::Track,
-    names::{may_be_time, time_rank},
+    names::{are_a_stamp, may_be_time, time_rank},
     options::TIME,
     stamps::date,
     text::bad_rows::BadRows,
@@ -140,7 +140,8 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
     let wanted = &options.time;
     let usual = || {
         let ranked = names.iter().enumerate().filter_map(|(i, name)| Some((time_rank(name)?, i)));
-        ranked.min().map(|(_, i)| i)
+        let stamp = || names.iter().position(|s| names.iter().any(|ns| are_a_stamp(s, ns)));
+        ranked.min().map(|(_, i)| i).or_else(stamp)
     };
     // A name of which only a word says so must be the only one.
     let only = || {
@@ -179,6 +180,7 @@ pub(crate) fn read(
     options: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<(), RecordingError> {
+    notes.extend(add_nanoseconds(track));
     let not_finite = |i: &usize| !track.stamps.counts[*i].is_finite();
     let lost: Vec<usize> = (0..track.stamps.counts.len()).filter(not_finite).collect();
     leave_out(file, track, &lost, "is no number", options, notes)?;
@@ -212,6 +214,21 @@ pub(crate) fn read(
     let copies = spread::spread(&mut track.stamps, steps, per_second, notes);
     leave_out(file, track, &copies, "is that of the row before", options, notes)?;
     unit::check_rate(file, &track.stamps, steps, options)
+}
+
+/// Adds the nanoseconds that have a column of their own to whole seconds, and says so.
+fn add_nanoseconds(track: &mut Track) -> Option<String> {
+    let Track { stamps, channels, .. } = track;
+    let at = channels.iter().position(|c| are_a_stamp(&stamps.name, &c.name))?;
+    let nanoseconds = channels.remove(at);
+    // differences from the first stamp keep all digits
+    let first = stamps.counts.iter().copied().find(|count| count.is_finite())?;
+    stamps.origin += first;
+    for (count, ns) in stamps.counts.iter_mut().zip(&nanoseconds.values) {
+        *count = *count - first + ns / 1e9;
+    }
+    stamps.per_second = Some(1.0);
+    Some(format!("column {} is added to {}", nanoseconds.name, stamps.name))
 }
 
 /// Leaves out rows whose stamps cannot be right, with a note.

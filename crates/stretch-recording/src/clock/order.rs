@@ -12,6 +12,8 @@ const SHORTEST: f64 = 3.0;
 /// long by chance, differ by less than this share.
 const LONG: f64 = 100.0;
 const SAME: f64 = 0.02;
+/// Share of what a counter holds, at either end, between which samples may be lost where it rolls over.
+const END: f64 = 0.01;
 /// Gap after stamps of a clock that was not set yet, in lengths of all that follows, and in steps.
 const UNSET: (f64, f64) = (10.0, 1e6);
 
@@ -22,13 +24,15 @@ fn moduli(per_second: f64) -> impl Iterator<Item = f64> {
     counters.chain(PERIODS_S.map(|period_s| period_s * per_second))
 }
 
-/// What is added to a stamp that goes back by `-back`, if a clock rolled over: the step over its end is then as long as the others.
-pub(super) fn roll_over(back: f64, step: f64, per_second: f64) -> Option<f64> {
+/// What is added to a stamp that goes back, if a clock rolled over: the step over its end is then as long as the others, or leads from
+/// the end of a counter to its beginning. The stamps are as recorded.
+pub(super) fn roll_over(from: f64, to: f64, step: f64, per_second: f64) -> Option<f64> {
     moduli(per_second).find(|modulus| {
-        let (steps, length) = ((back + modulus) / step, modulus / step);
+        let (over_the_end, length) = (to - from + modulus, modulus / step);
+        let is_end = || from < *modulus && to >= 0.0 && over_the_end < END * modulus;
         match length > LONG {
-            true => steps > 0.0 && steps <= BRIDGED,
-            false => length >= SHORTEST && (steps - 1.0).abs() <= SAME,
+            true => over_the_end > 0.0 && (over_the_end <= BRIDGED * step || is_end()),
+            false => length >= SHORTEST && (over_the_end / step - 1.0).abs() <= SAME,
         }
     })
 }
@@ -37,9 +41,9 @@ pub(super) fn roll_over(back: f64, step: f64, per_second: f64) -> Option<f64> {
 pub(super) fn unroll(stamps: &mut Stamps, step: f64, per_second: f64) -> Option<String> {
     let (mut added, mut first, mut times) = (0.0, None, 0);
     for i in 1..stamps.counts.len() {
-        let back = stamps.counts[i] + added - stamps.counts[i - 1];
-        if back < 0.0
-            && let Some(modulus) = roll_over(back, step, per_second)
+        let (from, to) = (stamps.recorded(i - 1) - added, stamps.recorded(i));
+        if to < from
+            && let Some(modulus) = roll_over(from, to, step, per_second)
         {
             added += modulus;
             times += 1;

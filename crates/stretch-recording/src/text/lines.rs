@@ -41,8 +41,8 @@ impl<R: Read> Lines<R> {
             if self.row == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
                 self.line.drain(..3);
             }
-            if self.line.get(2) == Some(&b':') {
-                part_arrow(&mut self.line);
+            if self.line.get(2) == Some(&b':') || self.line.first() == Some(&b'[') {
+                part_stamp(&mut self.line);
             }
             if !self.line.trim_ascii().is_empty() {
                 return Ok(Some((self.row, &self.line)));
@@ -63,13 +63,15 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// Puts a separator for the arrow behind the time of day that a serial monitor writes: `10:00:00.020 -> 101.3,1.02`.
-fn part_arrow(line: &mut Vec<u8>) {
-    const ARROW: &[u8] = b" -> ";
-    let Some(at) = memchr::memmem::find(line, ARROW) else { return };
-    if str::from_utf8(&line[..at]).is_ok_and(looks_like_stamp) {
+/// Puts a separator behind the time that a serial monitor writes before each line: `10:00:00.020 -> 101.3,1.02`, and
+/// `[2024-05-01 10:00:00.020] 101.3,1.02`.
+fn part_stamp(line: &mut Vec<u8>) {
+    let (start, end): (_, &[u8]) = if line.starts_with(b"[") { (1, b"] ") } else { (0, b" -> ") };
+    let Some(at) = memchr::memmem::find(line, end) else { return };
+    if str::from_utf8(&line[start..at]).is_ok_and(looks_like_stamp) {
         let separator = [b';', b'\t', b','].into_iter().find(|byte| line[at..].contains(byte));
-        line.splice(at..at + ARROW.len(), [separator.unwrap_or(b' ')]);
+        line.splice(at..at + end.len(), [separator.unwrap_or(b' ')]);
+        line.drain(..start);
     }
 }
 

@@ -27,7 +27,7 @@ const ROWS_BETWEEN: usize = 3;
 /// Names without a column that a header line may end with.
 const MOST_OPTIONAL: usize = 4;
 /// Separators, the surest first.
-const SEPARATORS: [u8; 4] = [b';', b'\t', b',', BLANKS];
+const SEPARATORS: [u8; 5] = [b';', b'\t', b'|', b',', BLANKS];
 
 /// What a table begins with.
 pub(crate) struct Top {
@@ -213,7 +213,7 @@ impl Finder<'_> {
         };
         let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {
             // No number has one of these in it.
-            let is_sure = matches!(best.0, b';' | b'\t');
+            let is_sure = matches!(best.0, b';' | b'\t' | b'|');
             if next.2 > best.2 && !is_sure { next } else { best }
         };
         let found = SEPARATORS.into_iter().filter_map(share).reduce(better);

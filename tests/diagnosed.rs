@@ -33,7 +33,11 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     let (cal, paper, d) =
         (scratch.path("diagnosed.json"), scratch.path("poly13.json"), scratch.path("d.json"));
     let said = runs(
-        stretch().arg("calibrate").arg(&bench).args(["--model", "diagnosed", "--out"]).arg(&cal),
+        stretch()
+            .arg("calibrate")
+            .arg(&bench)
+            .args(["--model", "diagnosed", "-v", "--out"])
+            .arg(&cal),
     );
     assert!(said.contains("gauge_relaxation c") && said.contains("the gauge alone"), "{said}");
     runs(stretch().arg("calibrate").arg(&bench).arg("--out").arg(&paper));

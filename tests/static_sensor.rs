@@ -87,6 +87,7 @@ fn bare_readings_are_answered_from_the_first_one_on() {
         let mut command = stretch();
         command.arg("apply").arg("--calibration").arg(scratch.path("cal.json")).args(arguments);
         let text = runs(command.arg(file));
+        assert!(text.contains(",rising,") && !text.contains("inflation"), "{text}");
         let estimates: Vec<f64> =
             text.lines().skip(1).map(|l| l.split(',').nth(1).unwrap().parse().unwrap()).collect();
         assert_eq!(estimates.iter().map(|e| e.round()).collect::<Vec<_>>(), [0.0, 100.0, 200.0]);

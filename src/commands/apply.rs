@@ -238,7 +238,7 @@ fn live(
                     warn(format!("stretch: {warning}"));
                 }
                 line.clear();
-                push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
+                push_line(&mut line, row.time_s, &reading, calibration);
                 out.write_all(&line)?;
                 out.flush()?;
             }
@@ -262,7 +262,7 @@ fn write_all(
     let mut line = Vec::with_capacity(64);
     for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
         line.clear();
-        push_line(&mut line, time_s, reading, knows_sd(calibration));
+        push_line(&mut line, time_s, reading, calibration);
         out.write_all(&line)?;
     }
     Ok(())
@@ -281,21 +281,29 @@ fn knows_sd(calibration: &Calibration) -> bool {
     matches!(calibration.spec().model, Model::Diagnosed(_))
 }
 
-fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld>, with_sd: bool) {
+fn push_line(
+    line: &mut Vec<u8>,
+    time_s: f64,
+    reading: &Result<Reading, Withheld>,
+    calibration: &Calibration,
+) {
     push_number(line, time_s);
     // writing to memory cannot fail
     let _ = match reading {
         Ok(Reading { estimate, rate, branch, domain, sd }) => {
+            let branch = calibration.spec().target.branch_name(*branch);
             let written = match rate.is_nan() {
                 true => write!(line, ",{estimate:.6},,{branch},{domain}"),
                 false => write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}"),
             };
-            match sd.filter(|_| with_sd) {
+            match sd.filter(|_| knows_sd(calibration)) {
                 Some(sd) => written.and_then(|()| write!(line, ",{sd:.6}")),
                 None => written,
             }
         }
-        Err(withheld) => write!(line, ",,,,{withheld}{}", if with_sd { "," } else { "" }),
+        Err(withheld) => {
+            write!(line, ",,,,{withheld}{}", if knows_sd(calibration) { "," } else { "" })
+        }
     };
     line.push(b'\n');
 }

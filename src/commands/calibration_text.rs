@@ -5,9 +5,13 @@ use stretch_data::unit_of;
 use stretch_report::{order_table, signal_table};
 
 use super::shared::{say, tell};
+use crate::display::is_verbose;
 use crate::table::{maybe, number, table, table_text};
 
-/// What `auto` rests on.
+/// The heading of how far the mean squared error of a model is above that of the best one.
+const SQUARED_EXCESS: &str = "over the best, squared";
+
+/// What `auto` rests on; columns without a value are left out.
 pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
     let unit = unit_of(reference);
     let unit = if unit.is_empty() { unit } else { format!(" in {unit}") };
@@ -42,15 +46,23 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
         "worst",
         "numbers",
         "M3 instr.",
-        "over the best, squared",
+        SQUARED_EXCESS,
         "",
     ];
-    say(table(&header, choice.rows.iter().map(row)))?;
-    say(format!("Models: {}.", MODELS_IN_WORDS))?;
-    say(
-        "worst: the largest error. numbers: how many coefficients. M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as \
-         measured. over the best, squared: mean squared error less that of the best model. \u{b1}: one standard error.",
-    )?;
+    let rows: Vec<Vec<String>> = choice.rows.iter().map(row).collect();
+    let has_values = |i: &usize| rows.iter().any(|row| row.get(*i).is_some_and(|cell| cell != "-"));
+    let is_shown = |i: &usize| has_values(i) && (is_verbose() || header[*i] != SQUARED_EXCESS);
+    let columns: Vec<usize> = (0..header.len()).filter(is_shown).collect();
+    let picked = |row: &Vec<String>| columns.iter().filter_map(|i| row.get(*i).cloned()).collect();
+    let header: Vec<&str> = columns.iter().map(|i| header[*i]).collect();
+    say(table(&header, rows.iter().map(picked)))?;
+    if is_verbose() {
+        say(format!("Models: {}.", MODELS_IN_WORDS))?;
+        say(
+            "worst: the largest error. numbers: how many coefficients. M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), \
+             as measured. over the best, squared: mean squared error less that of the best model. \u{b1}: one standard error.",
+        )?;
+    }
     say(format!("Chosen: {}.", choice.why))
 }
 
@@ -63,15 +75,17 @@ fn instructions(row: &ModelRow) -> String {
     }
 }
 
-/// The tables of a calibration, as the paper prints them.
+/// The tables of a calibration; with `-v` all that the paper prints.
 pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     print_fits(calibrated, ranking)?;
-    print_coefficients(calibrated)?;
+    if is_verbose() {
+        print_coefficients(calibrated)?;
+    }
     print_notes(calibrated)
 }
 
 /// How well each part was fitted.
-pub(super) fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
+fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     if !ranking.is_empty() {
         say(table_text(&signal_table(ranking)))?;
     }
@@ -89,7 +103,7 @@ pub(super) fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyh
     say(table(&header, calibrated.fits.iter().map(row)))
 }
 
-pub(super) fn print_notes(calibrated: &Calibrated) -> anyhow::Result<()> {
+fn print_notes(calibrated: &Calibrated) -> anyhow::Result<()> {
     for note in &calibrated.notes {
         tell(format!("note: {note}"))?;
     }

@@ -13,21 +13,21 @@ use stretch_calibrate::{
 };
 use stretch_data::files::write_folder;
 use stretch_data::{Trial, TrialKind, listed};
-use stretch_problem::{Examined, Problem};
-use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
+use stretch_problem::{Examined, Problem, in_words};
+use stretch_report::{Context, Judged, Subject, calibration_verdict, demo_page, readme_picture};
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
 use super::{
     apply::estimates_csv,
-    calibration_text::{print as print_calibration, print_fits, print_models, print_notes},
+    calibration_text::{print as print_calibration, print_models},
     diagnose::{print as print_diagnosis, told_on},
     evaluate::print_errors,
     json::Json,
     reading::column,
-    shared::{or_force, say, spinner, tell, write_text},
+    shared::{or_force, say, say_first, spinner, tell, write_text},
     simulate,
 };
-use crate::display::is_verbose;
+use crate::display::{is_quiet, is_verbose};
 use sessions::Sessions;
 
 /// The whole job: calibrate, judge, and say why simulator and rig disagree; one report
@@ -94,26 +94,26 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         anyhow::Ok(())
     });
     written.map_err(or_force)?;
-    let Some((sessions, job)) = done else { return Ok(()) };
+    let Some((sessions, job, result)) = done else { return Ok(()) };
     let answer = serde_json::json!({
         "seed": args.data.is_none().then_some(SEED),
         "evaluation": job.calibrations.evaluation,
         "kinds": job.calibrations.kinds,
         "diagnosis": job.examined.to_json(),
     });
-    args.json.answer(&answer, || print(&sessions, &job))?;
+    args.json.answer(&answer, || print(&sessions, &job, &result))?;
     if args.json.is_printed() {
         return Ok(());
     }
     tell(format!(
-        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}",
-        args.out.display(),
-        if args.data.is_none() { ", bench/ (the data set)" } else { "" }
+        "\n-v says more. Wrote estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}, and the report: open\n{}",
+        if args.data.is_none() { ", bench/ (the data set)" } else { "" },
+        args.out.join("report.html").display()
     ))
 }
 
-/// Does the job and writes what comes of it into a folder.
-fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
+/// Does the job, writes what comes of it into a folder, and says the result.
+fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job, String)> {
     let (title, sessions) = match &args.data {
         Some(path) => {
             let (reference, signal) = (args.reference.as_deref(), args.signal.as_deref());
@@ -125,12 +125,9 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
             (format!("The paper's experiment, simulated (seed {SEED})"), sessions)
         }
     };
-    if !args.json.is_printed() {
-        sessions.notes.iter().try_for_each(tell)?;
-    }
     let job = Job::of(&sessions).with_context(|| sessions.name.clone())?;
-    write(out, title, &sessions, &job)?;
-    Ok((sessions, job))
+    let result = write(out, title, &sessions, &job)?;
+    Ok((sessions, job, result))
 }
 
 /// The paper's session on the rig of the demonstration, written as a data set and read back as one.
@@ -151,7 +148,8 @@ fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     Ok(sessions)
 }
 
-fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
+/// Writes all files; the result in words.
+fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::Result<String> {
     let file = |name: &str| out.join(name);
     let calibrations = &job.calibrations;
     let shown = calibrations.shown();
@@ -189,7 +187,8 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     let judged = Judged { calibrated: &shown, evaluation, context: &context };
     let subject = Subject::of(&job.problem, &job.examined);
     write_text(&file("report.html"), &demo_page(&judged, &subject))?;
-    write_text(&file("estimate.svg"), &readme_picture(&shown, evaluation))
+    write_text(&file("estimate.svg"), &readme_picture(&shown, evaluation))?;
+    Ok(format!("{} {}", calibration_verdict(&judged), in_words(&job.examined.diagnosis).sentence))
 }
 
 /// Everything that was found.
@@ -294,23 +293,30 @@ fn trials(count: usize) -> String {
     if count == 1 { "one trial".to_owned() } else { format!("{count} trials") }
 }
 
-fn print(sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
-    let calibrations = &job.calibrations;
-    let evaluation = &calibrations.evaluation;
-    say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
+/// The result, and with `-v` all that it rests on.
+fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
+    let Calibrations { surfaces, choice, evaluation, kinds, .. } = &job.calibrations;
+    say_first(result)?;
+    if is_quiet() {
+        return Ok(());
+    }
+    sessions.notes.iter().try_for_each(|note| say(format!("\n{note}")))?;
     if is_verbose() {
-        print_calibration(&calibrations.surfaces, &job.ranking)?;
-    } else {
-        print_fits(&calibrations.surfaces, &job.ranking)?;
-        print_notes(&calibrations.surfaces)?;
+        say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
+        print_calibration(surfaces, &job.ranking)?;
+        say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
+        print_models(choice, &sessions.reference)?;
+        say("\nTested on trials that no fit has seen:")?;
+        for (kind, methods) in kinds {
+            print_errors(kind, methods, &evaluation.unit)?;
+        }
     }
-    say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
-    print_models(&calibrations.choice, &sessions.reference)?;
-    say("\nTested on trials that no fit has seen:")?;
-    for (kind, methods) in &calibrations.kinds {
-        print_errors(kind, methods, &evaluation.unit)?;
+    say("")?;
+    let tested = format!("On {} that no fit has seen", trials(sessions.test.len()));
+    print_errors(&tested, &evaluation.pooled, &evaluation.unit)?;
+    if is_verbose() {
+        say("\nWhy simulator and rig disagree:")?;
+        print_diagnosis(&job.examined)?;
     }
-    print_errors("All trials", &evaluation.pooled, &evaluation.unit)?;
-    say("\nWhy simulator and rig disagree:")?;
-    print_diagnosis(&job.examined)
+    Ok(())
 }

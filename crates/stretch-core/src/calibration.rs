@@ -1,7 +1,7 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
 use crate::{
-    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
+    Branch, DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
     folded::{Scales, line_holds, surface_holds},
     sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
@@ -53,6 +53,22 @@ impl Target {
         match self {
             Self::Contraction { rest_length } => -rest_length,
             Self::Direct => 1.0,
+        }
+    }
+
+    /// What a branch is called: `inflation` and `deflation` where a muscle contracts, `rising` and `falling` for any other reference.
+    ///
+    /// ```
+    /// use stretch_core::{Branch, Target};
+    /// assert_eq!(Target::Direct.branch_name(Branch::Deflation), "falling");
+    /// assert_eq!(Target::Contraction { rest_length: 90.0 }.branch_name(Branch::Deflation), "deflation");
+    /// ```
+    pub const fn branch_name(self, branch: Branch) -> &'static str {
+        match (self, branch) {
+            (Self::Contraction { .. }, Branch::Inflation) => "inflation",
+            (Self::Contraction { .. }, Branch::Deflation) => "deflation",
+            (Self::Direct, Branch::Inflation) => "rising",
+            (Self::Direct, Branch::Deflation) => "falling",
         }
     }
 }

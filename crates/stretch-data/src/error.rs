@@ -212,18 +212,23 @@ pub fn shown(content: &[u8]) -> String {
 }
 
 /// The candidate nearest to `name` by edit distance, when it is near enough to be meant:
-/// at most two edits and less than half of the name, letter case apart.
+/// at most two edits and less than half of the name, letter case apart, or the name without the unit at the end.
 ///
 /// ```
 /// let names = ["time_s", "length_mm", "bridge_v"];
 /// assert_eq!(stretch_data::nearest("lenght_mm", names), Some("length_mm"));
+/// assert_eq!(stretch_data::nearest("length", names), Some("length_mm"));
 /// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
 /// ```
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // a longer name is nobody's, and the distance takes the product of two lengths
     let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
     let name = short(name);
-    let near = candidates.into_iter().map(|one| (strsim::levenshtein(&name, &short(one)), one));
+    let edits = |one: &str| match one.strip_prefix(&name) {
+        Some(unit) if unit.starts_with('_') && !name.is_empty() => 0,
+        _ => strsim::levenshtein(&name, one),
+    };
+    let near = candidates.into_iter().map(|one| (edits(&short(one)), one));
     near.filter(|(edits, _)| *edits <= 2 && 2 * edits < name.chars().count().max(1))
         .min_by_key(|(edits, _)| *edits)
         .map(|(_, one)| one)

@@ -94,13 +94,7 @@ impl<'a> BranchView<'a> {
 
     /// Name of the branch.
     pub(crate) fn name(&self) -> &'static str {
-        let contraction = matches!(self.calibration.spec().target, Target::Contraction { .. });
-        match (self.fit.branch, contraction) {
-            (Some(Branch::Deflation), true) => "Deflation",
-            (Some(Branch::Deflation), false) => "Falling (deflation)",
-            (_, true) => "Inflation",
-            (_, false) => "Rising (inflation)",
-        }
+        self.calibration.spec().target.branch_name(self.fit.branch.unwrap_or_default())
     }
 
     fn rate_of(&self, normalised: f64) -> f64 {

@@ -81,8 +81,8 @@ pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluatio
     first.map_or_else(String::new, |trial| closest_look(evaluation, trial, &names).standalone())
 }
 
-/// The result in one sentence.
-pub(crate) fn calibration_verdict(judged: &Judged<'_>) -> String {
+/// How far the best calibration is off, in one sentence.
+pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let Judged { calibrated, evaluation, context } = *judged;
     let names = method_names(calibrated, evaluation);
     let methods = &evaluation.pooled;
@@ -275,7 +275,8 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
             .zip(inks)
             .map(|(view, ink)| {
                 let r_squared = fixed(view.fit.r_squared, 4);
-                let caption = format!("{}: R\u{b2} of the fit {r_squared}.", view.name());
+                let caption =
+                    format!("The {} branch: R\u{b2} of the fit {r_squared}.", view.name());
                 (surface_figure(view, ink), caption)
             })
             .collect();
@@ -286,7 +287,7 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
              less than a twentieth of the fastest rate are left out.",
         );
         let cuts: Vec<_> =
-            views.iter().map(|v| (slice_figure(v), format!("{}.", v.name()))).collect();
+            views.iter().map(|v| (slice_figure(v), format!("The {} branch.", v.name()))).collect();
         page.figures(&cuts);
     }
 }

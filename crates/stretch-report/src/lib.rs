@@ -25,7 +25,9 @@ mod surface_figure;
 mod thin;
 mod turn_figure;
 
-pub use calibration_page::{Context, Judged, calibration_page, demo_page, readme_picture};
+pub use calibration_page::{
+    Context, Judged, calibration_page, calibration_verdict, demo_page, readme_picture,
+};
 pub use calibration_tables::{comparison_table, method_table, order_table, signal_table};
 pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{

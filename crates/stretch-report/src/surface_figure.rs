@@ -21,13 +21,12 @@ const DOTS: usize = 900;
 
 /// The surface in the region that samples support, with dots above and below.
 pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
-    let name = view.name().to_lowercase();
+    let name = view.name();
     let [rate, signal, target] = &view.labels;
     let description = format!(
         "Surface of the {name} branch in space: {target} over {signal} and {rate}, with the samples"
     );
-    let legend =
-        [(ink, format!("{} surface", view.name())), (Ink::Truth, "samples of the fit".to_owned())];
+    let legend = [(ink, format!("{name} surface")), (Ink::Truth, "samples of the fit".to_owned())];
     Figure::new(&description)
         .draw(FigureSize { width: 400, height: 340 }, |area| draw(area, view, ink))
         .legend(legend)
@@ -293,7 +292,7 @@ pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
     let [_, signal, target] = &view.labels;
     let curves: Vec<(f64, Vec<(f64, f64)>)> =
         thirds.iter().filter_map(|third| curve(view, third)).collect();
-    let name = view.name().to_lowercase();
+    let name = view.name();
     let description = format!(
         "{target} against {signal} on the {name} branch: samples, and the surface at a slow, \
          a middle and a fast rate"

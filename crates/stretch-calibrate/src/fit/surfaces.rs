@@ -145,7 +145,8 @@ pub(crate) fn surfaces(
         }
         before += series.signal.len();
     }
-    for (raw, branch) in raw.iter().zip(["inflation", "deflation"]) {
+    for (raw, branch) in raw.iter().zip([Branch::Inflation, Branch::Deflation]) {
+        let branch = prepared.target.branch_name(branch);
         let (samples, terms) = (raw.signal.len() as u64, degree.terms());
         if samples <= terms as u64 {
             return Err(CalibrateError::OneBranch { branch, samples, terms });
@@ -165,10 +166,7 @@ fn surface(
     branch: Branch,
     raw: Raw,
 ) -> Result<(BranchSurface, FitReport), CalibrateError> {
-    let name = match branch {
-        Branch::Inflation => "inflation",
-        Branch::Deflation => "deflation",
-    };
+    let name = prepared.target.branch_name(branch);
     let range = |rates: &[f64]| {
         let Interval { min, max } = extent(rates.iter().copied());
         Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max }).map_err(|_| {

@@ -19,6 +19,7 @@ use std::{
 use anstream::{AutoStream, ColorChoice, stream::RawStream};
 use anyhow::ensure;
 use clap::builder::styling::{AnsiColor, Style};
+use stretch_core::is_hidden;
 use stretch_data::files::is_standard_output;
 use terminal_size::{Width, terminal_size};
 use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};
@@ -157,14 +158,7 @@ fn plain(text: &str) -> String {
     for c in text.chars() {
         match c {
             '\n' | '\t' => plain.push(c),
-            '\u{61c}'
-            | '\u{200b}'..='\u{200f}'
-            | '\u{2028}'..='\u{202e}'
-            | '\u{2066}'..='\u{2069}'
-            | '\u{feff}' => {
-                plain += &format!("\\u{:04x}", u32::from(c));
-            }
-            c if c.is_control() => plain += &format!("\\u{:04x}", u32::from(c)),
+            c if is_hidden(c) => plain += &format!("\\u{:04x}", u32::from(c)),
             c => plain.push(c),
         }
     }

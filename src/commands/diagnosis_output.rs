@@ -305,7 +305,7 @@ pub(super) fn write_snippets(
     let mut files = Vec::new();
     for one in all {
         for language in Language::ALL {
-            let name = format!("{}.{}", one.name, language.ending());
+            let name = format!("{}.{}", Language::identifier(&one.name), language.ending());
             files.extend(one.code(language).map(|code| (name, code)));
         }
     }

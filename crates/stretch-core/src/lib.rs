@@ -30,6 +30,7 @@ pub mod strategies;
 mod surface;
 mod unit;
 mod values;
+mod visible;
 
 pub use branch::Branch;
 pub use calibration::{
@@ -56,3 +57,4 @@ pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};
 pub use values::Values;
+pub use visible::is_hidden;

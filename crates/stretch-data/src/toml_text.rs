@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, mem};
 
 use serde::Serialize;
+use stretch_core::is_hidden;
 use toml_edit::{Item, Table};
 
 /// Comments for the entries of a rig file or a problem's file.
@@ -43,7 +44,7 @@ impl Remarks {
             }
             with_header(item, &mut |table| self.comment(table, &key));
         }
-        let head: String = self.head.iter().map(|line| comment(line)).collect();
+        let head: String = self.head.iter().map(|line| toml_comment(line)).collect();
         let gap = if head.is_empty() || document.iter().any(|(_, item)| item.is_value()) {
             ""
         } else {
@@ -59,7 +60,7 @@ impl Remarks {
             name.as_ref().and_then(|name| table.key_mut("name").zip(self.effects.get(name)))
         {
             key.leaf_decor_mut()
-                .set_prefix(lines.iter().map(|line| comment(line)).collect::<String>());
+                .set_prefix(lines.iter().map(|line| toml_comment(line)).collect::<String>());
         }
         let own = name.as_deref().unwrap_or(owner);
         for (key, item) in table.iter_mut() {
@@ -71,7 +72,7 @@ impl Remarks {
             };
             if let (Some(remark), Some(value)) = (places.iter().find_map(find), item.as_value_mut())
             {
-                value.decor_mut().set_suffix(format!(" {}", comment(remark).trim_end()));
+                value.decor_mut().set_suffix(format!(" {}", toml_comment(remark).trim_end()));
             }
         }
     }
@@ -87,8 +88,12 @@ fn with_header(item: &mut Item, each: &mut dyn FnMut(&mut Table)) {
     }
 }
 
-/// A comment ends with its line, and holds no control character.
-fn comment(text: &str) -> String {
-    let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+/// A text as a line of comment. It ends with that line, whatever names it has in it.
+///
+/// ```
+/// assert_eq!(stretch_data::toml_comment("deg\nname = 'b'"), "# deg name = 'b'\n");
+/// ```
+pub fn toml_comment(text: &str) -> String {
+    let text: String = text.chars().map(|c| if is_hidden(c) { ' ' } else { c }).collect();
     format!("# {text}\n")
 }

@@ -8,6 +8,8 @@ use alloc::{
 };
 use core::fmt::Write;
 
+use stretch_core::is_hidden;
+
 use crate::sketch::{Cell, Quantity, Sketch};
 
 /// A language that a sketch is spelt in.
@@ -43,12 +45,35 @@ impl Language {
         }
     }
 
-    fn comment(self, text: &str) -> String {
+    /// A text as a line of comment. Names of anybody's columns, and their units, are in it: none ends the comment or its line, or is a
+    /// coding that Python would read the file in.
+    ///
+    /// ```
+    /// use stretch_effects::Language;
+    /// assert_eq!(Language::C.comment("deg*/ int y; /*"), "/* deg* / int y; / * */");
+    /// assert_eq!(Language::Python.comment("mm\nimport os"), "# mm import os");
+    /// ```
+    pub fn comment(self, text: &str) -> String {
+        let text: String = text.chars().map(|c| if is_hidden(c) { ' ' } else { c }).collect();
         match self {
-            Self::C => format!("/* {text} */"),
-            Self::Python => format!("# {text}"),
+            Self::C => format!("/* {} */", text.replace("*/", "* /").replace("/*", "/ *")),
+            Self::Python => {
+                format!("# {}", text.replace("coding:", "coding :").replace("coding=", "coding ="))
+            }
             Self::Matlab => format!("% {text}"),
         }
+    }
+
+    /// A text as the name of a function or a file: ASCII letters, digits and underscores, a letter first.
+    ///
+    /// ```
+    /// use stretch_effects::Language;
+    /// assert_eq!(Language::identifier("output.length_mm.lag"), "output_length_mm_lag");
+    /// assert_eq!(Language::identifier("../2x"), "f____2x");
+    /// ```
+    pub fn identifier(text: &str) -> String {
+        let name = text.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("f_{name}") }
     }
 
     /// A function that all three have, as it is called here.
@@ -224,7 +249,8 @@ impl Sketch {
         let _ = writeln!(out, "\n\ndef {name}({}):", inputs.join(", "));
         // Constants are local, so that the code of several effects can stand in one file.
         for c in &self.constants {
-            let _ = writeln!(out, "    {} = {}  # {}", c.name, literal(c.value), c.unit);
+            let unit = Language::Python.comment(&c.unit);
+            let _ = writeln!(out, "    {} = {}  {unit}", c.name, literal(c.value));
         }
         out + &Language::Python.body(&self.body, 1) + "    return y\n"
     }
@@ -238,7 +264,8 @@ impl Sketch {
         }
         let mut out = format!("function {gives} = {name}({})\n", inputs.join(", "));
         for c in &self.constants {
-            let _ = writeln!(out, "    {} = {}; % {}", c.name, literal(c.value), c.unit);
+            let unit = Language::Matlab.comment(&c.unit);
+            let _ = writeln!(out, "    {} = {}; {unit}", c.name, literal(c.value));
         }
         if has_state {
             out.push_str("    if isempty(s)\n");

@@ -5,6 +5,7 @@ mod inverses;
 mod limits;
 mod linear;
 mod loops;
+mod names;
 mod ranges;
 mod session;
 mod support;

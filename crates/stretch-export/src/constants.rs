@@ -2,6 +2,8 @@
 
 use std::fmt::{Display, Write};
 
+use stretch_core::is_hidden;
+
 /// A number that has a spelling in C99 and in C++11.
 pub(crate) trait Literal {
     /// The spelling.
@@ -121,7 +123,7 @@ fn braced<L: Literal>(values: &[L]) -> String {
 
 /// A label that cannot end a comment, a string or a line.
 pub(crate) fn comment_safe(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control() && !"*\\?\"".contains(*c)).collect()
+    text.chars().filter(|c| !is_hidden(*c) && !"*\\?\"".contains(*c)).collect()
 }
 
 #[cfg(test)]
@@ -135,6 +137,21 @@ mod tests {
             let back: f32 = c.trim_end_matches('f').parse().unwrap();
             assert_eq!(back.to_bits(), x.to_bits(), "{c}");
             assert!(c.contains(['.', 'e']), "{c} would be an integer with a wrong ending");
+        }
+    }
+
+    #[test]
+    fn no_label_ends_a_comment_a_text_or_a_line() {
+        for (label, safe) in [
+            ("deg*/ int y; /*", "deg/ int y; /"),
+            ("mm\nint y;", "mmint y;"),
+            ("mm\\", "mm"),
+            ("\"; int y; \"", "; int y; "),
+            ("?\u{3f}/", "/"),
+            ("\u{202e}mm\u{2028}", "mm"),
+            ("\u{b5}m", "\u{b5}m"),
+        ] {
+            assert_eq!(comment_safe(label), safe, "{label:?}");
         }
     }
 

@@ -46,8 +46,7 @@ impl Implementation {
             format!("State: {}.", self.state()),
         ];
         let sketch = self.sketch.as_ref()?;
-        let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
-        Some(sketch.code(language, &name, &comments))
+        Some(sketch.code(language, &Language::identifier(&self.name), &comments))
     }
 }
 

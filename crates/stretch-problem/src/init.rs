@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_data::{Quantity, Trial, ends, unit};
+use stretch_data::{Quantity, Trial, ends, toml_comment, unit};
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
@@ -158,7 +158,7 @@ fn text(
         out += &format!("time = {}\n", quoted(time));
     }
     for why in left {
-        out += &format!("# left out: {}\n", why.replace('\n', " "));
+        out += &toml_comment(&format!("left out: {why}"));
     }
     out += "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"].\n";
     out += "wrap = \"all\"\n";
@@ -168,7 +168,10 @@ fn text(
     for c in columns.iter().take(LISTED) {
         let kind = if c.is_command() { ", held or called like a command" } else { "" };
         let unit = unit(&c.name).unwrap_or("unit not in its name");
-        out += &format!("#   {} ({unit}): {} to {}{kind}\n", c.name, c.range[0], c.range[1]);
+        out += &toml_comment(&format!(
+            "  {} ({unit}): {} to {}{kind}",
+            c.name, c.range[0], c.range[1]
+        ));
     }
     out += &stage(&columns, trials);
     out += "\n# Parameters of the simulator, each with its tolerance: one standard deviation.\n";

@@ -288,3 +288,44 @@ fn comments_stand_behind_values_and_above_effects() {
         assert!(written.contains(part), "{part}\n{written}");
     }
 }
+
+/// Names that would end a line, a text or a comment of a file, or hide what is in it.
+const HOSTILE: [&str; 9] = [
+    "deg\nbudget = 1",
+    "deg\u{7}\u{0}",
+    "\u{7f}\u{1b}[2J",
+    "'\"\"\"'''",
+    "\\",
+    "\u{202e}geg\u{2066}",
+    "\u{2028}\u{85}",
+    "# ]]",
+    "\r",
+];
+
+#[test]
+fn no_name_ends_a_text_or_a_comment() {
+    let text = "simulator = ['a']\n[[stage]]\noutput = 'y'\nunit = 'deg'\n[[parameter]]\nname = 'gain'\nunit = 'deg'\nvalue = 1\n\
+                [[effect]]\nname = 'bend'\nunit = 'deg'\nrange = [0, 1]\nvalue = 0.5\n[[wrapped]]\nname = 'output.y.backlash'\nw = 0.4\n\
+                [[trial]]\nfile = 'a.csv'\n";
+    for name in HOSTILE {
+        let mut spec = ProblemSpec::parse("p", text).expect("a problem");
+        spec.stages[0].output = name.to_owned();
+        spec.stages[0].unit = name.to_owned();
+        spec.parameters[0].unit = name.to_owned();
+        spec.effects[0].arguments[0].unit = name.to_owned();
+        spec.wrapped[0].name = format!("output.{name}.backlash");
+        spec.files[0].file = name.to_owned();
+        let mut remarks = Remarks { head: vec![name.into()], ..Remarks::default() };
+        let (gain, bend) = (("parameter".into(), "gain".into()), ("bend".into(), "bend".into()));
+        remarks.parameters.insert(gain, format!("0.4 {name}"));
+        remarks.parameters.insert(bend, format!("0.4 {name}"));
+        remarks.effects.insert(spec.wrapped[0].name.clone(), vec![name.into(), "y = x".into()]);
+        let written = spec.to_toml_with("problem.toml".as_ref(), &remarks);
+        let read = ProblemSpec::parse("p", &written);
+        assert_eq!(read.as_ref().ok(), Some(&spec), "{name:?}: {read:?}\n{written}");
+        let comments = written.lines().filter_map(|line| line.split_once("# ").map(|(_, c)| c));
+        let is_comment = |line: &&str| line.starts_with("0.4") || !line.contains('"');
+        let hidden = |line: &str| line.contains(stretch_core::is_hidden);
+        assert!(!comments.filter(is_comment).any(hidden), "{name:?}\n{written}");
+    }
+}

@@ -7,10 +7,10 @@
 use std::ops::Range;
 
 use serde::Serialize;
+use stretch_core::is_hidden;
 
 use super::{
     canvas::{Ink, STEPS},
-    markup::hides,
     thin::extent,
 };
 
@@ -278,9 +278,9 @@ pub(crate) fn embedded(json: &str) -> String {
     for c in json.chars() {
         match c {
             '<' | '>' | '&' => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
-            // a reader of the JSON gets the name as shown on the page
-            c if hides(c) => safe.push_str(&format!("\\\\u{:04x}", u32::from(c))),
             c if c.is_control() => safe.push('\u{fffd}'),
+            // a reader of the JSON gets the name as shown on the page
+            c if is_hidden(c) => safe.push_str(&format!("\\\\u{:04x}", u32::from(c))),
             c => safe.push(c),
         }
     }

@@ -1,5 +1,7 @@
 //! Text and numbers as they stand on a page.
 
+use stretch_core::is_hidden;
+
 /// Text that is safe between tags and in double quotes, and well-formed in XML.
 ///
 /// ```
@@ -16,17 +18,11 @@ pub fn escape(text: &str) -> String {
             '\'' => safe.push_str("&#39;"),
             '\n' | '\t' => safe.push(c),
             c if c.is_control() => safe.push('\u{fffd}'),
-            c if hides(c) => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
+            c if is_hidden(c) => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
             c => safe.push(c),
         }
     }
     safe
-}
-
-/// Whether the character would reverse the surrounding text or hide a part of a name; such a character is shown as an
-/// escape.
-pub(crate) fn hides(c: char) -> bool {
-    matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }
 
 /// Text in place of a missing number.

@@ -1,0 +1,16 @@
+//! Which characters can be seen.
+
+/// Whether a character is one that nobody sees as itself: it controls a terminal or ends a line, turns the text around it, or hides.
+///
+/// Names of columns and units come from files of anybody. Whoever writes them into code, onto a page or a terminal leaves such characters
+/// out or writes an escape, so that what is read is what is there.
+///
+/// ```
+/// use stretch_core::is_hidden;
+/// assert!(['\n', '\u{7f}', '\u{202e}', '\u{200b}', '\u{2028}', '\u{feff}'].map(is_hidden).iter().all(|hidden| *hidden));
+/// assert!(!['a', ' ', '\u{b5}', '\u{3a9}'].map(is_hidden).iter().any(|hidden| *hidden));
+/// ```
+pub fn is_hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}

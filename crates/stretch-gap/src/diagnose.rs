@@ -20,7 +20,7 @@ use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     missing::{Proposed, propose, propose_for},
     numerics::stopwatch::Stopwatch,
-    options::Options,
+    options::{Options, threads},
     problem::{
         altered_parameters::Altered,
         error::{GapError, if_possible},
@@ -67,7 +67,7 @@ pub fn diagnose(
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let task =
         Task { simulator, options, examines_effects: options.examines_effects, progress, stop };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(options.threads)).build();
     match pool {
         Ok(pool) => pool.install(|| run(task)),
         // No thread could be started: the caller's own will do.

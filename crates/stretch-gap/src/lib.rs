@@ -35,7 +35,7 @@ pub use fit::{
 };
 pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use numerics::random::RandomGenerator;
-pub use options::Options;
+pub use options::{Options, cap_threads, threads};
 pub use problem::{
     checks::DescriptionError,
     column::{Column, Distortion},

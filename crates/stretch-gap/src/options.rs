@@ -1,6 +1,6 @@
 //! Options of a diagnosis.
 
-use std::num::NonZeroUsize;
+use std::{env, num::NonZeroUsize, thread};
 
 use crate::problem::thresholds::Thresholds;
 
@@ -11,7 +11,7 @@ pub struct Options {
     pub examines_effects: bool,
     /// Largest number of effects named at once.
     pub depth: NonZeroUsize,
-    /// Number of threads; 0 uses all. The result does not depend on it.
+    /// Number of threads, as [`threads`] counts them: 0 uses all cores, and no more than these are used. The result does not depend on it.
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
@@ -42,5 +42,30 @@ impl Default for Options {
             detection_limits: false,
             thresholds: Thresholds::frozen(),
         }
+    }
+}
+
+/// The variable of the environment that says how many threads there are where nobody asks for a number.
+const VARIABLE: &str = "RAYON_NUM_THREADS";
+
+/// How many threads are started where so many are asked for: at most one a core. Where 0 are asked for it is what `RAYON_NUM_THREADS` says,
+/// or one a core.
+///
+/// ```
+/// let cores = std::thread::available_parallelism().map_or(1, usize::from);
+/// assert_eq!([0, 1, cores + 1, usize::MAX].map(stretch_gap::threads)[1..], [1, cores, cores]);
+/// ```
+pub fn threads(asked: usize) -> usize {
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let said = || env::var(VARIABLE).ok()?.parse().ok().filter(|said| *said > 0);
+    let asked = if asked == 0 { said().unwrap_or(cores) } else { asked };
+    asked.min(cores)
+}
+
+/// Caps the threads that all else shares, where `RAYON_NUM_THREADS` asks for more than there are cores. A program calls it once at its begin.
+pub fn cap_threads() {
+    if env::var_os(VARIABLE).is_some() {
+        // where somebody has begun already, the number stays what it is
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(0)).build_global();
     }
 }

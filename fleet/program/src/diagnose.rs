@@ -41,7 +41,7 @@ pub(crate) struct Args {
     /// Which of how many shares of the data sets is diagnosed here
     #[arg(long, default_value = "1/1", value_parser = share)]
     share: (usize, usize),
-    /// Threads of each diagnosis, 0 for all; the verdict is the same
+    /// Threads of each diagnosis, at most one a core, 0 for all; the verdict is the same
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Seed of the intervals

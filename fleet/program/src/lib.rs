@@ -54,6 +54,7 @@ const INTERRUPTED: u8 = 130;
 pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = Cli::parse_from(words);
     tell_in_a_line();
+    stretch_gap::cap_threads();
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(e) => {

@@ -1,6 +1,6 @@
 //! `stretch-fleet sql`: any question of a lake, and where questions are answered: here, or on a cluster.
 
-use std::{num::NonZeroUsize, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use anyhow::{Context, ensure};
 use datafusion::{
@@ -56,7 +56,7 @@ pub(crate) struct On {
     /// Scheduler of a cluster that answers: df://host:port [default: this machine]
     #[arg(long, value_name = "URL")]
     pub cluster: Option<String>,
-    /// Threads on this machine [default: all]
+    /// Threads on this machine, at most one a core [default: all]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
 }
@@ -75,8 +75,7 @@ impl On {
     /// Number of threads of this machine among which a command shares its work; `None` if a cluster
     /// answers.
     pub(crate) fn shares(&self) -> Option<usize> {
-        let all = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        self.cluster.is_none().then(|| self.threads.unwrap_or_else(all).max(1))
+        self.cluster.is_none().then(|| stretch_gap::threads(self.threads.unwrap_or(0)))
     }
 
     /// The same for a command that writes partial fits into the lake: no other command writes until
@@ -143,7 +142,7 @@ pub(crate) async fn session(
     let mut config =
         SessionConfig::new().with_information_schema(true).with_collect_statistics(false);
     if let Some(threads) = threads {
-        config = config.with_target_partitions(threads.max(1));
+        config = config.with_target_partitions(stretch_gap::threads(threads.max(1)));
     }
     let runtime = RuntimeEnvBuilder::new().with_object_list_cache_limit(LISTING_BYTES).build()?;
     if let Some(url) = cluster {

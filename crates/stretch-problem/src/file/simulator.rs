@@ -25,7 +25,7 @@ pub struct SimulatorEntry {
     pub fmu: Option<String>,
     /// Of an FMU: its names for parameters, effects and columns, where they differ.
     pub variables: Option<BTreeMap<String, String>>,
-    /// Number of workers at once; one without it.
+    /// Number of workers at once, at most 256; one without it.
     pub jobs: Option<NonZeroUsize>,
     /// Longest time that one model may take, s; 60 without it.
     #[serde(default, deserialize_with = "above_zero")]
@@ -54,6 +54,9 @@ pub enum BuiltIn {
     /// A gauge alone, on a data set or a trial.
     Gauge,
 }
+
+/// Most workers at once: each is a process, and has a thread that waits for it.
+const MOST_JOBS: usize = 256;
 
 /// Keys of every simulator that runs as workers.
 const WORKERS: [&str; 3] = ["jobs", "deadline_s", "start_s"];
@@ -102,6 +105,9 @@ impl SimulatorEntry {
         }
         if self.command.as_ref().is_some_and(|all| all.first().is_none_or(String::is_empty)) {
             return fail("command", "it is empty; write the program and its arguments".into());
+        }
+        if let Some(jobs) = self.jobs.filter(|jobs| jobs.get() > MOST_JOBS) {
+            return fail("jobs", format!("{jobs} is more than {MOST_JOBS} workers at once"));
         }
         match &self.python {
             Some(object) if object.split(':').filter(|part| !part.is_empty()).count() != 2 => {
@@ -220,6 +226,10 @@ mod tests {
             (
                 "command = \"a\"\njobs = 0",
                 "row 3, key simulator.jobs: 0 is not a whole number from 1 on",
+            ),
+            (
+                "command = \"a\"\njobs = 1000000000",
+                "row 3, key simulator.jobs: 1000000000 is more than 256 workers at once",
             ),
             (
                 "builtin = \"rig\"\nsignal = \"u\"",

@@ -7,12 +7,13 @@
 mod commands;
 mod display;
 mod old_names;
+mod outputs;
 mod paper;
 mod table;
 
 use std::{io::ErrorKind, process::ExitCode};
 
-use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
     apply, calibrate, convert, demo, diagnose, effects, evaluate, export, json, listen, page,
@@ -91,8 +92,14 @@ pub fn command() -> clap::Command {
 
 /// Runs the program with the arguments of the process.
 pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse_from(old_names::with_todays_names(std::env::args_os())) {
-        Ok(cli) => cli,
+    let mut command = Cli::command();
+    let arguments = old_names::with_todays_names(std::env::args_os());
+    let parsed = command.try_get_matches_from_mut(arguments).and_then(|matches| {
+        let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+        Ok((cli, outputs::guard(&command, &matches)))
+    });
+    let (cli, guarded) = match parsed {
+        Ok(parsed) => parsed,
         Err(answer) => return explain(&answer),
     };
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
@@ -102,8 +109,9 @@ pub fn run() -> ExitCode {
         (_, true) => Volume::Verbose,
         _ => Volume::Usual,
     });
+    stretch_gap::cap_threads();
     let mut done = ExitCode::SUCCESS;
-    let result = match cli.command {
+    let result = guarded.and_then(|()| match cli.command {
         Command::Calibrate(args) => calibrate::run(*args),
         Command::Sleeve(args) => sleeve::run(args),
         Command::Apply(args) => apply::run(args),
@@ -118,7 +126,7 @@ pub fn run() -> ExitCode {
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),
         Command::Page(args) => page::run(args),
-    };
+    });
     display::detail("the end");
     // whoever read our output has gone: nothing is wrong
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);

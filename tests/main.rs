@@ -18,6 +18,7 @@ mod listen;
 mod newcomer;
 mod nonsense;
 mod orphans;
+mod overwrites;
 mod own_data;
 mod page;
 mod pages;

@@ -6,7 +6,7 @@ use std::{
     process::ExitCode,
 };
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use clap::builder::NonEmptyStringValueParser;
 use indicatif::ProgressBar;
 use stretch_data::files::{FileError, Outputs};
@@ -204,9 +204,6 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         announce: Some(announce),
     };
     let problem = open(&args.data_set, &reading)?;
-    if let Some(fix) = args.fix.as_deref().filter(|fix| problem.is_read_from(fix)) {
-        bail!("{}: --fix would replace a file that is read; give it another name", fix.display());
-    }
     // what a simulation makes of numbers is the rig file's matter as much as the data's
     let beside = || match &args.rig {
         Some(rig) => format!("{} beside {}", shown(), rig.display()),

@@ -2,13 +2,13 @@
 
 use std::{
     borrow::Cow,
-    env, fs,
+    env,
     path::{Path, PathBuf},
     process::Command,
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::files::write_whole;
+use stretch_data::files::{read_whole, write_whole};
 
 use super::shared::say;
 use crate::display::warn;
@@ -62,7 +62,7 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
         (None, Some(page)) => return Ok(page.into()),
         (None, None) => build()?,
     };
-    let page = fs::read(&from).with_context(|| from.display().to_string())?;
+    let page = read_whole(&from).with_context(|| from.display().to_string())?;
     let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
     ensure!(is_page, "{}: this is no page of stretch; build it with web/build.sh", from.display());
     Ok(page.into())

@@ -1,13 +1,7 @@
 //! One problem: any simulator beside one session of recordings.
 
-use std::{
-    fmt::Debug,
-    num::NonZeroUsize,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fmt::Debug, num::NonZeroUsize, path::Path, sync::Arc};
 
-use stretch_data::DataSet;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
 use stretch_recording::ReadOptions;
 use stretch_sim::Catalogue;
@@ -75,13 +69,11 @@ pub struct Problem {
     /// Name of the data.
     pub name: String,
     source: Box<dyn Diagnosable>,
-    /// Files that must not be written over.
-    read: Vec<PathBuf>,
 }
 
 impl<S: Diagnosable + 'static> From<S> for Problem {
     fn from(source: S) -> Self {
-        Self { name: "data".to_owned(), source: Box::new(source), read: Vec::new() }
+        Self { name: "data".to_owned(), source: Box::new(source) }
     }
 }
 
@@ -124,9 +116,7 @@ impl Problem {
             columns: reading.columns.or(own),
             ..*reading
         };
-        let mut problem = Self::built_in(&file.folder.join(data_set), &reading)?;
-        problem.read.push(path.to_owned());
-        Ok(problem)
+        Self::built_in(&file.folder.join(data_set), &reading)
     }
 
     /// Reads a built-in simulator's problem from a data set's folder, or from a trial.
@@ -139,7 +129,7 @@ impl Problem {
                 return Err(no_option("--rig", "it is of one signal", hint));
             }
             let source = Box::new(read_sensors(path, several, reading.without, recorded)?);
-            return Ok(Self { name: name_of(path), source, read: vec![path.to_owned()] });
+            return Ok(Self { name: name_of(path), source });
         }
         let catalogue = Catalogue::default().without(reading.without)?;
         let source: Box<dyn Diagnosable> = match GaugeSimulator::read(
@@ -155,9 +145,7 @@ impl Problem {
                 ));
             }
         };
-        let own = DataSet::read(path).ok().and_then(|set| set.rig).map(|file| path.join(file));
-        let read = [Some(path.to_owned()), rig.map(Path::to_owned), own];
-        Ok(Self { name: name_of(path), source, read: read.into_iter().flatten().collect() })
+        Ok(Self { name: name_of(path), source })
     }
 
     /// Starts the workers of a simulator that is not built in, and binds them to the problem of a file.
@@ -194,7 +182,7 @@ impl Problem {
         let (checked, source) = Workers::bound(file.load_as(&recorded)?, workers)?;
         let name = file.shown_name().to_owned();
         let own = BlackBox::within(checked, Arc::new(source), file.budget.map(NonZeroUsize::get));
-        Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })
+        Ok(Self { name, source: Box::new(own) })
     }
 
     /// The problem under another name.
@@ -210,13 +198,6 @@ impl Problem {
     /// The simulator with everything that is asked of a [`Diagnosable`].
     pub(crate) fn source(&self) -> &dyn Diagnosable {
         &*self.source
-    }
-
-    /// Whether a path is one of the files that the problem was read from.
-    pub fn is_read_from(&self, path: &Path) -> bool {
-        let real = |path: &Path| path.canonicalize().ok();
-        let real_path = real(path);
-        real_path.is_some() && self.read.iter().any(|file| real(file) == real_path)
     }
 }
 

@@ -1,10 +1,11 @@
 //! Reads a recording: text in any dialect, arrays, Parquet.
 
 use std::{
-    fs::File,
     io::{self, Cursor, Read},
     path::Path,
 };
+
+use stretch_data::files::open_input;
 
 use crate::{
     ReadOptions, Recording, RecordingError, grid,
@@ -48,7 +49,7 @@ impl Recording {
             return Self::read(path, &options.of_episode(episode));
         }
         let file = path.display().to_string();
-        let reader = File::open(path).map_err(|e| RecordingError::io(&file, "open it", e))?;
+        let reader = open_input(path).map_err(|e| RecordingError::io(&file, "open it", e))?;
         let mut recording = Self::from_reader(reader, &file, options)?;
         if let Some(name) = path.file_name() {
             recording.trial.name = name.to_string_lossy().into_owned();

@@ -1,13 +1,12 @@
 //! A knee in a knitted sleeve, as its authors published it.
 
 use std::{
-    fs::File,
     io::{BufRead, BufReader, Read},
     path::Path,
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{Channel, Trial};
+use stretch_data::{Channel, Trial, files::open_input};
 
 /// Where the files are.
 pub(super) const REPOSITORY: &str = "github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve";
@@ -32,7 +31,7 @@ const RATE_HZ: f64 = 100.0;
 /// A file that cannot be read, and fields that are not numbers.
 pub(super) fn sessions(path: &Path) -> anyhow::Result<Option<Vec<Trial>>> {
     let told = || format!("{}: cannot read it as text", path.display());
-    let mut file = BufReader::new(File::open(path).with_context(told)?);
+    let mut file = BufReader::new(open_input(path).with_context(told)?);
     let mut sessions: Vec<Vec<[f64; COLUMNS.len()]>> = Vec::new();
     let mut line = String::new();
     for number in 1.. {

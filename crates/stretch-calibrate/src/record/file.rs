@@ -1,6 +1,6 @@
 //! Calibration records as files, in JSON for people or in postcard for a board. Both forms carry a seal.
 
-use std::path::Path;
+use std::{io::ErrorKind, path::Path};
 
 use stretch_core::{Calibration, CalibrationSpec, Schema, record};
 use stretch_data::files::{read_whole, write_whole};
@@ -35,7 +35,12 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     let file = path.display().to_string();
     let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
     let bytes = read_whole(path).map_err(|e| {
-        problem(format!("cannot read it: {e}; name a record made by stretch calibrate"))
+        // what is refused without a word of the system says itself what to do
+        let what_to_do = match e.kind() {
+            ErrorKind::Other => "",
+            _ => "; name a record made by stretch calibrate",
+        };
+        problem(format!("cannot read it: {e}{what_to_do}"))
     })?;
     if !is_postcard(path) {
         let text = String::from_utf8(bytes);

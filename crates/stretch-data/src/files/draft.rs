@@ -96,7 +96,7 @@ impl Draft {
 
     /// A folder if it has parents, else a file.
     fn new(path: &Path, force: bool, parents: Option<Parents>) -> io::Result<Self> {
-        let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let real = real(path);
         let mut builder = Builder::new();
         builder.prefix(".stretch-").suffix(".tmp");
         #[cfg(unix)]
@@ -185,6 +185,14 @@ fn without_path(error: io::Error) -> io::Error {
         Some((cause, _)) => io::Error::new(error.kind(), cause.to_owned()),
         None => error,
     }
+}
+
+/// A path without links and dots, also where nothing is there yet.
+pub(super) fn real(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| match path.file_name() {
+        Some(name) => real(folder_of(path)).join(name),
+        None => path.to_owned(),
+    })
 }
 
 /// The folder that a path is in.

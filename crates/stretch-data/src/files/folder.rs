@@ -11,6 +11,7 @@ use std::{
 use super::{
     FileError,
     draft::{Draft, ask, rename, sync, sync_folder},
+    inputs::check_output,
 };
 use crate::data_set::unchanged_trials;
 
@@ -46,7 +47,7 @@ fn is_inside(here: &Path, folder: &Path) -> bool {
 /// Links what is the user's in the old folder into the new one, and waits until all is on the disk.
 pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     if let Ok(meta) = fs::metadata(old) {
-        carry(old, new, &mut BTreeSet::new())?;
+        carry(old, new, &mut BTreeSet::new(), check_output)?;
         fs::set_permissions(new, meta.permissions())?;
     }
     sync_tree(new)
@@ -73,7 +74,7 @@ pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
     let (new, real) = (&draft.temporary, &draft.real);
     exchange(new, real)?;
     // what came into the old folder in the meantime
-    carry(new, real, &mut BTreeSet::new()).map_err(|why| {
+    carry(new, real, &mut BTreeSet::new(), |_, _| Ok(())).map_err(|why| {
         // not removed, because something of the user's is in it
         let left = std::mem::take(&mut draft.temporary);
         io::Error::other(format!("all is written, but {why}; the old folder is {}", left.display()))
@@ -108,8 +109,14 @@ fn exchange(new: &Path, real: &Path) -> io::Result<()> {
 
 /// Brings every file of `old` whose name is not in `new` into `new`: as a second name, or a copy where there is no such thing.
 ///
-/// If `new` is a data set, unchanged trials of the old data set (`replaced`) are left behind.
-fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result<()> {
+/// If `new` is a data set, unchanged trials of the old data set (`replaced`) are left behind. `check` is asked of every file that is not
+/// carried over.
+fn carry(
+    old: &Path,
+    new: &Path,
+    replaced: &mut BTreeSet<PathBuf>,
+    check: fn(&Path, &fs::Metadata) -> io::Result<()>,
+) -> io::Result<()> {
     if new.join("dataset.toml").is_file() {
         replaced.extend(unchanged_trials(old));
     }
@@ -123,19 +130,19 @@ fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result
                 let name = from.display();
                 return Err(io::Error::other(format!("{name} is a {kind}")));
             }
-            Ok(_) => {}
+            Ok(_) => check(&from, &entry.metadata()?)?,
             Err(_) if is_folder => {
                 fs::create_dir(&to)?;
                 fs::set_permissions(&to, entry.metadata()?.permissions())?;
             }
-            Err(_) if replaced.contains(&from) => {}
+            Err(_) if replaced.contains(&from) => check(&from, &entry.metadata()?)?,
             Err(_) => {
                 ask("link")?;
                 fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop))?;
             }
         }
         if is_folder {
-            carry(&from, &to, replaced)?;
+            carry(&from, &to, replaced, check)?;
         }
     }
     Ok(())

@@ -6,14 +6,22 @@
 
 mod draft;
 mod folder;
+mod inputs;
 mod outputs;
 mod stream;
 
-use std::{fmt, fs, io, io::Read, path::Path, sync::OnceLock};
+use std::{
+    collections::BTreeMap,
+    fmt, fs, io,
+    io::Read,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
 
 #[doc(hidden)]
 pub use draft::ask_before_disk_calls;
 pub use draft::{clean_up_and_exit, without_temporary_names};
+pub use inputs::{guard_inputs, is_input, open_input, rewrites};
 pub use outputs::{Outputs, write_folder, write_whole};
 pub use stream::is_standard_output;
 
@@ -62,13 +70,14 @@ fn without_number(cause: &io::Error) -> String {
 /// The largest file that is read as one piece, bytes: records, settings and diagnoses have kilobytes.
 const LARGEST: u64 = 64 << 20;
 
-/// What came on standard input, because it comes only once and may be asked for twice.
-static STDIN: OnceLock<Vec<u8>> = OnceLock::new();
+/// What came on standard input and through pipes, because it comes only once and may be asked for twice.
+static STREAMS: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
-/// Reads a file, `-` being standard input. What came there is kept, and a second reader gets the same.
+/// Reads a file, `-` being standard input. What came there is kept, and a second reader gets the same; so is what came through a pipe
+/// (`<(...)` of a shell) in a process that runs one command, which says so with [`guard_inputs`].
 ///
 /// # Errors
-/// What the system says, and a file of more than 64 MiB or a stream that goes on so long.
+/// What the system says, a file of more than 64 MiB or a stream that goes on so long, and a file that the command writes over.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;
@@ -78,14 +87,19 @@ static STDIN: OnceLock<Vec<u8>> = OnceLock::new();
 /// ```
 pub fn read_whole(path: impl AsRef<Path>) -> io::Result<Vec<u8>> {
     let path = path.as_ref();
-    if path.as_os_str() != "-" {
-        return bounded(fs::File::open(path)?);
+    let is_stdin = path.as_os_str() == "-";
+    let is_pipe = || fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
+    let comes_once = is_stdin || inputs::are_guarded() && is_pipe();
+    if !comes_once {
+        return bounded(open_input(path)?);
     }
-    if let Some(bytes) = STDIN.get() {
+    let mut streams = STREAMS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(bytes) = streams.get(path) {
         return Ok(bytes.clone());
     }
-    let bytes = bounded(io::stdin().lock())?;
-    Ok(STDIN.get_or_init(|| bytes).clone())
+    let bytes = if is_stdin { bounded(io::stdin().lock()) } else { bounded(open_input(path)?) }?;
+    streams.insert(path.to_owned(), bytes.clone());
+    Ok(bytes)
 }
 
 fn bounded(from: impl Read) -> io::Result<Vec<u8>> {

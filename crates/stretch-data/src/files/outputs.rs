@@ -10,6 +10,7 @@ use super::{
     FileError,
     draft::{Draft, ask, sync},
     folder::{check, complete},
+    inputs::check_output,
     is_standard_output,
     stream::open_stream,
 };
@@ -23,7 +24,9 @@ use super::{
 ///
 /// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
 /// the bytes come; a pipe that nobody reads is refused after two seconds, and so are standard
-/// input and disks.
+/// input and disks. What the reader of standard output does not take because it has gone is no error.
+///
+/// A file that this process has read as an input is not written over ([`guard_inputs`](super::guard_inputs)).
 ///
 /// # Errors
 /// [`FileError::Io`] with path and cause.
@@ -136,8 +139,11 @@ impl Outputs {
             let _ = out.into_parts();
             return written;
         }
-        if meta.as_ref().is_some_and(|meta| meta.permissions().readonly()) {
-            return Err(io::Error::other("it is read-only"));
+        if let Some(meta) = &meta {
+            check_output(path, meta)?;
+            if meta.permissions().readonly() {
+                return Err(io::Error::other("it is read-only"));
+            }
         }
         let draft = Draft::file(path)?;
         if self.0.iter().any(|other| other.real == draft.real) {

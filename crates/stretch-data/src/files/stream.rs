@@ -33,7 +33,7 @@ pub(super) fn open_stream(
     meta: Option<&Metadata>,
 ) -> io::Result<Option<Box<dyn Write>>> {
     if is_standard_output(path) {
-        return Ok(Some(Box::new(io::stdout())));
+        return Ok(Some(Box::<StandardOutput>::default()));
     }
     if is_one_of(path, STDIN) {
         return Err(io::Error::other("it is standard input, which is read; name a file"));
@@ -42,6 +42,32 @@ pub(super) fn open_stream(
     match meta.filter(|meta| is_descriptor || !meta.is_file()) {
         Some(meta) => Ok(Some(Box::new(open_device(path, meta)?))),
         None => Ok(None),
+    }
+}
+
+/// Standard output. Where its reader has gone, as `head` does, the rest is let go without a word: what else a command writes is still asked
+/// for.
+#[derive(Default)]
+struct StandardOutput {
+    has_gone: bool,
+}
+
+impl StandardOutput {
+    fn let_go<T>(&mut self, done: io::Result<T>, instead: T) -> io::Result<T> {
+        self.has_gone |= done.as_ref().is_err_and(|e| e.kind() == io::ErrorKind::BrokenPipe);
+        if self.has_gone { Ok(instead) } else { done }
+    }
+}
+
+impl Write for StandardOutput {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = if self.has_gone { Ok(0) } else { io::stdout().lock().write(bytes) };
+        self.let_go(written, bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let flushed = if self.has_gone { Ok(()) } else { io::stdout().lock().flush() };
+        self.let_go(flushed, ())
     }
 }
 

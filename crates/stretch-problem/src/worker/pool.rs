@@ -10,6 +10,8 @@ use std::{
     time::Duration,
 };
 
+use stretch_data::files::is_input;
+
 use super::{
     message::{self, Hello},
     process::{NO_BODY, Process},
@@ -58,6 +60,16 @@ impl WorkersSpec {
     /// effects as dicts by name, or an object with `simulate(parameters[n, p], effects[n, e])`. The worker needs python3 with NumPy.
     pub fn python(object: &str, folder: impl Into<PathBuf>) -> Self {
         Self::new(&["python3", "-c", SHIM, object], folder)
+    }
+
+    /// Guards the files that it names: the program, its arguments, a module.
+    fn guard(&self) -> Result<(), String> {
+        let module = |part: &str| part.split(':').next().unwrap_or(part).replace('.', "/") + ".py";
+        let named = self.command.iter().filter(|part| *part != SHIM);
+        let files = named.flat_map(|part| [part.clone(), module(part)]);
+        files.map(|file| self.folder.join(file)).try_for_each(|file| {
+            is_input(&file).map_err(|why| format!("{}: {why}", file.display()))
+        })
     }
 
     /// The command for messages, in one line: a part that holds white space or what is not printed stands in quotation marks, and the
@@ -133,7 +145,7 @@ impl Workers {
     pub fn start(spec: WorkersSpec, session: &RecordedSession) -> Result<Self, ProblemError> {
         let named =
             |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
-        let begun = begin(&spec, session);
+        let begun = spec.guard().and_then(|()| begin(&spec, session));
         let (process, hello, session_notes) = begun.map_err(named)?;
         let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });
         let session = session.clone();
@@ -249,17 +261,21 @@ impl Source for Workers {
         if let [one] = batches.as_slice() {
             return self.answer(one);
         }
+        // a thread for each worker, however many batches there are
+        let (next, taken) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+        let work = || loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(batch) = batches.get(at) else { return };
+            let answers = self.answer(batch);
+            taken.lock().unwrap_or_else(PoisonError::into_inner).push((at, answers));
+        };
         thread::scope(|scope| {
-            let begun: Vec<_> =
-                batches.iter().map(|batch| scope.spawn(|| self.answer(batch))).collect();
-            let ended = begun.into_iter().zip(&batches).flat_map(|(handle, batch)| {
-                handle.join().unwrap_or_else(|_| {
-                    let gone = || SourceError::Gone("a worker could not be asked".into());
-                    batch.iter().map(|_| Err(gone())).collect()
-                })
-            });
-            ended.collect()
-        })
+            let jobs = self.spec.jobs.clamp(1, batches.len().max(1));
+            (0..jobs).for_each(|_| drop(scope.spawn(work)));
+        });
+        let mut taken = taken.into_inner().unwrap_or_else(PoisonError::into_inner);
+        taken.sort_unstable_by_key(|(at, _)| *at);
+        taken.into_iter().flat_map(|(_, answers)| answers).collect()
     }
 
     fn answers_all(&self) -> bool {

@@ -1,10 +1,10 @@
 //! LeRobot's data sets: Parquet tables of episodes, with what their columns mean in `meta/info.json` beside them.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{io::Read, path::Path};
 
 use serde_json::Value;
 
-use stretch_data::Channel;
+use stretch_data::{Channel, files::open_input};
 
 use crate::grid::Track;
 
@@ -33,7 +33,7 @@ pub(crate) fn name(file: &Path, channels: &mut [Channel]) {
 fn features(file: &Path) -> Option<Value> {
     let root = file.ancestors().nth(3)?;
     let mut text = String::new();
-    let info = File::open(root.join("meta").join("info.json")).ok()?;
+    let info = open_input(root.join("meta").join("info.json")).ok()?;
     info.take(LONGEST).read_to_string(&mut text).ok()?;
     let mut info: Value = serde_json::from_str(&text).ok()?;
     info.get_mut("features").map(Value::take)

@@ -8,7 +8,7 @@ use stretch_calibrate::{
     calibration_seal, digest, is_postcard, read_calibration,
 };
 use stretch_core::{Calibration, CalibrationSpec, record};
-use stretch_data::files::{read_whole, write_whole};
+use stretch_data::files::{read_whole, rewrites, write_whole};
 
 use crate::{ArrayCalibration, GaugeCalibration, MAX_CHANNELS, Turns};
 
@@ -238,6 +238,7 @@ pub fn seal_record(path: &Path) -> Result<GaugeCalibration, CalibrateError> {
         }
         None => GaugeCalibration::read(path)?,
     };
+    rewrites(path);
     gauge.write(path)?;
     Ok(gauge)
 }

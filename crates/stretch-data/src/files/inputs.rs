@@ -1,0 +1,163 @@
+//! What a command reads it does not write over, whatever the two paths look like.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use super::{FileError, draft::real, is_standard_output};
+
+/// None in a process that runs no single command, such as one of Python: there a file may be read now and replaced an hour later.
+static GUARD: Mutex<Option<Guard>> = Mutex::new(None);
+
+fn guard() -> MutexGuard<'static, Option<Guard>> {
+    GUARD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[derive(Debug, Default)]
+struct Guard {
+    /// What is going to be written: the option with its path, and the file that is there before.
+    outputs: Vec<(String, Option<Identity>)>,
+    /// What was read, as it was called.
+    inputs: BTreeMap<Identity, PathBuf>,
+}
+
+/// What a file keeps under all its names: device and number, elsewhere the path without links and dots.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Identity(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] PathBuf);
+
+/// None of what holds no data of its own: pipes, devices, folders, nothing.
+#[cfg(unix)]
+fn identity_of(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
+    use std::os::unix::fs::MetadataExt;
+    meta.is_file().then(|| Identity([meta.dev(), meta.ino()]))
+}
+
+#[cfg(not(unix))]
+fn identity_of(path: &Path, meta: &fs::Metadata) -> Option<Identity> {
+    fs::canonicalize(path).ok().filter(|_| meta.is_file()).map(Identity)
+}
+
+fn identity(path: &Path) -> Option<Identity> {
+    identity_of(path, &fs::metadata(path).ok()?)
+}
+
+/// The file that standard input comes from.
+fn standard_input() -> Option<Identity> {
+    #[cfg(unix)]
+    {
+        let stdin = std::os::fd::AsFd::as_fd(&io::stdin()).try_clone_to_owned().ok()?;
+        identity_of(Path::new("-"), &File::from(stdin).metadata().ok()?)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
+/// From now on this process writes over nothing that it reads: [`open_input`] refuses what one of these outputs would replace, and every
+/// function that writes refuses what was read.
+///
+/// A program calls it once, with the options that name outputs, before its command begins. Without this call nothing is refused.
+///
+/// # Errors
+/// Two outputs that are one file, or a file in a folder that is written as well; an output that is standard input.
+pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Result<(), FileError> {
+    let mut guarded = Guard::default();
+    let mut before: Vec<(String, PathBuf)> = Vec::new();
+    let stdin = standard_input();
+    for (option, path) in outputs {
+        let is_stream = fs::metadata(&path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
+        if is_stream || is_standard_output(&path) {
+            continue;
+        }
+        let (shown, own, real) =
+            (format!("{option} {}", path.display()), identity(&path), real(&path));
+        let fail = |cause| Err(FileError::io(&shown, "write it", io::Error::other(cause)));
+        for ((other, other_real), (_, identity)) in before.iter().zip(&guarded.outputs) {
+            let is_same = own.is_some() && own == *identity;
+            if is_same || real.starts_with(other_real) || other_real.starts_with(&real) {
+                return fail(format!(
+                    "{other} goes there as well; name another file for one of them"
+                ));
+            }
+        }
+        if own.is_some() && own == stdin {
+            return fail("standard input comes from it; name another file".to_owned());
+        }
+        guarded.outputs.push((shown.clone(), own));
+        before.push((shown, real));
+    }
+    *guard() = Some(guarded);
+    Ok(())
+}
+
+/// Whether this process runs one command, which guards what it reads.
+pub(super) fn are_guarded() -> bool {
+    guard().is_some()
+}
+
+/// Opens a file that is read. Everything that a command reads is opened here, or named to [`is_input`].
+///
+/// # Errors
+/// What the system says; a file that the command is going to write over ([`guard_inputs`]).
+///
+/// ```
+/// use stretch_data::files::{guard_inputs, open_input, write_whole};
+/// let folder = tempfile::tempdir()?;
+/// let [trial, link] = ["a.csv", "link.csv"].map(|name| folder.path().join(name));
+/// std::fs::write(&trial, "time_s\n0\n")?;
+/// std::fs::hard_link(&trial, &link)?;
+/// guard_inputs([("--out".to_owned(), link.clone())])?;
+/// let refused = open_input(&trial).unwrap_err().to_string();
+/// assert!(refused.contains("--out") && refused.contains("link.csv"), "{refused}");
+/// // what no option names is refused where it is written
+/// guard_inputs([])?;
+/// open_input(&trial)?;
+/// let refused = write_whole(&link, |_| Ok(())).unwrap_err().to_string();
+/// assert!(refused.contains("a.csv"), "{refused}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn open_input(path: impl AsRef<Path>) -> io::Result<File> {
+    is_input(&path)?;
+    File::open(path)
+}
+
+/// Says that a file is read without [`open_input`], by another program such as a simulator.
+///
+/// # Errors
+/// A file that the command is going to write over.
+pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
+    let path = path.as_ref();
+    let mut guard = guard();
+    let (Some(guard), Some(own)) = (guard.as_mut(), identity(path)) else { return Ok(()) };
+    // first of all, so that whoever does not look at an error still writes nothing over it
+    guard.inputs.insert(own.clone(), path.to_owned());
+    match guard.outputs.iter().find(|(_, there)| there.as_ref() == Some(&own)) {
+        Some((shown, _)) => Err(io::Error::other(format!(
+            "{shown} would be written over it, and it is read; name another file there"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Says that a file is written again in its own place, by design, after it was read.
+pub fn rewrites(path: impl AsRef<Path>) {
+    if let (Some(guard), Some(own)) = (guard().as_mut(), identity(path.as_ref())) {
+        guard.inputs.remove(&own);
+    }
+}
+
+/// Refuses a file that was read.
+pub(super) fn check_output(path: &Path, meta: &fs::Metadata) -> io::Result<()> {
+    let guard = guard();
+    let input = || guard.as_ref()?.inputs.get(&identity_of(path, meta)?);
+    match input() {
+        Some(input) => Err(io::Error::other(format!(
+            "it is a file that this command reads, {}; name another file",
+            input.display()
+        ))),
+        None => Ok(()),
+    }
+}

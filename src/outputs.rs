@@ -1,0 +1,111 @@
+//! Which options name what a command writes, and what of that is refused before the command begins.
+
+use std::{
+    any::TypeId,
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use anyhow::ensure;
+use clap::{Arg, ArgMatches, Command};
+use stretch_data::files::guard_inputs;
+
+/// Options whose paths are written. All other paths are read.
+const OUTPUTS: [&str; 9] =
+    ["c", "experiment", "fix", "fixed", "json", "out", "report", "session", "snippets"];
+
+/// The option of an argument, where that is a path.
+fn option(argument: &Arg) -> Option<&str> {
+    let is_path = argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+    argument.get_long().filter(|_| is_path)
+}
+
+/// An output that was asked for.
+struct Output {
+    option: String,
+    path: PathBuf,
+    /// How such a file is called in the help: `cal.json`.
+    example: String,
+}
+
+fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
+    for argument in command.get_arguments() {
+        let Some(name) = option(argument).filter(|name| OUTPUTS.contains(name)) else { continue };
+        let example = argument.get_value_names().unwrap_or_default().concat();
+        let paths = matches.get_many::<PathBuf>(argument.get_id().as_str());
+        found.extend(paths.into_iter().flatten().map(|path| Output {
+            option: format!("--{name}"),
+            path: path.clone(),
+            example: example.clone(),
+        }));
+    }
+    if let Some((name, matches)) = matches.subcommand()
+        && let Some(command) = command.find_subcommand(name)
+    {
+        named(command, matches, found);
+    }
+}
+
+/// Guards what a command reads from what it writes, from now on.
+///
+/// # Errors
+/// Two outputs that are one file, and a recording where something else is to be written: a shell makes of `--out r*.csv` the name of
+/// the first recording.
+pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
+    let mut outputs = Vec::new();
+    named(command, matches, &mut outputs);
+    for Output { option, path, example } in &outputs {
+        let ending = Path::new(example).extension();
+        let is_expected = ending.is_some() && path.extension() == ending;
+        let such_as = ending.map_or(String::new(), |_| format!(", such as {example}"));
+        ensure!(
+            is_expected || example.contains(".csv") || !is_recording(path),
+            "{option} {}: this file is a recording, and what would replace it is none; name another file{such_as} (a shell makes of \
+             {option} *.csv the names of all recordings)",
+            path.display()
+        );
+    }
+    Ok(guard_inputs(outputs.into_iter().map(|output| (output.option, output.path)))?)
+}
+
+/// Whether a file begins with rows of numbers, or with what is no text, such as packed rows.
+fn is_recording(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let is_file = path.is_file();
+    if !is_file
+        || File::open(path).and_then(|file| file.take(1 << 14).read_to_end(&mut head)).is_err()
+    {
+        return false;
+    }
+    let text = String::from_utf8_lossy(&head);
+    let is_row = |line: &&str| {
+        let fields = || line.split([',', ';', '\t', ' ']).filter(|field| !field.is_empty());
+        fields().count() > 1 && fields().all(|field| field.trim().parse::<f64>().is_ok())
+    };
+    head.contains(&0) || text.lines().filter(is_row).nth(1).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Options whose paths are read.
+    const INPUTS: [&str; 6] = ["calibration", "data", "from", "prior", "rig", "test"];
+
+    fn paths(command: &Command, found: &mut Vec<String>) {
+        found.extend(command.get_arguments().filter_map(option).map(str::to_owned));
+        command.get_subcommands().for_each(|command| paths(command, found));
+    }
+
+    #[test]
+    fn every_option_with_a_path_is_known_as_one_that_is_read_or_written() {
+        let mut found = Vec::new();
+        paths(&crate::command(), &mut found);
+        found.sort();
+        found.dedup();
+        let mut known = [&OUTPUTS[..], &INPUTS].concat();
+        known.sort_unstable();
+        assert_eq!(found, known);
+    }
+}

@@ -10,7 +10,8 @@ pub struct Extent {
     pub low: f64,
     /// Greatest value.
     pub high: f64,
-    /// The quickest hundredth of its changes begins at this rate, units/s.
+    /// The quickest hundredth of its changes begins at this rate, units/s. A sample like the one before is no change: a command that is
+    /// held for more than a hundred samples changes all the same.
     pub quickest: f64,
     /// Sample time, s.
     pub dt_s: f64,
@@ -46,8 +47,9 @@ impl Extent {
     /// ```
     pub fn of<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> Self {
         let [low, high] = ends(parts.clone().flatten());
+        let changes = parts.clone().flat_map(|p| p.windows(2).map(|w| (w[1] - w[0]).abs()));
         let mut rates: Vec<f64> =
-            parts.clone().flat_map(|p| p.windows(2).map(|w| (w[1] - w[0]).abs() / dt_s)).collect();
+            changes.filter(|change| *change > 0.0).map(|change| change / dt_s).collect();
         let at = rates.len() * 99 / 100;
         let quickest = match rates.is_empty() {
             true => 0.0,

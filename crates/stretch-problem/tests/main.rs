@@ -25,6 +25,7 @@ mod rig;
 mod sensors;
 mod several;
 mod states;
+mod steps;
 mod support;
 mod units;
 mod workers;

@@ -9,6 +9,7 @@ use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec}
 use stretch_sim::Tolerance;
 
 use super::{
+    begins::{Before, Begins, begins},
     catalogue::{Acting, Around, behind_outputs, own_effects},
     columns::Columns,
     facts::facts,
@@ -41,6 +42,8 @@ pub struct Checked {
     pub(crate) off: Vec<f64>,
     /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
+    /// By stage, where what stands in front of it begins.
+    pub(crate) before: Vec<Before>,
     /// The entries of the problem, without the recordings.
     pub(crate) spec: ProblemSpec,
     pub(crate) grid: Grid,
@@ -79,8 +82,13 @@ impl Checked {
             stages.iter().map(|stage| velocity(stage, &columns)).collect();
         let positions: Vec<Option<Vec<f64>>> =
             stages.iter().map(|stage| position(stage, &columns)).collect();
+        let noises: Vec<Noise> = stages.iter().map(|stage| noise(stage, &columns)).collect();
+        let with_noise = || stages.iter().zip(&noises);
+        let begun: Vec<Begins> = with_noise().map(|(s, n)| begins_of(s, n, &columns)).collect();
+        let before: Vec<Before> = begun.iter().map(|begins| begins.before.clone()).collect();
         let among = Among {
             columns: &columns,
+            before: &before,
             stages: stages.iter().map(|s| s.name.as_str()).collect(),
             velocities: &velocities,
             positions: &positions,
@@ -101,10 +109,9 @@ impl Checked {
         let looked_for = around.without(looked_for, &spec.without)?;
         let (acting, catalogue) = looked_for.into_iter().unzip();
         let Around { wrappers, standing, .. } = around;
-        let noises: Vec<Noise> = stages.iter().map(|stage| noise(stage, &columns)).collect();
-        let with_noise = stages.iter().zip(&noises);
+        notes.extend(begins_note(&begun, &wrappers));
         let about = Description::new(DescriptionSpec {
-            stages: with_noise.map(|(s, n)| stage_spec(s, n, parameters, &unit_of)).collect(),
+            stages: with_noise().map(|(s, n)| stage_spec(s, n, parameters, &unit_of)).collect(),
             parameters: parameters.iter().map(parameter_spec).collect::<Result<_, _>>()?,
             effects: catalogue,
             trials: columns.trials.clone(),
@@ -125,6 +132,7 @@ impl Checked {
             acting,
             off,
             standing,
+            before,
             grid,
             notes,
             spec,
@@ -237,6 +245,26 @@ fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
     stated
         .or_else(|| Noise::of_rests(values, &inputs, &looked, columns.dt_s))
         .unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s))
+}
+
+/// The beginnings of the trials of a stage.
+fn begins_of(stage: &StageEntry, noise: &Noise, columns: &Columns) -> Begins {
+    let of = |name: &String| columns.of(name).unwrap_or(&[]);
+    let inputs: Vec<&[f64]> = stage.inputs.iter().map(of).collect();
+    let parts = (columns.ranges(), columns.looked_at());
+    begins((&inputs, of(&stage.output)), (&parts.0, &parts.1), noise.sd())
+}
+
+/// That what stands in front of a stage begins with a step from nobody knows where.
+fn begins_note(begun: &[Begins], wrappers: &[Placed]) -> Option<String> {
+    let in_front = wrappers.iter().filter(|w| w.site.side == Side::Input);
+    let unknown = |w: &Placed| begun[w.site.stage].unknown;
+    let first = in_front.max_by_key(|w| unknown(w)).filter(|w| unknown(w) > 0)?;
+    let (column, trials) = (&first.site.column, unknown(first));
+    let s = if trials == 1 { "" } else { "s" };
+    Some(format!(
+        "{column} steps at the first sample of {trials} trial{s}, and nothing says from where, so that a memory in front of the stage begins with the step; log some rest before it"
+    ))
 }
 
 /// Samples and session time of each trial, s, from the session's start.

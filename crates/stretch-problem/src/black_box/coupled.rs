@@ -60,8 +60,8 @@ fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     let mut most = (0.0, Vec::new(), Vec::new());
     for (at, wrapper) in acting(problem).filter(|(_, w)| is_at(w, stage, input)) {
         for values in wrapper.starts() {
-            let mut altered = columns[input].clone();
-            wrapper.act(values, &trials, &mut altered);
+            let (mut altered, mut before) = (columns[input].clone(), problem.before[stage].clone());
+            wrapper.act(values, &trials, &mut before, &mut altered);
             let by = apart(&altered, &columns[input]);
             if by > most.0 {
                 most = (by, altered, alteration(at, values).collect());

@@ -150,7 +150,7 @@ impl BlackBox {
         let mut columns = self.inputs_in(stage, course, outputs)?;
         for (at, values) in self.around(run, stage, Side::Input)? {
             let wrapper = &self.problem.wrappers[at];
-            wrapper.act(values, &self.trials_of(), &mut columns[wrapper.site.input]);
+            wrapper.act(values, &self.trials_of(), &mut [], &mut columns[wrapper.site.input]);
         }
         let mut hasher = DefaultHasher::new();
         columns.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
@@ -218,7 +218,7 @@ impl Laboratory for BlackBox {
             let mut output =
                 answer.map_err(|error| super::refused(error, self.least_runs()))?.to_vec();
             for (at, values) in self.around(&run, stage, Side::Output)? {
-                self.problem.wrappers[at].act(values, &trials, &mut output);
+                self.problem.wrappers[at].act(values, &trials, &mut [], &mut output);
             }
             outputs.push(output);
         }

@@ -60,11 +60,11 @@ impl BlackBox {
                 column.iter_mut().for_each(|x| *x += sd * random.gauss());
             }
         }
-        let trials = self.trials_of();
+        let (trials, mut begins) = (self.trials_of(), problem.before[stage].clone());
         for (at, values) in &before {
             let wrapper = &problem.wrappers[*at];
             how.extend(alteration(*at, values));
-            wrapper.act(values, &trials, &mut columns[wrapper.site.input]);
+            wrapper.act(values, &trials, &mut begins, &mut columns[wrapper.site.input]);
         }
         let touched = |i: &usize| {
             let is_noisy = noise_seed.is_some() && noise[*i] > 0.0;

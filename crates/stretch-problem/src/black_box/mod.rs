@@ -1,5 +1,6 @@
 //! A user's simulator with wrappers around it, as the diagnosis takes it.
 
+pub(crate) mod begins;
 mod catalogue;
 pub(crate) mod checked;
 pub(crate) mod columns;
@@ -197,7 +198,7 @@ impl BlackBox {
             let wrapper = &self.problem.wrappers[at];
             match wrapper.kind.find {
                 Some(find) => self.follow(find, run.stage, values, out),
-                None => wrapper.act(values, &trials, out),
+                None => wrapper.act(values, &trials, &mut [], out),
             }
         }
     }

@@ -9,7 +9,10 @@ use stretch_effects::{
 };
 use stretch_gap::EffectSpec;
 
-use crate::{black_box::columns::Columns, error::ProblemError};
+use crate::{
+    black_box::{begins::Before, columns::Columns},
+    error::ProblemError,
+};
 
 /// A channel of a stage that wrappers can stand on.
 #[derive(Debug, Clone)]
@@ -51,6 +54,8 @@ pub(crate) struct Placed {
 /// Columns, stages and kinds among which wrappers are placed.
 pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
+    /// By stage, where what stands in front of it begins.
+    pub(crate) before: &'a [Before],
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
     /// By stage, the velocity of its rubbing parts.
@@ -81,7 +86,7 @@ pub(crate) fn placed(
     }
     let (mut all, mut lacking) = (Vec::new(), Vec::new());
     for site in sites {
-        let extent = extent_of(among, &site.column)?;
+        let extent = extent_of(among, site)?;
         for kind in KINDS.iter().chain(among.kinds) {
             let own = at(kind, site, extent, among);
             let is_asked = |usual| {
@@ -144,10 +149,17 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     ProblemError::unknown("wrap", "wrapper", pattern, shown.iter().copied())
 }
 
-fn extent_of(among: &Among<'_>, column: &str) -> Result<Extent, ProblemError> {
+fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
+    let column = &site.column;
     let values = among.columns.of(column).unwrap_or(&[]);
-    let looked = among.columns.looked_at();
-    let extent = Extent::of(looked.iter().map(|r| &values[r.clone()]), among.columns.dt_s);
+    let before = among.before[site.stage].iter().filter(|_| site.side == Side::Input);
+    // a step at the first sample is a change as any other
+    let begun = |(range, before): (&Range<usize>, Option<f64>)| {
+        before.into_iter().chain(values[range.clone()].iter().copied()).collect()
+    };
+    let before = before.copied().chain(std::iter::repeat(None));
+    let looked: Vec<Vec<f64>> = among.columns.looked_at().iter().zip(before).map(begun).collect();
+    let extent = Extent::of(looked.iter().map(Vec::as_slice), among.columns.dt_s);
     if extent.span() > 0.0 {
         return Ok(Extent { session_s: among.columns.session_s(), ..extent });
     }
@@ -393,7 +405,16 @@ impl Placed {
     }
 
     /// Applies the wrapper to a channel, one trial after the other.
-    pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
+    ///
+    /// A trial of which `before` holds a value begins as if the channel had been there from long ago, one sample before its first; the value
+    /// is then that of the altered channel. Any other begins settled at its first value.
+    pub(crate) fn act(
+        &self,
+        values: &[f64],
+        trials: &Trials<'_>,
+        before: &mut [Option<f64>],
+        channel: &mut [f64],
+    ) {
         if EffectParameter::are_off(&self.parameters, values) {
             return;
         }
@@ -401,17 +422,24 @@ impl Placed {
         let mut cells = vec![0.0; operator.cells()];
         let mut ended_s: Option<f64> = None;
         let end = channel.len();
-        for (range, start_s) in trials.parts.iter().take_while(|(r, _)| r.end <= end) {
-            let signal = &mut channel[range.clone()];
+        let before = before.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
+        let parts = trials.parts.iter().take_while(|(r, _)| r.end <= end);
+        for ((range, start_s), before) in parts.zip(before) {
+            let before = before.and_then(Option::as_mut);
+            let lead = usize::from(before.is_some());
+            // what is looked at beside the channel was at its first value before
+            let led = |x: &[f64]| [&x[..lead.min(x.len())], x].concat();
+            let mut signal = led(&channel[range.clone()]);
+            if let (Some(first), Some(before)) = (signal.first_mut(), &before) {
+                *first = **before;
+            }
+            let signal = &mut signal[..];
+            let start_s = start_s - lead as f64 * trials.grid.dt_s();
             let Some(&first) = signal.first() else { continue };
-            let own;
-            let beside: &[f64] = match (&self.beside, self.kind.beside) {
-                (Some(beside), _) => &beside[range.clone()],
-                (None, Beside::Itself) => {
-                    own = signal.to_vec();
-                    &own
-                }
-                _ => &[],
+            let beside = match (&self.beside, self.kind.beside) {
+                (Some(beside), _) => led(&beside[range.clone()]),
+                (None, Beside::Itself) => signal.to_vec(),
+                _ => Vec::new(),
             };
             let start = match ended_s.filter(|_| self.kind.counts_session) {
                 Some(ended_s) => Start::Carried { rest_s: (start_s - ended_s).max(0.0) },
@@ -421,14 +449,19 @@ impl Placed {
             // what is driven by a position begins where the position does
             let first = beside.first().copied().filter(|_| is_driven).unwrap_or(first);
             operator.begin(start, first, &mut cells);
-            let load = self.load.as_ref().map_or(&[][..], |(load, _)| &load[range.clone()]);
-            let span = Span { start_s: *start_s, strain: beside, load, ..Span::whole(trials.grid) };
+            let load = self.load.as_ref().map_or(Vec::new(), |(load, _)| led(&load[range.clone()]));
+            let (strain, load) = (beside.as_slice(), load.as_slice());
+            let span = Span { start_s, strain, load, ..Span::whole(trials.grid) };
             // The friction of a stage is subtracted from the force in front of it, and added to the force behind it.
             let is_taken = self.is_taken();
-            let before = is_taken.then(|| signal.to_vec());
+            let untaken = is_taken.then(|| signal.to_vec());
             operator.run(&span, &mut cells, signal);
-            for (y, x) in signal.iter_mut().zip(before.iter().flatten()) {
+            for (y, x) in signal.iter_mut().zip(untaken.iter().flatten()) {
                 *y = x - (*y - x);
+            }
+            channel[range.clone()].copy_from_slice(&signal[lead..]);
+            if let (Some(first), Some(before)) = (signal.first(), before) {
+                *before = *first;
             }
             ended_s = Some(start_s + signal.len() as f64 * trials.grid.dt_s());
         }

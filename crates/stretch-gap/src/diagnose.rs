@@ -440,6 +440,10 @@ fn report(
     notes.extend(lost_note(runs));
     let mut reservations: Vec<Note> =
         implausible_noise_notes(cause.problem, &sanity).into_iter().map(Note::from).collect();
+    if cause.problem.is_held {
+        let held = "re-tuned parameters could not be simulated over all trials, and the simulator without effects keeps those that could";
+        reservations.push(Note::from(held.to_owned()));
+    }
     let not_examined = searched.lost(&candidates);
     if !not_examined.is_empty() {
         let because = "not looked at, because their runs failed: ";

@@ -58,9 +58,13 @@ fn records_that_are_not_whole_are_refused_with_where() {
     record.outputs[1][1234] = f64::NAN;
     let said = refused(&record).to_string();
     assert!(
-        said.starts_with("line: 1234 measured samples in a row are finite, the trials hold 4000"),
+        said.starts_with(
+            "line: 1234 measured samples in a row are finite and below 1e100, the trials hold 4000"
+        ),
         "{said}"
     );
+    record.outputs[1][1200] = -1e160;
+    assert!(matches!(refused(&record), GapError::Measured { found: 1200, needed: 4000, .. }));
     let mut short = toy.measured(1);
     short.outputs[0].truncate(3999);
     assert!(matches!(refused(&short), GapError::Measured { found: 3999, needed: 4000, .. }));
@@ -74,7 +78,7 @@ fn a_simulation_that_fails_from_the_start_is_refused_and_one_that_is_gone_ends_a
         |fails| Toy { fails: Some(fails), ..Toy::of(&[Law::Line]) }.may_lack(&Effect::ALL);
     let not_finite = refused(&failing(Fails::NotFinite).measured(1));
     assert!(
-        matches!(not_finite, GapError::NotFinite { ref stage, ref asked } if stage == "line" && asked.starts_with("asked for ")),
+        matches!(not_finite, GapError::NotFinite { ref stage, ref asked, .. } if stage == "line" && asked.starts_with("asked for ")),
         "{not_finite}"
     );
     // 1 is the gain as shipped.

@@ -111,12 +111,9 @@ impl Chain<'_> {
         if !self.simulator.simulate_on(run, input, &mut out)? {
             return Ok(None);
         }
-        match out.iter().all(|x| x.is_finite()) {
-            true => Ok(Some(out)),
-            false => {
-                let stage = self.simulator.stages()[stage].name.clone();
-                Err(GapError::NotFinite { stage, asked: String::new() })
-            }
+        match out.iter().position(|x| !x.is_finite()) {
+            None => Ok(Some(out)),
+            Some(at) => Err(GapError::not_finite(self.simulator, stage, (at, out[at]))),
         }
     }
 

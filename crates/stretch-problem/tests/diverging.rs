@@ -113,3 +113,102 @@ fn a_simulator_that_diverges_as_shipped_is_refused_with_its_values() {
         assert!(said.ends_with(&format!("(asked for tau = {tau} s)")), "{said}");
     }
 }
+
+/// A spring whose length follows its load; what it gives in a trial is up to the simulator, which is asked with a compliance.
+fn spring_told(
+    compliance: f64,
+    wrap: &[&str],
+    simulate: impl Fn(f64, usize, f64) -> f64 + Send + Sync + 'static,
+) -> Result<Diagnosis, GapError> {
+    let one = |trial: usize| {
+        let mut random = RandomGenerator::new(9, trial as u64);
+        let at = |i: usize, rate: f64| (rate * DT_S * i as f64 + trial as f64).sin();
+        let u: Vec<f64> = (0..SAMPLES).map(|i| 10.0 * at(i, 1.3) + 4.0 * at(i, 3.1)).collect();
+        let mut held = 0.0_f64;
+        let play = |x: f64| {
+            held = held.clamp(x - 0.5, x + 0.5);
+            held
+        };
+        let y = u.iter().map(|u| compliance * u).map(play);
+        let y = y.map(|y| y + 0.02 * random.gauss()).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let channels = vec![channel("force_N", u), channel("length_mm", y)];
+        let time_s = (0..SAMPLES).map(|i| DT_S * i as f64).collect();
+        let own = Trial { name: format!("t{trial}.csv"), time_s, channels };
+        let split = if trial == 1 { Split::Test } else { Split::Fit };
+        SessionTrial { start_s: 200.0 * trial as f64, split, ..SessionTrial::new(own) }
+    };
+    let problem = Checked::new(ProblemSpec {
+        stages: vec![StageEntry {
+            name: "spring".into(),
+            output: "length_mm".into(),
+            inputs: vec!["force_N".into()],
+            noise: Some(0.02),
+            ..StageEntry::default()
+        }],
+        parameters: vec![Parameter {
+            name: "compliance".into(),
+            unit: "mm/N".into(),
+            value: 2.0,
+            tolerance: Tolerance::Relative(0.05),
+            ..Parameter::default()
+        }],
+        wrap: wrap.iter().map(|name| (*name).to_owned()).collect(),
+        trials: (0..2).map(one).collect(),
+        ..ProblemSpec::default()
+    });
+    let problem = problem.expect("a problem");
+    let session = problem.session().clone();
+    let u = session.column("force_N").expect("the input").to_vec();
+    let source = closure(move |ask: &Ask<'_>| {
+        let parts = session.trials[..ask.trials].iter().enumerate();
+        let own = parts.flat_map(|(trial, part)| part.samples.clone().map(move |i| (trial, i)));
+        Ok(own.map(|(trial, i)| simulate(ask.parameters[0], trial, u[i])).collect())
+    });
+    let bench = BlackBox::new(problem, Arc::new(source));
+    Ok(diagnose(&bench, &Options::default(), &|_| (), &|| false)?.0)
+}
+
+/// Fits run the fitted trials alone, so that only the end would see it.
+#[test]
+fn re_tuned_parameters_that_diverge_on_test_trials_end_nothing() {
+    for beyond in [f64::INFINITY, f64::NAN, 1e160, -1e160] {
+        let softer = move |compliance: f64, trial: usize, u: f64| match trial {
+            1 if compliance > 2.02 => beyond,
+            _ => compliance * u,
+        };
+        let told = spring_told(2.1, &["output.backlash", "output.lag"], softer);
+        let told = told.expect("an answer");
+        assert!(told.gap.raw.is_finite() && told.gap.retuned.is_finite(), "{:?}", told.gap);
+        assert!(told.gap.retuned > 1.0, "{:?}", told.gap);
+        assert_eq!(told.parameters[0].bent, 2.0);
+        let said: Vec<String> = told.notes.iter().map(ToString::to_string).collect();
+        assert!(said.iter().any(|n| n.starts_with("re-tuned parameters could not")), "{said:?}");
+        let lost = said.iter().find(|n| n.contains(" could not be simulated, "));
+        let lost = lost.expect("a note on lost runs");
+        assert!(lost.contains(" s of trial t1.csv"), "{lost}");
+        assert!(!told.not_examined.is_empty(), "{said:?}");
+    }
+}
+
+#[test]
+fn what_diverges_on_test_trials_with_an_effect_alone_leaves_the_rest() {
+    // as shipped and re-tuned it can be simulated; with the compliance that it has beside the play it cannot
+    let told =
+        spring_told(2.0, &["output.backlash", "output.lag", "output.curve"], |c, _, u| c * u);
+    assert_eq!(told.expect("an answer").named, ["output.backlash"]);
+}
+
+#[test]
+fn answers_beyond_all_squares_are_refused_with_trial_time_and_value() {
+    for (trial, from_s) in [(0, "0 s of trial t0.csv"), (1, "0 s of trial t1.csv")] {
+        for (beyond, shown) in [(1e160, "1e160"), (-1e200, "-1e200"), (f64::INFINITY, "inf")] {
+            let told = spring_told(2.0, &["output.backlash"], move |compliance, own, u| {
+                if own == trial { beyond } else { compliance * u }
+            });
+            let said = told.expect_err("it is no output").to_string();
+            assert!(said.contains(&format!("gave {shown} at {from_s}")), "{said}");
+            assert!(said.ends_with("(asked for compliance = 2 mm/N)"), "{said}");
+        }
+    }
+}

@@ -175,6 +175,10 @@ pub(crate) fn posterior(
         None => None,
     };
     let posterior = weigh(thresholds, Gap { retuned, null_band }, kept, function);
+    let mut probabilities = posterior.sets.iter().map(|w| w.probability).chain([posterior.unknown]);
+    if probabilities.any(|p| !p.is_finite()) {
+        return Err(GapError::NoProbability { retuned });
+    }
     let of = |w: &Weighed| {
         let (candidate, blocks) = by_effects.remove(&w.hypothesis.effects)?;
         let Standing { left, is_at_bound: at_bound, .. } = w.standing;

@@ -84,6 +84,10 @@ pub(crate) const FINE: Effort =
 /// The same, the forms of effects held.
 pub(crate) const FINE_OF_FORM: Effort = Effort { holds_forms: true, ..FINE };
 
+/// Nothing is moved: what a model leaves, and how well its parameters are known there.
+pub(crate) const HELD: Effort =
+    Effort { iterations: 0, renewals: &[], is_rough: false, holds_forms: false };
+
 /// Added to every diagonal: a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
 /// Dampings tried in one iteration.
@@ -114,6 +118,9 @@ impl Comparison<'_> {
     ) -> Result<Fitted, GapError> {
         let near = effort.is_rough.then(|| start.parameters.clone());
         let mut descent = Descent::new(self, stages, start, near, effort.holds_forms)?;
+        if effort.iterations == 0 {
+            descent.linearise(known, true, known.is_empty())?;
+        }
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());

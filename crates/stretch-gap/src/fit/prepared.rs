@@ -23,7 +23,7 @@ use crate::{
         coordinate::{choice_cost, form_cost, free_parameters},
         hypothesis::Hypothesis,
         identifiability::{Identified, Information, identified},
-        levenberg_marquardt::{Effort, FINE, Fitted},
+        levenberg_marquardt::{Effort, FINE, Fitted, HELD},
         octaves::Octaves,
         score::{LEARNT, Misfit, Observations, gap, score, shared},
         starts::Starts,
@@ -64,6 +64,8 @@ pub(crate) struct PreparedProblem<'a> {
     transmitted: Vec<Misfit>,
     /// Number of starts of re-tuning, and how many of them ended at the result.
     pub(crate) starts: Starts,
+    /// Whether re-tuned parameters could not be simulated over all trials, so that others hold their place.
+    pub(crate) is_held: bool,
 }
 
 impl<'a> PreparedProblem<'a> {
@@ -80,6 +82,10 @@ impl<'a> PreparedProblem<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
+        // Whatever is found is compared with the simulator as shipped, over all trials.
+        for stage in 0..simulator.stages().len() {
+            runs.output(stage, &Model::nominal(simulator), simulator.trials().len())?;
+        }
         // Try twice the step, if the change from halving it stays within the limit. Not for counted
         // runs, because these may be an external program's.
         if simulator.model_runs().is_none() {
@@ -98,7 +104,7 @@ impl<'a> PreparedProblem<'a> {
         progress("noise");
         let rough = Comparison::around(runs.clone(), roles.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
-        let (first, _) = retuned(&rough, &shipped)?;
+        let (first, ..) = possible_retuning(&rough, &shipped, &shipped)?;
         let compare = Comparison::around(runs, roles, &first.model, None, seed)?;
         Self::of(compare, shipped, &first.model)
     }
@@ -128,7 +134,7 @@ impl<'a> PreparedProblem<'a> {
         shipped: Model,
         start: &Model,
     ) -> Result<Self, GapError> {
-        let (nominal, information) = retuned(&compare, start)?;
+        let (nominal, information, is_held) = possible_retuning(&compare, start, &shipped)?;
         let stages = compare.metrics.len();
         let memory: Result<Vec<f64>, GapError> = (0..stages)
             .into_par_iter()
@@ -163,6 +169,7 @@ impl<'a> PreparedProblem<'a> {
             observations,
             transmitted,
             starts,
+            is_held,
         })
     }
 
@@ -181,6 +188,7 @@ impl<'a> PreparedProblem<'a> {
             observations: self.observations.clone(),
             transmitted: self.transmitted.clone(),
             starts: self.starts,
+            is_held: self.is_held,
         }
     }
 
@@ -402,17 +410,34 @@ pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), G
         .try_for_each(|stage| compare.simulator().linearise(stage, model, compare.roles.fit_trials))
 }
 
+/// Every stage [re-tuned](retuned); where that cannot be simulated over all trials, the start is held, or else the parameters as shipped, and
+/// that is said.
+fn possible_retuning(
+    compare: &Comparison<'_>,
+    start: &Model,
+    shipped: &Model,
+) -> Result<(Hypothesis, Vec<Information>, bool), GapError> {
+    let (nominal, information) = retuned(compare, start, FINE)?;
+    if compare.runs.can_run(&nominal.model)? {
+        return Ok((nominal, information, false));
+    }
+    let held = if compare.runs.can_run(start)? { start } else { shipped };
+    let (nominal, information) = retuned(compare, held, HELD)?;
+    Ok((nominal, information, true))
+}
+
 /// Every stage re-tuned separately, stages that share a parameter together: without effects the
 /// other stages are independent of it.
 fn retuned(
     compare: &Comparison<'_>,
     start: &Model,
+    effort: Effort,
 ) -> Result<(Hypothesis, Vec<Information>), GapError> {
     let simulator = compare.simulator();
     linearise(compare, start)?;
     let groups = groups(simulator);
     let fits: Result<Vec<_>, GapError> =
-        groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], FINE)).collect();
+        groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], effort)).collect();
     let mut model = start.clone();
     let mut misfits = Vec::new();
     let mut parameter_sd = vec![0.0; model.parameters.len()];

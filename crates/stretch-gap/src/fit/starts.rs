@@ -115,7 +115,12 @@ impl PreparedProblem<'_> {
         places: &Places<'_>,
     ) -> Result<(Option<Model>, Starts), GapError> {
         let counts = |stage| self.gap_in(&self.nominal, stage) > least_gap;
-        let found = better_start(&self.compare, &self.nominal.model, counts, places)?;
+        let mut found = better_start(&self.compare, &self.nominal.model, counts, places)?;
+        if let Some(model) = found.0.take()
+            && self.compare.runs.can_run(&model)?
+        {
+            found.0 = Some(model);
+        }
         if found.0.is_none() {
             linearise(&self.compare, &self.nominal.model)?;
         }

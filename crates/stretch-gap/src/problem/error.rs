@@ -1,6 +1,6 @@
 //! Why a diagnosis was refused.
 
-use crate::problem::checks::DescriptionError;
+use crate::problem::{checks::DescriptionError, simulator::Simulator};
 
 /// Why a diagnosis was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]
@@ -9,9 +9,9 @@ pub enum GapError {
     /// The simulator's description does not hold together.
     #[error(transparent)]
     Description(#[from] DescriptionError),
-    /// A measured channel does not have as many finite samples as the trials.
+    /// A measured channel does not have as many finite samples as the trials; 1e100 and more is as good as infinite.
     #[error(
-        "{stage}: {found} measured samples in a row are finite, the trials hold {needed}; give one finite number for each sample"
+        "{stage}: {found} measured samples in a row are finite and below 1e100, the trials hold {needed}; give one such number for each sample"
     )]
     Measured {
         /// The stage.
@@ -42,17 +42,34 @@ pub enum GapError {
         /// Root mean square change in multiples of the noise.
         moved: f64,
     },
-    /// A simulated output was not finite.
-    #[error("{stage}: the simulation gave a number that is not finite{}", in_parentheses(.asked))]
+    /// A simulated output was not finite, or so great that sums of its square would not be.
+    #[error(
+        "{stage}: the simulation gave {value:e} at {time_s} s of trial {trial}, which is no output of a machine{}",
+        in_parentheses(.asked)
+    )]
     NotFinite {
         /// The stage.
         stage: String,
+        /// What it gave.
+        value: f64,
+        /// Time of that sample in its trial, s.
+        time_s: f64,
+        /// Name of the trial.
+        trial: String,
         /// The values that it was asked for; empty where they are not known.
         asked: String,
     },
     /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
     #[error(transparent)]
     Broken(Box<dyn std::error::Error + Send + Sync>),
+    /// Probabilities of the hypotheses are no numbers.
+    #[error(
+        "the probabilities of the hypotheses are no numbers (the re-tuned simulator leaves {retuned:e} times the noise): check the noise that is stated; if that is right, this is an error of the program"
+    )]
+    NoProbability {
+        /// Gap that the re-tuned simulator leaves, in variances of the noise.
+        retuned: f64,
+    },
     /// No more runs may be made.
     #[error(
         "the budget of {budget} model runs is spent before there is an answer; give {least} or more, the least that one needs"
@@ -120,9 +137,13 @@ impl GapError {
     /// use stretch_gap::GapError;
     /// assert!(GapError::simulator("the solver did not converge").is_of_runs());
     /// assert!(!GapError::Stopped.is_of_runs());
-    /// let not_finite = GapError::NotFinite { stage: "arm".into(), asked: String::new() };
-    /// assert!(not_finite.is_of_runs());
-    /// assert_eq!(not_finite.to_string(), "arm: the simulation gave a number that is not finite");
+    /// let (stage, trial) = ("arm".to_owned(), "a.csv".to_owned());
+    /// let beyond = GapError::NotFinite { stage, value: 1e160, time_s: 1.5, trial, asked: String::new() };
+    /// assert!(beyond.is_of_runs());
+    /// assert_eq!(
+    ///     beyond.to_string(),
+    ///     "arm: the simulation gave 1e160 at 1.5 s of trial a.csv, which is no output of a machine"
+    /// );
     /// ```
     pub fn is_of_runs(&self) -> bool {
         self.is_lost() || matches!(self, Self::Spent { .. })
@@ -137,9 +158,26 @@ impl GapError {
     pub(crate) fn asked(self, asked: String) -> Self {
         match self {
             Self::Simulator(error) => Self::Simulator(Box::new(Asked { error, asked })),
-            Self::NotFinite { stage, .. } => Self::NotFinite { stage, asked },
+            Self::NotFinite { stage, value, time_s, trial, .. } => {
+                Self::NotFinite { stage, value, time_s, trial, asked }
+            }
             other => other,
         }
+    }
+
+    /// That a stage gave a value that is no output, `at` samples after the first of all trials.
+    pub fn not_finite(simulator: &dyn Simulator, stage: usize, (at, value): (usize, f64)) -> Self {
+        let (mut trial, mut sample) = (String::new(), at);
+        for spec in simulator.trials() {
+            trial.clone_from(&spec.name);
+            if sample < spec.samples {
+                break;
+            }
+            sample -= spec.samples;
+        }
+        let time_s = sample as f64 * simulator.dt_s();
+        let stage = simulator.stages()[stage].name.clone();
+        Self::NotFinite { stage, value, time_s, trial, asked: String::new() }
     }
 
     /// An error of the simulator itself.

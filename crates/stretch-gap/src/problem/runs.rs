@@ -9,12 +9,13 @@ use std::{
 };
 
 use crate::problem::{
-    error::GapError,
+    error::{GapError, unless_lost},
     simulator::{Model, ModelRuns, Run, Simulator},
-    spec::EffectSpec,
+    spec::{EffectSpec, StageSpec},
 };
 
-/// Size of an output from which it is as good as infinite: sums of its square would be.
+/// Size of an output from which it is as good as infinite, and the same in multiples of the greatest measured value where that is less: sums
+/// of its square in variances of the noise would be.
 const MOST: f64 = 1e100;
 
 /// Runs that failed or gave numbers that are not finite.
@@ -38,6 +39,8 @@ pub(crate) struct Runs<'a> {
     count: Arc<AtomicUsize>,
     was_cut: Arc<AtomicBool>,
     lost: Arc<Mutex<Lost>>,
+    /// By stage, the size from which an output is as good as infinite.
+    most: Arc<[f64]>,
     /// What steps of integration are multiplied by.
     step: f64,
 }
@@ -52,16 +55,18 @@ impl<'a> Runs<'a> {
         stop: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Self, GapError> {
         let (count, was_cut, lost) = Default::default();
-        let runs = Self { simulator, stop, count, was_cut, lost, step: 1.0 };
-        let needed = runs.samples(simulator.trials().len());
-        for (stage, spec) in simulator.stages().iter().enumerate() {
-            let finite = simulator.measured(stage).iter().take_while(|x| x.is_finite());
-            let found = finite.take(needed).count();
+        let needed = simulator.trials().iter().map(|t| t.samples).sum();
+        let most = |(stage, spec): (usize, &StageSpec)| {
+            let measured = simulator.measured(stage).iter().take(needed);
+            let found = measured.clone().take_while(|x| x.abs() < MOST).count();
             if found < needed {
                 return Err(GapError::Measured { stage: spec.name.clone(), found, needed });
             }
-        }
-        Ok(runs)
+            let greatest = measured.fold(0.0_f64, |most, x| most.max(x.abs()));
+            Ok(if greatest > 0.0 { MOST.min(MOST * greatest) } else { MOST })
+        };
+        let most = simulator.stages().iter().enumerate().map(most).collect::<Result<_, _>>()?;
+        Ok(Self { simulator, stop, count, was_cut, lost, most, step: 1.0 })
     }
 
     /// Another simulator of the same session; its runs count here, too.
@@ -70,8 +75,8 @@ impl<'a> Runs<'a> {
         'a: 'b,
     {
         let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
-        let lost = Arc::clone(&self.lost);
-        Runs { simulator, stop: self.stop, count, was_cut, lost, step: self.step }
+        let (lost, most) = (Arc::clone(&self.lost), Arc::clone(&self.most));
+        Runs { simulator, stop: self.stop, count, was_cut, lost, most, step: self.step }
     }
 
     /// Runs with steps of integration so many times as long.
@@ -145,6 +150,17 @@ impl<'a> Runs<'a> {
     /// Samples of the first `trials` trials.
     pub(crate) fn samples(&self, trials: usize) -> usize {
         self.simulator.trials()[..trials].iter().map(|t| t.samples).sum()
+    }
+
+    /// Whether every stage of a model can be simulated over all trials, of which fits run only some.
+    ///
+    /// # Errors
+    /// What ends all.
+    pub(crate) fn can_run(&self, model: &Model) -> Result<bool, GapError> {
+        let trials = self.simulator.trials().len();
+        let mut stages = 0..self.simulator.stages().len();
+        let all = stages.try_for_each(|stage| self.output(stage, model, trials).map(drop));
+        Ok(unless_lost(all)?.is_some())
     }
 
     /// Output of a stage on its measured input over the first `trials` trials.
@@ -246,12 +262,10 @@ impl<'a> Runs<'a> {
     }
 
     fn finite(&self, stage: usize, out: Vec<f64>) -> Result<Vec<f64>, GapError> {
-        match out.iter().all(|x| x.abs() < MOST) {
-            true => Ok(out),
-            false => {
-                let stage = self.simulator.stages()[stage].name.clone();
-                Err(GapError::NotFinite { stage, asked: String::new() })
-            }
+        let is_beyond = |x: &f64| x.is_nan() || x.abs() >= self.most[stage];
+        match out.iter().position(is_beyond) {
+            None => Ok(out),
+            Some(at) => Err(GapError::not_finite(self.simulator, stage, (at, out[at]))),
         }
     }
 }

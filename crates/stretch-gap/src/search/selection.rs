@@ -10,11 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{
-        error::{GapError, unless_lost},
-        simulator::Model,
-        thresholds::Thresholds,
-    },
+    problem::{error::GapError, simulator::Model, thresholds::Thresholds},
     search::{
         acceptance::Acceptance,
         screen::{Ground, Screened},
@@ -145,18 +141,14 @@ impl<'a> Search<'a> {
         best: Hypothesis,
         rivals: &[(usize, Hypothesis)],
     ) -> Result<Hypothesis, GapError> {
-        let compare = &self.problem.compare;
-        let trials = compare.simulator().trials().len();
+        let runs = &self.problem.compare.runs;
         let mut sets: Vec<&Hypothesis> = rivals.iter().map(|(_, rival)| rival).collect();
         sets.sort_by(|a, b| b.score.total_cmp(&a.score));
         for set in std::iter::once(&best).chain(sets) {
-            let mut stages = 0..compare.metrics.len();
-            let all = stages
-                .try_for_each(|stage| compare.runs.output(stage, &set.model, trials).map(drop));
-            if unless_lost(all)?.is_some() {
+            if runs.can_run(&set.model)? {
                 return Ok(set.clone());
             }
-            compare.runs.not_judged(&set.effects);
+            runs.not_judged(&set.effects);
         }
         Ok(self.problem.nominal.clone())
     }

@@ -19,6 +19,7 @@ mod keys;
 mod pendulum;
 mod plant;
 mod predict;
+mod profile;
 mod repeated;
 mod rests;
 mod rig;

@@ -27,11 +27,8 @@ use crate::{
     },
 };
 
-/// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
-/// thousand.
-const END: f64 = 2.75;
-/// Excess that must be left for that to count: more error than noise.
-const LEFT: f64 = 1.0;
+/// Excess that must be left for parameters at the ends of their tolerances to count: more error than noise.
+pub(crate) const LEFT: f64 = 1.0;
 /// What the tolerances of such parameters are multiplied by to see whether they would explain all.
 const LOOSE: f64 = 5.0;
 /// Share of its nominal value that a parameter keeps then.
@@ -123,10 +120,8 @@ fn at_bounds(
     evidence: &Evidence,
 ) -> Result<Option<AtBounds>, GapError> {
     let simulator = problem.simulator();
-    let at_end = |index: &usize| {
-        let spec = &simulator.parameters()[*index];
-        spec.sd > 0.0 && (evidence.best.parameters[*index] - spec.nominal).abs() >= END * spec.sd
-    };
+    let at_end =
+        |index: &usize| simulator.parameters()[*index].is_at_end(evidence.best.parameters[*index]);
     let all = simulator.stages().iter().zip(&evidence.stages).enumerate();
     let worst = all
         .filter(|(_, (_, traces))| traces.excess_after > LEFT)

@@ -100,7 +100,16 @@ impl ParameterSpec {
     pub fn within(self, sd: f64) -> Self {
         Self { sd, ..self }
     }
+
+    /// Whether a re-tuned value is at the end of the parameter's tolerance.
+    pub(crate) fn is_at_end(&self, value: f64) -> bool {
+        self.sd > 0.0 && (value - self.nominal).abs() >= END * self.sd
+    }
 }
+
+/// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
+/// thousand.
+const END: f64 = 2.75;
 
 /// A parameter is at an end of its range if its distance is at most this share of the range.
 const AT_END: f64 = 1e-3;

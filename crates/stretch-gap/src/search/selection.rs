@@ -126,6 +126,7 @@ impl<'a> Search<'a> {
             match first.filter(|r| exchanges < EXCHANGES && r.score > best.score) {
                 Some(first) => best = self.grow(first.clone(), progress)?,
                 None => {
+                    let best = self.sets.straightened(best)?;
                     let best = self.of_all_trials(best, &rivals)?;
                     return Ok(Found { best: self.strongest_first(best)?, rivals });
                 }

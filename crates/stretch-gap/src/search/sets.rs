@@ -9,8 +9,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
+use stretch_effects::EffectParameter;
 
 use crate::{
+    evidence::sanity::LEFT,
     fit::{
         comparison::Sensitivities,
         hypothesis::Hypothesis,
@@ -29,6 +31,8 @@ use crate::{
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
 const STARTS: usize = 3;
 const PROMISING_START: f64 = 0.3;
+/// Places in the range of a parameter that is searched in equal ratios.
+const PLACES: usize = 6;
 /// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
@@ -221,6 +225,69 @@ impl<'a> Sets<'a> {
         Ok(found)
     }
 
+    /// A set, or where more than noise is left with parameters at the ends of their tolerances, what a fit from the parameters as shipped
+    /// finds, if that is better: they were bent before an effect was there, and then hold it where they need it.
+    pub(crate) fn straightened(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
+        for effect in set.effects.clone() {
+            let straight = match self.is_bent(&set, effect) {
+                true => unless_lost(self.begun_as_shipped(&set, effect))?.flatten(),
+                false => None,
+            };
+            if let Some(straight) = straight {
+                self.tried.insert(key(&straight.effects, None), straight.clone());
+                set = straight;
+            }
+        }
+        Ok(set)
+    }
+
+    /// Whether parameters of the stages of an effect are at the ends of their tolerances, and more than noise is left.
+    fn is_bent(&self, set: &Hypothesis, effect: usize) -> bool {
+        let simulator = self.problem.simulator();
+        let stages = simulator.effects()[effect].touches.iter();
+        let mut own = stages.flat_map(|stage| &simulator.stages()[*stage].parameters);
+        let is_at_end = |p: &usize| simulator.parameters()[*p].is_at_end(set.model.parameters[*p]);
+        own.any(is_at_end) && self.problem.gap(set) > LEFT && !self.problem.is_spent()
+    }
+
+    /// A set fitted from the parameters as shipped: at the starts of one of its effects, and with each of that effect's parameters that is
+    /// searched in equal ratios at [`PLACES`] of its range. None where that ends no better.
+    fn begun_as_shipped(
+        &self,
+        set: &Hypothesis,
+        effect: usize,
+    ) -> Result<Option<Hypothesis>, GapError> {
+        let simulator = self.problem.simulator();
+        let spec = &simulator.effects()[effect];
+        let (stages, own) = self.component(&set.effects, effect);
+        let mut model = set.model.clone();
+        model.effects.retain(|(e, _)| own.contains(e) && *e != effect);
+        for &p in stages.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
+            model.parameters[p] = self.problem.shipped.parameters[p];
+        }
+        let mut starts = spec.starts.clone();
+        for (at, p) in spec.parameters.iter().enumerate() {
+            let (true, None, Some(found)) = (p.is_log(), p.usual_form(), set.model.effect(effect))
+            else {
+                continue;
+            };
+            for place in 0..PLACES {
+                let share = (place as f64 + 0.5) / PLACES as f64;
+                let mut start = unformed(&spec.parameters, found);
+                start[at] = p.min * libm::pow(p.max / p.min, share);
+                starts.push(start);
+            }
+        }
+        let looked = starts.into_par_iter().map(|start| {
+            self.problem.compare.fit(&stages, model.with(effect, &start), &[], GLANCE)
+        });
+        let best = possible(looked)?.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let Some(best) = best else { return Ok(None) };
+        let fitted = self.problem.fit(&stages, best.model, &[], FINE)?;
+        let straight = self.join(set, set.effects.clone(), &stages, fitted);
+        Ok(Some(straight).filter(|straight| straight.score > set.score))
+    }
+
     /// The best coarse fit of every effect: where there are several starts, a glance at each says from which. With nuisances that are a little
     /// others a glance from where the set ended before is enough.
     fn coarse(
@@ -376,6 +443,12 @@ impl<'a> Sets<'a> {
         self.tried.insert(key, better.clone());
         Ok(better)
     }
+}
+
+/// Values of an effect with its forms as usual.
+fn unformed(parameters: &[EffectParameter], values: &[f64]) -> Vec<f64> {
+    let usual = |(p, value): (&EffectParameter, &f64)| p.usual_form().unwrap_or(*value);
+    parameters.iter().zip(values).map(usual).collect()
 }
 
 /// What a set is remembered by: its effects with one more, sorted.

@@ -61,6 +61,9 @@ pub enum Answer {
         closes: Closed,
         /// Effects that were found but close less than a name must.
         faint: Vec<String>,
+        /// Parameters of the simulator that are at the ends of their tolerances with these effects, with the distance in tolerances.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        ended: Vec<(String, f64)>,
     },
     /// Effects are missing, and leave more than noise.
     Partly {
@@ -75,6 +78,9 @@ pub enum Answer {
         rest: Option<Unexplained>,
         /// Effects that were found but close less than a name must.
         faint: Vec<String>,
+        /// Parameters of the simulator that are at the ends of their tolerances with these effects, with the distance in tolerances.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        ended: Vec<(String, f64)>,
     },
     /// A column of the record or a number of the rig file is wrong.
     WrongRecord {
@@ -203,6 +209,11 @@ impl Answer {
         let Findings { judged, gap, gross, shares, null_band, .. } = findings;
         let Naming { faint, .. } = &judged.seen_naming;
         let (faint, small) = (faint.clone(), faint.clone());
+        let all = simulator.parameters().iter().zip(&evidence.best.parameters);
+        let ended = all.filter(|(spec, value)| spec.is_at_end(**value));
+        let ended =
+            ended.map(|(spec, value)| (spec.name.clone(), (value - spec.nominal) / spec.sd));
+        let ended = ended.collect();
         match (judged.seen, findings.first) {
             (VerdictKind::Record, first) => {
                 let first = first.filter(|_| !gross.iter().any(Gross::is_plain));
@@ -211,7 +222,7 @@ impl Answer {
             }
             (VerdictKind::Effect, Some(first)) => {
                 let effects = missing_effects(&judged.seen_naming, shares);
-                Self::Missing { effects, closes: Closed::of(first, gap.left), faint }
+                Self::Missing { effects, closes: Closed::of(first, gap.left), faint, ended }
             }
             (VerdictKind::Partial, Some(first)) => {
                 let mut effects = missing_effects(&judged.seen_naming, shares);
@@ -223,6 +234,7 @@ impl Answer {
                     left: multiple(gap.left),
                     rest,
                     faint,
+                    ended,
                 }
             }
             (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {

@@ -163,7 +163,7 @@ impl Answer {
                      stays below {noise:.3} in 19 of 20 records like this one: it is larger, or something is missing."
                 )
             }
-            Self::Missing { effects, closes, faint } => {
+            Self::Missing { effects, closes, faint, ended } => {
                 let names: Vec<String> = effects.iter().map(alternatives).collect();
                 format!(
                     "The simulator lacks {}: {} {} of the gap on trials that were not fitted, and {}.",
@@ -171,9 +171,10 @@ impl Answer {
                     if names.len() > 1 { "together they close" } else { "it closes" },
                     closed(closes),
                     left_with(closes, probability)
-                ) + &below(effects, faint)
+                ) + &at_ends(ended)
+                    + &below(effects, faint)
             }
-            Self::Partly { effects, closes, left, rest, faint } => {
+            Self::Partly { effects, closes, left, rest, faint, ended } => {
                 let much = if *closes >= MOST { "Mostly" } else { "In part" };
                 let names: Vec<String> = effects.iter().map(with_share).collect();
                 let rest = rest.as_ref().map_or(String::new(), |rest| {
@@ -192,6 +193,7 @@ impl Answer {
                 });
                 let names = names.join(", ");
                 format!("{much} {names} of the gap on trials that were not fitted. {rest}")
+                    + &at_ends(ended)
                     + &below(effects, faint)
             }
             Self::WrongRecord { errors, corrected: None } => {
@@ -290,6 +292,21 @@ fn too_small(small: &[String]) -> String {
     match small.is_empty() {
         true => String::new(),
         false => format!(" Found, and too small to matter: {}.", small.join(", ")),
+    }
+}
+
+/// Parameters at the ends of their tolerances: what bends them may have bent the values of the effects as well.
+fn at_ends(ended: &[(String, f64)]) -> String {
+    let all: Vec<String> =
+        ended.iter().map(|(name, sigmas)| format!("{name} ({sigmas:+.1} tolerances)")).collect();
+    let (are, their) =
+        if all.len() == 1 { ("is", "its tolerance") } else { ("are", "their tolerances") };
+    match all.is_empty() {
+        true => String::new(),
+        false => format!(
+            " {} {are} at the end of {their}: the values that were found may make up for something else.",
+            all.join(" and ")
+        ),
     }
 }
 

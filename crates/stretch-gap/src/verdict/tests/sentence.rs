@@ -354,3 +354,38 @@ fn every_answer_has_its_words() {
     let values = serde_json::to_string_pretty(&values).expect("written");
     is_in_file(&folder.join("answers.json"), &(values + "\n"));
 }
+
+/// Names are given with values, and values mean less where parameters had to be bent for them.
+#[test]
+fn parameters_at_the_ends_of_their_tolerances_are_said_with_every_name() {
+    let (measured, plain, mut evidence) = line_and_lag();
+    let mostly = part(0.8, vec![share(PLAY, 0.7, false), share(LAG, 0.1, true)]);
+    let cases = [missing(&[PLAY]), missing(&[PLAY, LAG]), mostly];
+    let says = |case: &Case, evidence: &Evidence| {
+        let told = case.told(&measured, (&plain, evidence)).headline();
+        let at = told.find(": the values that were found");
+        at.map(|at| told[told[..at].rfind(". ").map_or(0, |end| end + 2)..at].to_owned())
+    };
+    for case in &cases {
+        assert_eq!(says(case, &evidence), None);
+    }
+    let simulator: &dyn Simulator = &measured;
+    let specs = simulator.parameters().iter().enumerate();
+    let all: Vec<_> = specs.filter(|(_, p)| p.sd > 0.0).collect();
+    let (one, other) = (all[0], all[1]);
+    evidence.best.parameters[one.0] = one.1.nominal + 3.0 * one.1.sd;
+    for case in &cases {
+        let said = says(case, &evidence).expect("one is at its end");
+        assert_eq!(
+            said,
+            format!("{} (+3.0 tolerances) is at the end of its tolerance", one.1.name)
+        );
+    }
+    evidence.best.parameters[other.0] = other.1.nominal - 2.8 * other.1.sd;
+    for case in &cases {
+        let said = says(case, &evidence).expect("two are at their ends");
+        let both = [(one.1, "+3.0"), (other.1, "-2.8")];
+        let both = both.map(|(p, by)| format!("{} ({by} tolerances)", p.name));
+        assert_eq!(said, format!("{} are at the end of their tolerances", both.join(" and ")));
+    }
+}

@@ -25,10 +25,9 @@ use crate::{
         sample_roles::Role,
         spec::ParameterSpec,
     },
+    search::sets::LEFT,
 };
 
-/// Excess that must be left for parameters at the ends of their tolerances to count: more error than noise.
-pub(crate) const LEFT: f64 = 1.0;
 /// What the tolerances of such parameters are multiplied by to see whether they would explain all.
 const LOOSE: f64 = 5.0;
 /// Share of its nominal value that a parameter keeps then.

@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use stretch_effects::EffectParameter;
 
 use crate::{
-    evidence::sanity::LEFT,
     fit::{
         comparison::Sensitivities,
         hypothesis::Hypothesis,
@@ -31,6 +30,8 @@ use crate::{
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
 const STARTS: usize = 3;
 const PROMISING_START: f64 = 0.3;
+/// Excess that must be left for parameters at the ends of their tolerances to count: more error than noise.
+pub(crate) const LEFT: f64 = 1.0;
 /// Places in the range of a parameter that is searched in equal ratios.
 const PLACES: usize = 6;
 /// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.

@@ -152,13 +152,14 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
 fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let column = &site.column;
     let values = among.columns.of(column).unwrap_or(&[]);
-    let before = among.before[site.stage].iter().filter(|_| site.side == Side::Input);
     // a step at the first sample is a change as any other
-    let begun = |(range, before): (&Range<usize>, Option<f64>)| {
-        before.into_iter().chain(values[range.clone()].iter().copied()).collect()
+    let begun = |range: Range<usize>| {
+        let trial = among.columns.ranges().iter().position(|all| all.start == range.start);
+        let before = trial.filter(|_| site.side == Side::Input);
+        let before = before.and_then(|trial| *among.before[site.stage].get(trial)?);
+        before.into_iter().chain(values[range].iter().copied()).collect()
     };
-    let before = before.copied().chain(std::iter::repeat(None));
-    let looked: Vec<Vec<f64>> = among.columns.looked_at().iter().zip(before).map(begun).collect();
+    let looked: Vec<Vec<f64>> = among.columns.looked_at().into_iter().map(begun).collect();
     let extent = Extent::of(looked.iter().map(Vec::as_slice), among.columns.dt_s);
     if extent.span() > 0.0 {
         return Ok(Extent { session_s: among.columns.session_s(), ..extent });

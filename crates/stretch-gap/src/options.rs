@@ -56,15 +56,22 @@ const VARIABLE: &str = "RAYON_NUM_THREADS";
 /// assert_eq!([0, 1, cores + 1, usize::MAX].map(stretch_gap::threads)[1..], [1, cores, cores]);
 /// ```
 pub fn threads(asked: usize) -> usize {
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    let said = || env::var(VARIABLE).ok()?.parse().ok().filter(|said| *said > 0);
-    let asked = if asked == 0 { said().unwrap_or(cores) } else { asked };
-    asked.min(cores)
+    let asked = if asked == 0 { said().unwrap_or(usize::MAX) } else { asked };
+    asked.min(cores())
+}
+
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What the variable says.
+fn said() -> Option<usize> {
+    env::var(VARIABLE).ok()?.parse().ok().filter(|said| *said > 0)
 }
 
 /// Caps the threads that all else shares, where `RAYON_NUM_THREADS` asks for more than there are cores. A program calls it once at its begin.
 pub fn cap_threads() {
-    if env::var_os(VARIABLE).is_some() {
+    if said().is_some_and(|said| said > cores()) {
         // where somebody has begun already, the number stays what it is
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(0)).build_global();
     }

@@ -21,7 +21,7 @@ mod _stretch {
     #[pymodule_export]
     use crate::error::StretchError;
     #[pymodule_export]
-    use crate::problem::{Entries, FixedEntries};
+    use crate::problem::{Entries, FixedEntries, comment, identifier};
     #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
     #[pymodule_export]
@@ -33,6 +33,7 @@ mod _stretch {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        stretch_gap::cap_threads();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

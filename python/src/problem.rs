@@ -259,7 +259,7 @@ impl Entries {
         let batch = how.batch.max(1);
         let workers = match (&self.file, simulator) {
             (_, Some(_)) => None,
-            (Some(file), None) => file.workers(jobs(how.threads)).map_err(said)?,
+            (Some(file), None) => file.workers(stretch_gap::threads(how.threads)).map_err(said)?,
             (None, None) => None,
         };
         if simulator.is_none() && workers.is_none() {
@@ -331,12 +331,16 @@ impl Work<Answer> {
     }
 }
 
-/// Number of workers at once: that of the processors where `threads` is 0.
-fn jobs(threads: usize) -> usize {
-    match threads {
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        given => given,
-    }
+/// A text as a line of comment in Python, whatever names are in it.
+#[pyfunction]
+pub(crate) fn comment(text: &str) -> String {
+    Language::Python.comment(text)
+}
+
+/// A name as one that Python takes.
+#[pyfunction]
+pub(crate) fn identifier(text: &str) -> String {
+    Language::identifier(text)
 }
 
 fn answer(problem: &Problem, examined: Examined) -> Answer {

@@ -10,7 +10,7 @@ from typing import Any
 
 from . import html
 from . import problem as entries
-from ._stretch import Fixed, StretchError
+from ._stretch import Fixed, StretchError, comment, identifier
 from .recordings import Array
 from .simulator import Asked
 
@@ -145,9 +145,6 @@ def fix(
             lines += ["", "", functions[name].rstrip()]
             continue
         one = described.get(name, {})
-        lines += ["", f"# {name}: {one.get('words', '')}", f"#   {one.get('equation', '')}", f"{_identifier(name)} = {values!r}"]
+        words = [f"{name}: {one.get('words', '')}", f"  {one.get('equation', '')}"]
+        lines += ["", *map(comment, words), f"{identifier(name)} = {values!r}"]
     return Fix(dict(parameters), dict(found), "\n".join(lines) + "\n", again)
-
-
-def _identifier(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name)

@@ -8,6 +8,7 @@ decided by the program's reader of NPZ files. So a file that `convert` wrote giv
 from __future__ import annotations
 
 import os
+import uuid
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -131,6 +132,8 @@ def convert(path: str | os.PathLike[str], out: str | os.PathLike[str]) -> Arrays
     """Writes what a file holds as an NPZ file that the program reads, with all its clocks; gives what was written."""
     if Path(out).suffix != ".npz":
         raise StretchError(f"{os.fspath(out)}: the name of what is written must end in .npz")
+    if Path(out).exists() and Path(out).samefile(path):
+        raise StretchError(f"{os.fspath(out)}: it is {os.fspath(path)}, which is read; name another file to write")
     found = contents(path)
     if found is None:
         recording = read(path)
@@ -139,10 +142,11 @@ def convert(path: str | os.PathLike[str], out: str | os.PathLike[str]) -> Arrays
         found.notes += recording.notes
     if not found.numbers:
         raise StretchError(f"{os.fspath(path)}: there are no numbers in it ({'; '.join(found.notes) or 'it is empty'})")
-    part = Path(f"{os.fspath(out)}.part")
+    # a name that nobody has
+    part = Path(f"{os.fspath(out)}.{uuid.uuid4().hex}.part")
     try:
         # numpy.savez takes no array that is called "file"
-        with zipfile.ZipFile(part, "w") as archive:
+        with zipfile.ZipFile(part, "x") as archive:
             for name, values in found.numbers.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, np.asarray(values), allow_pickle=False)

@@ -192,14 +192,6 @@ fn re_tuned_parameters_that_diverge_on_test_trials_end_nothing() {
 }
 
 #[test]
-fn what_diverges_on_test_trials_with_an_effect_alone_leaves_the_rest() {
-    // as shipped and re-tuned it can be simulated; with the compliance that it has beside the play it cannot
-    let told =
-        spring_told(2.0, &["output.backlash", "output.lag", "output.curve"], |c, _, u| c * u);
-    assert_eq!(told.expect("an answer").named, ["output.backlash"]);
-}
-
-#[test]
 fn answers_beyond_all_squares_are_refused_with_trial_time_and_value() {
     for (trial, from_s) in [(0, "0 s of trial t0.csv"), (1, "0 s of trial t1.csv")] {
         for (beyond, shown) in [(1e160, "1e160"), (-1e200, "-1e200"), (f64::INFINITY, "inf")] {

@@ -27,6 +27,8 @@ struct Output {
     path: PathBuf,
     /// How such a file is called in the help: `cal.json`.
     example: String,
+    /// Whether the command makes recordings of recordings, so that one may replace another.
+    makes_recordings: bool,
 }
 
 fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
@@ -38,6 +40,8 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
             option: format!("--{name}"),
             path: path.clone(),
             example: example.clone(),
+            // estimates have words in their rows and are not taken for a recording
+            makes_recordings: command.get_name() != "apply",
         }));
     }
     if let Some((name, matches)) = matches.subcommand()
@@ -55,12 +59,12 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
 pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
     let mut outputs = Vec::new();
     named(command, matches, &mut outputs);
-    for Output { option, path, example } in &outputs {
+    for Output { option, path, example, makes_recordings } in &outputs {
         let ending = Path::new(example).extension();
         let is_expected = ending.is_some() && path.extension() == ending;
         let such_as = ending.map_or(String::new(), |_| format!(", such as {example}"));
         ensure!(
-            is_expected || example.contains(".csv") || !is_recording(path),
+            (*makes_recordings && (is_expected || example.contains(".csv"))) || !is_recording(path),
             "{option} {}: this file is a recording, and what would replace it is none; name another file{such_as} (a shell makes of \
              {option} *.csv the names of all recordings)",
             path.display()

@@ -9,10 +9,11 @@ use crate::support::{
 };
 
 /// Commands that write `OUT` over one of the files that they read.
-const OVER_INPUTS: [(&str, &str); 33] = [
+const OVER_INPUTS: [(&str, &str); 34] = [
     // a shell makes of --out r*.csv the names of all recordings, the first of which is no input
     ("calibrate --out OUT b.csv", "a.csv"),
     ("calibrate a.csv --out cal.json --report OUT", "b.csv"),
+    ("apply --calibration cal.json --out OUT b.csv", "a.csv"),
     ("calibrate b.csv a.csv --out OUT", "a.csv"),
     ("calibrate a.csv --out new.json --report OUT", "a.csv"),
     ("calibrate a.csv --out new.json --json=OUT", "a.csv"),

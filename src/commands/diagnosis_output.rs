@@ -187,15 +187,15 @@ fn implement(out: &mut Vec<String>, all: &[Implementation], diagnosis: &Diagnosi
 }
 
 fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    let moved: Vec<_> = diagnosis
-        .parameters
-        .iter()
-        .filter(|p| p.is_evidence && (p.sigmas.abs() > 1.0 || bent(p) > 1.0))
-        .collect();
+    let moved: Vec<_> =
+        diagnosis.parameters.iter().filter(|p| p.sigmas.abs() > 1.0 || bent(p) > 1.0).collect();
     if moved.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
         return;
     }
-    out.push("\nNominal parameters that moved by more than their tolerance:".to_owned());
+    out.push(
+        "\nNominal parameters that moved by more than their tolerance, with the effect or without it:"
+            .to_owned(),
+    );
     let rows = moved.iter().map(|p| {
         vec![
             p.name.clone(),
@@ -205,8 +205,7 @@ fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
             if diagnosis.named.is_empty() { "-".to_owned() } else { number(p.bent) },
         ]
     });
-    let header =
-        ["parameter", "as shipped", "re-tuned", "tolerances", "bent to, without the effect"];
+    let header = ["parameter", "as shipped", "re-tuned", "moved, tolerances", "without the effect"];
     out.push(table(&header, rows));
 }
 

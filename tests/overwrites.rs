@@ -115,13 +115,14 @@ fn a_refusal_names_the_option_and_the_input() {
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
     }
     // a pipe from a file is that file
+    scratch.write("begun.csv", "time_s,bridge_v\n");
     let before = tree(&scratch.path(""));
-    let mut piped = command(&scratch, "apply --calibration cal.json - --out a.csv");
-    let from = fs::File::open(scratch.path("a.csv")).unwrap();
+    let mut piped = command(&scratch, "apply --calibration cal.json - --out begun.csv");
+    let from = fs::File::open(scratch.path("begun.csv")).unwrap();
     let output = piped.stdin(from).stderr(Stdio::piped()).output().unwrap();
     let message = one_line(&String::from_utf8_lossy(&output.stderr));
     assert!(!output.status.success(), "{message}");
-    assert!(message.contains("--out a.csv") && message.contains("standard input"), "{message}");
+    assert!(message.contains("--out begun.csv") && message.contains("standard input"), "{message}");
     assert!(tree(&scratch.path("")) == before);
 }
 
@@ -159,7 +160,8 @@ fn what_is_no_loss_is_done() {
         "evaluate --calibration cal.json a.csv --json=/dev/stdout",
         // an output of yesterday
         "calibrate a.csv --out cal.json --report cal.html",
-        "apply --calibration cal.json a.csv --out b.csv",
+        "apply --calibration cal.json a.csv --out estimate.csv",
+        "apply --calibration cal.json b.csv --out estimate.csv",
         "convert a.csv --out out.csv",
         // in its own place, by design
         "export --calibration cal.json --seal",

@@ -2,7 +2,7 @@
 
 use pyo3::{prelude::*, types::PyDict};
 use stretch_calibrate::LiveReceptor;
-use stretch_core::Branch;
+use stretch_core::Target;
 
 /// What a receptor answers for one sample.
 #[pyclass(frozen, module = "stretch_gap", get_all)]
@@ -51,10 +51,7 @@ impl Receptor {
         Some(Reading {
             estimate: reading.estimate,
             rate: reading.rate,
-            branch: match reading.branch {
-                Branch::Inflation => "rising",
-                Branch::Deflation => "falling",
-            },
+            branch: Target::Direct.branch_name(reading.branch),
             domain: reading.domain.to_string(),
             sd: reading.sd,
         })

@@ -83,9 +83,7 @@ impl<'a> PreparedProblem<'a> {
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
         // Whatever is found is compared with the simulator as shipped, over all trials.
-        for stage in 0..simulator.stages().len() {
-            runs.output(stage, &Model::nominal(simulator), simulator.trials().len())?;
-        }
+        runs.try_all(&Model::nominal(simulator))?;
         // Try twice the step, if the change from halving it stays within the limit. Not for counted
         // runs, because these may be an external program's.
         if simulator.model_runs().is_none() {

@@ -152,15 +152,22 @@ impl<'a> Runs<'a> {
         self.simulator.trials()[..trials].iter().map(|t| t.samples).sum()
     }
 
-    /// Whether every stage of a model can be simulated over all trials, of which fits run only some.
+    /// Simulates every stage of a model over all trials, of which fits run only some.
     ///
     /// # Errors
-    /// What ends all.
-    pub(crate) fn can_run(&self, model: &Model) -> Result<bool, GapError> {
+    /// Why a stage cannot be simulated.
+    pub(crate) fn try_all(&self, model: &Model) -> Result<(), GapError> {
         let trials = self.simulator.trials().len();
         let mut stages = 0..self.simulator.stages().len();
-        let all = stages.try_for_each(|stage| self.output(stage, model, trials).map(drop));
-        Ok(unless_lost(all)?.is_some())
+        stages.try_for_each(|stage| self.output(stage, model, trials).map(drop))
+    }
+
+    /// Whether every stage of a model can be simulated over all trials.
+    ///
+    /// # Errors
+    /// An error that ends the diagnosis.
+    pub(crate) fn can_run(&self, model: &Model) -> Result<bool, GapError> {
+        Ok(unless_lost(self.try_all(model))?.is_some())
     }
 
     /// Output of a stage on its measured input over the first `trials` trials.

@@ -1,6 +1,6 @@
-//! Where what stands in front of a stage begins a trial.
+//! The command at which the operators in front of a stage begin a trial.
 //!
-//! A trial that begins with the step of its command begins at rest elsewhere: at the command from before, which nobody recorded. A memory
+//! A trial that begins with the step of its command begins at rest at the command before the step, which was not recorded. A memory
 //! in front of the stage (a limit of the rate, a lag, a delay) is still there, and so is the output. Where the output says which command
 //! that was, the memory begins with it:
 //!
@@ -76,7 +76,7 @@ pub(crate) fn begins(
 struct Line {
     offset: f64,
     slope: f64,
-    /// One standard deviation of the commands beside the line.
+    /// Standard deviation of the commands from the line.
     left: f64,
 }
 

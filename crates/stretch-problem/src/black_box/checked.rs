@@ -42,7 +42,7 @@ pub struct Checked {
     pub(crate) off: Vec<f64>,
     /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
-    /// By stage, where what stands in front of it begins.
+    /// By stage, the commands at which the operators in front of it begin.
     pub(crate) before: Vec<Before>,
     /// The entries of the problem, without the recordings.
     pub(crate) spec: ProblemSpec,
@@ -255,7 +255,7 @@ fn begins_of(stage: &StageEntry, noise: &Noise, columns: &Columns) -> Begins {
     begins((&inputs, of(&stage.output)), (&parts.0, &parts.1), noise.sd())
 }
 
-/// That what stands in front of a stage begins with a step from nobody knows where.
+/// A note on trials that begin with a step from an unknown command.
 fn begins_note(begun: &[Begins], wrappers: &[Placed]) -> Option<String> {
     let in_front = wrappers.iter().filter(|w| w.site.side == Side::Input);
     let unknown = |w: &Placed| begun[w.site.stage].unknown;

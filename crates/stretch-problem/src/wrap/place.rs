@@ -54,7 +54,7 @@ pub(crate) struct Placed {
 /// Columns, stages and kinds among which wrappers are placed.
 pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
-    /// By stage, where what stands in front of it begins.
+    /// By stage, the commands at which the operators in front of it begin.
     pub(crate) before: &'a [Before],
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
@@ -152,9 +152,10 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
 fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let column = &site.column;
     let values = among.columns.of(column).unwrap_or(&[]);
+    let trials = among.columns.ranges();
     // a step at the first sample is a change as any other
     let begun = |range: Range<usize>| {
-        let trial = among.columns.ranges().iter().position(|all| all.start == range.start);
+        let trial = trials.iter().position(|all| all.start == range.start);
         let before = trial.filter(|_| site.side == Side::Input);
         let before = before.and_then(|trial| *among.before[site.stage].get(trial)?);
         before.into_iter().chain(values[range].iter().copied()).collect()

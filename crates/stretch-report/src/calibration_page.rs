@@ -18,6 +18,7 @@ use super::{
     markup::{fixed, number, with_unit},
     memory_figure::{loop_figure, remembers, step_figure},
     page::Page,
+    signal_figure::signal_figure,
     subject::Subject,
     surface_figure::{slice_figure, surface_figure},
 };
@@ -67,6 +68,7 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let names = method_names(calibrated, evaluation);
     // the picture first: what the numbers below it mean is seen there
     over_time(page, evaluation, &names);
+    loops(page, calibrated, evaluation, &names);
     judged(page, evaluation, &names, context);
     errors(page, evaluation, &names);
     shapes(page, calibrated, &evaluation.unit);
@@ -213,6 +215,28 @@ fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     if more > 0 {
         page.text(&format!("{more} more recordings are in the tables only."));
     }
+}
+
+/// The loop of the sensor, with the best calibration over it.
+fn loops(
+    page: &mut Page,
+    calibrated: &[(&str, &Calibrated)],
+    evaluation: &Evaluation,
+    names: &[String],
+) {
+    let (Some((_, first)), Some(best)) = (calibrated.first(), best(&evaluation.pooled)) else {
+        return;
+    };
+    let name = names.get(best).map_or("", String::as_str);
+    page.section(
+        "Signal and reference",
+        "A sensor without memory gives one curve. Hysteresis gives a loop: the signal at one length differs between rising and \
+         falling. Samples at rest (slower than 5 % of the fastest) are left out.",
+    );
+    page.figure(
+        &signal_figure(evaluation, (best, name), first.calibration.spec().signal.as_str()),
+        "All recordings, and the estimates in the eight seconds with the most motion.",
+    );
 }
 
 fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {

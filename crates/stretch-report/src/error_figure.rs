@@ -134,7 +134,7 @@ fn points(evaluation: &Evaluation, methods: usize, against: Against) -> Vec<Vec<
 }
 
 /// Central differences of the reference over eleven samples; NaN at the ends.
-fn rates(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+pub(crate) fn rates(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     let mut rates = vec![f64::NAN; values.len()];
     let spans = time_s.windows(2 * REACH + 1).zip(values.windows(2 * REACH + 1));
     for (rate, (t, y)) in rates.iter_mut().skip(REACH).zip(spans) {

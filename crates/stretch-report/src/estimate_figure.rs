@@ -105,7 +105,7 @@ fn window_figure(
 
 /// The window of [`WINDOW_S`] in which the reference travels farthest, in the
 /// middle half of the trial: neither its start nor its end.
-fn liveliest(trial: &TrialErrors) -> Option<Range<f64>> {
+pub(crate) fn liveliest(trial: &TrialErrors) -> Option<Range<f64>> {
     let span = extent(trial.time_s.iter().copied())?;
     let length = span.end - span.start;
     if length <= WINDOW_S {

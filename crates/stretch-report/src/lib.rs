@@ -20,6 +20,7 @@ mod output_table;
 mod page;
 mod predict_page;
 mod script;
+mod signal_figure;
 mod subject;
 mod surface_figure;
 mod thin;

@@ -145,10 +145,10 @@ fn a_page_is_one_well_formed_file_with_every_figure() {
     let page = made.page(&context("tuesday"));
     let all = elements(&page);
     let count = |name: &str| all.iter().filter(|e| *e == name).count();
-    // twice over time, errors twice, histogram, two surfaces, two cuts
-    assert_eq!(count("figure"), 9);
-    // three of them in a shape for phones and one for desktops
-    assert_eq!(count("svg"), 12);
+    // twice over time, signal and reference, errors twice, histogram, two surfaces, two cuts
+    assert_eq!(count("figure"), 10);
+    // four of them in a shape for phones and one for desktops
+    assert_eq!(count("svg"), 14);
     assert!(!page.contains("class=\"missing\""));
     // methods, comparisons, signals; coefficients of three fits, orders of two
     assert_eq!(count("table"), 8);
@@ -249,6 +249,7 @@ fn data_without_a_number_give_notes_and_no_panic() {
         trial: "void".into(),
         methods: methods.clone(),
         time_s: (0..samples).map(|n| n as f64 * 0.01).collect(),
+        signal: vec![value; samples],
         reference: vec![value; samples],
         estimates: vec![vec![value; samples]; 2],
         rates: vec![vec![f64::NAN; samples]; 2],

@@ -34,6 +34,7 @@ fn trial(name: &str, pooled: &[MethodErrors]) -> TrialErrors {
         methods: pooled.to_vec(),
         estimates: (0..pooled.len()).map(estimate).collect(),
         rates: vec![time_s.iter().map(|t| 33.0 * (1.1 * t).sin()).collect(); pooled.len()],
+        signal: reference.iter().map(|x| 1.0 + 0.01 * x).collect(),
         time_s,
         reference,
     }

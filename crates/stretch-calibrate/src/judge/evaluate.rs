@@ -94,6 +94,9 @@ pub struct TrialErrors {
     /// Time stamps, in seconds.
     #[serde(skip)]
     pub time_s: Vec<f64>,
+    /// The signal, as it was recorded.
+    #[serde(skip)]
+    pub signal: Vec<f64>,
     /// The reference.
     #[serde(skip)]
     pub reference: Vec<f64>,
@@ -171,6 +174,7 @@ pub fn evaluate(
             trial: trial.name.clone(),
             methods: errors,
             time_s: trial.time_s.clone(),
+            signal: trial.require(first.spec().signal.as_str())?.to_vec(),
             reference,
             rates: methods.iter().map(|m| m.rates.clone()).collect(),
             estimates: methods.into_iter().map(|m| m.values).collect(),

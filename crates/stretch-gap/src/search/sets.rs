@@ -286,7 +286,9 @@ impl<'a> Sets<'a> {
         let Some(best) = best else { return Ok(None) };
         let fitted = self.problem.fit(&stages, best.model, &[], FINE)?;
         let straight = self.join(set, set.effects.clone(), &stages, fitted);
-        Ok(Some(straight).filter(|straight| straight.score > set.score))
+        // An effect at the end of its range holds parameters no better than their own tolerances do.
+        let is_bound = straight.is_at_bound(effect, simulator.effects());
+        Ok(Some(straight).filter(|straight| straight.score > set.score && !is_bound))
     }
 
     /// The best coarse fit of every effect: where there are several starts, a glance at each says from which. With nuisances that are a little

@@ -61,5 +61,9 @@ fn live(header: &Header) -> String {
     has.extend(header.array.is_none().then_some("one"));
     has.extend(header.pressure.then_some("pressure"));
     let pins: Vec<String> = (0..header.array.unwrap_or(0)).map(|k| format!("A{k}")).collect();
-    kept(include_str!("arduino/Live.ino"), &has).replace("@PINS@", &pins.join(", "))
+    let [rising, falling] = header.branches;
+    kept(include_str!("arduino/Live.ino"), &has)
+        .replace("@PINS@", &pins.join(", "))
+        .replace("@RISING@", rising)
+        .replace("@FALLING@", falling)
 }

@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 use stretch_calibrate::{
     CalibrateError, RecordNumbers, SpellingError, calibration_seal, fixed_record,
 };
-use stretch_core::{Calibration, Label, Model, Provenance, SampleRate};
+use stretch_core::{Branch, Calibration, Label, Model, Provenance, SampleRate, Target};
 use stretch_receptor::code::Adc;
 use stretch_sleeve::{ArrayCalibration, GaugeCalibration, Turns, array_seal};
 
@@ -78,6 +78,8 @@ pub struct Header {
     pub pressure: bool,
     /// Gauges of an array, which are sampled together; none of a calibration of one.
     pub array: Option<usize>,
+    /// Names of the branches: rising or inflation, falling or deflation.
+    pub branches: [&'static str; 2],
 }
 
 /// A calibration as a C99 header that compiles as C++11 too.
@@ -195,6 +197,7 @@ pub fn array_header<const N: usize>(
         sample_rate: calibration.spec().sample_rate_hz,
         provenance: &calibration.spec().provenance,
         seal: array_seal(calibration).map_err(ExportError::NoRecord)?,
+        target: Target::Direct,
     };
     let made = assembled(
         &source,
@@ -213,6 +216,7 @@ struct Source<'a> {
     sample_rate: SampleRate,
     provenance: &'a Provenance,
     seal: u32,
+    target: Target,
 }
 
 impl<'a> Source<'a> {
@@ -223,6 +227,7 @@ impl<'a> Source<'a> {
             sample_rate: calibration.spec().sample_rate_hz,
             provenance: &calibration.spec().provenance,
             seal,
+            target: calibration.spec().target,
         }
     }
 }
@@ -237,7 +242,7 @@ fn assembled(
 ) -> Header {
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
-    let branches = !has.contains(&"array");
+    let has_branches = !has.contains(&"array");
     let mut text = opening(source, form, &model, &has) + &frame(source, options);
     text += "\n/* ---- the record ---- */\n\n";
     text += &constants.into_text();
@@ -252,7 +257,7 @@ fn assembled(
         ),
     };
     let step = step.iter().copied();
-    let parts: Vec<&str> = if branches {
+    let parts: Vec<&str> = if has_branches {
         text += include_str!("c/branches.h");
         [begin, reading]
             .into_iter()
@@ -265,7 +270,8 @@ fn assembled(
     parts.iter().for_each(|part| text += &kept(part, &has));
     text += self_test;
     text += "\n#endif\n";
-    Header { text, form, model, pressure, array: None }
+    let branches = [Branch::Inflation, Branch::Deflation].map(|b| source.target.branch_name(b));
+    Header { text, form, model, pressure, array: None, branches }
 }
 
 /// What the file is, for whoever opens it.

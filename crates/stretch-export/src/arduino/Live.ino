@@ -68,7 +68,7 @@ void loop() {
   Serial.print(reading.estimate, 3);
 @end
   Serial.print(" " STRETCH_UNIT);
-  Serial.print(reading.branch == STRETCH_INFLATION ? " inflation" : " deflation");
+  Serial.print(reading.branch == STRETCH_INFLATION ? " @RISING@" : " @FALLING@");
   Serial.println(reading.domain == STRETCH_INSIDE ? "" : " outside the calibrated domain");
 @end
 @if array

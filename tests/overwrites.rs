@@ -97,11 +97,11 @@ fn a_refusal_names_the_option_and_the_input() {
     for (line, parts) in [
         (
             "convert a.csv --out ./a.csv",
-            ["a.csv: cannot open it", "--out ./a.csv would be written over it"],
+            ["a.csv: cannot open it", "--out ./a.csv would overwrite it"],
         ),
         (
             "apply --calibration cal.json a.csv --out cal.json",
-            ["cal.json: cannot read it", "--out cal.json would be written over it"],
+            ["cal.json: cannot read it", "--out cal.json would overwrite it"],
         ),
         (
             "calibrate --out a.csv b.csv",
@@ -109,7 +109,7 @@ fn a_refusal_names_the_option_and_the_input() {
         ),
         (
             "calibrate a.csv --out x.json --report ./x.json",
-            ["--report ./x.json", "--out x.json goes there as well"],
+            ["--report ./x.json", "--out x.json is written there, too"],
         ),
     ] {
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
@@ -144,7 +144,7 @@ fn two_outputs_of_one_name_are_refused_before_anything_is_there() {
         "sleeve renew --prior prior.json a.csv --out x --json=./x",
         "demo --out x --json=x/d.json",
     ] {
-        let parts = ["x", "goes there as well; name another file for one of them"];
+        let parts = ["x", "is written there, too; choose another file for one of them"];
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
         assert!(tree(&scratch.path("")) == before, "{line}");
     }

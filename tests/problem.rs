@@ -94,7 +94,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let (is_good, text) = said(folder.path(), &["--fix", fixed.to_str().unwrap()]);
     assert!(is_good && text.contains("the problem re-tuned, with brake"), "{text}");
     let (is_good, text) = said(folder.path(), &["--fix", file.to_str().unwrap()]);
-    assert!(!is_good && text.contains("would be written over it"), "{text}");
+    assert!(!is_good && text.contains("would overwrite it"), "{text}");
     assert!(fs::read_to_string(&fixed).unwrap().contains("value = "));
     let json = folder.path().join("again.json");
     let (is_good, text) = said(&fixed, &[json_to(&json).as_str()]);
@@ -169,7 +169,7 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         (
             "output = \"angle_deg\"",
             "outptu = \"angle_deg\"",
-            "row 3, key stage[0].outptu: nothing reads it (did you mean output?)",
+            "row 3, key stage[0].outptu: unknown (did you mean output?)",
         ),
         ("file = \"a.csv\"", "file = \"b.csv\"", "b.csv"),
         ("command_V", "comand_V", "there is no column comand_V (did you mean command_V?)"),

@@ -148,7 +148,7 @@ impl DataSet {
         let differs = (stamped_hz / self.rate_hz - 1.0).abs() > 0.05;
         differs.then(|| {
             format!(
-                "dataset.toml says rate_hz = {}, the stamps of {} say {stamped_hz:.2} Hz: the stamps are believed; correct \
+                "dataset.toml says rate_hz = {}, the stamps of {} say {stamped_hz:.2} Hz: the stamps are used; correct \
                  whichever is wrong",
                 self.rate_hz, trial.name
             )

@@ -97,7 +97,7 @@ pub enum DataError {
     },
     /// A test trial whose samples are those of a trial that may be fitted.
     #[error(
-        "{test} is to be tested on and holds the samples of {fit}, which is fitted: what was fitted on tests nothing; record another trial, or leave one of them out"
+        "{test} is a test trial, and it holds the samples of {fit}, which is fitted; a fitted trial cannot be a test: record another trial, or leave one of them out"
     )]
     FittedAndTested {
         /// The trial that may be fitted.
@@ -106,7 +106,7 @@ pub enum DataError {
         test: String,
     },
     /// A session in which no trial has two samples.
-    #[error("no trial has two samples; give at least one recording")]
+    #[error("no recording has two or more rows; give a recording that has")]
     NoSamples,
     /// TOML that cannot be parsed at all.
     #[error("{file}, row {row}: this is not TOML: {message}")]

@@ -231,7 +231,7 @@ impl Even {
             )),
             _ => self.notes.extend(gaps.iter().map(|(lost_s, at_s)| {
                 format!(
-                    "{name}: {lost_s:.3} s are missing after {at_s:.2} s; it goes on as a trial of its own"
+                    "{name}: {lost_s:.3} s are missing after {at_s:.2} s; the part behind the gap is a trial of its own"
                 )
             })),
         }

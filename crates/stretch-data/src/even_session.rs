@@ -114,7 +114,7 @@ fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataErr
 /// assert_eq!(session.trials()[1].name(), "a.csv (part 2)");
 /// assert_eq!(
 ///     session.notes(),
-///     ["a.csv: 0.800 s are missing after 0.99 s; it goes on as a trial of its own"]
+///     ["a.csv: 0.800 s are missing after 0.99 s; the part behind the gap is a trial of its own"]
 /// );
 /// # Ok::<(), stretch_data::DataError>(())
 /// ```
@@ -191,7 +191,7 @@ impl EvenSession {
             return order;
         }
         self.notes.push(
-            "the trials give no rising start_s: pauses of 15 s in the order of the file are assumed"
+            "start_s does not rise from trial to trial: the order of the file and pauses of 15 s are assumed"
                 .into(),
         );
         let mut at_s = 0.0;

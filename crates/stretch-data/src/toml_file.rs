@@ -39,7 +39,7 @@ const LARGEST_BYTES: usize = 4 << 20;
 /// assert_eq!(fails("gain = 'ten'"), "servo.toml, row 1, key gain: \"ten\" is not a number");
 /// assert_eq!(
 ///     fails("gain = 10\ncolumms = []"),
-///     "servo.toml, row 2, key columms: nothing reads it (did you mean columns?); known are gain, columns"
+///     "servo.toml, row 2, key columms: unknown (did you mean columns?); known are gain, columns"
 /// );
 /// assert!(fails("gain = 10\ntau_s = = 0.2").starts_with("servo.toml, row 2: this is not TOML"));
 /// # Ok::<(), stretch_data::DataError>(())
@@ -297,11 +297,7 @@ impl Error for Refusal {
     }
 
     fn unknown_field(field: &str, known: &'static [&'static str]) -> Self {
-        Self::custom(format!(
-            "nothing reads it{}; known are {}",
-            meant(field, known),
-            known.join(", ")
-        ))
+        Self::custom(format!("unknown{}; known are {}", meant(field, known), known.join(", ")))
     }
 
     fn unknown_variant(variant: &str, known: &'static [&'static str]) -> Self {

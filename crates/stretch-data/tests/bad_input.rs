@@ -92,7 +92,7 @@ fn rig_files() {
         ),
         (
             "[muscle]\ntau_m = { value = 1, tolerence = 0.5 }",
-            "r, row 2, key muscle.tau_m.tolerence: nothing reads it (did you mean tolerance?); known are value, tolerance, tolerance_abs",
+            "r, row 2, key muscle.tau_m.tolerence: unknown (did you mean tolerance?); known are value, tolerance, tolerance_abs",
         ),
         ("seed = 3", "r, row 1, key seed: 3 is not a table"),
         ("[[effect]]\nh = 0.2", "r, row 1, key effect[0].name: it is missing; write it"),

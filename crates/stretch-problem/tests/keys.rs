@@ -94,12 +94,12 @@ fn a_text_stands_for_a_list_of_one_and_wrong_values_are_named_with_their_key() {
         (
             "output = 'y'",
             "outptu = 'y'",
-            "p, row 4, key stage[0].outptu: nothing reads it (did you mean output?); known are name, output",
+            "p, row 4, key stage[0].outptu: unknown (did you mean output?); known are name, output",
         ),
         (
             "value = 1",
             "valeu = 1",
-            "p, row 8, key parameter[0].valeu: nothing reads it (did you mean value?)",
+            "p, row 8, key parameter[0].valeu: unknown (did you mean value?)",
         ),
         ("value = 1", "", "p, row 6, key parameter[0].value: it is missing; write it"),
         (

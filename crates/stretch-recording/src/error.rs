@@ -19,7 +19,7 @@ pub enum RecordingError {
     Data(#[from] DataError),
     /// A file without a byte, or with blank lines only.
     #[error(
-        "{file}: the file is empty; it needs a header line with the names of its columns, then a row a sample"
+        "{file}: the file is empty; it needs a header line with the names of its columns, then one row per sample"
     )]
     Empty {
         /// The file.
@@ -35,7 +35,7 @@ pub enum RecordingError {
     },
     /// Lines of text without a row of numbers.
     #[error(
-        "{file}: none of its first {lines} lines is a row of numbers (the first is \"{first}\"); write a line a sample, with a separator between its numbers"
+        "{file}: none of its first {lines} lines is a row of numbers (the first is \"{first}\"); write one line per sample, with a separator between its numbers"
     )]
     NoNumbers {
         /// The file.
@@ -169,7 +169,7 @@ pub enum RecordingError {
     },
     /// Other columns than there are names for them.
     #[error(
-        "{file}, row {row}: there are {found} numbers where {given} columns were named; name as many"
+        "{file}, row {row}: the row has {found} numbers, but --columns names {given}; give {found} names"
     )]
     Named {
         /// The file.
@@ -240,7 +240,7 @@ pub enum RecordingError {
         missing: DataError,
     },
     /// Nothing but a time.
-    #[error("{file}: no channel of numbers has a clock{}", if notes.is_empty() { String::new() } else { format!(" ({notes})") })]
+    #[error("{file}: it holds no column of numbers besides the time{}", if notes.is_empty() { String::new() } else { format!(" ({notes})") })]
     NoChannels {
         /// The file.
         file: String,

@@ -108,7 +108,7 @@ pub(crate) fn joined(
             tracks.into_iter().partition(|t| t.channels.iter().any(is_asked));
         tracks = needed;
         let clocks: Vec<_> = other.into_iter().map(|t| t.label).collect();
-        note(&mut notes, "left out, nothing asked for is on these clocks", &clocks);
+        note(&mut notes, "left out, because no requested column is on these clocks", &clocks);
     }
     let mut left_out = Vec::new();
     for track in &mut tracks {
@@ -190,7 +190,7 @@ pub(crate) fn sparse(
         let label = format!("{} of {}", stamps.name, channel.name);
         tracks.push((rows, Track { label, stamps, channels: vec![channel] }));
     }
-    note(notes, "columns with blanks have the clock of their own rows", &names);
+    note(notes, "columns with blanks keep the time stamps of their filled rows", &names);
     track.channels = others;
     let own = tracks.into_iter().map(|(_, track)| track);
     std::iter::once(track).filter(|t| !t.channels.is_empty()).chain(own).collect()
@@ -380,7 +380,7 @@ fn on_one_grid(
     for track in timed {
         for channel in &track.channels {
             if channels.iter().any(|other| other.name == channel.name) {
-                notes.push(format!("{} stands on two clocks; the first is taken", channel.name));
+                notes.push(format!("{} appears on two clocks; the first is used", channel.name));
                 continue;
             }
             let held = HELD.contains(&channel.name.as_str());
@@ -456,10 +456,13 @@ fn tell(
             ""
         };
     let slower = timed.iter().any(|t| grid_hz.is_some_and(|hz| hz < 0.99 * t.rate_hz()));
-    let unfiltered =
-        if slower { "; nothing is filtered, so that what is faster folds down" } else { "" };
+    let unfiltered = if slower {
+        "; no low-pass filter is applied, so content above half the new rate aliases"
+    } else {
+        ""
+    };
     notes.push(format!(
-        "brought to {onto} by straight lines{commands}: {}{unfiltered}",
+        "resampled to {onto} by linear interpolation{commands}: {}{unfiltered}",
         listed(&moved)
     ));
     let ends = timed.iter().fold((f64::MAX, f64::MIN), |(first, last), t| {
@@ -468,7 +471,7 @@ fn tell(
     let (begin_s, end_s) = (from_s - ends.0, ends.1 - to_s);
     if begin_s > 0.0 || end_s > 0.0 {
         notes.push(format!(
-            "{begin_s:.3} s at the beginning and {end_s:.3} s at the end are left out: not every clock runs there"
+            "{begin_s:.3} s at the beginning and {end_s:.3} s at the end are left out, because not every clock covers them"
         ));
     }
     if dropped > 0 {

@@ -197,9 +197,11 @@ impl ReadOptions {
         has_time: bool,
         stated: Option<(f64, String)>,
     ) -> Option<(f64, String)> {
-        let given = self.sample_rate_hz.map(|rate_hz| (rate_hz, "was said".to_owned()));
-        let stated = || stated.map(|(rate_hz, by)| (rate_hz, format!("{by} above it says")));
-        let usual = || Some((self.untimed_hz?, "is usual; --time RATEhz sets another".to_owned()));
+        let given = self.sample_rate_hz.map(|rate_hz| (rate_hz, "as the option says".to_owned()));
+        let stated = || stated.map(|(rate_hz, by)| (rate_hz, format!("as {by} above it says")));
+        let usual = || {
+            Some((self.untimed_hz?, "because it states no rate; --time RATEhz sets one".to_owned()))
+        };
         given.or_else(|| stated().or_else(usual).filter(|_| !has_time))
     }
 

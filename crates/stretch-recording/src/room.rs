@@ -51,7 +51,7 @@ impl Room {
         }
         let most = self.most >> 20;
         Err(format!(
-            "once it is read it takes more than {most} MB of memory, and a file of its size may take no more; save it unpacked, or in parts"
+            "it needs more than {most} MB of memory when it is read, which is the limit for a file of its size; save it unpacked, or in parts"
         ))
     }
 
@@ -141,7 +141,7 @@ impl<R: Read> Read for Unpacked<R> {
         self.given += read as u64;
         if self.given > UNPACKED + RATIO * self.decoder.get_ref().count.get() {
             return Err(io::Error::other(format!(
-                "it unpacks to more than {RATIO} times its size, as no recording does; unpack it with gunzip and look at it"
+                "it unpacks to more than {RATIO} times its size, which is more than any recording; unpack it with gunzip and look at it"
             )));
         }
         Ok(read)

@@ -67,7 +67,7 @@ impl Format {
             _ if is_page(head) => {
                 Self::Foreign("HTML", "a server answered in place of the file; download it again")
             }
-            _ if is_json(head) => Self::Foreign("JSON", "write a row a sample as CSV"),
+            _ if is_json(head) => Self::Foreign("JSON", "write CSV with one row per sample"),
             _ => match (find(&PYTHON), find(&FOREIGN)) {
                 (Some((what, extra)), _) => Self::Python(what, extra),
                 (None, Some((what, todo))) => Self::Foreign(what, todo),

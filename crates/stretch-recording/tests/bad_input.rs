@@ -30,7 +30,7 @@ fn files_that_are_not_there_or_hold_nothing() {
     assert_eq!(error.to_string(), "no/such.csv: cannot open it: No such file or directory");
     assert!(!error.is_row());
     let empty = "t.csv: the file is empty; it needs a header line with the names of its columns, \
-                 then a row a sample";
+                 then one row per sample";
     says("", empty);
     says("\u{feff}\r\n\n", empty);
     says(
@@ -46,7 +46,7 @@ fn files_that_are_not_there_or_hold_nothing() {
     says(
         "(1.0) can0 123#2710\n(1.1) can0 123#2711\n",
         "t.csv: none of its first 2 lines is a row of numbers (the first is \"(1.0) can0 123#2710\"); \
-         write a line a sample, with a separator between its numbers",
+         write one line per sample, with a separator between its numbers",
     );
 }
 

@@ -247,7 +247,7 @@ fn stale_rows_are_left_out() {
 fn a_rate_replaces_a_column_of_time() {
     let text = table("time_s", |_, t| format!("{:.3}", t / 2.0));
     let options = ReadOptions::new().require("bridge_v").sample_rate_hz(RATE_HZ);
-    let says = "column time_s is not read: 50 samples a second";
+    let says = "column time_s is not read: samples are counted at 50 Hz";
     is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-12, says);
     let still = table("time_s", |_, _| "oops".to_owned());
     is_at_50_hz(&read_as(&still, &options).unwrap(), 0, 1e-12, says);

@@ -117,11 +117,9 @@ fn a_rate_above_the_table_is_taken_where_there_is_no_time() {
     );
     let (read, notes) = names(&scope, &ReadOptions::new());
     assert_eq!(read, "x ch1_v ch2_v");
-    assert!(
-        notes.contains(
-            &"there is no time: 50 samples a second, as Increment above it says".to_owned()
-        )
-    );
+    assert!(notes.contains(
+        &"there is no time: samples are counted at 50 Hz, as Increment above it says".to_owned()
+    ));
     // what is said counts
     let Recording { trial, .. } =
         Recording::from_reader(scope.as_bytes(), "t", &ReadOptions::new().sample_rate_hz(10.0))

@@ -95,7 +95,7 @@ fn a_grid_is_chosen_and_nothing_lies_beyond_the_samples() {
     assert_eq!(
         notes,
         [
-            "brought to a grid of 40 Hz by straight lines: time_s (100.00 Hz); nothing is filtered, so that what is faster folds down"
+            "resampled to a grid of 40 Hz by linear interpolation: time_s (100.00 Hz); no low-pass filter is applied, so content above half the new rate aliases"
         ]
     );
     let table = plain();
@@ -170,13 +170,13 @@ fn slower_channels_are_brought_to_the_fastest_clock_and_not_beyond_their_own() {
     }
     assert!(
         notes.contains(
-            &"brought to the clock of gauge.time_s (100.00 Hz) by straight lines: pressure.time_s (25.00 Hz)".into()
+            &"resampled to the clock of gauge.time_s (100.00 Hz) by linear interpolation: pressure.time_s (25.00 Hz)".into()
         ),
         "{notes:?}"
     );
     assert!(
         notes.contains(
-            &"0.050 s at the beginning and 0.100 s at the end are left out: not every clock runs there".into()
+            &"0.050 s at the beginning and 0.100 s at the end are left out, because not every clock covers them".into()
         ),
         "{notes:?}"
     );

@@ -79,7 +79,7 @@ pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Res
             let is_same = own.is_some() && own == *identity;
             if is_same || real.starts_with(other_real) || other_real.starts_with(&real) {
                 return fail(format!(
-                    "{other} goes there as well; name another file for one of them"
+                    "{other} is written there, too; choose another file for one of them"
                 ));
             }
         }
@@ -136,7 +136,7 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     guard.inputs.insert(own.clone(), path.to_owned());
     match guard.outputs.iter().find(|(_, there)| there.as_ref() == Some(&own)) {
         Some((shown, _)) => Err(io::Error::other(format!(
-            "{shown} would be written over it, and it is read; name another file there"
+            "{shown} would overwrite it, and the command reads it; choose another output file"
         ))),
         None => Ok(()),
     }

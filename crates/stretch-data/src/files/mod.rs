@@ -108,7 +108,7 @@ fn bounded(from: impl Read) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > LARGEST {
         let most = LARGEST >> 20;
         return Err(io::Error::other(format!(
-            "it is larger than {most} MB, as no file of this kind is"
+            "it is larger than {most} MB, the limit for a file of this kind"
         )));
     }
     Ok(bytes)

@@ -42,7 +42,7 @@ use crate::file::{SimulatorEntry, simulator, simulator_schema};
 /// assert_eq!(problem.parameters[0].name, "gain");
 /// let error = ProblemSpec::parse("problem.toml", &text.replace("tolerance", "tolerence")).unwrap_err();
 /// assert!(error.to_string().starts_with(
-///     "problem.toml, row 11, key parameter[0].tolerence: nothing reads it (did you mean tolerance?)"
+///     "problem.toml, row 11, key parameter[0].tolerence: unknown (did you mean tolerance?)"
 /// ));
 /// # Ok::<(), stretch_problem::ProblemError>(())
 /// ```

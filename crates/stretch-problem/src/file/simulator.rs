@@ -95,10 +95,7 @@ impl SimulatorEntry {
         let more = if self.builtin.is_some() { &[][..] } else { &WORKERS };
         let known = [&[kind], own, more].concat();
         if let Some(key) = given.iter().find(|key| !known.contains(key)) {
-            return fail(
-                key,
-                format!("nothing reads it with {kind}; known are {}", known.join(", ")),
-            );
+            return fail(key, format!("unknown with {kind}; known are {}", known.join(", ")));
         }
         if self.reference.is_some() != self.signal.is_some() {
             return fail("reference", "reference and signal go together; give both".into());
@@ -211,7 +208,7 @@ mod tests {
             ),
             (
                 "python = \"a:b\"\nvariables = {}",
-                "row 3, key simulator.variables: nothing reads it with python",
+                "row 3, key simulator.variables: unknown with python",
             ),
             (
                 "python = \"a\"",
@@ -233,7 +230,7 @@ mod tests {
             ),
             (
                 "builtin = \"rig\"\nsignal = \"u\"",
-                "row 3, key simulator.signal: nothing reads it with builtin",
+                "row 3, key simulator.signal: unknown with builtin",
             ),
             (
                 "builtin = \"gauge\"\nsignal = \"u\"",

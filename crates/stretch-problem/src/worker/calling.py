@@ -220,10 +220,7 @@ class Asked:
         return [self._rows(answer[o], models, samples, o) for o in outputs]
 
     def _rows(self, answer: Any, models: int, samples: int, output: str) -> Array:
-        try:
-            table = np.asarray(answer, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise StretchError(f"the simulator returned no numbers for {output}: {error}") from None
+        table = _numbers(answer, f" for {output}")
         if table.ndim == 1 and models == 1:
             table = table[np.newaxis]
         whole = samples if self.is_called_once_a_trial else self.samples(len(self.spans))
@@ -244,8 +241,19 @@ class Asked:
 def _first_axis(answer: Any) -> Any:
     """One model's outputs as a batch of one."""
     if isinstance(answer, dict):
-        return {output: np.asarray(values)[np.newaxis] for output, values in answer.items()}
+        return {output: _numbers(values, f" for {output}")[np.newaxis] for output, values in answer.items()}
+    return _numbers(answer)[np.newaxis]
+
+
+def _numbers(values: Any, what: str = "") -> Array:
+    """An answer as numbers; a masked sample is no number, and complex numbers, times and texts are refused."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    table = np.asarray(values)
+    kinds = {"c": "complex numbers", "m": "durations", "M": "times", "U": "text", "S": "text"}
+    if table.dtype.kind in kinds:
+        raise StretchError(f"the simulator returned {kinds[table.dtype.kind]}{what}; return real numbers in the output's unit")
     try:
-        return np.asarray(answer, dtype=np.float64)[np.newaxis]
+        return table.astype(np.float64)
     except (TypeError, ValueError) as error:
-        raise StretchError(f"the simulator returned no numbers: {error}") from None
+        raise StretchError(f"the simulator returned no numbers{what}: {error}") from None

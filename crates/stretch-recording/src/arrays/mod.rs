@@ -215,7 +215,7 @@ pub(crate) fn tracks(
         };
         channels[i].extend(array.into_columns(clocks[i].array.values.len()).into_iter().flatten());
     }
-    note(&mut notes, "left out, no clock has their length or two clocks have", &left_out);
+    note(&mut notes, "left out, because no clock or more than one has their length", &left_out);
     if let Some(rate_hz) = options.sample_rate_hz {
         let [ClockArray { array, .. }] = &clocks[..] else {
             let names: Vec<&str> = clocks.iter().map(|clock| clock.array.name.as_str()).collect();
@@ -225,7 +225,7 @@ pub(crate) fn tracks(
             );
             return Err(RecordingError::Format { file: file.to_owned(), format: "array", problem });
         };
-        notes.push(note_on_rate(Some(&array.name), rate_hz, "was said"));
+        notes.push(note_on_rate(Some(&array.name), rate_hz, "as the option says"));
         let stamps = Stamps::at_rate(array.values.len(), rate_hz);
         return Ok((vec![Track::new(stamps, channels.remove(0))], notes));
     }
@@ -345,7 +345,8 @@ fn counted(
         );
         return Err(RecordingError::NoTime { file: file.to_owned(), hint });
     };
-    let said = if options.sample_rate_hz.is_some() { "was said" } else { "the file says" };
+    let said =
+        if options.sample_rate_hz.is_some() { "as the option says" } else { "as the file says" };
     notes.push(note_on_rate(None, rate_hz, said));
     let channels = others.into_iter().filter(|a| a.values.len() > 1);
     let channels = channels.filter_map(|a| a.into_columns(samples));

@@ -159,7 +159,7 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
 pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
     let time =
         column.map_or("there is no time".to_owned(), |name| format!("column {name} is not read"));
-    format!("{time}: {rate_hz} samples a second, as {by}")
+    format!("{time}: samples are counted at {rate_hz} Hz, {by}")
 }
 
 /// A note on a time that counts from long ago, or is a time of day, and is counted from its first sample instead.
@@ -212,7 +212,7 @@ pub(crate) fn read(
         steps = anew.ok_or_else(|| never_rises(file, &track.stamps))?;
     }
     let copies = spread::spread(&mut track.stamps, steps, per_second, notes);
-    leave_out(file, track, &copies, "is that of the row before", options, notes)?;
+    leave_out(file, track, &copies, "repeats that of the row before", options, notes)?;
     unit::check_rate(file, &track.stamps, steps, options)
 }
 
@@ -252,7 +252,7 @@ fn leave_out(
         let why = match options.strict {
             true => "--strict leaves no row out".to_owned(),
             false => format!(
-                "{count} of {all} rows would be left out, and no more than one in five is; split the recording where its time begins again"
+                "{count} of {all} rows have bad stamps, and at most one in five may; split the recording where its time begins again"
             ),
         };
         return Err(RecordingError::Stamps { at, problem: format!("{evidence}: {why}") });

@@ -66,10 +66,12 @@ pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns
         .collect();
     let samples: usize = signals.iter().map(|signal| signal.len()).sum();
     let hours = samples as f64 * calibration.spec().sample_rate_hz.period_s() / 3600.0;
-    let learnt = Learnt::of(&movements, hours)?;
+    let (learnt, ends) = measure_levels(&movements, hours)?;
     let level = sign * learnt.level;
-    let slope = slope(calibration, level, learnt.ends(sign))?;
-    let turns = learnt.turns(level, finder.least_span, slope);
+    let ends = ends.map(|end| sign * end);
+    let ends = Interval { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) };
+    let reference_per_signal = slope(calibration, level, ends)?;
+    let turns = Turns { level, least_span: finder.least_span, reference_per_signal, ..learnt };
     Some(turns).filter(|turns| turns.validate().is_ok())
 }
 
@@ -95,80 +97,42 @@ fn middle_span(signals: &[&[f64]]) -> Option<f64> {
     (low < high).then(|| (high - low) as f64 / PARTS as f64 * (max - min))
 }
 
-/// Levels of movements, times the sign of the polarity.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Learnt {
-    high_share: f64,
-    level: f64,
-    scatter: f64,
-    movements: u32,
-    limit: f64,
-    mean_limit: f64,
-    movements_an_hour: f64,
-    follow: f64,
-    low: f64,
-    high: f64,
-}
-
-impl Learnt {
-    /// Of movements in stretches, recorded in so many hours.
-    fn of(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<Self> {
-        let all: Vec<(f64, f64)> = movements.iter().flatten().copied().collect();
-        let (low, high, high_share) = weighted(&all)?;
-        let level = |(low, high): &(f64, f64)| (1.0 - high_share) * low + high_share * high;
-        let sequences: Vec<Vec<f64>> =
-            movements.iter().map(|own| own.iter().map(level).collect()).collect();
-        let Levels { mean, variance, alike, count } = levels(&sequences)?;
-        // the estimate of a correlation is low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403)
-        let alike = (alike + (1.0 + 4.0 * alike) / count).clamp(0.0, 0.99);
-        let (independent, scatter) = independent(count, variance, alike);
-        if !(independent >= LEAST_MOVEMENTS && variance > 0.0) {
-            return None;
-        }
-        let movements_an_hour = count / hours;
-        // half for the median, half for the mean
-        let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
-        let t = critical(share, (independent - 1.0).floor());
-        let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
-        let mean_variance = Turns::MEAN_SHARE / (2.0 - Turns::MEAN_SHARE) * count / independent;
-        let level = clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter);
-        Some(Self {
-            high_share,
-            level,
-            scatter,
-            movements: count as u32,
-            limit: spread(median_variance(alike)).max(tail(&sequences, level, share)),
-            mean_limit: spread(mean_variance.min(1.0)),
-            movements_an_hour,
-            follow: follow(&sequences, count, variance),
-            low,
-            high,
-        })
+/// Levels of movements in stretches, recorded in so many hours, and their mean ends: all times the
+/// sign of the polarity, and before the least span and the slope of the estimate are known.
+fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [f64; 2])> {
+    let all: Vec<(f64, f64)> = movements.iter().flatten().copied().collect();
+    let (low, high, high_share) = weighted(&all)?;
+    let level = |(low, high): &(f64, f64)| (1.0 - high_share) * low + high_share * high;
+    let sequences: Vec<Vec<f64>> =
+        movements.iter().map(|own| own.iter().map(level).collect()).collect();
+    let Levels { mean, variance, alike, count } = levels(&sequences)?;
+    // the estimate of a correlation is low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403)
+    let alike = (alike + (1.0 + 4.0 * alike) / count).clamp(0.0, 0.99);
+    let (independent, scatter) = independent(count, variance, alike);
+    if !(independent >= LEAST_MOVEMENTS && variance > 0.0) {
+        return None;
     }
-
-    /// Converts to a record with values in the signal's unit: the level, the least span, and the
-    /// change of the estimate per change of the signal.
-    fn turns(self, level: f64, least_span: f64, reference_per_signal: f64) -> Turns {
-        Turns {
-            level,
-            high_share: self.high_share,
-            least_span,
-            scatter: self.scatter,
-            movements: self.movements,
-            limit: self.limit,
-            mean_limit: self.mean_limit,
-            false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
-            movements_an_hour: self.movements_an_hour,
-            follow: self.follow,
-            reference_per_signal,
-        }
-    }
-
-    /// The mean ends of movements, in the signal's unit.
-    fn ends(&self, sign: f64) -> Interval {
-        let (one, other) = (sign * self.low, sign * self.high);
-        Interval { min: one.min(other), max: one.max(other) }
-    }
+    let movements_an_hour = count / hours;
+    // half for the median, half for the mean
+    let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
+    let t = critical(share, (independent - 1.0).floor());
+    let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
+    let mean_variance = Turns::MEAN_SHARE / (2.0 - Turns::MEAN_SHARE) * count / independent;
+    let level = clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter);
+    let learnt = Turns {
+        level,
+        high_share,
+        least_span: 0.0,
+        scatter,
+        movements: count as u32,
+        limit: spread(median_variance(alike)).max(tail(&sequences, level, share)),
+        mean_limit: spread(mean_variance.min(1.0)),
+        false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
+        movements_an_hour,
+        follow: follow(&sequences, count, variance),
+        reference_per_signal: 0.0,
+    };
+    Some((learnt, [low, high]))
 }
 
 /// Mean low and high ends, and the weight of the high end at which levels scatter least: `(v -

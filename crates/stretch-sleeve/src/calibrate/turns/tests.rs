@@ -78,8 +78,8 @@ fn learn(scatter: Scatter, movements: usize, seed: u64) -> Option<Turns> {
     let mut own = Movements::new(scatter, seed);
     let volts = |(low, high): (f64, f64)| (0.02 * low, 0.02 * high);
     let ends: Vec<(f64, f64)> = (0..movements).map(|_| volts(own.next())).collect();
-    let learnt = Learnt::of(&[ends], movements as f64 / AN_HOUR)?;
-    Some(learnt.turns(learnt.level, 0.2, -50.0))
+    let (learnt, _) = measure_levels(&[ends], movements as f64 / AN_HOUR)?;
+    Some(Turns { least_span: 0.2, reference_per_signal: -50.0, ..learnt })
 }
 
 /// Output of the watch for so many further movements, each with a zero that is off by `off_mm`.
@@ -221,9 +221,9 @@ fn a_shift_is_found_and_told() {
 
 #[test]
 fn what_says_nothing_is_none() {
-    assert_eq!(Learnt::of(&[], 1.0), None);
-    assert_eq!(Learnt::of(&[vec![(0.0, 1.0); 30]], 1.0), None);
+    assert_eq!(measure_levels(&[], 1.0), None);
+    assert_eq!(measure_levels(&[vec![(0.0, 1.0); 30]], 1.0), None);
     // a walking one has practically one level
     let walk: Vec<(f64, f64)> = (0..30).map(|k| (f64::from(k), 100.0 + f64::from(k))).collect();
-    assert_eq!(Learnt::of(&[walk], 1.0), None);
+    assert_eq!(measure_levels(&[walk], 1.0), None);
 }

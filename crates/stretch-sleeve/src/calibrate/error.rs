@@ -1,9 +1,6 @@
 //! Reasons why there is no calibration of a sleeve.
 
 use stretch_calibrate::CalibrateError;
-use stretch_core::DesignError;
-use stretch_data::DataError;
-use stretch_filter::FilterError;
 
 /// Why gauges could not be calibrated together, or a prior could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -39,23 +36,11 @@ pub enum SleeveError {
     },
     /// Errors that calibrations of any kind can have.
     #[error(transparent)]
-    Calibrate(#[from] CalibrateError),
+    Calibrate(CalibrateError),
 }
 
-impl From<DesignError> for SleeveError {
-    fn from(error: DesignError) -> Self {
-        CalibrateError::from(error).into()
-    }
-}
-
-impl From<DataError> for SleeveError {
-    fn from(error: DataError) -> Self {
-        CalibrateError::from(error).into()
-    }
-}
-
-impl From<FilterError> for SleeveError {
-    fn from(error: FilterError) -> Self {
-        CalibrateError::from(error).into()
+impl<E: Into<CalibrateError>> From<E> for SleeveError {
+    fn from(error: E) -> Self {
+        Self::Calibrate(error.into())
     }
 }

@@ -33,6 +33,6 @@ pub mod toolkit {
         fit::{
             LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, TermRows, leave_one_out,
         },
-        prepare::{SHORTEST, check_rows, check_turns, even_signals, extent, noise, sample_rate_hz},
+        prepare::{check_rows, even, even_signals, extent, noise, pooled_range, sample_rate_hz},
     };
 }

@@ -7,7 +7,10 @@ use stretch_core::{
 };
 use stretch_data::listed;
 
-use crate::{CalibrateError, prepare::Prepared};
+use crate::{
+    CalibrateError,
+    prepare::{Prepared, extent},
+};
 
 use super::{
     calibrate::Choice,
@@ -90,6 +93,15 @@ impl StateDesign {
             states
         };
         x.iter().map(step).collect()
+    }
+
+    /// The least and the greatest value of each state in some pieces.
+    pub fn domain<'a>(
+        &self,
+        pieces: impl Iterator<Item = &'a Vec<Vec<f64>>> + Clone,
+    ) -> Vec<Interval> {
+        let one = |k: usize| extent(pieces.clone().flatten().map(move |states| states[k]));
+        (0..self.shape().states).map(one).collect()
     }
 
     /// Name of a state in a table.
@@ -261,10 +273,8 @@ fn train(
     ridges: &[f64],
 ) -> Result<Trained, CalibrateError> {
     let period_s = prepared.sample_rate.period_s();
-    let total = prepared.series.iter().map(|s| s.signal.len()).sum();
-    let mut before = 0;
     let mut pieces = Vec::new();
-    for series in &prepared.series {
+    for (series, fold) in prepared.folds() {
         let above = rested(
             &series.signal,
             rest,
@@ -273,22 +283,12 @@ fn train(
             prepared.sample_rate,
         );
         let x: Vec<f64> = above.iter().map(|&v| prepared.signal_range.normalise(v)).collect();
-        let fold = (0..x.len()).map(|i| prepared.fold(series, i, before, total)).collect();
         let target = series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
-        before += x.len();
         pieces.push(Piece { fold, states: design.states(&x, period_s), target });
     }
     let shape = design.shape();
-    let mut domain = vec![Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }; shape.states];
-    let mut estimate = domain[0];
-    for piece in &pieces {
-        for (states, &target) in piece.states.iter().zip(&piece.target) {
-            for (d, &s) in domain.iter_mut().zip(states) {
-                *d = Interval { min: d.min.min(s), max: d.max.max(s) };
-            }
-            estimate = Interval { min: estimate.min.min(target), max: estimate.max.max(target) };
-        }
-    }
+    let domain = design.domain(pieces.iter().map(|piece| &piece.states));
+    let estimate = extent(pieces.iter().flat_map(|piece| piece.target.iter().copied()));
     if domain.iter().any(|d| d.min >= d.max) || shape.terms() > MAX_HISTORY_TERMS {
         return Err(undetermined());
     }

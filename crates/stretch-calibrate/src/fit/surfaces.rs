@@ -4,48 +4,32 @@ use stretch_core::{
     Branch, BranchSurface, Degree, Interval, LinearMap, MAX_DEGREE, Model, Range, RangeSpec,
     RateSource, sizes::MOST,
 };
-use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, robust_fit};
+use stretch_fit::{
+    Factor, Fit, FitError, Loss, OrderTable, Sample, SurfaceAccumulator, robust_fit,
+};
 
 use crate::{
     CalibrateError, Options, Robust,
-    prepare::{Prepared, branches, extent},
+    prepare::{Prepared, branches, extent, pooled_range},
 };
 
 use super::report::{Coefficient, FitReport, Fitted, Order};
 
-/// A normalised sample, and the number of the fold that contains it.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    fold: usize,
-    rate: f64,
-    signal: f64,
-    target: f64,
-}
-
-impl Sample {
-    /// The row that least squares takes.
-    pub(crate) fn row(&self) -> stretch_fit::Sample<f64> {
-        stretch_fit::Sample { rate: self.rate, volts: self.signal, value: self.target }
-    }
-}
+/// The number of the fold that contains a sample, and the sample, normalised.
+type Folded = (usize, Sample<f64>);
 
 /// All samples without their rates, and the signals among them.
-fn of_signal(prepared: &Prepared) -> (Vec<Sample>, Interval) {
-    let all = || prepared.series.iter().flat_map(|s| s.signal.iter().zip(&s.target));
-    let mut samples: Vec<Sample> = Vec::new();
-    let (total, mut before) = (all().count(), 0);
-    for series in &prepared.series {
-        for (i, (&v, &t)) in series.signal.iter().zip(&series.target).enumerate() {
-            samples.push(Sample {
-                fold: prepared.fold(series, i, before, total),
-                rate: 0.0,
-                signal: prepared.signal_range.normalise(v),
-                target: prepared.target_range.normalise(t),
-            });
+fn of_signal(prepared: &Prepared) -> (Vec<Folded>, Interval) {
+    let mut samples = Vec::new();
+    for (series, folds) in prepared.folds() {
+        for ((&v, &t), fold) in series.signal.iter().zip(&series.target).zip(folds) {
+            let volts = prepared.signal_range.normalise(v);
+            let value = prepared.target_range.normalise(t);
+            samples.push((fold, Sample { rate: 0.0, volts, value }));
         }
-        before += series.signal.len();
     }
-    (samples, extent(all().map(|(&v, _)| v)))
+    let signals = prepared.series.iter().flat_map(|series| series.signal.iter().copied());
+    (samples, extent(signals))
 }
 
 /// Fits a line of the signal.
@@ -101,25 +85,24 @@ pub(crate) fn curve(prepared: &Prepared, options: &Options) -> Result<Fitted, Ca
 
 /// Assigns samples to the folds of a cross-validation by the level of the reference, where it has levels (weights
 /// that were held for many samples) or the samples are a table: neighbours of one level would judge themselves.
-fn leave_out_levels(samples: &mut [Sample], is_table: bool) {
-    let mut levels: Vec<f64> = samples.iter().map(|s| s.target).collect();
+fn leave_out_levels(samples: &mut [Folded], is_table: bool) {
+    let mut levels: Vec<f64> = samples.iter().map(|(_, s)| s.value).collect();
     levels.sort_by(f64::total_cmp);
     levels.dedup();
     if is_table || 2 * levels.len() <= samples.len() {
-        for sample in samples {
-            sample.fold = levels.partition_point(|&level| level < sample.target) % TABLE_PARTS;
+        for (fold, sample) in samples {
+            *fold = levels.partition_point(|&level| level < sample.value) % TABLE_PARTS;
         }
     }
 }
 
-/// Samples of one branch before normalisation.
-#[derive(Default)]
+/// A sample before normalisation.
 struct Raw {
-    fold: Vec<usize>,
-    signal: Vec<f64>,
-    signal_rate: Vec<f64>,
-    target: Vec<f64>,
-    target_rate: Vec<f64>,
+    fold: usize,
+    signal: f64,
+    signal_rate: f64,
+    target: f64,
+    target_rate: f64,
 }
 
 /// Fits a surface of signal and rate for each branch.
@@ -128,26 +111,26 @@ pub(crate) fn surfaces(
     options: &Options,
     degree: Degree,
 ) -> Result<Fitted, CalibrateError> {
-    let mut raw = [Raw::default(), Raw::default()];
-    let total = prepared.series.iter().map(|s| s.signal.len()).sum();
-    let mut before = 0;
-    for series in &prepared.series {
+    let mut raw = [Vec::new(), Vec::new()];
+    for (series, folds) in prepared.folds() {
         for (i, branch) in branches(series, options, prepared.dead).into_iter().enumerate() {
             let (Some(branch), Some(signal_rate)) = (branch, series.signal_rate[i]) else {
                 continue;
             };
-            let raw = &mut raw[usize::from(branch == Branch::Deflation)];
-            raw.fold.push(prepared.fold(series, i, before, total));
-            raw.signal.push(series.signal[i]);
-            raw.signal_rate.push(signal_rate);
-            raw.target.push(series.target[i]);
-            raw.target_rate.push(series.target_rate[i]);
+            let (signal, target) = (series.signal[i], series.target[i]);
+            let (fold, target_rate) = (folds[i], series.target_rate[i]);
+            raw[usize::from(branch == Branch::Deflation)].push(Raw {
+                fold,
+                signal,
+                signal_rate,
+                target,
+                target_rate,
+            });
         }
-        before += series.signal.len();
     }
     for (raw, branch) in raw.iter().zip([Branch::Inflation, Branch::Deflation]) {
         let branch = prepared.target.branch_name(branch);
-        let (samples, terms) = (raw.signal.len() as u64, degree.terms());
+        let (samples, terms) = (raw.len() as u64, degree.terms());
         if samples <= terms as u64 {
             return Err(CalibrateError::OneBranch { branch, samples, terms });
         }
@@ -164,37 +147,32 @@ fn surface(
     options: &Options,
     degree: Degree,
     branch: Branch,
-    raw: Raw,
+    raw: Vec<Raw>,
 ) -> Result<(BranchSurface, FitReport), CalibrateError> {
     let name = prepared.target.branch_name(branch);
-    let range = |rates: &[f64]| {
-        let Interval { min, max } = extent(rates.iter().copied());
-        Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max }).map_err(|_| {
-            CalibrateError::Constant {
-                column: format!("the rate in the {name} branch"),
-                value: min,
-            }
-        })
+    let all = |of: fn(&Raw) -> f64| extent(raw.iter().map(of));
+    let range = |of: fn(&Raw) -> f64| {
+        let column = format!("the rate in the {name} branch");
+        pooled_range(&column, options.normalisation, 0.0, all(of))
     };
-    let rate_range = range(&raw.signal_rate)?;
-    let (rates, fitted_range) = match options.rate_source {
-        RateSource::Voltage => (&raw.signal_rate, rate_range),
-        RateSource::Strain => (&raw.target_rate, range(&raw.target_rate)?),
+    let rate_range = range(|raw| raw.signal_rate)?;
+    let rate: fn(&Raw) -> f64 = match options.rate_source {
+        RateSource::Voltage => |raw| raw.signal_rate,
+        RateSource::Strain => |raw| raw.target_rate,
     };
-    let samples: Vec<Sample> = (0..raw.signal.len())
-        .map(|i| Sample {
-            fold: raw.fold[i],
-            rate: fitted_range.normalise(rates[i]),
-            signal: prepared.signal_range.normalise(raw.signal[i]),
-            target: prepared.target_range.normalise(raw.target[i]),
-        })
-        .collect();
+    let fitted_range = range(rate)?;
+    let sample = |raw: &Raw| Sample {
+        rate: fitted_range.normalise(rate(raw)),
+        volts: prepared.signal_range.normalise(raw.signal),
+        value: prepared.target_range.normalise(raw.target),
+    };
+    let samples: Vec<Folded> = raw.iter().map(|raw| (raw.fold, sample(raw))).collect();
     let report = fit(name, Some(branch), &samples, degree, options.robust)?;
     let fitted = BranchSurface {
         rate_range,
         surface: report.surface,
-        signal_domain: extent(raw.signal.iter().copied()),
-        rate_domain: extent(raw.signal_rate.iter().copied()),
+        signal_domain: all(|raw| raw.signal),
+        rate_domain: all(|raw| raw.signal_rate),
         fit: report.summary(),
     };
     Ok((fitted, report))
@@ -207,7 +185,7 @@ type Factors = Vec<Factor<f64>>;
 fn fit(
     name: &'static str,
     branch: Option<Branch>,
-    samples: &[Sample],
+    samples: &[Folded],
     degree: Degree,
     robust: Robust,
 ) -> Result<FitReport, CalibrateError> {
@@ -222,7 +200,7 @@ fn fit(
         Robust::Bisquare | Robust::Lar => {
             let loss =
                 if robust == Robust::Bisquare { Loss::Bisquare } else { Loss::LeastAbsolute };
-            let rows = || samples.iter().map(Sample::row);
+            let rows = || samples.iter().map(|(_, sample)| *sample);
             let mut memory = vec![0.0; samples.len()];
             let robust = robust_fit(degree, loss, rows, &mut memory).map_err(failed)?;
             rejected = Some(robust.rejected);
@@ -230,7 +208,7 @@ fn fit(
         }
     };
     let step = samples.len().div_ceil(CLOUD).max(1);
-    let cloud = samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect();
+    let cloud = samples.iter().step_by(step).map(|(_, s)| [s.rate, s.volts, s.value]).collect();
     Ok(FitReport { rejected, cloud, ..report(name, branch, degree, &folds, &fitted)? })
 }
 
@@ -291,13 +269,12 @@ fn report(
 const CLOUD: usize = 3000;
 
 /// The triangular factor of each fold, of the widest degree that the order table needs.
-fn factors(samples: &[Sample], degree: Degree) -> Result<Factors, FitError> {
-    let folds = samples.iter().map(|s| s.fold).max().map_or(0, |last| last + 1);
+fn factors(samples: &[Folded], degree: Degree) -> Result<Factors, FitError> {
+    let folds = samples.iter().map(|(fold, _)| *fold).max().map_or(0, |last| last + 1);
     let mut factors = Vec::with_capacity(folds);
     for fold in 0..folds {
         let mut sums = SurfaceAccumulator::<f64>::new(degree)?;
-        let rows = samples.iter().filter(|s| s.fold == fold);
-        sums.extend(rows.map(Sample::row))?;
+        sums.extend(samples.iter().filter(|(own, _)| *own == fold).map(|(_, sample)| *sample))?;
         if sums.samples() > 0 {
             factors.push(sums.factor());
         }
@@ -317,16 +294,17 @@ fn merged(folds: &Factors) -> Result<Factor<f64>, FitError> {
 fn orders(table: &OrderTable<f64>, named: impl Fn(Degree) -> String) -> Vec<Order> {
     table
         .rows()
-        .map(|(degree, row)| Order {
-            model: named(*degree),
-            terms: degree.terms(),
-            r_squared: row.as_ref().ok().and_then(|row| row.r_squared),
-            rmse: row.as_ref().ok().and_then(|row| row.rmse),
-            cross_validated_rmse: row
-                .as_ref()
-                .ok()
-                .and_then(|row| row.cross_validation.as_ref().ok().map(|cv| cv.rmse)),
-            problem: row.as_ref().err().map(ToString::to_string),
+        .map(|(degree, row)| {
+            let fitted = row.as_ref().ok();
+            let cross_validation = fitted.and_then(|row| row.cross_validation.as_ref().ok());
+            Order {
+                model: named(*degree),
+                terms: degree.terms(),
+                r_squared: fitted.and_then(|row| row.r_squared),
+                rmse: fitted.and_then(|row| row.rmse),
+                cross_validated_rmse: cross_validation.map(|cv| cv.rmse),
+                problem: row.as_ref().err().map(ToString::to_string),
+            }
         })
         .collect()
 }

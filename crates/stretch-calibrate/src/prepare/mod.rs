@@ -6,7 +6,7 @@ mod trials;
 
 pub use gross_errors::without_gross_errors;
 pub use series::{Rated, RatedPart, extent, noise, rated, sample_rate_hz};
-pub use trials::{MOST_ROWS, SHORTEST, check_rows, check_turns, even_signals};
+pub use trials::{MOST_ROWS, check_rows, even, even_signals, pooled_range};
 
 pub(crate) use gross_errors::rows;
 pub(crate) use series::{branches, polarity, rates_at_use};

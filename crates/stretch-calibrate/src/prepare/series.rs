@@ -3,7 +3,7 @@
 use stretch_core::{
     Branch, Design, Interval, Polarity, RateEstimator, RateSource, SampleRate, Stage, Target,
 };
-use stretch_data::{EvenPart, EvenSpec, Rows, Trial};
+use stretch_data::{EvenPart, Rows, Trial};
 use stretch_filter::{
     RateFilter, SgFilter, SgShape,
     log::{central_difference, noise_of_differences, second_differences},
@@ -11,7 +11,7 @@ use stretch_filter::{
 
 use crate::{CalibrateError, Options, SplitBy};
 
-use super::trials::{SHORTEST, check_turns, noise_gain};
+use super::trials::{even, noise_gain};
 
 /// A stretch of a trial without gaps, on an even grid.
 #[derive(Debug, Clone)]
@@ -215,10 +215,7 @@ pub fn rated(
         None => SampleRate::new(sample_rate_hz(trial)?)?,
     };
     let columns: Vec<&str> = std::iter::once(signal).chain(others.iter().copied()).collect();
-    let rate_hz = sample_rate.hz();
-    let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
-    let even = trial.even(&columns, spec)?;
-    check_turns(&even, &trial.name, &[signal])?;
+    let even = even(trial, &columns, 1, sample_rate)?;
     if even.parts.is_empty() {
         let (trial, samples) = (trial.name.clone(), trial.len());
         return Err(CalibrateError::TooShort { trial, samples });

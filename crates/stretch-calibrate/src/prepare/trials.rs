@@ -12,7 +12,7 @@ use crate::{CalibrateError, Options};
 use super::series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series};
 
 /// Parts of a trial with fewer samples have no rate.
-pub const SHORTEST: usize = 3;
+const SHORTEST: usize = 3;
 
 /// The most rows of all trials together that a calibration is fitted to: a day at 100 Hz, which takes about 2 GB.
 pub const MOST_ROWS: usize = 10_000_000;
@@ -67,7 +67,13 @@ impl Prepared {
             (other, _) => other,
         })?;
         let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
-        let dead = dead_bands(options, sample_rate, noise_v, signal_range, target_range)?;
+        // without a given one, three standard deviations of the rate's noise
+        let signal = match options.dead_band {
+            Some(dead_band) => dead_band,
+            None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
+        };
+        let target_dead = signal * target_range.span() / signal_range.span();
+        let dead = DeadBands { signal, target: target_dead };
         let series = pieces
             .into_iter()
             .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
@@ -110,27 +116,19 @@ impl Prepared {
         })?)
     }
 
-    /// Number of the fold of a sample in cross-validation: each trial is a fold, or each tenth of the samples when
-    /// there are fewer than three trials.
-    pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
+    /// Each series, and the number of the fold of each of its samples in cross-validation: each trial is a fold, or
+    /// each tenth of the samples when there are fewer than three trials.
+    pub(crate) fn folds(&self) -> impl Iterator<Item = (&Series, Vec<usize>)> {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
-        if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
+        let total: usize = self.series.iter().map(|s| s.signal.len()).sum();
+        let mut before = 0;
+        self.series.iter().map(move |series| {
+            let own = before..before + series.signal.len();
+            before = own.end;
+            let fold = |place| if trials >= 3 { series.trial } else { place * 10 / total };
+            (series, own.map(fold).collect())
+        })
     }
-}
-
-/// The dead bands: those of the options where given, else three standard deviations of the rate's noise.
-fn dead_bands(
-    options: &Options,
-    sample_rate: SampleRate,
-    noise_v: f64,
-    signal_range: Range,
-    target_range: Range,
-) -> Result<DeadBands, CalibrateError> {
-    let signal = match options.dead_band {
-        Some(dead_band) => dead_band,
-        None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
-    };
-    Ok(DeadBands { signal, target: signal * target_range.span() / signal_range.span() })
 }
 
 /// Trials, or their parts between gaps, on the grid of the first trial, with the counts of their rows.
@@ -186,10 +184,7 @@ impl Evened {
         // Only where the pressure was recorded: an error names the cause that lacks it.
         let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
         columns.extend(has_pressure.then_some(options.pressure.as_str()));
-        let rate_hz = first_hz;
-        let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
-        let even = trial.even(&columns, spec)?;
-        check_turns(&even, &trial.name, &columns[..1])?;
+        let even = even(trial, &columns, 1, sample_rate)?;
         self.turn = self.turn.or(even.turns[1]);
         self.rows.add(even.rows);
         self.notes.extend(even.notes);
@@ -237,17 +232,27 @@ fn line((_, [signal, reference, _]): &Piece) -> [f64; 3] {
     [at_signal, at_reference, if along > 0.0 { across / along } else { 0.0 }]
 }
 
-/// Refuses signals that wrap; they come first among the columns of `even`.
+/// A trial on an even grid. The first `signals` of its columns must not wrap.
 ///
 /// # Errors
-/// [`CalibrateError::WrappedSignal`].
-pub fn check_turns(even: &Even, trial: &str, signals: &[&str]) -> Result<(), CalibrateError> {
-    let wrapped =
-        signals.iter().zip(&even.turns).find_map(|(column, turn)| Some((column, (*turn)?)));
-    wrapped.map_or(Ok(()), |(column, turn)| {
-        let (trial, column) = (trial.to_owned(), (*column).to_owned());
-        Err(CalibrateError::WrappedSignal { trial, column, turn })
-    })
+/// [`CalibrateError::WrappedSignal`], and [`CalibrateError::Data`] for a column that is not there.
+pub fn even(
+    trial: &Trial,
+    columns: &[&str],
+    signals: usize,
+    rate: SampleRate,
+) -> Result<Even, CalibrateError> {
+    let rate_hz = rate.hz();
+    let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
+    let even = trial.even(columns, spec)?;
+    let mut turns = columns.iter().zip(&even.turns).take(signals);
+    match turns.find_map(|(column, turn)| Some((column, (*turn)?))) {
+        Some((column, turn)) => {
+            let (trial, column) = (trial.name.clone(), (*column).to_owned());
+            Err(CalibrateError::WrappedSignal { trial, column, turn })
+        }
+        None => Ok(even),
+    }
 }
 
 /// The signals of trials, brought onto an even grid as [`calibrate`](crate::calibrate()) does before a fit: a list for
@@ -325,7 +330,10 @@ fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError>
 }
 
 /// The range of a column from its extent.
-fn pooled_range(
+///
+/// # Errors
+/// [`CalibrateError::Constant`] for a column that never changes.
+pub fn pooled_range(
     column: &str,
     mode: Normalisation,
     zero: f64,

@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 
 use nalgebra::DMatrix;
-use stretch_calibrate::toolkit::{StateDesign, TermRows, extent};
+use stretch_calibrate::toolkit::{StateDesign, TermRows};
 use stretch_core::Interval;
 
 /// States and products of a channel: a cubic, and the change over each time constant, times the
@@ -30,17 +30,6 @@ impl Bank {
     pub(crate) fn new(domains: Vec<Vec<Interval>>) -> Self {
         let rows = domains.iter().map(|domain| TermRows::new(BANK.shape(), domain)).collect();
         Self { domains, rows }
-    }
-
-    /// The states of a channel, computed as in the receptor.
-    pub(crate) fn states(signal: &[f64], period_s: f64) -> States {
-        BANK.states(signal, period_s)
-    }
-
-    /// The domain of each state of a channel.
-    pub(crate) fn domain<'a>(pieces: impl Iterator<Item = &'a States> + Clone) -> Vec<Interval> {
-        let states = BANK.shape().states;
-        (0..states).map(|k| extent(pieces.clone().flatten().map(|s| s[k]))).collect()
     }
 
     /// Terms of one channel, the constant not counted.

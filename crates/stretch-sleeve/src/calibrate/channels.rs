@@ -3,15 +3,15 @@
 
 use stretch_calibrate::{
     CalibrateError,
-    toolkit::{SETTLE, SHORTEST, check_rows, check_turns, extent, sample_rate_hz},
+    toolkit::{SETTLE, check_rows, even, extent, sample_rate_hz},
 };
 use stretch_core::SampleRate;
-use stretch_data::{EvenSpec, Trial};
+use stretch_data::Trial;
 use stretch_metrics::Agreement;
 
 use crate::{MAX_CHANNELS, SleeveError};
 
-use super::bank::{Bank, States};
+use super::bank::{BANK, Bank, States};
 
 /// Channels whose correlation differs from one by less than this are copies.
 const COPY: f64 = 1e-9;
@@ -96,17 +96,14 @@ impl Channels {
         self.notes.extend(note);
         let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();
         columns.push(reference);
-        let spec =
-            EvenSpec { rate_hz: first_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
-        let even = trial.even(&columns, spec)?;
-        check_turns(&even, &trial.name, &columns[..signals.len()])?;
+        let even = even(&trial, &columns, signals.len(), self.sample_rate)?;
         self.notes.extend(even.rows.note());
         self.notes.extend(even.notes);
         let period_s = self.sample_rate.period_s();
         for mut part in even.parts {
             let Some(reference) = part.columns.pop() else { continue };
             let signals = part.columns;
-            let states = signals.iter().map(|signal| Bank::states(signal, period_s)).collect();
+            let states = signals.iter().map(|signal| BANK.states(signal, period_s)).collect();
             self.stretches.push(Stretch { trial: index, signals, states, reference });
         }
         Ok(())
@@ -155,7 +152,7 @@ impl Channels {
     /// The bank over the states that were seen.
     pub(crate) fn bank(&self) -> Bank {
         let channels = self.stretches.first().map_or(0, |s| s.signals.len());
-        let domain = |k: usize| Bank::domain(self.stretches.iter().map(move |s| &s.states[k]));
+        let domain = |k: usize| BANK.domain(self.stretches.iter().map(move |s| &s.states[k]));
         Bank::new((0..channels).map(domain).collect())
     }
 }

@@ -9,12 +9,12 @@ use stretch_core::{
 };
 
 use crate::{
-    ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec, GaugeCalibration,
-    MAX_CHANNELS, SleeveCalibration, SleeveError,
+    ArrayCalibration, ArrayGains, ArrayShifts, ArraySpec, GaugeCalibration, MAX_CHANNELS,
+    SleeveCalibration, SleeveError,
 };
 
 use super::{
-    array::Still,
+    array::{Still, watched},
     bank::{BANK, Bank},
     channels::Channels,
     turns::find_turns,
@@ -22,19 +22,6 @@ use super::{
 
 /// Ridge of the regression of a lost channel on the remaining ones, as a share of a term's power.
 const RIDGE: f64 = 1e-6;
-
-/// Limits of each channel.
-pub(crate) struct Watched {
-    pub(crate) channels: Vec<WatchedChannel>,
-    pub(crate) shifts: Option<ArrayShifts<MAX_CHANNELS>>,
-}
-
-pub(crate) struct WatchedChannel {
-    pub(crate) possible: Interval,
-    pub(crate) still_samples: u16,
-    pub(crate) follows: Vec<f64>,
-    pub(crate) largest_jump: f64,
-}
 
 /// Coefficients of the terms of a [`Bank`], in normalised target, and the data that they were
 /// fitted to.
@@ -58,11 +45,12 @@ pub(crate) struct Linear {
 
 impl Linear {
     /// The record, with the turning points of a single gauge if the calibration's channels show
-    /// them.
+    /// them. `channels` are the fitted data, if any, and `shifts` the usual differences between
+    /// channels, if known.
     pub(crate) fn record(
         &self,
-        watched: &Watched,
         channels: Option<&Channels>,
+        shifts: Option<ArrayShifts<MAX_CHANNELS>>,
         provenance: Provenance,
     ) -> Result<SleeveCalibration, SleeveError> {
         match self.signals.len() {
@@ -73,7 +61,7 @@ impl Linear {
                 let turns = find_turns(&one, &signals);
                 Ok(SleeveCalibration::One(Box::new(GaugeCalibration::new(one, turns)?)))
             }
-            _ => Ok(SleeveCalibration::Many(Box::new(self.many(watched, provenance)?))),
+            _ => Ok(SleeveCalibration::Many(Box::new(self.many(channels, shifts, provenance)?))),
         }
     }
 
@@ -187,23 +175,11 @@ impl Linear {
 
     fn many(
         &self,
-        watched: &Watched,
+        channels: Option<&Channels>,
+        shifts: Option<ArrayShifts<MAX_CHANNELS>>,
         provenance: Provenance,
     ) -> Result<ArrayCalibration<MAX_CHANNELS>, SleeveError> {
         let count = self.signals.len();
-        let channel = |k: usize| -> Result<ArrayChannel<MAX_CHANNELS>, SleeveError> {
-            let list = |f: fn(&Interval) -> f64| self.domains[k].iter().map(f).collect::<Vec<_>>();
-            let own = &watched.channels[k];
-            Ok(ArrayChannel {
-                signal: Label::new(&self.signals[k])?,
-                state_min: Values::new("state_min", &list(|d| d.min))?,
-                state_max: Values::new("state_max", &list(|d| d.max))?,
-                possible: own.possible,
-                still_samples: own.still_samples,
-                follows: Values::new("follows", &own.follows)?,
-                largest_jump: own.largest_jump,
-            })
-        };
         let ends = [self.estimate.min, self.estimate.max];
         let ends = ends.map(|t| self.target.to_reference(self.target_range.denormalise(t)));
         let everything: Vec<usize> = (0..count).collect();
@@ -216,11 +192,11 @@ impl Linear {
             degree: BANK.degree,
             memory_degree: BANK.memory_degree,
             estimate_domain: Interval { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) },
-            channels: (0..count).map(channel).collect::<Result<_, _>>()?,
+            channels: (0..count).map(|k| watched(self, channels, k)).collect::<Result<_, _>>()?,
             all: self.gains(&everything)?,
             without: (0..count).map(|k| self.gains(&lost(k))).collect::<Result<_, _>>()?,
             alone: (0..count).map(|k| self.gains(&[k])).collect::<Result<_, _>>()?,
-            shifts: watched.shifts.clone(),
+            shifts,
             provenance,
         })?)
     }

@@ -1,18 +1,24 @@
 //! One model of many channels, with one ridge per channel, chosen on left-out data.
 
-use stretch_calibrate::{CalibrateError, toolkit::extent};
-use stretch_core::{Interval, Normalisation, Provenance, Range, RangeSpec, Target};
+use stretch_calibrate::{
+    CalibrateError,
+    toolkit::{extent, pooled_range},
+};
+use stretch_core::{Interval, Normalisation, Target};
 use stretch_data::Trial;
 
 use crate::{
     SleeveCalibration, SleeveError,
-    calibrate::{channels::Channels, linear::Linear},
+    calibrate::{
+        channels::{Channels, provenance},
+        linear::Linear,
+    },
 };
 
 use super::{
     parted::{Carried, carried, parted},
     shifts::shifts,
-    watch::{Still, watched},
+    watch::Still,
 };
 
 /// A note on data that do not show which difference between channels is usual.
@@ -64,10 +70,9 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
         }
         None => Target::Direct,
     };
-    let Interval { min, max } = extent(channels.reference().map(|x| target.from_reference(x)));
-    let spec = RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max };
-    let constant = || CalibrateError::Constant { column: options.reference.clone(), value: min };
-    let target_range = Range::new(spec).map_err(|_| constant())?;
+    let seen = extent(channels.reference().map(|x| target.from_reference(x)));
+    let target_range = pooled_range(&options.reference, Normalisation::MinMax, 0.0, seen)?;
+    let estimate = [seen.min, seen.max].map(|end| target_range.normalise(end));
     let bank = channels.bank();
     if bank.domains.iter().flatten().any(|d| d.min >= d.max) {
         return Err(undetermined().into());
@@ -89,7 +94,7 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
         sample_rate_hz: channels.sample_rate.hz(),
         target,
         target_range,
-        estimate: Interval { min: target_range.normalise(min), max: target_range.normalise(max) },
+        estimate: Interval { min: estimate[0], max: estimate[1] },
         domains: bank.domains,
         weights: weights.iter().copied().collect(),
         gram,
@@ -102,13 +107,10 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
     if shifts.is_none() && options.signals.len() > 1 {
         notes.push(TOO_SHORT.into());
     }
-    let watched = watched(&linear, Some(&channels), shifts)?;
-    let mut columns: Vec<&str> = options.signals.iter().map(String::as_str).collect();
-    columns.push(&options.reference);
-    let provenance = Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str()))
-        .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
+    let columns = options.signals.iter().chain([&options.reference]);
+    let provenance = provenance(&options.date, trials, columns);
     Ok(ArrayFit {
-        calibration: linear.record(&watched, Some(&channels), provenance)?,
+        calibration: linear.record(Some(&channels), shifts, provenance)?,
         carried,
         rmse: held.rmse * unit,
         notes,

@@ -8,13 +8,13 @@
 
 use nalgebra::DVector;
 use stretch_calibrate::CalibrateError;
-use stretch_core::Interval;
+use stretch_core::{Interval, Label, Values};
 
 use crate::{
-    ArrayShifts, JUMP_SAMPLES, Jump, MAX_CHANNELS, Repeats, SleeveError,
+    ArrayChannel, JUMP_SAMPLES, Jump, MAX_CHANNELS, Repeats, SleeveError,
     calibrate::{
         channels::Channels,
-        linear::{Linear, Watched, WatchedChannel, cholesky},
+        linear::{Linear, cholesky},
     },
     samples_a_tick,
 };
@@ -34,33 +34,30 @@ const MARGIN: f64 = 0.5;
 /// Ridge of the regression on the other channels, as a share of their power.
 const RIDGE: f64 = 1e-3;
 
-/// Limits for each channel of a model; `channels` are the fitted data, if any, and `shifts` the
-/// usual differences between channels, if known.
+/// A channel of a model with its limits; `channels` are the fitted data, if any.
 pub(crate) fn watched(
     linear: &Linear,
     channels: Option<&Channels>,
-    shifts: Option<ArrayShifts<MAX_CHANNELS>>,
-) -> Result<Watched, SleeveError> {
-    let count = linear.signals.len();
-    let found: Option<Vec<_>> = (0..count).map(|k| one(linear, channels, k)).collect();
-    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
-    Ok(Watched { channels: found.ok_or_else(undetermined)?, shifts })
-}
-
-fn one(linear: &Linear, channels: Option<&Channels>, k: usize) -> Option<WatchedChannel> {
+    k: usize,
+) -> Result<ArrayChannel<MAX_CHANNELS>, SleeveError> {
     let domain = linear.domains[k][0];
     let margin = MARGIN * (domain.max - domain.min);
-    let follows = follows(linear, k)?;
+    let undetermined = || CalibrateError::Undetermined { model: "array".into() };
+    let follows = follows(linear, k).ok_or_else(undetermined)?;
+    let list = |f: fn(&Interval) -> f64| linear.domains[k].iter().map(f).collect::<Vec<_>>();
     let greatest =
         channels.map_or_else(Vec::new, |channels| greatest_of_seconds(channels, &follows, k));
     let usual = match greatest.len() >= LEAST_BLOCKS {
         true => hourly(&greatest, linear.signals.len()),
         false => 0.0,
     };
-    Some(WatchedChannel {
+    Ok(ArrayChannel {
+        signal: Label::new(&linear.signals[k])?,
+        state_min: Values::new("state_min", &list(|d| d.min))?,
+        state_max: Values::new("state_max", &list(|d| d.max))?,
         possible: Interval { min: domain.min - margin, max: domain.max + margin },
         still_samples: linear.still.limit(k, linear.sample_rate_hz),
-        follows,
+        follows: Values::new("follows", &follows)?,
         largest_jump: usual.max(LEAST_SLIP * (domain.max - domain.min)),
     })
 }

@@ -11,15 +11,13 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use stretch_calibrate::{CalibrateError, toolkit::extent};
-use stretch_core::Provenance;
 use stretch_data::{Trial, unit_of};
 
 use crate::{
     SleeveCalibration, SleeveError,
     calibrate::{
-        array::watched,
         bank::Bank,
-        channels::Channels,
+        channels::{Channels, provenance},
         linear::{Linear, inverse, symmetric},
     },
 };
@@ -144,13 +142,9 @@ impl Prior {
         let variance = predicted * self.spread(0.0, known > 0).widening;
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
         let linear = Linear { signals: signals.clone(), ..linear };
-        let watched = watched(&linear, Some(&channels), None)?;
-        let names = trials.iter().map(|trial| trial.name.as_str());
-        let columns: Vec<&str> = signals.iter().map(String::as_str).collect();
-        let provenance = Provenance::new(&options.date, names)
-            .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)));
+        let provenance = provenance(&options.date, trials, signals);
         Ok(Renewed {
-            calibration: linear.record(&watched, Some(&channels), provenance)?,
+            calibration: linear.record(Some(&channels), None, provenance)?,
             summary: self.summary(&normal.mean, &after.mean, &rows, &values, (distance, variance)),
             notes,
         })

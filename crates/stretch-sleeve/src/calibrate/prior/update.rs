@@ -6,15 +6,14 @@ use stretch_calibrate::{
     CalibrateError,
     toolkit::{RowAccumulator, extent},
 };
-use stretch_core::Provenance;
 use stretch_data::{Trial, unit_of};
 
 use crate::{
     SleeveCalibration, SleeveError,
     calibrate::{
-        array::{Still, watched},
+        array::Still,
         bank::Bank,
-        channels::{Channels, correlation},
+        channels::{Channels, correlation, provenance},
         linear::{Linear, cholesky, term_correlation},
     },
 };
@@ -119,11 +118,8 @@ impl Prior {
         let variance = predicted * spread.widening;
         let unit = self.unit_of_target();
         let expected_rmse = variance.sqrt() * unit;
-        let names = trials.iter().map(|trial| trial.name.as_str());
-        let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();
-        columns.push(reference);
-        let provenance = Provenance::new(&options.date, names)
-            .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)));
+        let columns = signals.iter().chain([reference]);
+        let provenance = provenance(&options.date, trials, columns);
         let linear = Linear {
             signals: signals.clone(),
             reference: reference.clone(),
@@ -131,9 +127,8 @@ impl Prior {
             still: channels.iter().fold(self.still.clone(), |all, own| all.and(&Still::of(own))),
             ..self.linear(&posterior.mean, gram, variance)
         };
-        let watched = watched(&linear, channels.as_ref(), None)?;
         Ok(Updated {
-            calibration: linear.record(&watched, channels.as_ref(), provenance)?,
+            calibration: linear.record(channels.as_ref(), None, provenance)?,
             summary: UpdateSummary {
                 seconds,
                 known,

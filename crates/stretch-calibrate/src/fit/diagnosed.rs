@@ -11,7 +11,7 @@ use crate::{
 use super::{
     calibrate::Choice,
     curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
-    defects::Defects,
+    defects::{Defects, Moved},
     history::SETTLE,
     observer_model::{LIVE_CATCH_UP_S, Piece, candidates, judge_live, pieces},
     report::{Coefficient, FitReport, Fitted},
@@ -78,10 +78,9 @@ pub(crate) fn diagnosed(
         map.agility,
         map.steady_s,
     );
-    let Forward { defects, rest, errors_in, .. } = forward;
-    let at = defects.at;
-    let choice =
-        DiagnosedChoice { at, errors_in, rest, agility: map.agility, steady_s: map.steady_s };
+    let Forward { errors_in, rest, .. } = forward;
+    let (at, agility, steady_s) = (forward.defects.at, map.agility, map.steady_s);
+    let choice = DiagnosedChoice { at, errors_in, rest, agility, steady_s };
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), Choice::Diagnosed(choice)))
 }
 
@@ -106,27 +105,21 @@ struct Forward {
     errors_in: ErrorsIn,
     defects: Defects,
     rest: Option<RestTracker>,
-    /// The curve in signed signal, rising.
-    curve: Vec<f64>,
-    domain: Interval,
+    seen: Seen,
     noise: f64,
     /// Standard errors of the coordinates.
     errors: Vec<f64>,
-    /// Hysteresis state of the plays where a trial begins.
-    initial_hysteresis: [f64; 2],
-    /// Travel of the gauge at the end of the trials.
-    travelled: f64,
 }
 
 fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
-    let named = |(i, error): (usize, &f64)| {
-        let parameter = &forward.defects.moved[i];
-        let value = parameter.value(forward.defects.at[i]);
-        Coefficient::named(parameter.name(), value, 1.96 * parameter.error(value, *error))
-    };
-    let coefficients: Vec<Coefficient> = forward.errors.iter().enumerate().map(named).collect();
+    let Defects { moved, at, .. } = &forward.defects;
+    let names = moved.iter().map(Moved::name).collect();
+    let values: Vec<f64> = moved.iter().zip(at).map(|(own, x)| own.value(*x)).collect();
+    let errors = moved.iter().zip(&values).zip(&forward.errors);
+    let errors: Vec<f64> = errors.map(|((own, value), error)| own.error(*value, *error)).collect();
+    let coefficients = Coefficient::named(names, &values, &errors);
     let kind = Memory::Diagnosed.to_string();
-    let terms = forward.curve.len() + coefficients.len() + 3;
+    let terms = forward.seen.curve.len() + coefficients.len() + 3;
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
     FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, terms, None)
 }
@@ -154,20 +147,22 @@ struct Record<'a> {
 
 /// A forward model at given parameter values, and its residuals.
 struct Seen {
+    simulated: Simulated,
+    /// The curve in signed signal, rising.
     curve: Vec<f64>,
     domain: Interval,
     residuals: Vec<f64>,
     square: f64,
     /// Sum of squared errors of the signal, whichever errors `square` counts.
     volts: f64,
-    initial_hysteresis: [f64; 2],
-    travelled: f64,
 }
 
 /// Every drive with its signal, and the state of the defects.
 struct Simulated {
     pairs: Vec<(f64, f64)>,
+    /// Hysteresis state of the plays where a trial begins.
     initial_hysteresis: [f64; 2],
+    /// Travel of the gauge at the end of the trials.
     travelled: f64,
 }
 
@@ -230,13 +225,14 @@ impl<'a> Record<'a> {
 
     /// The curve with the least residuals, and these residuals.
     fn look(&self, defects: &Defects) -> Option<Seen> {
-        let Simulated { pairs, initial_hysteresis, travelled } = self.pairs(defects);
+        let simulated = self.pairs(defects);
+        let pairs = &simulated.pairs;
         if pairs.len() <= KNOTS + defects.at.len() {
             return None;
         }
         let domain = inner(pairs.iter().map(|(drive, _)| *drive).collect())?;
         let mut rows = CurveRows::new(0);
-        for (drive, signal) in &pairs {
+        for (drive, signal) in pairs {
             rows.push(Place::new(*drive, domain), &[], *signal);
         }
         let solution = rows.factor().solve(|_, power| 1e-12 * (1.0 + power))?;
@@ -256,15 +252,12 @@ impl<'a> Record<'a> {
         };
         let residuals: Vec<f64> = pairs.iter().map(left).collect();
         let square = residuals.iter().map(|r| r * r).sum::<f64>();
-        Some(Seen { curve, domain, residuals, square, volts, initial_hysteresis, travelled })
+        Some(Seen { simulated, curve, domain, residuals, square, volts })
     }
 
     /// Levenberg-Marquardt over the parameters of the defects; the curve is solved for at each step.
     fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
-        // a block counts as one observation, and so does the value that the diagnosis found
-        let block = (BLOCK_S / self.period_s).max(1.0);
-        let strayed = |defects: &Defects| defects.strayed(&begin);
         let mut defects = begin.clone();
         let mut seen = self.look(&defects).ok_or_else(undetermined)?;
         let count = defects.at.len();
@@ -277,13 +270,14 @@ impl<'a> Record<'a> {
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
             let mut slope =
                 nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
-            let level = self.mean(&seen) * block;
+            // a block counts as one observation, and so does the value that the diagnosis found
+            let level = self.mean(&seen) * self.block();
             let cost = |seen: &Seen, defects: &Defects| {
-                let stray: f64 = strayed(defects).iter().map(|(d, w)| w * d * d).sum();
+                let stray: f64 = defects.strayed(&begin).iter().map(|(d, w)| w * d * d).sum();
                 seen.square + level * stray
             };
             let before = cost(&seen, &defects);
-            for (i, (distance, weight)) in strayed(&defects).into_iter().enumerate() {
+            for (i, (distance, weight)) in defects.strayed(&begin).into_iter().enumerate() {
                 normal[(i, i)] += level * weight;
                 slope[i] += level * weight * distance;
             }
@@ -315,19 +309,13 @@ impl<'a> Record<'a> {
         let range = seen.curve[KNOTS - 1] - seen.curve[0];
         // a curve that follows noiseless data exactly still needs a positive noise for the weights
         let noise = noise.max(1e-6 * range);
-        let Seen { curve, domain, initial_hysteresis, travelled, .. } = seen;
-        let errors_in = self.errors_in;
-        Ok(Forward {
-            errors_in,
-            defects,
-            rest: self.rest,
-            curve,
-            domain,
-            noise,
-            errors,
-            initial_hysteresis,
-            travelled,
-        })
+        let Self { errors_in, rest, .. } = *self;
+        Ok(Forward { errors_in, defects, rest, seen, noise, errors })
+    }
+
+    /// Samples of a block.
+    fn block(&self) -> f64 {
+        (BLOCK_S / self.period_s).max(1.0)
     }
 
     fn mean(&self, seen: &Seen) -> f64 {
@@ -357,14 +345,15 @@ impl<'a> Record<'a> {
 
     /// Standard errors of the coordinates, where a block counts as one observation.
     fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
-        let block = (BLOCK_S / self.period_s).max(1.0);
         if normal.is_empty() {
             return Vec::new();
         }
         match normal.clone().try_inverse() {
-            Some(inverse) => {
-                inverse.diagonal().iter().map(|v| noise * (v.max(0.0) * block).sqrt()).collect()
-            }
+            Some(inverse) => inverse
+                .diagonal()
+                .iter()
+                .map(|v| noise * (v.max(0.0) * self.block()).sqrt())
+                .collect(),
             None => vec![f64::NAN; normal.nrows()],
         }
     }
@@ -372,10 +361,10 @@ impl<'a> Record<'a> {
     /// The filter with the least live error.
     fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         use rayon::prelude::*;
-        let grid = STEADY_S.iter().flat_map(|s| AGILITIES.iter().map(move |a| (*a, *s)));
-        let grid: Vec<(f64, f64)> = grid.collect();
-        let maps: Result<Vec<DiagnosedMap>, CalibrateError> =
-            grid.into_par_iter().map(|(a, s)| self.judged(forward, a, s)).collect();
+        let maps: Result<Vec<DiagnosedMap>, CalibrateError> = STEADY_S
+            .par_iter()
+            .flat_map(|s| AGILITIES.par_iter().map(|a| self.judged(forward, *a, *s)))
+            .collect();
         let best = maps?.into_iter().min_by(|a, b| a.fit.rmse.total_cmp(&b.fit.rmse));
         best.ok_or(CalibrateError::NoTrials)
     }
@@ -388,7 +377,7 @@ impl<'a> Record<'a> {
         steady_s: f64,
     ) -> Result<DiagnosedMap, CalibrateError> {
         let prepared = self.prepared;
-        let map = self.map(forward, agility, steady_s)?;
+        let map = DiagnosedMap { agility, steady_s, ..self.map(forward)? };
         let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
         let mut apart = 0.0;
         let tally = judge_live(prepared, Model::Diagnosed(map), |error, reading| {
@@ -398,34 +387,28 @@ impl<'a> Record<'a> {
         Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }
 
-    fn map(
-        &self,
-        forward: &Forward,
-        agility: f64,
-        steady_s: f64,
-    ) -> Result<DiagnosedMap, CalibrateError> {
-        let prepared = self.prepared;
-        let sign = prepared.polarity.sign();
-        let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
-        let estimate_domain = self.targets.unwrap_or(forward.domain);
+    /// The map without these statistics.
+    fn map(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
+        let Seen { simulated, curve, domain, .. } = &forward.seen;
+        let sign = self.prepared.polarity.sign();
+        let curve: Vec<f64> = curve.iter().map(|v| sign * v).collect();
+        let estimate_domain = self.targets.unwrap_or(*domain);
         let map = forward.defects.map();
         // the fitted curve gives the signal at rest without noise
         let live = LiveDefects::<f64>::new(&map, self.period_s);
         let mut still = live.begin(estimate_domain.min, 0.0);
         let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);
-        let level = Place::new(at_rest, forward.domain).on(&curve);
+        let level = Place::new(at_rest, *domain).on(&curve);
         let rest =
             forward.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
-        let travelled = forward.travelled;
+        let travelled = simulated.travelled;
         Ok(DiagnosedMap {
             rest,
-            initial_hysteresis: forward.initial_hysteresis,
+            initial_hysteresis: simulated.initial_hysteresis,
             worn: map.worn.map(|worn| stretch_core::Worn { travelled, ..worn }),
             curve: Values::new("curve", &curve)?,
-            drive_domain: forward.domain,
+            drive_domain: *domain,
             noise: forward.noise,
-            agility,
-            steady_s,
             estimate_domain,
             ..map
         })

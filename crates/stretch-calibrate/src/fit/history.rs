@@ -207,9 +207,7 @@ pub(crate) fn history(
         estimate_domain: best.estimate,
         fit,
     };
-    let coefficients = choice.design.term_names().into_iter().zip(weights).zip(&errors);
-    let coefficients =
-        coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
+    let coefficients = Coefficient::named(choice.design.term_names(), weights, &errors);
     let report = FitReport::of_model(
         NAME.to_owned(),
         &fit,

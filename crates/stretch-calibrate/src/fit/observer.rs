@@ -44,8 +44,8 @@ pub(crate) fn observer(
     let (forward, map) = match choice {
         Some(Choice::Observer(choice)) => {
             let forward = forward(prepared, &pieces(prepared, choice.rest)?, choice)?;
-            let map = map(prepared, &forward)?;
-            (forward, judged(prepared, map)?)
+            let map = judged(prepared, &forward)?;
+            (forward, map)
         }
         _ => choose(prepared, rest)?,
     };
@@ -56,14 +56,12 @@ pub(crate) fn observer(
     names.extend(choice.radii().iter().map(|w| format!("play of {w} of the range")));
     names.extend(choice.taus().map(|_| "time constant, s".to_owned()));
     let values: Vec<f64> = forward.dynamics.iter().copied().chain(choice.taus()).collect();
-    let bounds = bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
-    let coefficients = names.into_iter().zip(&values).zip(&bounds.errors);
-    let coefficients =
-        coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
+    let (errors, condition) =
+        bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
+    let coefficients = Coefficient::named(names, &values, &errors);
     let kind = Memory::Observer.to_string();
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
-    let report =
-        FitReport::of_model(kind, &map.fit, sse, bounds.condition, coefficients, terms, None);
+    let report = FitReport::of_model(kind, &map.fit, sse, condition, coefficients, terms, None);
     let note = format!(
         "observer: {terms} numbers; noise of the signal {:.4}; the speed of the motion is taken as a random walk of {} 1/s^3{}",
         forward.noise,
@@ -155,7 +153,7 @@ fn tuned(
     let mut best: Option<ObserverMap> = None;
     for agility in AGILITIES {
         forward.choice.agility = agility;
-        let map = judged(prepared, map(prepared, &forward)?)?;
+        let map = judged(prepared, &forward)?;
         if best.as_ref().is_none_or(|b| map.fit.rmse < b.fit.rmse) {
             best = Some(map);
         }
@@ -254,7 +252,8 @@ fn spread(samples: &[Sample], dynamics: &[f64], drive: Interval, curve: &[f64]) 
     (samples.iter().map(square).sum::<f64>() / samples.len() as f64).sqrt()
 }
 
-fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
+/// The map with the statistics of its estimates, computed by the receptor that runs live.
+fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
     let sign = prepared.polarity.sign();
     let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
     let taus: Vec<f64> = forward.choice.taus().collect();
@@ -266,7 +265,7 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
     let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
     let rest =
         forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
-    Ok(ObserverMap {
+    let map = ObserverMap {
         rest,
         curve: Values::new("curve", &curve)?,
         drive_domain: forward.drive,
@@ -279,30 +278,20 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
         agility: forward.choice.agility,
         estimate_domain,
         fit: FitSummary { samples: 0, r_squared: 0.0, rmse: 0.0 },
-    })
-}
-
-/// The map with the statistics of its estimates, computed by the receptor that runs live.
-fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, CalibrateError> {
+    };
     let fit = judge_live(prepared, Model::Observer(map), |_, _| ())?.summary();
     Ok(ObserverMap { fit, ..map })
 }
 
-/// Standard errors and condition of a forward model.
-struct Bounds {
-    /// Standard errors of lead, amplitudes and weights of plays, then of the time
-    /// constants; NaN where the data do not determine them.
-    errors: Vec<f64>,
-    /// Condition number of the rows behind the standard errors.
-    condition: f64,
-}
-
 /// Bounds of a forward model on the pieces that it was fitted to.
+///
+/// The first are standard errors of lead, amplitudes and weights of plays, then of the time constants; NaN where the
+/// data do not determine them. The second is the condition number of the rows behind the standard errors.
 ///
 /// The bounds are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
 /// together: an effect that the curve or a time constant could absorb is
 /// not counted as known. The choice of the structure is taken as known.
-fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Bounds {
+fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> (Vec<f64>, f64) {
     let Forward { choice, curve, drive, dynamics, .. } = forward;
     let taus: Vec<f64> = choice.taus().collect();
     let more = dynamics.len() + taus.len();
@@ -344,10 +333,7 @@ fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Bounds {
     }
     // the least positive number keeps a column of zeros from dividing by nothing
     match rows.factor().solve(|_, power| BOUNDS_RIDGE * power + 1e-300) {
-        Some(solution) => Bounds {
-            errors: solution.block_errors(&blocks).split_off(KNOTS),
-            condition: solution.condition(),
-        },
-        None => Bounds { errors: vec![f64::NAN; more], condition: f64::INFINITY },
+        Some(solution) => (solution.block_errors(&blocks).split_off(KNOTS), solution.condition()),
+        None => (vec![f64::NAN; more], f64::INFINITY),
     }
 }

@@ -85,10 +85,14 @@ pub struct Order {
 }
 
 impl Coefficient {
-    /// A coefficient that is no power of rate and signal.
-    pub(crate) fn named(name: String, estimate: f64, half_width: f64) -> Self {
-        let (lower, upper) = (estimate - half_width, estimate + half_width);
-        Self { name, rate_power: 0, signal_power: 0, estimate, lower, upper }
+    /// Coefficients that are no powers of rate and signal, with their standard errors.
+    pub(crate) fn named(names: Vec<String>, estimates: &[f64], errors: &[f64]) -> Vec<Self> {
+        let all = names.into_iter().zip(estimates).zip(errors);
+        all.map(|((name, &estimate), error)| {
+            let (lower, upper) = (estimate - 1.96 * error, estimate + 1.96 * error);
+            Self { name, rate_power: 0, signal_power: 0, estimate, lower, upper }
+        })
+        .collect()
     }
 }
 

@@ -159,10 +159,7 @@ pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, Calibr
     let own_hz = calibration.spec().sample_rate_hz.hz();
     let mut live =
         LiveReceptor::new(&at_rate(calibration, sample_rate_hz(trial).unwrap_or(own_hz))?)?;
-    let pressure = match pressure_column(calibration) {
-        Some(column) => Some(trial.require(column)?),
-        None => None,
-    };
+    let pressure = pressure_column(calibration).map(|column| trial.require(column)).transpose()?;
     let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
         if let Some(pressure) = pressure {
             live.set_pressure(pressure[i]);

@@ -91,7 +91,42 @@ pub fn judge_model(
     options: &Options,
     kind: ModelKind,
 ) -> Result<Judged, CalibrateError> {
-    judge(trials, &folds(trials, options), &turning(trials, options)?, options, kind)
+    let turning = turning(trials, options)?;
+    let options = Options { model: kind, ..options.clone() };
+    let (whole, choice): (_, Option<Choice>) = calibrate_with(trials, &options, None)?;
+    let parameters = whole
+        .fits
+        .iter()
+        .map(|fit| {
+            let own = fit.orders.iter().find(|order| order.model == fit.model);
+            own.map_or(fit.coefficients.len(), |order| order.terms)
+        })
+        .sum::<usize>()
+        + if matches!(kind, ModelKind::Remembering { rest: true, .. }) { 3 } else { 0 };
+    let mut errors = Errors::default();
+    for fold in folds(trials, &options) {
+        let rest = without(trials, &fold, &options);
+        let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
+        let trial = &trials[fold.trial];
+        let reference = trial.require(&options.reference)?;
+        let calibration = match options.is_table {
+            true => beyond_its_ends(calibrated.calibration, trial.require(&options.signal)?)?,
+            false => calibrated.calibration,
+        };
+        let applied = apply(&calibration, trial)?;
+        let estimates: Vec<f64> =
+            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
+        let period_s = 1.0 / sample_rate_hz(trial)?;
+        let which = match (trial.name.contains("pulse"), turning[fold.trial]) {
+            (true, true) => 1,
+            (false, true) => 0,
+            (_, false) => 2,
+        };
+        let settle = if options.is_table { 0 } else { SETTLE };
+        let judged = fold.from.max(settle).min(fold.to)..fold.to;
+        errors.take(&reference[judged.clone()], &estimates[judged], period_s, which);
+    }
+    Ok(Judged { parameters, errors })
 }
 
 /// Which trials reverse; a table, whose rows have no order, does not.
@@ -145,50 +180,6 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
         }
     }
     rest
-}
-
-fn judge(
-    trials: &[Trial],
-    folds: &[Fold],
-    turning: &[bool],
-    options: &Options,
-    kind: ModelKind,
-) -> Result<Judged, CalibrateError> {
-    let options = Options { model: kind, ..options.clone() };
-    let (whole, choice): (_, Option<Choice>) = calibrate_with(trials, &options, None)?;
-    let parameters = whole
-        .fits
-        .iter()
-        .map(|fit| {
-            let own = fit.orders.iter().find(|order| order.model == fit.model);
-            own.map_or(fit.coefficients.len(), |order| order.terms)
-        })
-        .sum::<usize>()
-        + if matches!(kind, ModelKind::Remembering { rest: true, .. }) { 3 } else { 0 };
-    let mut errors = Errors::default();
-    for fold in folds {
-        let rest = without(trials, fold, &options);
-        let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
-        let trial = &trials[fold.trial];
-        let reference = trial.require(&options.reference)?;
-        let calibration = match options.is_table {
-            true => beyond_its_ends(calibrated.calibration, trial.require(&options.signal)?)?,
-            false => calibrated.calibration,
-        };
-        let applied = apply(&calibration, trial)?;
-        let estimates: Vec<f64> =
-            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
-        let period_s = 1.0 / sample_rate_hz(trial)?;
-        let which = match (trial.name.contains("pulse"), turning[fold.trial]) {
-            (true, true) => 1,
-            (false, true) => 0,
-            (_, false) => 2,
-        };
-        let settle = if options.is_table { 0 } else { SETTLE };
-        let judged = fold.from.max(settle).min(fold.to)..fold.to;
-        errors.take(&reference[judged.clone()], &estimates[judged], period_s, which);
-    }
-    Ok(Judged { parameters, errors })
 }
 
 /// A line or a curve that is not held at the ends of the signals that it was fitted to: of a table without its largest

@@ -1,6 +1,7 @@
 //! The digest of a record in JSON: the record's last field, computed over every other byte that is no white space.
 
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
+use serde_path_to_error::Error;
 use stretch_core::record::checksum;
 
 use crate::CalibrateError;
@@ -39,6 +40,20 @@ pub fn split(text: &str) -> (String, Option<&str>) {
         Some((object, digest)) => (object, Some(digest)),
         None => (text.to_owned(), None),
     }
+}
+
+/// The object of a record whose digest is that of its text; `None` for one that was edited or damaged.
+pub fn verified(text: &str) -> Option<String> {
+    let (object, found) = split(text);
+    (found == Some(digest(&object).as_str())).then_some(object)
+}
+
+/// The value of an object without its digest.
+///
+/// # Errors
+/// The fault, and the field that has it.
+pub fn parse<T: DeserializeOwned>(object: &str) -> Result<T, Error<serde_json::Error>> {
+    serde_path_to_error::deserialize(&mut serde_json::Deserializer::from_str(object))
 }
 
 /// The object with its digest behind the last field.

@@ -123,9 +123,7 @@ impl GaugeCalibration {
         calibration: Calibration,
     ) -> Result<Self, CalibrateError> {
         let (object, _) = digest::split(text);
-        let mut json = serde_json::Deserializer::from_str(&object);
-        let beside: Result<Beside, _> = serde_path_to_error::deserialize(&mut json);
-        let Beside { turns } = beside.map_err(|error| unusable(name, error))?;
+        let Beside { turns } = digest::parse(&object).map_err(|error| unusable(name, error))?;
         Self::new(calibration, turns).map_err(|error| unusable(name, error))
     }
 
@@ -199,21 +197,17 @@ impl SleeveCalibration {
             return several.or_else(|_| one());
         }
         let text = String::from_utf8(bytes).unwrap_or_default();
-        let (object, found) = digest::split(&text);
+        let (object, _) = digest::split(&text);
         let value: Option<serde_json::Value> = serde_json::from_str(&object).ok();
         if value.is_none_or(|value| value.get("channels").is_none()) {
             return one();
         }
         let file = path.display().to_string();
-        if found != Some(digest::digest(&object).as_str()) {
-            return Err(unusable(
-                &file,
-                "its digest is not that of its text, so it was edited or damaged; calibrate again",
-            ));
-        }
-        let mut json = serde_json::Deserializer::from_str(&object);
-        let several = serde_path_to_error::deserialize(&mut json);
-        Ok(Self::Many(Box::new(several.map_err(|error| unusable(&file, error))?)))
+        let damaged =
+            "its digest is not that of its text, so it was edited or damaged; calibrate again";
+        let object = digest::verified(&text).ok_or_else(|| unusable(&file, damaged))?;
+        let several = digest::parse(&object).map_err(|error| unusable(&file, error))?;
+        Ok(Self::Many(Box::new(several)))
     }
 }
 

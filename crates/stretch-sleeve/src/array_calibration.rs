@@ -160,7 +160,7 @@ pub struct ArraySpec<const N: usize> {
 /// # Ok::<(), DesignError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "ArraySpec<N>", into = "ArraySpec<N>")]
+#[serde(try_from = "ArraySpec<N>")]
 pub struct ArrayCalibration<const N: usize>(ArraySpec<N>);
 
 impl<const N: usize> ArraySpec<N> {
@@ -182,9 +182,6 @@ impl<const N: usize> ArrayCalibration<N> {
     pub fn new(mut spec: ArraySpec<N>) -> Result<Self, DesignError> {
         spec.schema = Schema::CURRENT;
         let channels = spec.channels.len();
-        let count = |field, got: usize, want: usize| {
-            DesignError::check(field, got as f64, got == want).map(|_| ())
-        };
         DesignError::check(
             "channels",
             channels as f64,
@@ -233,14 +230,16 @@ impl<const N: usize> ArrayCalibration<N> {
     }
 }
 
+/// Checks how many numbers a list has.
+fn count(field: &'static str, got: usize, want: usize) -> Result<(), DesignError> {
+    DesignError::check(field, got as f64, got == want).map(|_| ())
+}
+
 fn check_channel<const N: usize>(
     channel: &ArrayChannel<N>,
     states: usize,
     channels: usize,
 ) -> Result<(), DesignError> {
-    let count = |field, got: usize, want: usize| {
-        DesignError::check(field, got as f64, got == want).map(|_| ())
-    };
     count("length of state_min", channel.state_min.len(), states)?;
     count("length of state_max", channel.state_max.len(), states)?;
     for (&min, &max) in channel.state_min.iter().zip(channel.state_max.iter()) {
@@ -265,11 +264,9 @@ fn check_gains<const N: usize>(
     size("gains.constant", gains.constant)?;
     size("gains.sd", gains.sd)?;
     DesignError::check("gains.sd", gains.sd, gains.sd >= 0.0)?;
-    let got = gains.terms.len();
-    DesignError::check("length of gains.terms", got as f64, got == channels)?;
+    count("length of gains.terms", gains.terms.len(), channels)?;
     for (channel, own) in gains.terms.iter().enumerate() {
-        let want = if uses(channel) { terms } else { 0 };
-        DesignError::check("length of gains.terms", own.len() as f64, own.len() == want)?;
+        count("length of gains.terms", own.len(), if uses(channel) { terms } else { 0 })?;
         own.iter().try_for_each(|&gain| size("gains.terms", gain).map(|_| ()))?;
     }
     Ok(())
@@ -281,11 +278,8 @@ fn check_shifts<const N: usize>(
 ) -> Result<(), DesignError> {
     extent("shifts.block_s", shifts.block_s)?;
     extent("shifts.false_alarms_an_hour", shifts.false_alarms_an_hour)?;
-    for (field, list) in
-        [("length of shifts.usual", &shifts.usual), ("length of shifts.limits", &shifts.limits)]
-    {
-        DesignError::check(field, list.len() as f64, list.len() == channels)?;
-    }
+    count("length of shifts.usual", shifts.usual.len(), channels)?;
+    count("length of shifts.limits", shifts.limits.len(), channels)?;
     shifts.usual.iter().try_for_each(|&usual| size("shifts.usual", usual).map(|_| ()))?;
     shifts.limits.iter().try_for_each(|&limit| extent("shifts.limits", limit).map(|_| ()))
 }
@@ -294,11 +288,5 @@ impl<const N: usize> TryFrom<ArraySpec<N>> for ArrayCalibration<N> {
     type Error = DesignError;
     fn try_from(spec: ArraySpec<N>) -> Result<Self, DesignError> {
         Self::new(spec)
-    }
-}
-
-impl<const N: usize> From<ArrayCalibration<N>> for ArraySpec<N> {
-    fn from(calibration: ArrayCalibration<N>) -> Self {
-        calibration.0
     }
 }

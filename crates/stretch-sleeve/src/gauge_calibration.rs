@@ -25,15 +25,8 @@ use stretch_core::{
 /// # Ok::<(), stretch_core::DesignError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parts", into = "Parts")]
-pub struct GaugeCalibration {
-    calibration: Calibration,
-    turns: Option<Turns>,
-}
-
-/// The fields in the order of bytes, before they are checked.
-#[derive(Serialize, Deserialize)]
-struct Parts(Calibration, Option<Turns>);
+#[serde(try_from = "(Calibration, Option<Turns>)")]
+pub struct GaugeCalibration(Calibration, Option<Turns>);
 
 impl GaugeCalibration {
     /// A record with the turning points of movements; without them if too few were recorded.
@@ -42,30 +35,24 @@ impl GaugeCalibration {
     /// [`DesignError`] that names the field of the turns.
     pub fn new(calibration: Calibration, turns: Option<Turns>) -> Result<Self, DesignError> {
         turns.as_ref().map_or(Ok(()), Turns::validate)?;
-        Ok(Self { calibration, turns })
+        Ok(Self(calibration, turns))
     }
 
     /// The calibration.
     pub fn calibration(&self) -> &Calibration {
-        &self.calibration
+        &self.0
     }
 
     /// Turning points of movements.
     pub fn turns(&self) -> Option<&Turns> {
-        self.turns.as_ref()
+        self.1.as_ref()
     }
 }
 
-impl TryFrom<Parts> for GaugeCalibration {
+impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
     type Error = DesignError;
-    fn try_from(Parts(calibration, turns): Parts) -> Result<Self, DesignError> {
+    fn try_from((calibration, turns): (Calibration, Option<Turns>)) -> Result<Self, DesignError> {
         Self::new(calibration, turns)
-    }
-}
-
-impl From<GaugeCalibration> for Parts {
-    fn from(gauge: GaugeCalibration) -> Self {
-        Self(gauge.calibration, gauge.turns)
     }
 }
 

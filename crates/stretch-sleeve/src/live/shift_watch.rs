@@ -1,6 +1,7 @@
 //! Checks whether a gauge of several still agrees with the others.
 
 use stretch_core::{Design, Real};
+use stretch_receptor::numbers::rounded;
 
 use crate::ArrayCalibration;
 
@@ -112,17 +113,12 @@ impl<T: Real, const N: usize> ShiftWatch<T, N> {
         let of = calibration.spec().shifts.as_ref()?;
         let (samples_a_value, values_a_block) =
             block_of(calibration.spec().sample_rate_hz.hz(), of.block_s);
-        let rounded = |list: &[f64]| {
-            let mut all = [T::zero(); N];
-            all.iter_mut().zip(list).for_each(|(place, &x)| *place = T::from_f64(x));
-            all
-        };
         Some(Self {
             channels: calibration.spec().channels.len(),
             samples_a_value,
             values_a_block,
-            usual: rounded(&of.usual),
-            limits: rounded(&of.limits),
+            usual: rounded(of.usual.iter().copied()),
+            limits: rounded(of.limits.iter().copied()),
             per_block: T::from_f64(1.0 / f64::from(values_a_block)),
         })
     }

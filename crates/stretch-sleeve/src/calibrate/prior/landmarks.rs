@@ -3,6 +3,7 @@
 //! The low and the high end are the 5 % of the samples in which the reference, or its substitute,
 //! is smallest and largest. The rest is the 10 % in which the signals move least.
 
+use serde::{Deserialize, Serialize};
 use stretch_core::Interval;
 
 use crate::calibrate::channels::Channels;
@@ -89,16 +90,24 @@ pub(crate) struct Landmark {
     pub(crate) sessions: usize,
 }
 
+/// A session's path and its landmarks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Landmarks {
+    pub(crate) path: Vec<String>,
+    pub(crate) at: [f64; LANDMARKS],
+}
+
 /// A landmark over the sessions that share most with a path, `sd^2 = v (1 + 1/n)`, where `v` is the
 /// pooled variance of all groups of sessions that share as much.
 pub(crate) fn expected(
-    sessions: &[(Vec<String>, [f64; LANDMARKS])],
+    sessions: &[Landmarks],
     path: &[String],
     landmark: usize,
 ) -> Option<Landmark> {
     (0..=path.len()).rev().find_map(|depth| {
-        let own = sessions.iter().filter(|(p, _)| p.starts_with(&path[..depth]));
-        let own: Vec<f64> = own.map(|(_, values)| values[landmark]).collect();
+        let own = sessions.iter().filter(|session| session.path.starts_with(&path[..depth]));
+        let own: Vec<f64> = own.map(|session| session.at[landmark]).collect();
         let variance = pooled(sessions, depth, landmark).filter(|_| !own.is_empty())?;
         let (count, sessions) = (own.len() as f64, own.len());
         let mean = own.iter().sum::<f64>() / count;
@@ -108,14 +117,10 @@ pub(crate) fn expected(
 
 /// The variance within groups of sessions that share the first steps of their paths; `None` if no
 /// group has two.
-fn pooled(
-    sessions: &[(Vec<String>, [f64; LANDMARKS])],
-    depth: usize,
-    landmark: usize,
-) -> Option<f64> {
+fn pooled(sessions: &[Landmarks], depth: usize, landmark: usize) -> Option<f64> {
     let mut groups: std::collections::BTreeMap<&[String], Vec<f64>> = Default::default();
-    for (path, values) in sessions {
-        groups.entry(&path[..depth.min(path.len())]).or_default().push(values[landmark]);
+    for Landmarks { path, at } in sessions {
+        groups.entry(&path[..depth.min(path.len())]).or_default().push(at[landmark]);
     }
     let (mut squares, mut free) = (0.0, 0.0);
     for group in groups.values() {
@@ -134,7 +139,7 @@ mod tests {
     fn a_known_path_narrows_a_landmark_and_a_movement_is_counted() {
         let path = |who: &str| vec![who.to_owned()];
         let sessions: Vec<_> = [("a", 1.0), ("a", 1.2), ("b", 5.0), ("b", 5.2)]
-            .map(|(who, x)| (path(who), [x; LANDMARKS]))
+            .map(|(who, x)| Landmarks { path: path(who), at: [x; LANDMARKS] })
             .into();
         let known = expected(&sessions, &path("b"), 0).unwrap();
         // two groups of two: v = (2 * 0.02)/2 = 0.02, times 3/2

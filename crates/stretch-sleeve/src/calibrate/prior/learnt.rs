@@ -1,6 +1,7 @@
 //! A prior: the distribution of a model's coefficients over sessions.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
     CalibrateError,
     toolkit::{LinearFactor, extent},
@@ -15,9 +16,10 @@ use crate::{
 
 use super::{
     expected::{Expected, expected},
-    landmarks::LANDMARKS,
-    session::Session,
-    tree::{Leaf, Normal, Spread, Tree},
+    landmarks::Landmarks,
+    record::{triangle, triangles},
+    session::{SCHEMA, Session},
+    tree::{Known, Leaf, Normal, Spread, Tree},
 };
 
 /// Errors of sleeves are correlated over about this time, in seconds: samples within it count as
@@ -35,8 +37,11 @@ const LEAST_SESSIONS: usize = 3;
 /// its square. All terms are defined over the prior's own domains. Sessions vary around their
 /// wearer and wearers around the population (with as many levels as the sessions' paths have), and
 /// each level has its own covariance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+// messages about a file call it a record
+#[serde(deny_unknown_fields, expecting = "struct Record")]
 pub struct Prior {
+    pub(crate) schema: u32,
     /// Columns of the signals.
     pub signals: Vec<String>,
     /// Column of the reference.
@@ -52,23 +57,32 @@ pub struct Prior {
     pub(crate) estimate: Interval,
     pub(crate) domains: Vec<Vec<Interval>>,
     /// For every path that was seen, the empty one first.
-    pub(crate) known: Vec<(Vec<String>, Normal)>,
+    pub(crate) known: Vec<Known>,
     /// Covariance of each level below the root.
+    #[serde(with = "triangles")]
     pub(crate) levels: Vec<DMatrix<f64>>,
     /// Variance of a sample about its session's own coefficients, in normalised target.
     pub(crate) noise: f64,
     /// Mean of `X'X` over a sample.
+    #[serde(with = "triangle")]
     pub(crate) gram: DMatrix<f64>,
     /// The longest runs of equal samples that were seen.
-    pub(crate) still: Still,
+    pub(crate) still_samples: Vec<u32>,
+    /// Samples of each channel that were looked at.
+    pub(crate) still_seen: u64,
     /// For each session its path and landmarks, in normalised target.
-    pub(crate) landmarks: Vec<(Vec<String>, [f64; LANDMARKS])>,
+    pub(crate) landmarks: Vec<Landmarks>,
 }
 
 impl Prior {
     /// The reference's unit over normalised target, without its sign.
     pub(super) fn unit_of_target(&self) -> f64 {
         self.target_range.span() * self.target.reference_per_target().abs()
+    }
+
+    /// The longest runs of equal samples that were seen.
+    pub(super) fn still(&self) -> Still {
+        Still { longest: self.still_samples.clone(), samples: self.still_seen }
     }
 
     /// Learns a prior from sessions.
@@ -110,22 +124,23 @@ impl Prior {
         let paths: Vec<Vec<String>> = sessions.iter().map(|s| filled(s, depth)).collect();
         let paths = without_single_levels(paths);
         let tree = Tree::new(&paths, &leaves);
-        let Spread { levels, noise } = tree.learn().ok_or_else(undetermined)?;
-        let spread = Spread { levels, noise };
+        let spread = tree.learn().ok_or_else(undetermined)?;
         let known = tree.known(&spread).ok_or_else(undetermined)?;
         let left = tree.left_out(&spread).ok_or_else(undetermined)?;
         let still = sessions.iter().map(Session::still).reduce(|all, one| all.and(&one));
+        let still = still.ok_or_else(undetermined)?;
         let count: f64 = leaves.iter().map(|leaf| leaf.count).sum();
         let gram = leaves
             .iter()
             .fold(DMatrix::zeros(bank.terms(), bank.terms()), |sum, leaf| sum + &leaf.gram / count);
         let unit = target_range.span() * target.reference_per_target().abs();
         Ok(Self {
+            schema: SCHEMA,
             signals: first.signals.clone(),
             reference: first.reference.clone(),
             sample_rate_hz: first.sample_rate_hz,
             sessions: sessions.len(),
-            expected: expected(&parts, &left, (noise, &gram), unit),
+            expected: expected(&parts, &left, (spread.noise, &gram), unit),
             target,
             target_range,
             estimate: Interval {
@@ -135,9 +150,10 @@ impl Prior {
             domains,
             known,
             levels: spread.levels,
-            noise,
+            noise: spread.noise,
             gram,
-            still: still.ok_or_else(undetermined)?,
+            still_samples: still.longest,
+            still_seen: still.samples,
             landmarks: normalised_landmarks(sessions, (target, target_range)),
         })
     }
@@ -172,7 +188,7 @@ impl Prior {
 
     /// The paths that were seen: sensors, their wearers, and activities.
     pub fn paths(&self) -> impl Iterator<Item = &[String]> {
-        self.known.iter().skip(1).map(|(path, _)| path.as_slice())
+        self.known.iter().skip(1).map(|known| known.path.as_slice())
     }
 
     /// The distribution of the coefficients of a new session of a path, and how much of the path was seen.
@@ -180,15 +196,15 @@ impl Prior {
         let fits = |seen: &[String]| {
             seen.len() <= path.len() && seen.iter().zip(path).all(|(a, b)| a == b)
         };
-        let best =
-            self.known.iter().filter(|(seen, _)| fits(seen)).max_by_key(|(seen, _)| seen.len());
-        let Some((seen, normal)) = best else {
+        let seen = self.known.iter().filter(|known| fits(&known.path));
+        let Some(Known { path: seen, mean, covariance }) = seen.max_by_key(|own| own.path.len())
+        else {
             // the empty path is always known
             return (Normal { mean: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }, 0);
         };
         let below = &self.levels[seen.len().min(self.levels.len())..];
-        let covariance = below.iter().fold(normal.covariance.clone(), |sum, level| sum + level);
-        (Normal { mean: normal.mean.clone(), covariance }, seen.len())
+        let covariance = below.iter().fold(covariance.clone(), |sum, level| sum + level);
+        (Normal { mean: mean.clone(), covariance }, seen.len())
     }
 }
 
@@ -216,15 +232,12 @@ fn leaves(session: &Session, bank: &Bank, (target, range): (Target, Range)) -> O
 }
 
 /// The landmarks of sessions in normalised target.
-fn normalised_landmarks(
-    sessions: &[Session],
-    (target, range): (Target, Range),
-) -> Vec<(Vec<String>, [f64; LANDMARKS])> {
+fn normalised_landmarks(sessions: &[Session], (target, range): (Target, Range)) -> Vec<Landmarks> {
     let normalised = |x: f64| range.normalise(target.from_reference(x));
     let one = |s: &Session| {
         let [low, high, rest] = s.landmarks.map(normalised);
         // a target may fall where the reference rises
-        (s.path.clone(), [low.min(high), low.max(high), rest])
+        Landmarks { path: s.path.clone(), at: [low.min(high), low.max(high), rest] }
     };
     sessions.iter().map(one).collect()
 }

@@ -3,62 +3,18 @@
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use stretch_calibrate::digest;
-use stretch_core::{Interval, Range, Target};
+use stretch_core::Interval;
 use stretch_data::files::read_whole;
 
-use crate::{
-    SleeveError,
-    calibrate::{array::Still, bank::Bank},
-};
+use crate::{SleeveError, calibrate::bank::Bank};
 
 use super::{
-    expected::Expected,
-    landmarks::LANDMARKS,
     learnt::Prior,
     session::{SCHEMA, Session, packed, unpacked},
-    tree::Normal,
+    tree::Known,
 };
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Record {
-    schema: u32,
-    signals: Vec<String>,
-    reference: String,
-    sample_rate_hz: f64,
-    sessions: usize,
-    expected: Vec<Expected>,
-    target: Target,
-    target_range: Range,
-    estimate: Interval,
-    domains: Vec<Vec<Interval>>,
-    known: Vec<Known>,
-    levels: Vec<Vec<f64>>,
-    noise: f64,
-    gram: Vec<f64>,
-    still_samples: Vec<u32>,
-    still_seen: u64,
-    landmarks: Vec<Landmarks>,
-}
-
-/// A session's path and its landmarks.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Landmarks {
-    path: Vec<String>,
-    at: [f64; LANDMARKS],
-}
-
-/// A path that was seen, with mean and covariance (upper triangle, row by row) of its coefficients.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Known {
-    path: Vec<String>,
-    mean: Vec<f64>,
-    covariance: Vec<f64>,
-}
 
 fn problem(file: &str, problem: impl std::fmt::Display) -> SleeveError {
     let problem = format!(
@@ -73,58 +29,25 @@ impl Prior {
     /// # Errors
     /// [`SleeveError::Prior`] with the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, SleeveError> {
-        let (record, file): (Record, _) = opened(path)?;
-        if record.schema != SCHEMA {
+        let (prior, file): (Self, _) = opened(path)?;
+        if prior.schema != SCHEMA {
             return Err(problem(&file, "it was written by another release"));
         }
-        let wrong = || problem(&file, "its numbers are not as many as its channels need");
+        let terms = 1 + prior.domains.len() * Bank::terms_a_channel();
         let has_domain = |d: &Vec<Interval>| !d.is_empty() && d.iter().all(|d| d.min < d.max);
-        if record.domains.len() != record.signals.len()
-            || record.still_samples.len() != record.signals.len()
-            || !record.domains.iter().all(has_domain)
-        {
-            return Err(wrong());
+        let is_whole = |matrix: &DMatrix<f64>| matrix.ncols() == terms;
+        let is_known = |own: &Known| own.mean.len() == terms && is_whole(&own.covariance);
+        let is_good = prior.domains.len() == prior.signals.len()
+            && prior.still_samples.len() == prior.signals.len()
+            && prior.domains.iter().all(has_domain)
+            && prior.known.iter().all(is_known)
+            && prior.known.first().is_some_and(|root| root.path.is_empty())
+            && prior.noise > 0.0
+            && prior.levels.iter().chain([&prior.gram]).all(is_whole);
+        match is_good {
+            true => Ok(prior),
+            false => Err(problem(&file, "its numbers are not as many as its channels need")),
         }
-        let terms = Bank::new(record.domains.clone()).terms();
-        let matrix = |numbers: &Vec<f64>| {
-            let upper = unpacked(numbers, terms).ok_or_else(wrong)?;
-            Ok::<_, SleeveError>(mirrored(upper))
-        };
-        let known: Result<Vec<_>, SleeveError> = record
-            .known
-            .iter()
-            .map(|known| {
-                if known.mean.len() != terms {
-                    return Err(wrong());
-                }
-                let mean = DVector::from_column_slice(&known.mean);
-                Ok((known.path.clone(), Normal { mean, covariance: matrix(&known.covariance)? }))
-            })
-            .collect();
-        let known = known?;
-        if known.first().is_none_or(|(path, _)| !path.is_empty())
-            || record.noise.is_nan()
-            || record.noise <= 0.0
-        {
-            return Err(wrong());
-        }
-        Ok(Self {
-            levels: record.levels.iter().map(matrix).collect::<Result<_, _>>()?,
-            gram: matrix(&record.gram)?,
-            known,
-            signals: record.signals,
-            reference: record.reference,
-            sample_rate_hz: record.sample_rate_hz,
-            sessions: record.sessions,
-            expected: record.expected,
-            target: record.target,
-            target_range: record.target_range,
-            estimate: record.estimate,
-            domains: record.domains,
-            noise: record.noise,
-            still: Still { longest: record.still_samples, samples: record.still_seen },
-            landmarks: record.landmarks.into_iter().map(|l| (l.path, l.at)).collect(),
-        })
     }
 
     /// The prior in JSON.
@@ -132,35 +55,7 @@ impl Prior {
     /// # Errors
     /// Never, because all of its numbers are finite.
     pub fn to_json(&self) -> Result<String, SleeveError> {
-        let known = self.known.iter().map(|(path, normal)| Known {
-            path: path.clone(),
-            mean: normal.mean.iter().copied().collect(),
-            covariance: packed(&normal.covariance),
-        });
-        let record = Record {
-            schema: SCHEMA,
-            signals: self.signals.clone(),
-            reference: self.reference.clone(),
-            sample_rate_hz: self.sample_rate_hz,
-            sessions: self.sessions,
-            expected: self.expected.clone(),
-            target: self.target,
-            target_range: self.target_range,
-            estimate: self.estimate,
-            domains: self.domains.clone(),
-            known: known.collect(),
-            levels: self.levels.iter().map(packed).collect(),
-            noise: self.noise,
-            gram: packed(&self.gram),
-            still_samples: self.still.longest.clone(),
-            still_seen: self.still.samples,
-            landmarks: self
-                .landmarks
-                .iter()
-                .map(|(path, at)| Landmarks { path: path.clone(), at: *at })
-                .collect(),
-        };
-        sealed(&record, "prior")
+        sealed(self, "prior")
     }
 }
 
@@ -175,15 +70,9 @@ fn opened<T: for<'d> Deserialize<'d>>(path: &Path) -> Result<(T, String), Sleeve
     let file = path.display().to_string();
     let bytes = read_whole(path).map_err(|error| problem(&file, error))?;
     let text = String::from_utf8(bytes).map_err(|error| problem(&file, error))?;
-    let (object, found) = digest::split(&text);
-    if found != Some(digest::digest(&object).as_str()) {
-        return Err(problem(
-            &file,
-            "its digest is not that of its text, so it was edited or damaged",
-        ));
-    }
-    let mut json = serde_json::Deserializer::from_str(&object);
-    let value = serde_path_to_error::deserialize(&mut json).map_err(|e| problem(&file, e))?;
+    let damaged = "its digest is not that of its text, so it was edited or damaged";
+    let object = digest::verified(&text).ok_or_else(|| problem(&file, damaged))?;
+    let value = digest::parse(&object).map_err(|error| problem(&file, error))?;
     Ok((value, file))
 }
 
@@ -207,8 +96,53 @@ impl Session {
     }
 }
 
+/// A symmetric matrix as its upper triangle, row by row.
+pub(crate) mod triangle {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(own: &DMatrix<f64>, to: S) -> Result<S::Ok, S::Error> {
+        packed(own).serialize(to)
+    }
+
+    /// Empty if the numbers are not those of a triangle.
+    pub(crate) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<DMatrix<f64>, D::Error> {
+        Vec::deserialize(from).map(|own| mirrored(&own))
+    }
+}
+
+/// Symmetric matrices as [`triangle`]s.
+pub(crate) mod triangles {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(all: &[DMatrix<f64>], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(all.iter().map(packed))
+    }
+
+    pub(crate) fn deserialize<'d, D: Deserializer<'d>>(
+        from: D,
+    ) -> Result<Vec<DMatrix<f64>>, D::Error> {
+        let all: Vec<Vec<f64>> = Vec::deserialize(from)?;
+        Ok(all.iter().map(|own| mirrored(own)).collect())
+    }
+}
+
+/// A vector as a list.
+pub(crate) mod list {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(own: &DVector<f64>, to: S) -> Result<S::Ok, S::Error> {
+        own.as_slice().serialize(to)
+    }
+
+    pub(crate) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<DVector<f64>, D::Error> {
+        Vec::deserialize(from).map(DVector::from_vec)
+    }
+}
+
 /// The symmetric matrix of an upper triangle.
-fn mirrored(mut upper: DMatrix<f64>) -> DMatrix<f64> {
+fn mirrored(numbers: &[f64]) -> DMatrix<f64> {
+    let columns = (1..=numbers.len()).find(|n| n * (n + 1) / 2 >= numbers.len()).unwrap_or(0);
+    let mut upper = unpacked(numbers, columns).unwrap_or_else(|| DMatrix::zeros(0, 0));
     upper.fill_lower_triangle_with_upper_triangle();
     upper
 }

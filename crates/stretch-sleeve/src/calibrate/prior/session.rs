@@ -239,8 +239,7 @@ fn parts(channels: &Channels) -> Vec<SessionPart> {
     let mut sums: Vec<(u64, RowAccumulator)> =
         (0..=PARTS_S.len()).map(|_| (0, RowAccumulator::new(bank.terms()))).collect();
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-    let mut before = 0;
-    for stretch in &channels.stretches {
+    for (before, stretch) in channels.placed() {
         for sample in stretch.warmed_up() {
             let time_s = (before + sample) as f64 / hz;
             let part = PARTS_S.iter().take_while(|&&end_s| time_s >= end_s).count();
@@ -248,7 +247,6 @@ fn parts(channels: &Channels) -> Vec<SessionPart> {
             sums[part].1.push(&row, stretch.reference[sample]);
             sums[part].0 += 1;
         }
-        before += stretch.len();
     }
     let one = |(rows, sums): (u64, RowAccumulator)| SessionPart {
         rows,

@@ -9,8 +9,11 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::calibrate::linear::{inverse, symmetric};
+
+use super::record::{list, triangle};
 
 /// Weight of the diagonal in a covariance, in nodes per term, because a term has few nodes to learn
 /// from.
@@ -36,6 +39,17 @@ pub(crate) struct Leaf {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Normal {
     pub(crate) mean: DVector<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+}
+
+/// A path that was seen, and the distribution of its coefficients.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Known {
+    pub(crate) path: Vec<String>,
+    #[serde(with = "list")]
+    pub(crate) mean: DVector<f64>,
+    #[serde(with = "triangle")]
     pub(crate) covariance: DMatrix<f64>,
 }
 
@@ -232,15 +246,12 @@ impl<'a> Tree<'a> {
     }
 
     /// The posterior of every inner node with its path, the root's first, whose path is empty.
-    pub(crate) fn known(&self, spread: &Spread) -> Option<Vec<(Vec<String>, Normal)>> {
+    pub(crate) fn known(&self, spread: &Spread) -> Option<Vec<Known>> {
         let passed = self.pass(spread)?;
-        let mut known = vec![(Vec::new(), passed.root_posterior)];
-        for (node, normal) in self.nodes.iter().zip(passed.posterior) {
-            if node.leaf.is_none() {
-                known.push((node.path.clone(), normal));
-            }
-        }
-        Some(known)
+        let known = |(path, Normal { mean, covariance })| Known { path, mean, covariance };
+        let inner = self.nodes.iter().zip(passed.posterior).filter(|(node, _)| node.leaf.is_none());
+        let inner = inner.map(|(node, normal)| (node.path.clone(), normal));
+        Some([(Vec::new(), passed.root_posterior)].into_iter().chain(inner).map(known).collect())
     }
 
     /// Prediction of the tree for each session without it: with the rest of its path known, and
@@ -360,7 +371,7 @@ mod tests {
         let left = Tree::new(&paths, &leaves).left_out(&spread).unwrap();
         let (rest, others) = (&paths[1..], leaves[1..].to_vec());
         let known = Tree::new(rest, &others).known(&spread).unwrap();
-        let (_, own) = known.iter().find(|(path, _)| *path == paths[0]).unwrap();
+        let own = known.iter().find(|known| known.path == paths[0]).unwrap();
         let found = left[0][0].as_ref().unwrap();
         assert!((&found.mean - &own.mean).amax() < 1e-9);
         let wanted = &own.covariance + &spread.levels[1];
@@ -369,6 +380,6 @@ mod tests {
         let (rest, others) = (&paths[6..], leaves[6..].to_vec());
         let known = Tree::new(rest, &others).known(&spread).unwrap();
         let found = left[0][1].as_ref().unwrap();
-        assert!((&found.mean - &known[0].1.mean).amax() < 1e-9);
+        assert!((&found.mean - &known[0].mean).amax() < 1e-9);
     }
 }

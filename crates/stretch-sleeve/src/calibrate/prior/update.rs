@@ -124,7 +124,7 @@ impl Prior {
             signals: signals.clone(),
             reference: reference.clone(),
             samples: channels.as_ref().map_or(0, |c| c.reference().count() as u64),
-            still: channels.iter().fold(self.still.clone(), |all, own| all.and(&Still::of(own))),
+            still: channels.iter().fold(self.still(), |all, own| all.and(&Still::of(own))),
             ..self.linear(&posterior.mean, gram, variance)
         };
         Ok(Updated {
@@ -157,7 +157,7 @@ impl Prior {
             weights: weights.iter().copied().collect(),
             gram,
             variance,
-            still: self.still.clone(),
+            still: self.still(),
             samples: 0,
         }
     }
@@ -288,7 +288,7 @@ impl Prior {
     /// Refuses data in which most channels that clearly follow the reference follow it in the
     /// opposite direction.
     fn refuse_polarity(&self, channels: &Channels) -> Result<(), SleeveError> {
-        let mean = &self.known[0].1.mean;
+        let mean = &self.known[0].mean;
         let sign = self.target.reference_per_target().signum();
         let pair = |k: usize| {
             let prior = sign * term_correlation(&self.gram, mean, 1 + k * Bank::terms_a_channel());

@@ -1,5 +1,7 @@
 //! Leave one trial out, without a second look at its samples.
 
+use core::ops::Range;
+
 use stretch_core::{Degree, Real};
 
 use crate::{Factor, FitError};
@@ -33,38 +35,72 @@ impl<T: Real> HeldOut<T> {
 ///
 /// A trial enters as its [`Factor`]; the others' factors are merged, and the
 /// error on the one left out follows from its own factor as
-/// `|R c - q|^2 + rest`, so no sample is read again. `k` trials cost `k^2`
-/// merges. Samples within a trial are neighbours in time and resemble each
+/// `|R c - q|^2 + rest`, so no sample is read again. `k` trials cost
+/// `k log k` merges. Samples within a trial are neighbours in time and resemble each
 /// other; leaving out samples would flatter, leaving out trials does not.
 ///
 /// `degree` may be any degree within the accumulated one. Trials without a
 /// sample are passed over.
 ///
 /// # Errors
-/// Each item: [`FitError::MissingTerm`] when factors differ in degree or
-/// `degree` is not within it, and as for [`Factor::fit`] when the others cannot
+/// [`FitError::MissingTerm`] when factors differ in degree. Each item:
+/// [`FitError::MissingTerm`] when `degree` is not within it, and as for [`Factor::fit`] when the others cannot
 /// determine the surface (there must be at least two trials).
 pub fn held_out<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     degree: Degree,
-) -> impl Iterator<Item = Result<HeldOut<T>, FitError>> + '_ {
-    trials.iter().enumerate().filter(|(_, out)| out.samples() > 0).map(move |(trial, out)| {
-        let mut others: Option<Factor<T, TERMS>> = None;
-        for (_, other) in trials.iter().enumerate().filter(|&(place, _)| place != trial) {
-            match &mut others {
-                Some(sum) => sum.merge(other)?,
-                None => others = Some(*other),
-            }
+    mut visit: impl FnMut(Result<HeldOut<T>, FitError>),
+) -> Result<(), FitError> {
+    leave_out(trials, &mut |trial, others| visit(judge(trials, trial, others, degree)))
+}
+
+/// The error on one trial of the surface that the others determine.
+pub(crate) fn judge<T: Real, const TERMS: usize>(
+    trials: &[Factor<T, TERMS>],
+    trial: usize,
+    others: &Factor<T, TERMS>,
+    degree: Degree,
+) -> Result<HeldOut<T>, FitError> {
+    let out = &trials[trial];
+    let fit = others.fit_degree(degree)?;
+    let sse = out.restrict(degree)?.residual_of(fit.coefficients());
+    if !sse.is_finite() {
+        return Err(FitError::NotFinite);
+    }
+    Ok(HeldOut { trial, samples: out.samples(), sse, weight: out.weight() })
+}
+
+/// Calls `visit` with each trial that has samples and the merged factor of all others.
+pub(crate) fn leave_out<T: Real, const TERMS: usize>(
+    trials: &[Factor<T, TERMS>],
+    visit: &mut impl FnMut(usize, &Factor<T, TERMS>),
+) -> Result<(), FitError> {
+    let Some(first) = trials.first() else { return Ok(()) };
+    leave_out_within(trials, 0..trials.len(), &first.without_samples(), visit)
+}
+
+/// Does so for the trials of a range, outside of which the trials are merged already.
+///
+/// Each half is merged into what the other half lacks: no list of prefixes and suffixes is needed, for which there is no allocator here.
+fn leave_out_within<T: Real, const TERMS: usize>(
+    trials: &[Factor<T, TERMS>],
+    Range { start, end }: Range<usize>,
+    outside: &Factor<T, TERMS>,
+    visit: &mut impl FnMut(usize, &Factor<T, TERMS>),
+) -> Result<(), FitError> {
+    if end - start == 1 {
+        if trials[start].samples() > 0 {
+            visit(start, outside);
         }
-        let needed = degree.terms() as u64;
-        let others = others.ok_or(FitError::TooFewSamples { needed, got: 0 })?;
-        let fit = others.fit_degree(degree)?;
-        let sse = out.restrict(degree)?.residual_of(fit.coefficients());
-        if !sse.is_finite() {
-            return Err(FitError::NotFinite);
-        }
-        Ok(HeldOut { trial, samples: out.samples(), sse, weight: out.weight() })
-    })
+        return Ok(());
+    }
+    let middle = start.midpoint(end);
+    for (half, other) in [(start..middle, middle..end), (middle..end, start..middle)] {
+        let mut outside = *outside;
+        trials[other].iter().try_for_each(|trial| outside.merge(trial))?;
+        leave_out_within(trials, half, &outside, visit)?;
+    }
+    Ok(())
 }
 
 /// The errors of [`held_out`] pooled over all trials.
@@ -108,22 +144,55 @@ pub fn cross_validate<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     degree: Degree,
 ) -> Result<CrossValidation<T>, FitError> {
-    let mut count = 0;
-    let mut samples: u64 = 0;
-    let mut sse = T::zero();
-    let mut weight = T::zero();
-    let mut worst: Option<HeldOut<T>> = None;
-    for held_out in held_out(trials, degree) {
-        let trial = held_out?;
-        count += 1;
-        samples = samples.saturating_add(trial.samples);
-        sse = sse + trial.sse;
-        weight = weight + trial.weight;
-        if worst.is_none_or(|worst| trial.mean_square() > worst.mean_square()) {
-            worst = Some(trial);
-        }
+    let mut pooled = Pooled::default();
+    held_out(trials, degree, |trial| pooled.take(trial))?;
+    pooled.finish(degree)
+}
+
+/// The errors on the trials that have been left out so far.
+pub(crate) struct Pooled<T> {
+    /// The sums of squared errors and weights, and the worst trial; or the first failure.
+    sums: Result<Option<Sums<T>>, FitError>,
+}
+
+#[derive(Clone, Copy)]
+struct Sums<T> {
+    trials: usize,
+    samples: u64,
+    sse: T,
+    weight: T,
+    worst: HeldOut<T>,
+}
+
+impl<T> Default for Pooled<T> {
+    fn default() -> Self {
+        Self { sums: Ok(None) }
     }
-    let needed = degree.terms() as u64;
-    let worst = worst.ok_or(FitError::TooFewSamples { needed, got: 0 })?;
-    Ok(CrossValidation { trials: count, samples, rmse: (sse / weight).sqrt(), worst })
+}
+
+impl<T: Real> Pooled<T> {
+    pub(crate) fn take(&mut self, trial: Result<HeldOut<T>, FitError>) {
+        let Ok(before) = self.sums else { return };
+        self.sums = trial.map(|trial| {
+            let HeldOut { samples, sse, weight, .. } = trial;
+            let Some(sums) = before else {
+                return Some(Sums { trials: 1, samples, sse, weight, worst: trial });
+            };
+            let is_worse = trial.mean_square() > sums.worst.mean_square();
+            Some(Sums {
+                trials: sums.trials + 1,
+                samples: sums.samples.saturating_add(samples),
+                sse: sums.sse + sse,
+                weight: sums.weight + weight,
+                worst: if is_worse { trial } else { sums.worst },
+            })
+        });
+    }
+
+    pub(crate) fn finish(self, degree: Degree) -> Result<CrossValidation<T>, FitError> {
+        let needed = degree.terms() as u64;
+        let sums = self.sums?.ok_or(FitError::TooFewSamples { needed, got: 0 })?;
+        let Sums { trials, samples, sse, weight, worst } = sums;
+        Ok(CrossValidation { trials, samples, rmse: (sse / weight).sqrt(), worst })
+    }
 }

@@ -127,6 +127,11 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         }
     }
 
+    /// A factor of the same degree without a sample.
+    pub(crate) fn without_samples(&self) -> Self {
+        Self::empty(self.basis)
+    }
+
     /// The degree that the samples were accumulated for.
     pub fn degree(&self) -> Degree {
         self.basis.degree()

@@ -2,7 +2,10 @@
 
 use stretch_core::{Degree, MAX_DEGREE, Real};
 
-use crate::{CrossValidation, Factor, FitError, cross_validate, held_out};
+use crate::{
+    CrossValidation, Factor, FitError,
+    cross_validation::{Pooled, judge, leave_out},
+};
 
 /// The most orders that one table compares.
 const MOST: usize = 5;
@@ -148,25 +151,40 @@ impl<T: Real> OrderTable<T> {
             trials.split_first().ok_or(FitError::TooFewSamples { needed, got: 0 })?;
         let mut all = *first;
         rest.iter().try_for_each(|trial| all.merge(trial))?;
+        let mut orders = [None; MOST];
+        orders.iter_mut().zip(degrees).for_each(|(place, degree)| *place = Some(degree));
+        let mut judged: [Pooled<T>; MOST] = Default::default();
+        let mut differences = [[Difference::new(); MOST]; MOST];
+        leave_out(trials, &mut |trial, others| {
+            // one merge of the others serves every order
+            let held =
+                orders.map(|degree| degree.map(|degree| judge(trials, trial, others, degree)));
+            for (i, held_out) in held.iter().enumerate() {
+                let Some(held_out) = held_out else { continue };
+                judged[i].take(*held_out);
+                for (j, best) in held.iter().enumerate() {
+                    if let (Ok(a), Some(Ok(b))) = (held_out, best) {
+                        differences[i][j].take(a.mean_square() - b.mean_square());
+                    }
+                }
+            }
+        })?;
         let mut rows = [None; MOST];
-        for (place, degree) in rows.iter_mut().zip(degrees) {
-            *place = Some((degree, row(&all, trials, degree)));
+        for ((place, degree), judged) in rows.iter_mut().zip(orders).zip(judged) {
+            *place = degree.map(|degree| (degree, row(&all, degree, judged.finish(degree))));
         }
         let mut table = Self { chosen, rows };
-        table.compare(trials);
-        Ok(table)
-    }
-
-    /// Fills in each row's excess over the best one.
-    fn compare<const TERMS: usize>(&mut self, trials: &[Factor<T, TERMS>]) {
-        let Some(best) = self.best().map(|row| row.degree) else { return };
-        for (degree, row) in self.rows.iter_mut().flatten() {
-            if let Ok(row) = row
-                && row.cross_validation.is_ok()
-            {
-                row.excess = excess(trials, *degree, best);
+        let best = table.best().map(|row| row.degree);
+        if let Some(best) = orders.iter().position(|&degree| degree == best) {
+            for ((_, row), differences) in table.rows.iter_mut().flatten().zip(differences) {
+                if let Ok(row) = row
+                    && row.cross_validation.is_ok()
+                {
+                    row.excess = differences[best].excess();
+                }
             }
         }
+        Ok(table)
     }
 
     /// The order that was asked about.
@@ -210,8 +228,8 @@ fn shifted(degree: Degree, rate: i8, volts: i8) -> Option<Degree> {
 
 fn row<T: Real, const TERMS: usize>(
     all: &Factor<T, TERMS>,
-    trials: &[Factor<T, TERMS>],
     degree: Degree,
+    cross_validation: Result<CrossValidation<T>, FitError>,
 ) -> Result<OrderRow<T>, FitError> {
     let fit = all.fit_degree(degree)?;
     Ok(OrderRow {
@@ -219,28 +237,36 @@ fn row<T: Real, const TERMS: usize>(
         terms: degree.terms(),
         r_squared: fit.r_squared(),
         rmse: fit.rmse(),
-        cross_validation: cross_validate(trials, degree),
+        cross_validation,
         excess: None,
     })
 }
 
-/// The difference in held-out mean squared error, over trials.
-fn excess<T: Real, const TERMS: usize>(
-    trials: &[Factor<T, TERMS>],
-    degree: Degree,
-    best: Degree,
-) -> Option<Excess<T>> {
-    let differences = || {
-        held_out(trials, degree)
-            .zip(held_out(trials, best))
-            .filter_map(|(a, b)| Some(a.ok()?.mean_square() - b.ok()?.mean_square()))
-    };
-    let count = differences().count();
-    if count < 2 {
-        return None;
+/// The difference of two orders in held-out mean squared error, over the trials so far: their number, the mean, and the sum of squares
+/// about it (Welford 1962, doi:10.1080/00401706.1962.10490022).
+#[derive(Clone, Copy)]
+struct Difference<T> {
+    count: T,
+    mean: T,
+    squares: T,
+}
+
+impl<T: Real> Difference<T> {
+    fn new() -> Self {
+        Self { count: T::zero(), mean: T::zero(), squares: T::zero() }
     }
-    let n = T::from_f64(count as f64);
-    let mean = differences().fold(T::zero(), |sum, d| sum + d) / n;
-    let squares = differences().fold(T::zero(), |sum, d| sum + (d - mean) * (d - mean));
-    Some(Excess { mean, standard_error: (squares / (n * (n - T::one()))).sqrt() })
+
+    fn take(&mut self, difference: T) {
+        self.count = self.count + T::one();
+        let off = difference - self.mean;
+        self.mean = self.mean + off / self.count;
+        self.squares = self.squares + off * (difference - self.mean);
+    }
+
+    fn excess(self) -> Option<Excess<T>> {
+        let Self { count, mean, squares } = self;
+        let fewer = count - T::one();
+        (fewer > T::zero())
+            .then(|| Excess { mean, standard_error: (squares / (count * fewer)).sqrt() })
+    }
 }

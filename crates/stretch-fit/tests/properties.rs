@@ -240,8 +240,10 @@ proptest! {
         let factors: Vec<_> =
             parts.iter().map(|part| accumulate::<16>(Degree::POLY13, part).factor()).collect();
         let (mut sum, mut count) = (0.0, 0);
-        for held_out in held_out(&factors, Degree::POLY13) {
-            let held_out = held_out.unwrap();
+        let mut left_out = Vec::new();
+        held_out(&factors, Degree::POLY13, |trial| left_out.push(trial.unwrap())).unwrap();
+        prop_assert_eq!(left_out.len(), trials);
+        for held_out in left_out {
             let others: Vec<Sample> = (0..trials)
                 .filter(|&t| t != held_out.trial)
                 .flat_map(|t| parts[t].iter().copied())

@@ -270,16 +270,14 @@ const CLOUD: usize = 3000;
 
 /// The triangular factor of each fold, of the widest degree that the order table needs.
 fn factors(samples: &[Folded], degree: Degree) -> Result<Factors, FitError> {
-    let folds = samples.iter().map(|(fold, _)| *fold).max().map_or(0, |last| last + 1);
-    let mut factors = Vec::with_capacity(folds);
-    for fold in 0..folds {
+    let mut sorted: Vec<&Folded> = samples.iter().collect();
+    sorted.sort_by_key(|(fold, _)| *fold);
+    let factor = |fold: &[&Folded]| {
         let mut sums = SurfaceAccumulator::<f64>::new(degree)?;
-        sums.extend(samples.iter().filter(|(own, _)| *own == fold).map(|(_, sample)| *sample))?;
-        if sums.samples() > 0 {
-            factors.push(sums.factor());
-        }
-    }
-    Ok(factors)
+        sums.extend(fold.iter().map(|(_, sample)| *sample))?;
+        Ok(sums.factor())
+    };
+    sorted.chunk_by(|a, b| a.0 == b.0).map(factor).collect()
 }
 
 fn merged(folds: &Factors) -> Result<Factor<f64>, FitError> {

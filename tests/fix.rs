@@ -72,7 +72,7 @@ fn a_named_effect_is_written_agrees_and_replays_the_measurement() {
         command.arg("diagnose").arg(&folder).args(["--no-next", "--rig"]).arg(rig);
         command
     };
-    fails(with(&fixed).arg("--fix").arg(&fixed), &["fixed.toml", "name another file"]);
+    fails(with(&fixed).arg("--fix").arg(&fixed), &["fixed.toml", "choose another output file"]);
     fails(with(&fixed).arg("--snippets").arg(&code), &["code", "exists"]);
     let other = scratch.write("other.toml", "mine");
     let said = runs(with(&fixed).arg("--fix").arg(&other));

@@ -162,7 +162,7 @@ fn without_names_it_is_said_what_was_found() {
     fails("# nothing yet\n", &ReadOptions::new(), &["none of its first 1 lines"]);
     fails("\n \n", &ReadOptions::new(), &["the file is empty"]);
     let four = ReadOptions::new().columns(["time_s", "a", "b", "c"]);
-    fails(&rows(",", ""), &four, &["row 1: there are 3 numbers where 4 columns were named"]);
+    fails(&rows(",", ""), &four, &["row 1: the row has 3 numbers, but --columns names 4"]);
 }
 
 #[test]

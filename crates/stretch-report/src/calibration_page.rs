@@ -186,15 +186,18 @@ fn travel_per_second(trial: &TrialErrors) -> f64 {
     ends.map_or(0.0, |(first, last)| travel / (last - first).max(f64::MIN_POSITIVE))
 }
 
+/// The recording with the most motion, because the quality of a model shows where there is motion.
+fn with_most_motion(trials: &[TrialErrors]) -> Option<usize> {
+    let pace = |i: &usize| travel_per_second(&trials[*i]);
+    (0..trials.len()).rev().max_by(|a, b| pace(a).total_cmp(&pace(b)))
+}
+
 fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     page.section("Estimate and reference over time", "");
     let caption = |trial: &TrialErrors| format!("{}, the whole recording.", trial.trial);
     let closer = "The eight seconds with the most motion, away from the ends.";
     let mut drawn: Vec<&TrialErrors> = evaluation.trials.iter().collect();
-    // the quality of a model shows where there is motion
-    let pace = |i: &usize| travel_per_second(&evaluation.trials[*i]);
-    let first = (0..drawn.len()).rev().max_by(|a, b| pace(a).total_cmp(&pace(b)));
-    if let Some(first) = first {
+    if let Some(first) = with_most_motion(&evaluation.trials) {
         drawn[..=first].rotate_right(1);
     }
     for (index, trial) in drawn.into_iter().take(DRAWN).enumerate() {
@@ -228,14 +231,15 @@ fn loops(
         return;
     };
     let name = names.get(best).map_or("", String::as_str);
+    let shown = with_most_motion(&evaluation.trials).map(|i| &evaluation.trials[i]);
     page.section(
         "Signal and reference",
         "A sensor without memory gives one curve. Hysteresis gives a loop: the signal at one length differs between rising and \
          falling. Samples at rest (slower than 5 % of the fastest) are left out.",
     );
     page.figure(
-        &signal_figure(evaluation, (best, name), first.calibration.spec().signal.as_str()),
-        "All recordings, and the estimates in the eight seconds with the most motion.",
+        &signal_figure(evaluation, shown, (best, name), first.calibration.spec().signal.as_str()),
+        "All recordings, and the estimates in the eight seconds that are drawn first above.",
     );
 }
 

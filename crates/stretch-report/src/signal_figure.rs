@@ -22,14 +22,15 @@ const POINTS: usize = 600;
 const AT_REST: f64 = 0.05;
 
 /// Reference over signal for the moving samples of all trials, coloured by direction, and the estimates of one method for
-/// the liveliest seconds of the first trial.
+/// the liveliest seconds of the trial `shown`.
 pub(crate) fn signal_figure(
     evaluation: &Evaluation,
+    shown: Option<&TrialErrors>,
     (method, name): (usize, &str),
     signal: &str,
 ) -> Figure {
     let [rising, falling] = directions(&evaluation.trials);
-    let estimates = evaluation.trials.first().map_or(Vec::new(), |trial| line(trial, method));
+    let estimates = shown.map_or(Vec::new(), |trial| line(trial, method));
     let all = || rising.iter().chain(&falling).chain(estimates.iter().flatten());
     let (Some(x), Some(y)) = (extent(all().map(|p| p.0)), extent(all().map(|p| p.1))) else {
         return Figure::missing("No recording moves, so there is no loop to draw.");

@@ -398,7 +398,10 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
     assert_eq!(grid.trial.len(), 299, "{:?}", grid.notes);
     for options in [asked, ReadOptions::new()] {
         let Recording { trial, notes } = read_as(&text, &options).unwrap();
-        assert!(notes.iter().any(|note| note.contains("time stamps of their filled rows")), "{notes:?}");
+        assert!(
+            notes.iter().any(|note| note.contains("time stamps of their filled rows")),
+            "{notes:?}"
+        );
         let (joint, bridge) =
             (trial.require("/joint/position").unwrap(), trial.require("/cmd/data").unwrap());
         for ((t, joint), bridge) in trial.time_s.iter().zip(joint).zip(bridge) {

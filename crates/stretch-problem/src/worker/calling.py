@@ -247,13 +247,13 @@ def _first_axis(answer: Any) -> Any:
 
 def _numbers(values: Any, what: str = "") -> Array:
     """An answer as numbers; a masked sample is no number, and complex numbers, times and texts are refused."""
-    if np.ma.isMaskedArray(values):
-        values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
-    table = np.asarray(values)
     kinds = {"c": "complex numbers", "m": "durations", "M": "times", "U": "text", "S": "text"}
-    if table.dtype.kind in kinds:
-        raise StretchError(f"the simulator returned {kinds[table.dtype.kind]}{what}; return real numbers in the output's unit")
     try:
-        return table.astype(np.float64)
+        if np.ma.isMaskedArray(values):
+            values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+        table = np.asarray(values)
+        if table.dtype.kind not in kinds:
+            return table.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise StretchError(f"the simulator returned no numbers{what}: {error}") from None
+    raise StretchError(f"the simulator returned {kinds[table.dtype.kind]}{what}; return real numbers in the output's unit")

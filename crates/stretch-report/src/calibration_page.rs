@@ -18,7 +18,7 @@ use super::{
     markup::{fixed, number, with_unit},
     memory_figure::{loop_figure, remembers, step_figure},
     page::Page,
-    signal_figure::signal_figure,
+    signal_figure::{AT_REST, signal_figure},
     subject::Subject,
     surface_figure::{slice_figure, surface_figure},
 };
@@ -67,8 +67,9 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
     // the picture first: what the numbers below it mean is seen there
-    over_time(page, evaluation, &names);
-    loops(page, calibrated, evaluation, &names);
+    let liveliest = with_most_motion(&evaluation.trials);
+    over_time(page, evaluation, liveliest, &names);
+    loops(page, calibrated, evaluation, liveliest, &names);
     judged(page, evaluation, &names, context);
     errors(page, evaluation, &names);
     shapes(page, calibrated, &evaluation.unit);
@@ -192,12 +193,12 @@ fn with_most_motion(trials: &[TrialErrors]) -> Option<usize> {
     (0..trials.len()).rev().max_by(|a, b| pace(a).total_cmp(&pace(b)))
 }
 
-fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
+fn over_time(page: &mut Page, evaluation: &Evaluation, liveliest: Option<usize>, names: &[String]) {
     page.section("Estimate and reference over time", "");
     let caption = |trial: &TrialErrors| format!("{}, the whole recording.", trial.trial);
     let closer = "The eight seconds with the most motion, away from the ends.";
     let mut drawn: Vec<&TrialErrors> = evaluation.trials.iter().collect();
-    if let Some(first) = with_most_motion(&evaluation.trials) {
+    if let Some(first) = liveliest {
         drawn[..=first].rotate_right(1);
     }
     for (index, trial) in drawn.into_iter().take(DRAWN).enumerate() {
@@ -225,17 +226,21 @@ fn loops(
     page: &mut Page,
     calibrated: &[(&str, &Calibrated)],
     evaluation: &Evaluation,
+    liveliest: Option<usize>,
     names: &[String],
 ) {
     let (Some((_, first)), Some(best)) = (calibrated.first(), best(&evaluation.pooled)) else {
         return;
     };
     let name = names.get(best).map_or("", String::as_str);
-    let shown = with_most_motion(&evaluation.trials).map(|i| &evaluation.trials[i]);
+    let shown = liveliest.map(|i| &evaluation.trials[i]);
     page.section(
         "Signal and reference",
-        "A sensor without memory gives one curve. Hysteresis gives a loop: the signal at one length differs between rising and \
-         falling. Samples at rest (slower than 5 % of the fastest) are left out.",
+        &format!(
+            "A sensor without memory gives one curve. Hysteresis gives a loop: the signal at one length differs between rising and \
+             falling. Samples at rest (slower than {} % of the fastest) are left out.",
+            100.0 * AT_REST
+        ),
     );
     page.figure(
         &signal_figure(evaluation, shown, (best, name), first.calibration.spec().signal.as_str()),

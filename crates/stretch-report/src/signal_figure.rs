@@ -18,8 +18,8 @@ const DOTS: usize = 700;
 /// Most points of the line of estimates.
 const POINTS: usize = 600;
 
-/// Samples slower than this share of the fastest rate have no direction; the report names the share.
-const AT_REST: f64 = 0.05;
+/// Samples slower than this share of the fastest rate are at rest: they have no direction.
+pub(crate) const AT_REST: f64 = 0.05;
 
 /// Reference over signal for the moving samples of all trials, coloured by direction, and the estimates of one method for
 /// the liveliest seconds of the trial `shown`.

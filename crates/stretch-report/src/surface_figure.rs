@@ -10,6 +10,7 @@ use super::{
     canvas::Ink,
     figure::{Area, Axes, Drawn, Figure, FigureSize, dot, plot, px, stroke, words},
     markup::{number, tick},
+    signal_figure::AT_REST,
     thin::{padded, quantile, sample, sorted},
 };
 
@@ -329,7 +330,7 @@ pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
 
 /// The samples in motion in three equal parts by the size of their rate.
 fn thirds(view: &BranchView<'_>) -> Vec<Vec<[f64; 3]>> {
-    let at_rest = 0.05 * view.rate.start.abs().max(view.rate.end.abs());
+    let at_rest = AT_REST * view.rate.start.abs().max(view.rate.end.abs());
     let mut by_pace: Vec<_> =
         view.cloud.iter().copied().filter(|sample| sample[0].abs() > at_rest).collect();
     by_pace.sort_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));

@@ -46,7 +46,7 @@ use crate::{
         note::Note,
         notes::{
             answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
-            implausible_noise_notes, lost_note, swing_notes,
+            implausible_noise_notes, lost_note, recorder_notes, swing_notes,
         },
     },
 };
@@ -451,6 +451,7 @@ fn report(
     }
     notes.extend(reservations.iter().cloned());
     notes.extend(searched.problem.starts.note().map(Note::from));
+    notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
     notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // What another form of an effect leaves may look like a swing.
     if is_quiet || evidence.gap.left <= thresholds.unknown_excess {

@@ -3,7 +3,7 @@
 
 use stretch_gap::{Note, Options, SlowDrift, VerdictKind};
 
-use crate::toys::{Effect, Law, Toy, slow, texts};
+use crate::toys::{Effect, Law, Measured, Toy, slow, texts};
 
 fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -98,6 +98,55 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
             "{}",
             told.sentence
         );
+    }
+}
+
+/// A record whose output wanders by so many times its noise.
+fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64])]) -> Measured {
+    let recorder_drift = Some(SlowDrift { sd: 0.35, correlation_s: 2.0 });
+    let toy = Toy { recorder_drift, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden) };
+    let drift = slow(times * toy.noise, correlation_s, (toy.samples(), toy.dt_s), seed);
+    toy.measured(seed).rewritten(|_, outputs| {
+        outputs[0].iter_mut().zip(&drift).for_each(|(y, drift)| *y += drift);
+    })
+}
+
+/// Of 20 records with slow noise as recorders have it, none has a gap; what the noise is taken for is said.
+#[test]
+fn slow_noise_of_a_recorder_is_no_gap() {
+    for (times, correlation_s) in [(0.0, 1.0), (0.4, 1.0), (0.7, 3.0), (0.5, 8.0)] {
+        for seed in 0..5 {
+            let told = wandering(times, correlation_s, seed, &[]).diagnosed().0;
+            let agrees = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+            assert!(agrees, "{times} {correlation_s} {seed}: {}", told.sentence);
+            let notes = texts(&told.notes);
+            let is_said = notes.iter().any(|note| note.contains("slow noise"));
+            assert!(is_said == (times > 0.0), "{times} {correlation_s} {seed}: {notes:?}");
+        }
+    }
+}
+
+/// A recorder does not wander by more than its noise: that is a gap, however slow.
+#[test]
+fn what_wanders_by_more_than_noise_stays_a_gap() {
+    for (times, correlation_s) in [(2.0, 1.0), (2.0, 3.0), (5.0, 10.0)] {
+        for seed in 0..5 {
+            let told = wandering(times, correlation_s, seed, &[]).diagnosed().0;
+            assert!(told.gap.retuned > 1.0, "{times} {correlation_s} {seed}: {:?}", told.gap);
+            let agrees = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+            assert!(!agrees, "{times} {correlation_s} {seed}: {}", told.sentence);
+        }
+    }
+}
+
+/// An effect as large as the slow noise beside it is told from it, because the two have not the same course.
+#[test]
+fn an_effect_beside_slow_noise_is_found() {
+    for seed in 0..5 {
+        let told = wandering(0.6, 3.0, seed, &[(Effect::Quadratic, &[0.05])]).diagnosed().0;
+        assert_eq!(told.named, ["quadratic"], "{seed}: {}", told.sentence);
+        let value = told.candidates[0].parameters[0].value;
+        approx::assert_abs_diff_eq!(value, 0.05, epsilon = 0.01);
     }
 }
 

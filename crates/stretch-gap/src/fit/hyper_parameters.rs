@@ -9,7 +9,10 @@
 //!
 //! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
 //! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance beside the others'
-//! greatest: a record that fits at one level alone says less than one that fits at many. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
+//! greatest: a record that fits at one level alone says less than one that fits at many.
+//!
+//! A recorder need not drift: a = 0 is one of its sizes. It has no drift that is larger than its noise. Where such a drift fits best, something
+//! else wanders, and a is 0: a gap has to stay one, and a prior alone would only make it dear. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
 //! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
 //! the noise alone.
 
@@ -22,6 +25,8 @@ use crate::{
 
 /// Sizes that are tried, as multiples of what the simulator describes.
 const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
+/// Sizes that no recorder's drift has. Where one of them fits best, something else wanders, and nothing of it is taken for the recorder's.
+const BEYOND: [f64; 4] = [4.0, 6.4, 10.0, 16.0];
 /// Correlation times that are tried, s.
 const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
 /// Deviations of the priors of ln a and of ln tau: a factor of two, and of three.
@@ -34,7 +39,8 @@ impl Metric {
         let (mut best, mut gained) = (self.clone(), 0.0);
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
-            let levels = hypotheses(&best.loose()[which]).chain([own]);
+            let levels = hypotheses(&best.loose()[which]).chain(beyond(&best.loose()[which]));
+            let levels = levels.chain([own]);
             let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let levels: Vec<Level> = levels.collect();
             let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
@@ -44,7 +50,10 @@ impl Metric {
             let fits: Vec<f64> = tried.par_iter().map(fit).collect();
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
-            if let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+            if BEYOND.contains(&metric.loose()[which].level.size) {
+                best = best.with(|i, own| if i == which { NONE } else { own }, roles);
+            } else {
                 gained += most - before;
                 best = metric.clone();
             }
@@ -115,17 +124,33 @@ impl Metric {
     }
 }
 
+/// No drift at all.
+pub(crate) const NONE: Level = Level { size: 0.0, time_s: 1.0 };
+
+/// Levels that a nuisance may have; a recorder need not drift at all.
 fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
     let times_s: Vec<f64> = match loose.drift {
         _ if loose.is_by_tick => Vec::new(),
         Some(_) => TIMES_S.into(),
         None => vec![loose.level.time_s],
     };
-    times_s.into_iter().flat_map(|time_s| SIZES.map(|size| Level { size, time_s }))
+    loose.parameter.is_none().then_some(NONE).into_iter().chain(levels(times_s, SIZES))
 }
 
-/// -ln p.
+/// Levels that only something else than a recorder can have.
+fn beyond(loose: &Loose) -> impl Iterator<Item = Level> {
+    loose.parameter.is_none().then(|| levels(TIMES_S.into(), BEYOND)).into_iter().flatten()
+}
+
+fn levels<const N: usize>(times_s: Vec<f64>, sizes: [f64; N]) -> impl Iterator<Item = Level> {
+    times_s.into_iter().flat_map(move |time_s| sizes.map(|size| Level { size, time_s }))
+}
+
+/// -ln p; nothing where there is no drift.
 fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
+    if size == 0.0 {
+        return 0.0;
+    }
     let usual_s = loose.drift.map_or(time_s, |w| w.correlation_s);
     0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
 }

@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use crate::{
     fit::{
+        hyper_parameters::NONE,
         noise_level::NoiseLevel,
         nuisance::{Drifting, Knots, Nuisance, Patch},
     },
@@ -39,11 +40,11 @@ pub(crate) struct Metric {
     nuisances: Vec<Option<Nuisance>>,
 }
 
-/// A parameter that drifts or is offset in each trial.
+/// A parameter that drifts or is offset in each trial, or the recorder where it may drift.
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
-    /// Index of the parameter.
-    pub(crate) parameter: usize,
+    /// Index of the parameter; none for the recorder.
+    pub(crate) parameter: Option<usize>,
     /// Change of the output, in multiples of the noise, for one standard deviation as the simulator describes it.
     column: Arc<[f64]>,
     /// See [`RecordFacts::drift_clocks`](crate::RecordFacts::drift_clocks).
@@ -63,7 +64,8 @@ fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> 
     roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }
 
-/// Size of a nuisance, as a multiple of what the simulator describes, and its correlation time, s (of no meaning for an offset).
+/// Size of a nuisance, as a multiple of what the simulator describes (0: there is none), and its correlation time, s (of no meaning for an
+/// offset).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Level {
     pub(crate) size: f64,
@@ -100,6 +102,18 @@ impl Metric {
         let parameters: Vec<usize> = own.filter(is_loose).collect();
         let mut metric = Self { noise, loose: Vec::new(), nuisances: Vec::new() };
         let trials = simulator.trials();
+        let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect::<Vec<u32>>();
+        // First, so that its place is the same where no parameter drifts.
+        if let Some(drift) = simulator.stages()[stage].recorder_drift {
+            let column =
+                metric.noise.sd.iter().map(|sd| if sd.is_finite() { drift.sd } else { 0.0 });
+            let (column, clock) = (column.collect(), always());
+            let knots = knots_of(&clock, roles, simulator.dt_s());
+            let level = NONE;
+            let (parameter, clock, drift) = (None, clock.into(), Some(drift));
+            let is_by_tick = false;
+            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level, knots });
+        }
         let plain = match parameters.is_empty() {
             true => Vec::new(),
             false => runs.output(stage, model, trials.len())?,
@@ -112,7 +126,6 @@ impl Metric {
             for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.noise.sd) {
                 *x = (*x - y) / sd;
             }
-            let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
             let clock = simulator.record().drift_clock(p).map_or_else(always, <[u32]>::to_vec);
             let knots = match spec.drift {
                 Some(_) => knots_of(&clock, roles, simulator.dt_s()),
@@ -122,8 +135,8 @@ impl Metric {
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());
             let drift = spec.drift;
-            let own = Loose { parameter: p, column, clock, drift, is_by_tick, level, knots };
-            metric.loose.push(own);
+            let parameter = Some(p);
+            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level, knots });
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
@@ -138,7 +151,7 @@ impl Metric {
         let one = |(at, segment): (usize, &Segment)| {
             let range = segment.from..segment.to;
             let (mut offsets, mut drifting) = (Vec::new(), Vec::new());
-            for loose in &self.loose {
+            for loose in self.loose.iter().filter(|loose| loose.level.size > 0.0) {
                 let Level { size, time_s } = loose.level;
                 let part: Vec<f64> = loose.column[range.clone()].iter().map(|x| size * x).collect();
                 let clock = &loose.clock[range.clone()];
@@ -155,7 +168,8 @@ impl Metric {
                     offsets.push(Patch { from: 0, values: part });
                 }
             }
-            (!self.loose.is_empty()).then(|| Nuisance::new(offsets, drifting))
+            let is_any = !(offsets.is_empty() && drifting.is_empty());
+            is_any.then(|| Nuisance::new(offsets, drifting))
         };
         self.nuisances = roles.segments.iter().enumerate().map(one).collect();
     }
@@ -163,6 +177,13 @@ impl Metric {
     /// Parameters of the stage that drift or are offset in each trial.
     pub(crate) fn loose(&self) -> &[Loose] {
         &self.loose
+    }
+
+    /// Standard deviation of the recorder's drift, in multiples of the noise, and its correlation time, s; none where there is none.
+    pub(crate) fn recorder_drift(&self) -> Option<(f64, f64)> {
+        let own =
+            self.loose.iter().find(|loose| loose.parameter.is_none() && loose.level.size > 0.0)?;
+        Some((own.drift?.sd * own.level.size, own.level.time_s))
     }
 
     /// The nuisance of each segment.
@@ -255,7 +276,8 @@ impl Metric {
         let knots = knots_of(&clock, roles, dt_s);
         let drift = Some(drift);
         let is_by_tick = false;
-        let loose = vec![Loose { parameter: 0, column, clock, drift, is_by_tick, level, knots }];
+        let loose =
+            vec![Loose { parameter: Some(0), column, clock, drift, is_by_tick, level, knots }];
         let mut metric = Self { noise, loose, nuisances: Vec::new() };
         metric.marginalise(roles);
         metric

@@ -54,11 +54,13 @@ const PEAKS: usize = 6;
 impl Metric {
     /// The likeliest swing of every parameter that drifts; `clean` is a residual over all segments, nuisances taken out.
     pub(crate) fn swings(&self, roles: &SampleRoles, clean: &[f64]) -> Vec<Swing> {
-        let drifts = self.loose().iter().filter(|loose| loose.drift.is_some() && !loose.is_by_tick);
+        let is_drift = |l: &&Loose| l.drift.is_some() && !l.is_by_tick && l.level.size > 0.0;
+        let drifts = self.loose().iter().filter(is_drift);
         let one = |(which, loose): (usize, &Loose)| {
+            let parameter = loose.parameter?;
             let (hertz, share, probability) = self.likeliest(which, roles, clean)?;
             let sd = loose.drift.map_or(0.0, |drift| drift.sd) * loose.level.size;
-            Some(Swing { parameter: loose.parameter, hertz, amplitude: share * sd, probability })
+            Some(Swing { parameter, hertz, amplitude: share * sd, probability })
         };
         drifts.enumerate().filter_map(one).collect()
     }

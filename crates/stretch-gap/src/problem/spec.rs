@@ -22,6 +22,9 @@ pub struct StageSpec {
     /// Noise of the output, including rounding; `None` if it has to be estimated from the record's
     /// second differences.
     pub noise: Option<Noise>,
+    /// Slow drift that the recorder may add to the output, its `sd` in multiples of the noise. Whether it is
+    /// there, how large and how quick, is estimated from the record; at most 2.5 times `sd`.
+    pub recorder_drift: Option<SlowDrift>,
 }
 
 impl StageSpec {
@@ -33,6 +36,7 @@ impl StageSpec {
             unit: unit.into(),
             parameters: parameters.into(),
             noise: None,
+            recorder_drift: None,
         }
     }
 }
@@ -45,7 +49,7 @@ impl StageSpec {
 /// around these values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SlowDrift {
-    /// Standard deviation, in the parameter's unit.
+    /// Standard deviation, in the parameter's unit; of a recorder in multiples of the noise.
     pub sd: f64,
     /// Correlation time, s.
     pub correlation_s: f64,

@@ -129,6 +129,20 @@ pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) ->
         .collect()
 }
 
+/// A note for each output whose recorder is taken to add slow noise.
+pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
+    let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
+    let note = |(metric, spec): (&Metric, &StageSpec)| {
+        let (times, time_s) = metric.recorder_drift()?;
+        Some(format!(
+            "{} has slow noise of {times:.2} times its other noise, which lasts some {time_s} s: the diagnosis counts it as noise of the \
+             recorder, and a gap as small and as slow would not be seen",
+            spec.channel
+        ))
+    };
+    stages.filter_map(note).collect()
+}
+
 /// Share of the fitted span by which test trials must lie outside of it.
 const BEYOND: f64 = 0.1;
 

@@ -19,7 +19,8 @@ pub(crate) use laboratory::levels;
 pub(crate) use laws::{Effect, Law};
 pub(crate) use simulator::Measured;
 use stretch_gap::{
-    Description, DescriptionSpec, Noise, Note, ParameterSpec, RandomGenerator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Noise, Note, ParameterSpec, RandomGenerator, SlowDrift,
+    StageSpec, TrialSpec,
 };
 
 /// The text of each note.
@@ -46,6 +47,8 @@ pub(crate) struct Toy {
     pub(crate) noise: f64,
     /// What the simulator says that the noise is, as a multiple of it; none where the record has to tell.
     pub(crate) stated: Option<f64>,
+    /// Slow drift that the simulator says its recorder may have.
+    pub(crate) recorder_drift: Option<SlowDrift>,
     /// Standard deviation of the noise of the recorded `x`.
     pub(crate) input_noise: f64,
     /// Samples of every trial, and whether it is tested on.
@@ -104,6 +107,7 @@ impl Toy {
             courses: Vec::new(),
             noise: 0.01,
             stated: Some(1.0),
+            recorder_drift: None,
             input_noise: 0.0,
             trials: vec![(1000, false), (1000, false), (1000, false), (1000, true)],
             dt_s: 0.01,
@@ -156,6 +160,7 @@ impl Toy {
         let stages = (0..self.laws.len()).map(|i| {
             let name = stage_name(&self.laws, i);
             let mut stage = StageSpec::new(&name, &format!("y{i}"), "u", &self.own(i));
+            stage.recorder_drift = self.recorder_drift;
             stage.noise = self.stated.map(|times| Noise::known(times * self.noise * self.units[1]));
             stage
         });

@@ -1,6 +1,6 @@
 //! Noise of the rig's channels, from the recording or from the rig file.
 
-use stretch_gap::{Noise, WINDOW};
+use stretch_gap::{Noise, SlowDrift, WINDOW};
 use stretch_sim::{Key, RigParams};
 
 use super::session::{RigSession, RigTrial};
@@ -11,12 +11,21 @@ const USED: (f64, usize) = (0.5, 24);
 /// Time after a command from which a parabola follows the rest of the muscle's motion, s: a few time constants of the muscle.
 const SETTLED_S: f64 = 2.0;
 
+/// Slow noise of a recorder (1 sd), in multiples of its noise: amplifiers flicker, and references drift with the room.
+const DRIFT: f64 = 0.35;
+/// Correlation time of that drift, s.
+const DRIFT_CORRELATION_S: f64 = 2.0;
+/// Most noise of a recorder, in multiples of what the rig file says: noise beyond it is not the recorder's.
+const MOST_NOISE: f64 = 2.0;
+
 /// Noise of every channel, with the quantisation noise of the converters.
 #[derive(Debug, Clone)]
 pub(super) struct Noises {
     pub(super) length_mm: Noise,
     pub(super) volts: Noise,
     pub(super) pressure_kpa: Noise,
+    pub(super) length_drift: SlowDrift,
+    pub(super) volts_drift: SlowDrift,
 }
 
 impl Noises {
@@ -38,9 +47,19 @@ impl Noises {
             Noise::of_windows(&windows, Some(stated), quiet.is_still, session.dt_s())
                 .unwrap_or_else(|| Noise::known(stated))
         };
+        let drift = |stated: f64, noise: &Noise| SlowDrift {
+            sd: DRIFT * (MOST_NOISE * stated / noise.sd()).min(1.0),
+            correlation_s: DRIFT_CORRELATION_S,
+        };
+        let of_length = with_step(Key::SigmaL, Key::Travel);
+        let of_volts = with_step(Key::SigmaV, Key::VFs);
+        let length_mm = of(of_length, |t| &t.length_mm);
+        let volts = of(of_volts, |t| &t.bridge_v);
         Self {
-            length_mm: of(with_step(Key::SigmaL, Key::Travel), |t| &t.length_mm),
-            volts: of(with_step(Key::SigmaV, Key::VFs), |t| &t.bridge_v),
+            length_drift: drift(of_length, &length_mm),
+            volts_drift: drift(of_volts, &volts),
+            length_mm,
+            volts,
             pressure_kpa: of(1e-3 * params[Key::SigmaP], |t| t.pressure_kpa().unwrap_or(&[])),
         }
     }

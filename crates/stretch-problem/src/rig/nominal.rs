@@ -90,10 +90,10 @@ pub(super) fn stages(
     noises: &Noises,
 ) -> Vec<StageSpec> {
     let stage = |kind: &RigStage| {
-        let (channel, unit, noise) = match kind {
-            RigStage::Pneumatics => ("pressure_kpa", "kPa", &noises.pressure_kpa),
-            RigStage::Sensing => ("bridge_v", "V", &noises.volts),
-            _ => ("length_mm", "mm", &noises.length_mm),
+        let (channel, unit, noise, drift) = match kind {
+            RigStage::Pneumatics => ("pressure_kpa", "kPa", &noises.pressure_kpa, None),
+            RigStage::Sensing => ("bridge_v", "V", &noises.volts, Some(noises.volts_drift)),
+            _ => ("length_mm", "mm", &noises.length_mm, Some(noises.length_drift)),
         };
         // The pressure at a trial's start and the timing of commands belong to the chamber.
         let owner = |parameter: &TunedParameter| match parameter {
@@ -109,6 +109,8 @@ pub(super) fn stages(
                 .filter(|&i| kind.holds(owner(&parameters[i])))
                 .collect(),
             noise: (noise.sd() > 0.0).then(|| noise.clone()),
+            // Where the supply acts, its drift takes slow noise as well.
+            recorder_drift: drift.filter(|_| !kind.holds(RigStage::Pneumatics)),
         }
     };
     kinds.iter().map(stage).collect()

@@ -18,9 +18,10 @@ def main() -> int:
     command = commands.add_parser("convert", help=told, description=told[0].upper() + told[1:] + ".")
     command.add_argument("recording", help="the file; of a ROS 2 bag its folder does, too")
     command.add_argument("out", help="the file to write, FILE.npz")
+    command.add_argument("--force", action="store_true", help="replace a file that is there")
     asked = parser.parse_args()
     try:
-        found = convert(asked.recording, asked.out)
+        found = convert(asked.recording, asked.out, force=asked.force)
     except StretchError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _stretch, html
+from .outputs import replaceable
 from .recordings import Array, column, recordings, same_length, times
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class Calibration:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Into a file, whole or not at all: postcard for a board where its name ends in `.postcard`, else JSON."""
-        self._record.save(path)
+        self._record.save(replaceable(path, ".json", ".postcard"))
 
     def to_json(self) -> str:
         """The record that the program reads: `stretch apply`, `stretch listen`, `stretch export`."""

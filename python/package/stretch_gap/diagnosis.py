@@ -14,6 +14,7 @@ from . import problem as entries
 from ._stretch import StretchError
 from .fix import Again, Fix, fix
 from .frames import frame
+from .outputs import replaceable
 from .recordings import Array
 from .simulator import Asked
 
@@ -228,7 +229,7 @@ class Diagnosis:
         if not self._page:
             raise StretchError("a diagnosis that was read from text has no figures; diagnose again")
         if path is not None:
-            with open(path, "w", encoding="utf-8") as file:
+            with open(replaceable(path, ".html"), "w", encoding="utf-8") as file:
                 file.write(self._page)
         return self._page
 

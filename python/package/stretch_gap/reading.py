@@ -128,12 +128,15 @@ def _reader(file: Path) -> Callable[[Path, Arrays], None] | None:
     return next((reader for at, magic, reader in READERS if head.startswith(magic, at)), None)
 
 
-def convert(path: str | os.PathLike[str], out: str | os.PathLike[str]) -> Arrays:
-    """Writes what a file holds as an NPZ file that the program reads, with all its clocks; gives what was written."""
+def convert(path: str | os.PathLike[str], out: str | os.PathLike[str], *, force: bool = False) -> Arrays:
+    """Writes what a file holds as an NPZ file that the program reads, with all its clocks; gives what was written. A file that is
+    there is a recording, which only `force` replaces."""
     if Path(out).suffix != ".npz":
         raise StretchError(f"{os.fspath(out)}: the name of what is written must end in .npz")
     if Path(out).exists() and Path(out).samefile(path):
         raise StretchError(f"{os.fspath(out)}: it is {os.fspath(path)}, which is read; name another file to write")
+    if Path(out).is_file() and not force:
+        raise StretchError(f"{os.fspath(out)}: it is a recording that is there; name another file, or replace it with force")
     found = contents(path)
     if found is None:
         recording = read(path)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._stretch import StretchError
+from .outputs import replaceable
 
 Array = NDArray[np.float64]
 CURVES = ("measured", "as_shipped", "retuned", "with_effects")
@@ -30,7 +31,7 @@ def write(
     except ImportError:
         raise StretchError("the package rerun-sdk is not installed; pip install rerun-sdk") from None
     stream = rerun.RecordingStream("stretch")
-    stream.save(os.fspath(path))
+    stream.save(replaceable(path, ".rrd"))
     stream.log("diagnosis", rerun.TextDocument(sentence), static=True)
     first = 0
     for trial, samples, start_s in spans:

@@ -33,6 +33,11 @@ if [ -n "${MODULE:-}" ]; then
     cp "$MODULE" "$installed/_stretch.abi3.so"
 else
     "$fresh/build/bin/maturin" build --quiet --profile "$profile" --interpreter "$python" --out "$fresh/wheels"
+    "$python" -m zipfile -e "$fresh"/wheels/*.whl "$fresh/content"
+    if grep -rlF "${PWD%/python}" "$fresh"/content/*.dist-info; then
+        echo "the wheel names the folder in which it was built"
+        exit 1
+    fi
     pip "$fresh"/wheels/*.whl pytest pandas
     ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
 fi

@@ -6,6 +6,7 @@ use proptest::{
     strategy::{Strategy, ValueTree},
     test_runner::TestRunner,
 };
+use serde_json::Value;
 use stretch_calibrate::{
     BoardReceptor, calibration_from_edited_json, calibration_from_json, calibration_to_json,
     fixed_record, parse_adc, read_calibration,
@@ -175,6 +176,66 @@ fn a_hand_edit_is_told_and_read_where_its_digest_is_not_checked() {
     let impossible = edited.replacen("0.125", "-1.0", 1);
     let message = calibration_from_edited_json(&impossible, "cal.json").unwrap_err().to_string();
     assert!(message.contains("dead_band"), "{message}");
+}
+
+/// The objects in a value, as JSON pointers.
+fn objects(value: &Value, pointer: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(fields) => {
+            found.push(pointer.to_owned());
+            fields
+                .iter()
+                .for_each(|(key, value)| objects(value, &format!("{pointer}/{key}"), found));
+        }
+        Value::Array(items) => {
+            for (i, item) in items.iter().enumerate() {
+                objects(item, &format!("{pointer}/{i}"), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn a_field_of_a_newer_program_is_refused_wherever_it_stands() {
+    let mut kept = Vec::new();
+    for calibration in kinds() {
+        let text = calibration_to_json(&calibration).unwrap();
+        let whole: Value = serde_json::from_str(&text).unwrap();
+        let mut places = Vec::new();
+        objects(&whole, "", &mut places);
+        assert!(places.len() > 5, "{places:?}");
+        for place in places {
+            let mut newer = whole.clone();
+            newer.pointer_mut(&place).unwrap()["of_tomorrow"] = 1.into();
+            match calibration_from_edited_json(&newer.to_string(), "cal.json") {
+                Ok(_) => kept.push(format!("{} {place}", calibration.spec().model.name())),
+                Err(error) => {
+                    // an object that says which of several it is holds one field
+                    let (error, at) =
+                        (error.to_string(), place.trim_start_matches('/').replace('/', "."));
+                    assert!(
+                        error.contains("of_tomorrow") || error.contains(&format!("in {at}:")),
+                        "{error}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(kept.is_empty(), "{} places: {kept:#?}", kept.len());
+}
+
+#[test]
+fn a_record_with_sorted_fields_is_told_as_one_and_sealed_again() {
+    for calibration in kinds() {
+        let text = calibration_to_json(&calibration).unwrap();
+        // as jq -S writes it
+        let sorted = serde_json::from_str::<Value>(&text).unwrap().to_string();
+        let message = calibration_from_json(&sorted, "cal.json").unwrap_err().to_string();
+        let says = "its fields were sorted; check every number, then renew it with: stretch export";
+        assert!(message.contains(says), "{message}");
+        assert_eq!(calibration_from_edited_json(&sorted, "cal.json").unwrap(), calibration);
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ pub const CALIBRATION_SCHEMA: u32 = 2;
 /// What is estimated, and how a normalised target becomes a number with a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Target {
     /// The reference is the length L of a muscle; the target is its
     /// contraction `(L0 - L)/L0`, 0 at rest.

@@ -8,6 +8,7 @@ use crate::{
 /// A straight line: `target = slope signal + intercept`, all normalised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct LinearMap {
     /// Normalised target per normalised signal.
     pub slope: f64,
@@ -22,6 +23,7 @@ pub struct LinearMap {
 /// One branch's surface and where it is valid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct BranchSurface {
     /// Normalises the signed signal rate, in signal units per second.
     pub rate_range: Range,
@@ -38,7 +40,7 @@ pub struct BranchSurface {
 /// How a calibration turns a signal into a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 #[non_exhaustive]
 pub enum Model {

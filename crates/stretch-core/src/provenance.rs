@@ -75,6 +75,7 @@ impl Provenance {
 /// How well a fit described the samples it was made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FitSummary {
     /// Samples in the fit.
     pub samples: u64,
@@ -102,6 +103,7 @@ mod forms {
 
     /// As text, where a field may be missing.
     #[derive(Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
     struct Text {
         date: Label,
         trial_count: u32,

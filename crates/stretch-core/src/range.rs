@@ -52,6 +52,7 @@ pub struct Range<T = f64> {
 /// What a [`Range`] is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RangeSpec<T = f64> {
     /// Which offset is subtracted.
     pub mode: Normalisation,

@@ -8,7 +8,7 @@ use crate::DesignError;
 /// the choice is part of the calibration. `stretch-filter` builds what is named here.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum RateEstimator {
     /// Central difference of a log, as the paper's; looks one sample ahead, so

@@ -195,6 +195,7 @@ mod record {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
     #[derive(Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
     struct Stored<T> {
         degree: Degree,
         coefficients: heapless::Vec<T, MAX_TERMS>,

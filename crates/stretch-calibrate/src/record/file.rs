@@ -173,13 +173,14 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
         Some(found) if found == computed => {}
         Some(found) => {
             return Err(unusable(format!(
-                "its digest is {found} and its text gives {computed}: it was edited or damaged; {advice}"
+                "its digest is {found} and its text gives {computed}: {}; {advice}",
+                digest::CHANGED
             )));
         }
         // records of schema 1 had no digest
         None if schema != Schema::CURRENT => {}
         None => {
-            return Err(unusable(format!("it has no digest as its last field; {advice}")));
+            return Err(unusable(format!("it has no digest; {advice}")));
         }
     }
     Ok(calibration)

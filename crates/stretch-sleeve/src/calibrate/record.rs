@@ -204,8 +204,8 @@ impl SleeveCalibration {
         }
         let file = path.display().to_string();
         let damaged =
-            "its digest is not that of its text, so it was edited or damaged; calibrate again";
-        let object = digest::verified(&text).ok_or_else(|| unusable(&file, damaged))?;
+            || format!("its digest is not that of its text: {}; calibrate again", digest::CHANGED);
+        let object = digest::verified(&text).ok_or_else(|| unusable(&file, damaged()))?;
         let several = digest::parse(&object).map_err(|error| unusable(&file, error))?;
         Ok(Self::Many(Box::new(several)))
     }

@@ -17,6 +17,7 @@ const LEAST_COUNT: f64 = 5.0;
 /// follows its first minute. A shorter one is judged on its end (what follows 30, 20 or 10 s), for
 /// the seconds before that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Expected {
     /// Seconds of reference.
     pub seconds: f64,
@@ -38,6 +39,7 @@ pub struct Expected {
 /// is the `c` predicted standard deviations for which the mean of `erf(c/sqrt(2 r))` over the
 /// sessions is 0.95.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ErrorSpread {
     /// Mean ratio of the mean squared error to the predicted variance.
     pub widening: f64,

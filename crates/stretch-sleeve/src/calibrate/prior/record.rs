@@ -70,8 +70,13 @@ fn opened<T: for<'d> Deserialize<'d>>(path: &Path) -> Result<(T, String), Sleeve
     let file = path.display().to_string();
     let bytes = read_whole(path).map_err(|error| problem(&file, error))?;
     let text = String::from_utf8(bytes).map_err(|error| problem(&file, error))?;
-    let damaged = "its digest is not that of its text, so it was edited or damaged";
-    let object = digest::verified(&text).ok_or_else(|| problem(&file, damaged))?;
+    let damaged = || {
+        format!(
+            "its digest is not that of its text: {}; learn it again, or take an unchanged copy",
+            digest::CHANGED
+        )
+    };
+    let object = digest::verified(&text).ok_or_else(|| problem(&file, damaged()))?;
     let value = digest::parse(&object).map_err(|error| problem(&file, error))?;
     Ok((value, file))
 }

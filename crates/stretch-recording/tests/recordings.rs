@@ -88,6 +88,58 @@ fn parquet() {
     }
 }
 
+/// Whole numbers of Parquet whose bits are all ones: how the column is declared, and what it then says.
+#[cfg(feature = "parquet")]
+const ONES: [(&str, f64); 7] = [
+    ("INT32 c", -1.0),
+    ("INT32 c (INTEGER(32,true))", -1.0),
+    ("INT32 c (INTEGER(32,false))", 4_294_967_295.0),
+    ("INT32 c (UINT_32)", 4_294_967_295.0),
+    ("INT64 c", -1.0),
+    ("INT64 c (INTEGER(64,false))", 18_446_744_073_709_551_615.0),
+    ("INT64 c (UINT_64)", 18_446_744_073_709_551_615.0),
+];
+
+#[test]
+#[cfg(feature = "parquet")]
+fn whole_numbers_of_parquet_have_the_sign_that_the_file_declares() {
+    use ::parquet::{
+        column::writer::ColumnWriter, file::writer::SerializedFileWriter,
+        schema::parser::parse_message_type,
+    };
+    const ROWS: i32 = 20;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.parquet");
+    for (declared, wanted) in ONES {
+        let schema = format!("message m {{ REQUIRED DOUBLE time_s; REQUIRED {declared}; }}");
+        let schema = parse_message_type(&schema).expect("a schema").into();
+        let file = std::fs::File::create(&path).expect("a file");
+        let mut file = SerializedFileWriter::new(file, schema, Default::default()).expect("begun");
+        let mut group = file.next_row_group().expect("a group");
+        while let Some(mut column) = group.next_column().expect("a column") {
+            let written = match column.untyped() {
+                ColumnWriter::DoubleColumnWriter(own) => {
+                    let time: Vec<f64> = (0..ROWS).map(|i| 0.01 * f64::from(i)).collect();
+                    own.write_batch(&time, None, None)
+                }
+                ColumnWriter::Int32ColumnWriter(own) => {
+                    own.write_batch(&[-1; ROWS as usize], None, None)
+                }
+                ColumnWriter::Int64ColumnWriter(own) => {
+                    own.write_batch(&[-1; ROWS as usize], None, None)
+                }
+                _ => unreachable!("no such column is declared"),
+            };
+            written.expect("written");
+            column.close().expect("closed");
+        }
+        group.close().expect("closed");
+        file.close().expect("closed");
+        let Recording { trial, .. } = Recording::read(&path, &ReadOptions::new()).expect("read");
+        assert_eq!(trial.channel("c").expect("numbers"), [wanted; ROWS as usize], "{declared}");
+    }
+}
+
 #[test]
 fn a_grid_is_chosen_and_nothing_lies_beyond_the_samples() {
     let Recording { trial, notes } = read("plain.csv", &asked().grid_hz(40.0));

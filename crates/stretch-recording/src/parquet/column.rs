@@ -1,7 +1,7 @@
 //! A column of a Parquet file: a number a row, or a list of numbers a row.
 
 use ::parquet::{
-    basic::{LogicalType, TimeUnit as Unit},
+    basic::{ConvertedType as Kind, LogicalType, TimeUnit as Unit},
     column::reader::{ColumnReader, ColumnReaderImpl},
     data_type::DataType,
     errors::ParquetError,
@@ -149,9 +149,19 @@ fn append_group(
         return Ok(false);
     }
     let levels = (column.max_def_level(), column.max_rep_level());
+    let is_unsigned = matches!(
+        column.converted_type(),
+        Kind::UINT_8 | Kind::UINT_16 | Kind::UINT_32 | Kind::UINT_64
+    );
     match group.get_column_reader(i)? {
         ColumnReader::BoolColumnReader(r) => {
             append(r, rows, levels, into, |x| f64::from(u8::from(x)))?;
+        }
+        ColumnReader::Int32ColumnReader(r) if is_unsigned => {
+            append(r, rows, levels, into, |x| x.cast_unsigned().into())?;
+        }
+        ColumnReader::Int64ColumnReader(r) if is_unsigned => {
+            append(r, rows, levels, into, |x| x.cast_unsigned() as f64)?;
         }
         ColumnReader::Int32ColumnReader(r) => append(r, rows, levels, into, f64::from)?,
         ColumnReader::Int64ColumnReader(r) => append(r, rows, levels, into, |x| x as f64)?,

@@ -197,6 +197,30 @@ fn what_comes_through_a_pipe_is_read_once() {
 }
 
 #[test]
+fn a_pipe_whose_reader_goes_is_no_failure() {
+    let scratch = inputs();
+    // more than a pipe holds
+    scratch.loops("long.csv", 120.0, 1.1);
+    for line in [
+        "convert long.csv --out - | head -1",
+        "convert long.csv --out >(head -1)",
+        "apply --calibration cal.json long.csv | head -1",
+        "apply --calibration cal.json long.csv --out >(head -1)",
+        "apply --calibration cal.json - --out >(head -1) < long.csv",
+        "export --calibration board.json --c - | head -1",
+        "simulate --protocol pulses --out - | head -1",
+    ] {
+        let mut bash = Command::new("bash");
+        bash.args(["-c", &format!("\"$0\" {line}; exit ${{PIPESTATUS[0]}}")]).arg(program());
+        let bash = bash.current_dir(scratch.path("")).stdin(Stdio::null());
+        let Ok(output) = bash.output() else { return };
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{line}: {said}");
+        assert!(!said.contains("roken pipe"), "{line}: {said}");
+    }
+}
+
+#[test]
 fn help_that_cannot_be_shown_is_a_failure_and_help_that_nobody_reads_is_none() {
     let scratch = Scratch::new();
     for (line, out, code) in [

@@ -24,7 +24,7 @@ use super::{
 ///
 /// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
 /// the bytes come; a pipe that nobody reads is refused after two seconds, and so are standard
-/// input and disks. What the reader of standard output does not take because it has gone is no error.
+/// input and disks. What a reader of these does not take because it has gone is no error.
 ///
 /// A file that this process has read as an input is not written over ([`guard_inputs`](super::guard_inputs)).
 ///

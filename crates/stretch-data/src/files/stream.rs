@@ -33,40 +33,40 @@ pub(super) fn open_stream(
     meta: Option<&Metadata>,
 ) -> io::Result<Option<Box<dyn Write>>> {
     if is_standard_output(path) {
-        return Ok(Some(Box::<StandardOutput>::default()));
+        return Ok(Some(Box::new(Stream { out: io::stdout(), has_gone: false })));
     }
     if is_one_of(path, STDIN) {
         return Err(io::Error::other("it is standard input, which is read; name a file"));
     }
     let is_descriptor = path.starts_with("/dev/fd") || path.starts_with("/proc");
     match meta.filter(|meta| is_descriptor || !meta.is_file()) {
-        Some(meta) => Ok(Some(Box::new(open_device(path, meta)?))),
+        Some(meta) => Ok(Some(Box::new(Stream { out: open_device(path, meta)?, has_gone: false }))),
         None => Ok(None),
     }
 }
 
-/// Standard output. Where its reader has gone, as `head` does, the rest is let go without a word: what else a command writes is still asked
-/// for.
-#[derive(Default)]
-struct StandardOutput {
+/// Standard output, or a pipe. Where its reader has gone, as `head` does, the rest is let go without a word: what else a command writes is
+/// still asked for.
+struct Stream<W> {
+    out: W,
     has_gone: bool,
 }
 
-impl StandardOutput {
+impl<W> Stream<W> {
     fn let_go<T>(&mut self, done: io::Result<T>, instead: T) -> io::Result<T> {
         self.has_gone |= done.as_ref().is_err_and(|e| e.kind() == io::ErrorKind::BrokenPipe);
         if self.has_gone { Ok(instead) } else { done }
     }
 }
 
-impl Write for StandardOutput {
+impl<W: Write> Write for Stream<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = if self.has_gone { Ok(0) } else { io::stdout().lock().write(bytes) };
+        let written = if self.has_gone { Ok(0) } else { self.out.write(bytes) };
         self.let_go(written, bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let flushed = if self.has_gone { Ok(()) } else { io::stdout().lock().flush() };
+        let flushed = if self.has_gone { Ok(()) } else { self.out.flush() };
         self.let_go(flushed, ())
     }
 }

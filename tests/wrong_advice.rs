@@ -261,23 +261,27 @@ fn samples_at_another_rate_are_told() {
     let scratch = Scratch::new();
     let record = scratch.calibration("cal.json");
     let text = fs::read_to_string(scratch.loops("whole.csv", 40.0, 1.1)).unwrap();
-    // the same rows in half the time, and every tenth of them
-    let at = |times: f64, every: usize| {
+    // the same rows in half the time, every tenth of them, and every other one late
+    let at = |times: f64, every: usize, late_s: f64| {
         let mut out = String::from("time_s,length_mm,bridge_v\n");
-        for line in text.lines().skip(1).step_by(every) {
+        for (i, line) in text.lines().skip(1).step_by(every).enumerate() {
             let (time_s, rest) = line.split_once(',').unwrap();
-            writeln!(out, "{:.4},{rest}", times * time_s.parse::<f64>().unwrap()).unwrap();
+            let late_s = if i % 2 == 0 { 0.0 } else { late_s };
+            writeln!(out, "{:.4},{rest}", times * time_s.parse::<f64>().unwrap() + late_s).unwrap();
         }
         out
     };
     for (text, told) in [
         (
-            at(0.5, 1),
+            at(0.5, 1, 0.0),
             Some("200.0000 samples a second come where the calibration was recorded at 100"),
         ),
-        (at(1.0, 10), Some("10.0000 samples a second come")),
-        (at(1.0, 1), None),
-        (at(1.05, 1), None),
+        (at(0.5, 1, 0.002), Some("200.0000 samples a second come")),
+        (at(1.0, 10, 0.0), Some("10.0000 samples a second come")),
+        (at(1.0, 10, 0.04), Some("10.0000 samples a second come")),
+        (at(1.0, 1, 0.0), None),
+        (at(1.0, 1, 0.004), None),
+        (at(1.05, 1, 0.0), None),
     ] {
         let log = scratch.write("log.csv", &text);
         let apply = |input: Option<&str>| {

@@ -7,7 +7,7 @@ use std::{
 
 use stretch_calibrate::PACE_TOLERANCE;
 use stretch_core::Calibration;
-use stretch_data::{DataError, DataSet, Split, Trial};
+use stretch_data::{DataError, DataSet, Split, Trial, rate_of};
 use stretch_recording::{DateOrder, ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
 use super::shared::progress;
@@ -219,28 +219,24 @@ impl Pace {
             return None;
         }
         self.is_told = true;
-        let mut sorted = std::mem::take(&mut self.intervals_s);
-        sorted.sort_by(f64::total_cmp);
-        let usual_s = sorted[INTERVALS / 2];
-        // stamps of a coarse clock have the right interval on average only
-        let near = &sorted[..sorted.partition_point(|interval_s| *interval_s <= 2.5 * usual_s)];
-        let mean_s = near.iter().sum::<f64>() / near.len() as f64;
-        let (share, rate_hz) = (usual_s * self.rate_hz, self.rate_hz);
-        let is_usual = |interval_s: f64| (interval_s * rate_hz - 1.0).abs() <= PACE_TOLERANCE;
-        if is_usual(usual_s) || is_usual(mean_s) {
+        let mut stamps_s = vec![0.0];
+        for interval_s in std::mem::take(&mut self.intervals_s) {
+            stamps_s.push(stamps_s[stamps_s.len() - 1] + interval_s);
+        }
+        let (found_hz, rate_hz) = (rate_of(&stamps_s)?, self.rate_hz);
+        if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
             return None;
         }
         let what = if self.needs_signal_only {
             "its estimates are right, the rates are not"
-        } else if share < 1.0 {
+        } else if found_hz > rate_hz {
             "its rates, and estimates that rest on them, are wrong"
         } else {
             "the samples in between count as missing"
         };
         Some(format!(
-            "{:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
-             the log there with stretch convert --grid {rate_hz}",
-            1.0 / usual_s
+            "{found_hz:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
+             the log there with stretch convert --grid {rate_hz}"
         ))
     }
 }

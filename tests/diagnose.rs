@@ -126,10 +126,12 @@ fn a_simulated_effect_is_named_and_reported() {
         "{text}"
     );
     // Whatever the number of threads, the same bits.
-    let again = scratch.path("again.json");
-    runs(&mut run("1", &again));
+    let (again, page_again) = (scratch.path("again.json"), scratch.path("again.html"));
+    runs(run("1", &again).arg("--report").arg(&page_again));
     assert!(d == read(&again));
-    let page = without_program(&fs::read_to_string(page).unwrap());
+    let page = fs::read_to_string(page).unwrap();
+    assert!(page == fs::read_to_string(page_again).unwrap(), "the report tells two runs apart");
+    let page = without_program(&page);
     assert!(
         !page.contains("http://")
             && !page.contains("https://")

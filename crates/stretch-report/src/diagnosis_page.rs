@@ -428,7 +428,6 @@ fn numbers(page: &mut Page, d: &Diagnosis) {
             });
         }
     }
-    page.text(&format!("The diagnosis took {} s.", number(d.runtime_s, 2)));
 }
 
 #[cfg(test)]

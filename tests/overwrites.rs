@@ -9,10 +9,11 @@ use crate::support::{
 };
 
 /// Commands that write `OUT` over one of the files that they read.
-const OVER_INPUTS: [(&str, &str); 34] = [
+const OVER_INPUTS: [(&str, &str); 35] = [
     // a shell makes of --out r*.csv the names of all recordings, the first of which is no input
     ("calibrate --out OUT b.csv", "a.csv"),
     ("calibrate a.csv --out cal.json --report OUT", "b.csv"),
+    ("convert --out OUT b.csv", "a.csv"),
     ("apply --calibration cal.json --out OUT b.csv", "a.csv"),
     ("calibrate b.csv a.csv --out OUT", "a.csv"),
     ("calibrate a.csv --out new.json --report OUT", "a.csv"),
@@ -29,7 +30,7 @@ const OVER_INPUTS: [(&str, &str); 34] = [
     ("apply --calibration cal.json a.csv --out OUT", "cal.json"),
     ("evaluate --calibration cal.json a.csv --json=OUT", "a.csv"),
     ("evaluate --calibration cal.json a.csv --json=OUT", "cal.json"),
-    ("convert a.csv --out OUT", "a.csv"),
+    ("convert a.csv --force --out OUT", "a.csv"),
     ("convert a.csv --from-zero --out OUT", "a.csv"),
     ("diagnose bench --report OUT", "bench/arbitrary_1.csv"),
     ("diagnose bench --fix OUT", "bench/dataset.toml"),
@@ -96,7 +97,7 @@ fn a_refusal_names_the_option_and_the_input() {
     let scratch = inputs();
     for (line, parts) in [
         (
-            "convert a.csv --out ./a.csv",
+            "convert a.csv --force --out ./a.csv",
             ["a.csv: cannot open it", "--out ./a.csv would overwrite it"],
         ),
         (
@@ -106,6 +107,10 @@ fn a_refusal_names_the_option_and_the_input() {
         (
             "calibrate --out a.csv b.csv",
             ["--out a.csv: this file is a recording", "such as cal.json"],
+        ),
+        (
+            "convert --out a.csv b.csv",
+            ["--out a.csv: this file is a recording", "only --force replaces it"],
         ),
         (
             "calibrate a.csv --out x.json --report ./x.json",
@@ -163,6 +168,7 @@ fn what_is_no_loss_is_done() {
         "apply --calibration cal.json a.csv --out estimate.csv",
         "apply --calibration cal.json b.csv --out estimate.csv",
         "convert a.csv --out out.csv",
+        "convert b.csv --out out.csv --force",
         // in its own place, by design
         "export --calibration cal.json --seal",
         "init logs --force",

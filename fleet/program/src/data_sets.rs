@@ -16,7 +16,10 @@ use datafusion::{
     },
     parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError},
 };
-use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_data::{
+    Channel, SessionTrial, Trial,
+    files::{guard_inputs, is_input},
+};
 
 use crate::{
     lake::{Lake, LakeFile, Refused},
@@ -41,7 +44,10 @@ pub(crate) type Name = [String; 4];
 
 /// A lake that holds trials; files that it cannot use are reported.
 pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
+    // no answer is written over what it was made from
+    guard_inputs([])?;
     let lake = Lake::open(folder)?;
+    lake.files.iter().try_for_each(|file| is_input(&file.path))?;
     let left_out = lake
         .unfit
         .iter()

@@ -40,6 +40,26 @@ fn drift_names_the_sensors_that_moved() {
 }
 
 #[test]
+fn no_answer_is_written_over_what_it_was_made_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path().join("lake");
+    said("make --lake {} --sensors 4 --days 40 --rows 300 --seed 3", &[&lake]);
+    let before = tree(&lake);
+    let trial = before.keys().find(|name| name.ends_with(".parquet")).expect("a trial");
+    for line in ["drift --lake {} --from 2026-01 --to 2026-02 --out {}", "prior --lake {} --out {}"]
+    {
+        for over in [trial, "lake.json"] {
+            let told = refused(line, &[&lake, &lake.join(over)]);
+            assert!(
+                told.contains("it is a file that this command reads"),
+                "{line}, {over}: {told}"
+            );
+            assert!(tree(&lake) == before, "{line}, {over}");
+        }
+    }
+}
+
+#[test]
 fn answers_come_as_a_table_csv_and_records() {
     let folder = tempfile::tempdir().unwrap();
     let (lake, out) = (folder.path().join("lake"), folder.path().join("out"));

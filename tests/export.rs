@@ -140,6 +140,9 @@ fn with_gxx_the_arduino_example_of_two_gauges_names_the_one_that_is_cut_off() {
 fn with_gxx_a_board_of_another_converter_is_refused_with_the_option_that_names_it() {
     let scratch = Scratch::new();
     let calibration = calibrated(&scratch, &["--model", "poly13"]);
+    // of a library for AVR
+    fs::create_dir(scratch.path("avr")).unwrap();
+    scratch.write("avr/pgmspace.h", "#define PROGMEM\n");
     for (adc, refused) in [("12,0,3.3", true), ("10,0,5", false)] {
         let library = scratch.path(adc);
         runs(export(&calibration, &library).args(["--arduino", "--adc", adc]));
@@ -147,7 +150,8 @@ fn with_gxx_a_board_of_another_converter_is_refused_with_the_option_that_names_i
         let main = format!("#define __AVR__\n{ARDUINO}\n#include \"{}\"\n", example.display());
         let source = scratch.write("avr.cpp", main);
         let mut gxx = std::process::Command::new("g++");
-        gxx.args(["-std=gnu++11", "-fsyntax-only", "-I"]).arg(library.join("src")).arg(source);
+        gxx.args(["-std=gnu++11", "-fsyntax-only", "-I"]).arg(library.join("src"));
+        gxx.arg("-I").arg(scratch.path(".")).arg(source);
         let said = gxx.output().expect("g++");
         let error = String::from_utf8_lossy(&said.stderr);
         assert_eq!(said.status.success(), !refused, "{error}");

@@ -68,10 +68,13 @@ impl Constants {
         self.line(&format!("#define STRETCH_{name} {word}{comment}"))
     }
 
-    /// `static const type stretch_name[n] = {..}`.
+    /// `static const type stretch_name[n] STRETCH_FLASH = {..}`.
     pub(crate) fn array<L: Literal>(&mut self, kind: &str, name: &str, values: &[L]) -> &mut Self {
         let count = values.len();
-        self.line(&format!("static const {kind} stretch_{name}[{count}] = {};", braced(values)))
+        self.line(&format!(
+            "static const {kind} stretch_{name}[{count}] STRETCH_FLASH = {};",
+            braced(values)
+        ))
     }
 
     /// The same with rows of one length.
@@ -86,7 +89,7 @@ impl Constants {
         let inner: Vec<String> =
             rows.iter().map(|row| format!("    {}", braced(row.as_ref()))).collect();
         self.line(&format!(
-            "static const {kind} stretch_{name}[{count}][{length}] = {{\n{}\n}};",
+            "static const {kind} stretch_{name}[{count}][{length}] STRETCH_FLASH = {{\n{}\n}};",
             inner.join(",\n")
         ))
     }

@@ -244,6 +244,8 @@ fn assembled(
     let pressure = has.contains(&"crosstalk");
     let has_branches = !has.contains(&"array");
     let mut text = opening(source, form, &model, &has) + &frame(source, options);
+    text += "\n";
+    text += include_str!("c/flash.h");
     text += "\n/* ---- the record ---- */\n\n";
     text += &constants.into_text();
     text.push('\n');

@@ -112,7 +112,7 @@ pub(crate) fn fixed(
         rows.push(&format!("{{{}, {}, {flags}}}", code.0, answer.map_or(0, |(e, ..)| e)));
     }
     let fields = "int32_t code;\n    int32_t estimate;";
-    Ok(kept(&rows.text(fields, "code", BRANCH, "reading.estimate != samples[n].estimate"), &[]))
+    Ok(kept(&rows.text(fields, "code", BRANCH, "reading.estimate != sample->estimate"), &[]))
 }
 
 /// The self-test of a form in `float`.
@@ -223,7 +223,7 @@ pub(crate) fn array<const N: usize>(
     let fields =
         "float volts[STRETCH_CHANNELS];\n    float estimate;\n    float sd;\n    uint16_t lost;";
     let unlike = format!(
-        "reading.lost != samples[n].lost || {} ||\n            {}",
+        "reading.lost != sample->lost || {} ||\n            {}",
         differs("estimate"),
         differs("sd")
     );
@@ -232,7 +232,7 @@ pub(crate) fn array<const N: usize>(
 
 /// Whether a number of a reading is not that of a row.
 fn differs(number: &str) -> String {
-    format!("reading.{number} < samples[n].{number} || reading.{number} > samples[n].{number}")
+    format!("reading.{number} < sample->{number} || reading.{number} > sample->{number}")
 }
 
 /// Rows of the table, as many on a line as fit.

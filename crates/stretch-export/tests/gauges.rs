@@ -4,7 +4,7 @@ mod compilers;
 
 use std::{fmt::Write as _, fs};
 
-use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
+use compilers::{Compiler, compiled, compiler, gcc_and_gxx, on_uno, run, strict_c, uno};
 use proptest::{
     prelude::*,
     strategy::ValueTree,
@@ -286,6 +286,24 @@ fn with_gxx_gauges_of_every_kind_give_the_same_bits() {
 #[ignore = "needs clang; ./ci.sh runs it"]
 fn with_clang_gauges_of_every_kind_give_the_same_bits() {
     every_kind(&[compiler("clang", &["-std=c99", "-O2"], &[])]);
+}
+
+#[test]
+#[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
+fn with_avr_gcc_two_gauges_on_an_uno_give_the_same_bits() {
+    let mut runner = TestRunner::deterministic();
+    let calibration = example_array();
+    let (input, expected) = told(&calibration, &rows(&mut runner, 2));
+    let folder = tempfile::tempdir().unwrap();
+    let made = array_header(&calibration, &options(None)).unwrap();
+    fs::write(folder.path().join(HEADER), made.text).unwrap();
+    for compiler in uno() {
+        let found = on_uno(folder.path(), "gauges.c", &[], &compiler, &input);
+        for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
+            assert_eq!(found, expected, "{}: row {n}", compiler.program);
+        }
+        assert!(found.lines().count() > 200, "{found}");
+    }
 }
 
 #[test]

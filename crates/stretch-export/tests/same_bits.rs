@@ -2,20 +2,20 @@
 
 mod compilers;
 
-use std::{fmt::Write as _, fs, path::PathBuf};
+use std::{fmt::Write as _, fs, path::PathBuf, process::Command};
 
-use compilers::{Compiler, compiled, compiler, gcc_and_gxx, run, strict_c};
+use compilers::{Compiler, compiled, compiler, gcc_and_gxx, on_uno, run, simulated, strict_c, uno};
 
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Degree, Design, DiagnosedMap, Interval, Knee, Model,
     ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Surface, Values, Volts, Worn,
 };
-use stretch_export::{Form, HEADER, Options, arduino_library, gauge_header, header};
+use stretch_export::{Form, HEADER, Options, arduino_library, array_header, gauge_header, header};
 use stretch_receptor::{
     Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
 };
-use stretch_sleeve::{GaugeCalibration, Turns, Zero, ZeroWatch};
+use stretch_sleeve::{GaugeCalibration, SleeveCalibration, Turns, Zero, ZeroWatch};
 
 fn adc() -> Adc {
     parse_adc("12,0,3.3").unwrap()
@@ -185,12 +185,110 @@ fn holds_with(
             if turns.is_some() && form == Form::Float {
                 assert!(expected.contains("zero "), "{name}");
             }
-            let what = || format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
-            for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
-                assert_eq!(found, expected, "{} sample {n} of {}", what(), codes.len());
-            }
-            assert_eq!(found.lines().count(), expected.lines().count(), "{}", what());
+            let what = format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
+            let answered = same(&what, &found, &expected);
+            assert_eq!(answered, expected.lines().count(), "{what}");
         }
+    }
+}
+
+/// Holds each line that was found against that which is expected; how many there are.
+fn same(what: &str, found: &str, expected: &str) -> usize {
+    for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
+        assert_eq!(found, expected, "{what}: sample {n}");
+    }
+    found.lines().count()
+}
+
+/// An Uno has integers of 16 bits, a `double` of 32, 2 KB of RAM, and another library for floats.
+#[test]
+#[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
+fn with_avr_gcc_an_uno_gives_the_same_bits() {
+    let boards = boards_models().flat_map(|(name, calibration)| {
+        [Form::Fixed, Form::Float].map(|form| (name, calibration.clone(), form))
+    });
+    let named = defects().map(|(name, calibration)| (name, calibration, Form::Float));
+    for (name, calibration, form) in boards.chain(named) {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options { form: Some(form), adc: adc() };
+        let made = header(&calibration, &options).unwrap();
+        fs::write(folder.path().join(HEADER), made.text).unwrap();
+        let codes = erratic();
+        let (input, expected) =
+            (input(&calibration, form, &codes), expected(&calibration, None, form, &codes));
+        for compiler in uno() {
+            let defined: &[&str] = if form == Form::Float { &["-DFLOAT"] } else { &[] };
+            let found = on_uno(folder.path(), "harness.c", defined, &compiler, &input);
+            let what = format!("{name} {form} {}", compiler.program);
+            let answered = same(&what, &found, &expected);
+            assert!(answered > 200, "{what}: {answered} answers\n{found}");
+        }
+    }
+}
+
+/// Flash and RAM of an Uno: 32 KB less the bootloader, and 2 KB.
+const UNO_BYTES: [usize; 2] = [32_256, 2_048];
+
+/// Bytes of flash and of RAM without stack: those of the records that `firmware/c.sh` exports.
+#[test]
+#[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
+fn with_avr_gcc_every_form_fits_an_uno() {
+    let folder = tempfile::tempdir().unwrap();
+    let compiler = &uno()[0];
+    let bytes = |defined: &[&str]| {
+        let program = compiled(folder.path(), "compilers/uno.c", defined, compiler);
+        let output = Command::new("avr-size").arg(program).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let numbers = text.lines().nth(1).unwrap().split_whitespace().take(3);
+        let [text, data, bss] = numbers.map(|n| n.parse().unwrap()).collect::<Vec<usize>>()[..]
+        else {
+            panic!("{text}")
+        };
+        [text + data, data + bss]
+    };
+    let version = Command::new(compiler.program).arg("-dumpversion").output().unwrap();
+    let version = String::from_utf8(version.stdout).unwrap();
+    let mut rows = format!(
+        "# avr-g++ {} -Os; STRETCH_PAGES=write cargo test --test same_bits uno -- --ignored\n\
+         model and form,flash (bytes),flash with the self-test,RAM (bytes),stack (bytes)\n",
+        version.trim()
+    );
+    let forms = ["linear", "poly13", "observer", "observer-rest"]
+        .map(|name| [(name, Form::Fixed), (name, Form::Float)])
+        .concat();
+    let forms = forms
+        .into_iter()
+        .chain(["diagnosed", "diagnosed-rest", "gauges"].map(|name| (name, Form::Float)));
+    for (name, form) in forms {
+        let options = Options { form: Some(form), adc: adc() };
+        let made = match SleeveCalibration::read(&firmware(&format!("{name}.postcard"))).unwrap() {
+            SleeveCalibration::One(one) => gauge_header(&one, &options),
+            SleeveCalibration::Many(several) => array_header(&several, &options),
+        }
+        .unwrap();
+        fs::write(folder.path().join(HEADER), made.text).unwrap();
+        let float: &[&str] = if form == Form::Float { &["-DFLOAT"] } else { &[] };
+        let [flash, ram] = bytes(float);
+        let [tested, _] = bytes(&[float, &["-DSELF_TEST"]].concat());
+        let program =
+            compiled(folder.path(), "compilers/uno.c", &[float, &["-DSTACK"]].concat(), compiler);
+        let stack = usize::from_str_radix(simulated(&program).trim(), 16);
+        let stack = stack.unwrap_or_else(|_| panic!("{name} {form}: the self-test fails"));
+        assert!(flash < tested && tested < UNO_BYTES[0], "{name} {form}: {tested} bytes of flash");
+        assert!(ram + stack < UNO_BYTES[1], "{name} {form}: {ram} and {stack} bytes of RAM");
+        writeln!(rows, "{} {form},{flash},{tested},{ram},{stack}", made.model).unwrap();
+    }
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../reference/arduino_uno.csv");
+    if std::env::var("STRETCH_PAGES").is_ok_and(|what| what == "write") {
+        fs::write(&file, &rows).unwrap();
+    }
+    let written = fs::read_to_string(&file).unwrap();
+    if written.lines().next() == rows.lines().next() {
+        assert_eq!(written, rows, "STRETCH_PAGES=write writes them anew");
+    } else {
+        println!(
+            "SKIPPED the bytes on the page: they were counted with another compiler than {version}"
+        );
     }
 }
 
@@ -213,17 +311,18 @@ fn with_clang_records_of_every_kind_give_the_same_bits() {
 }
 
 fn every_kind(compilers: &[Compiler]) {
-    boards_models(compilers);
-    named_defects(compilers);
-}
-
-fn boards_models(compilers: &[Compiler]) {
-    for name in ["linear", "poly13", "observer", "observer-rest"] {
-        let calibration = read_calibration(&firmware(&format!("{name}.postcard"))).unwrap();
+    for (name, calibration) in boards_models() {
         for form in [Form::Fixed, Form::Float] {
             holds(name, &calibration, form, compilers);
         }
     }
+    named_defects(compilers);
+}
+
+fn boards_models() -> impl Iterator<Item = (&'static str, Calibration)> {
+    ["linear", "poly13", "observer", "observer-rest"]
+        .into_iter()
+        .map(|name| (name, read_calibration(&firmware(&format!("{name}.postcard"))).unwrap()))
 }
 
 fn changed(calibration: &Calibration, change: impl FnOnce(&mut CalibrationSpec)) -> Calibration {

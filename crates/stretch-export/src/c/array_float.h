@@ -117,7 +117,8 @@ STRETCH_INLINE void stretch_pass(stretch_channel *c, float x)
         }
     }
     for (k = 0; k < STRETCH_RELAXATIONS; k++) {
-        c->low_passes[k] = c->low_passes[k] + stretch_shares[k] * (x - c->low_passes[k]);
+        c->low_passes[k] =
+            c->low_passes[k] + STRETCH_FLOAT(stretch_shares[k]) * (x - c->low_passes[k]);
     }
 @end
     c->last = x;
@@ -154,10 +155,10 @@ STRETCH_INLINE uint8_t stretch_take(stretch_channel *c, int k, float x, int othe
         return STRETCH_IN_USE;
     }
     c->missing = 0;
-    if (x < stretch_least[k] || x > stretch_most[k]) {
+    if (x < STRETCH_FLOAT(stretch_least[k]) || x > STRETCH_FLOAT(stretch_most[k])) {
         return STRETCH_LOST_OUTSIDE;
     }
-    if (stretch_repeats(c, x, others_change) >= stretch_still[k]) {
+    if (stretch_repeats(c, x, others_change) >= STRETCH_INT(stretch_still[k])) {
         return STRETCH_LOST_STILL;
     }
     stretch_pass(c, x);
@@ -200,7 +201,8 @@ static STRETCH_APART int stretch_cause(const float *jumps)
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         float along = 0.0f, power = 0.0f, explained;
         for (j = 0; j < STRETCH_CHANNELS; j++) {
-            const float moved = j == k ? stretch_per_slip[j] : -(stretch_follows[j][k] * stretch_per_slip[j]);
+            const float per_slip = STRETCH_FLOAT(stretch_per_slip[j]);
+            const float moved = j == k ? per_slip : -(STRETCH_FLOAT(stretch_follows[j][k]) * per_slip);
             along = along + moved * jumps[j];
             power = power + moved * moved;
         }
@@ -232,9 +234,10 @@ STRETCH_INLINE void stretch_watch(stretch_state *s)
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         float told = 0.0f;
         for (j = 0; j < STRETCH_CHANNELS; j++) {
-            told = told + stretch_follows[k][j] * s->of[j].last;
+            told = told + STRETCH_FLOAT(stretch_follows[k][j]) * s->of[j].last;
         }
-        jumps[k] = stretch_jump(&s->of[k], s->of[k].last - told) * stretch_per_slip[k];
+        jumps[k] =
+            stretch_jump(&s->of[k], s->of[k].last - told) * STRETCH_FLOAT(stretch_per_slip[k]);
         exceeds |= jumps[k] > 1.0f || jumps[k] < -1.0f;
     }
     if (exceeds && s->warmed >= STRETCH_JUMP) {
@@ -248,7 +251,7 @@ STRETCH_INLINE void stretch_watch(stretch_state *s)
 @end
 /* ---- the estimate ---- */
 
-/* What one channel adds to a sum, term by term. */
+/* What one channel adds to a sum, term by term; gains are a row of a table. */
 STRETCH_INLINE float stretch_add(const stretch_channel *c, int k, const float *gains, float sum,
                                  uint8_t *clamped)
 {
@@ -261,15 +264,16 @@ STRETCH_INLINE float stretch_add(const stretch_channel *c, int k, const float *g
     }
 @end
     for (i = 0; i < STRETCH_STATES; i++) {
-        const float scaled = (states[i] - stretch_centre[k][i]) * stretch_per_half[k][i];
+        const float scaled =
+            (states[i] - STRETCH_FLOAT(stretch_centre[k][i])) * STRETCH_FLOAT(stretch_per_half[k][i]);
         states[i] = scaled > -1.0f ? scaled : -1.0f;
         states[i] = states[i] < 1.0f ? states[i] : 1.0f;
         *clamped = (uint8_t)(*clamped | (scaled < -1.0f || scaled > 1.0f));
     }
     for (i = 0; i < STRETCH_TERMS; i++) {
-        const uint8_t parent = stretch_parents[i];
-        made[i] = (parent == 0 ? 1.0f : made[parent - 1]) * states[stretch_extends[i]];
-        sum = sum + gains[i] * made[i];
+        const uint8_t parent = STRETCH_BYTE(stretch_parents[i]);
+        made[i] = (parent == 0 ? 1.0f : made[parent - 1]) * states[STRETCH_BYTE(stretch_extends[i])];
+        sum = sum + STRETCH_FLOAT(gains[i]) * made[i];
     }
     return sum;
 }
@@ -285,7 +289,8 @@ STRETCH_INLINE stretch_reading stretch_estimate(const stretch_state *s)
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         if (s->of[k].loss == STRETCH_IN_USE) {
             left++;
-            if (best < 0 || stretch_alone_sd[k] < stretch_alone_sd[best]) {
+            if (best < 0 ||
+                STRETCH_FLOAT(stretch_alone_sd[k]) < STRETCH_FLOAT(stretch_alone_sd[best])) {
                 best = k;
             }
         } else {
@@ -297,14 +302,15 @@ STRETCH_INLINE stretch_reading stretch_estimate(const stretch_state *s)
         return stretch_answer(STRETCH_ALL_LOST);
     }
     if (left + 1 < STRETCH_CHANNELS) {
-        sum = stretch_add(&s->of[best], best, stretch_alone[best], stretch_alone_constant[best], &reading.clamped);
-        reading.sd = stretch_alone_sd[best];
+        sum = stretch_add(&s->of[best], best, stretch_alone[best],
+                          STRETCH_FLOAT(stretch_alone_constant[best]), &reading.clamped);
+        reading.sd = STRETCH_FLOAT(stretch_alone_sd[best]);
     } else {
 @if several
         if (last_lost >= 0) {
             gains = stretch_without + last_lost * STRETCH_CHANNELS;
-            sum = stretch_without_constant[last_lost];
-            reading.sd = stretch_without_sd[last_lost];
+            sum = STRETCH_FLOAT(stretch_without_constant[last_lost]);
+            reading.sd = STRETCH_FLOAT(stretch_without_sd[last_lost]);
         }
 @end
         for (k = 0; k < STRETCH_CHANNELS; k++) {

@@ -12,8 +12,8 @@ STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rat
     (void)stretch_clamp(rate, STRETCH_RATE_MIN, STRETCH_RATE_MAX, STRETCH_RATE_CLAMPED, outside);
     *slope = 0.0f;
     for (j = STRETCH_DEGREE; j > 0; j--) {
-        estimate = estimate * v + stretch_curve[j];
-        *slope = *slope * v + (float)j * stretch_curve[j];
+        estimate = estimate * v + STRETCH_FLOAT(stretch_curve[j]);
+        *slope = *slope * v + (float)j * STRETCH_FLOAT(stretch_curve[j]);
     }
-    return estimate * v + stretch_curve[0];
+    return estimate * v + STRETCH_FLOAT(stretch_curve[0]);
 }

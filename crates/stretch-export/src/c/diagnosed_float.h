@@ -134,9 +134,9 @@ STRETCH_INLINE float stretch_apart(float at, float u, float radius)
 /* What the plays leave of a drive. */
 STRETCH_INLINE float stretch_played(const stretch_state *s, float u)
 {
-    return u - STRETCH_PLAYED * (stretch_apart(s->plays[0], u, stretch_radii[0]) +
-                                 stretch_apart(s->plays[1], u, stretch_radii[1]) +
-                                 stretch_apart(s->plays[2], u, stretch_radii[2]));
+    return u - STRETCH_PLAYED * (stretch_apart(s->plays[0], u, STRETCH_FLOAT(stretch_radii[0])) +
+                                 stretch_apart(s->plays[1], u, STRETCH_FLOAT(stretch_radii[1])) +
+                                 stretch_apart(s->plays[2], u, STRETCH_FLOAT(stretch_radii[2])));
 }
 
 @end
@@ -227,8 +227,9 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
     u = stretch_played(s, u);
     for (i = 0; i < 3; i++) {
         const float behind = input - s->plays[i];
-        if ((behind < 0.0f ? -behind : behind) > stretch_radii[i]) {
-            s->plays[i] = input - stretch_apart(s->plays[i], input, stretch_radii[i]);
+        if ((behind < 0.0f ? -behind : behind) > STRETCH_FLOAT(stretch_radii[i])) {
+            s->plays[i] =
+                input - stretch_apart(s->plays[i], input, STRETCH_FLOAT(stretch_radii[i]));
         }
     }
 @end
@@ -236,7 +237,8 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
     input = u;
     u = STRETCH_OWN * u + stretch_past(s);
     for (i = 0; i < 3; i++) {
-        s->fading[i] = stretch_kept[i] * s->fading[i] + stretch_taken[i] * input;
+        s->fading[i] = STRETCH_FLOAT(stretch_kept[i]) * s->fading[i] +
+                       STRETCH_FLOAT(stretch_taken[i]) * input;
     }
 @end
 @if worn
@@ -255,26 +257,27 @@ STRETCH_INLINE float stretch_forward(float drive, float *slope)
 {
     const float place = (drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP;
     const int below = (int)stretch_held(place, 0.0f, (float)(STRETCH_KNOTS - 2));
-    const float rise = stretch_curve[below + 1] - stretch_curve[below];
+    const float knot = STRETCH_FLOAT(stretch_curve[below]);
+    const float rise = STRETCH_FLOAT(stretch_curve[below + 1]) - knot;
     *slope = rise * STRETCH_PER_STEP;
-    return stretch_curve[below] + (place - (float)below) * rise;
+    return knot + (place - (float)below) * rise;
 }
 
 /* The drive that a signal suggests by itself; beyond an end as the last line goes on. */
 STRETCH_INLINE float stretch_inverse(float signal)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
-    float place;
+    float place, knot;
     while (above - below > 1) {
         const int middle = (below + above) / 2;
-        if (stretch_curve[middle] <= signal) {
+        if (STRETCH_FLOAT(stretch_curve[middle]) <= signal) {
             below = middle;
         } else {
             above = middle;
         }
     }
-    place = (float)below +
-            (signal - stretch_curve[below]) / (stretch_curve[below + 1] - stretch_curve[below]);
+    knot = STRETCH_FLOAT(stretch_curve[below]);
+    place = (float)below + (signal - knot) / (STRETCH_FLOAT(stretch_curve[below + 1]) - knot);
     return STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
 }
 
@@ -297,13 +300,13 @@ STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
 @end
 @if hysteresis
     for (i = 0; i < 3; i++) {
-        s->plays[i] = u - initial * stretch_radii[i];
+        s->plays[i] = u - initial * STRETCH_FLOAT(stretch_radii[i]);
     }
     u = stretch_played(s, u);
 @end
 @if relaxation
     for (i = 0; i < 3; i++) {
-        s->fading[i] = stretch_settled[i] * u;
+        s->fading[i] = STRETCH_FLOAT(stretch_settled[i]) * u;
     }
 @end
 @if worn
@@ -411,7 +414,8 @@ STRETCH_INLINE void stretch_turn(stretch_state *s)
 /* Takes in a signed signal above its baseline; whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 {
-    const float first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
+    const float first = STRETCH_FLOAT(stretch_curve[0]);
+    const float last = STRETCH_FLOAT(stretch_curve[STRETCH_KNOTS - 1]);
     const float span = last - first;
     const float here = s->target;
     const float drive = stretch_drive(s, here);

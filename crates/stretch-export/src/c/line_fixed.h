@@ -6,12 +6,13 @@ typedef struct stretch_surface {
     int32_t slope;
 } stretch_surface;
 
-static const stretch_surface stretch_surfaces[1] = STRETCH_SURFACES;
+static const stretch_surface stretch_surfaces[1] STRETCH_FLASH = STRETCH_SURFACES;
 
 STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {
-    const stretch_surface *surface = &stretch_surfaces[0];
+    stretch_surface room;
+    const stretch_surface *surface = STRETCH_LOADED(room, stretch_surfaces[0]);
     const int32_t volts =
         stretch_clamp(&surface->signal, ((int32_t)sample - surface->centre) * 32768,
                       STRETCH_SIGNAL_CLAMPED, outside);

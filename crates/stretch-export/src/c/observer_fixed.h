@@ -70,17 +70,19 @@ STRETCH_INLINE int32_t stretch_play(int32_t before, int32_t x, int32_t radius)
 STRETCH_INLINE int32_t stretch_inverse(int32_t signal, int32_t *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
-    *held = stretch_held(signal, stretch_curve[0], stretch_curve[STRETCH_KNOTS - 1]);
+    *held = stretch_held(signal, STRETCH_INT(stretch_curve[0]),
+                         STRETCH_INT(stretch_curve[STRETCH_KNOTS - 1]));
     while (above - below > 1) {
         const int middle = (below + above) / 2;
-        if (stretch_curve[middle] <= *held) {
+        if (STRETCH_INT(stretch_curve[middle]) <= *held) {
             below = middle;
         } else {
             above = middle;
         }
     }
     return (int32_t)below * 65536 +
-           (int32_t)(stretch_product(*held - stretch_curve[below], stretch_recips[below]) >>
+           (int32_t)(stretch_product(*held - STRETCH_INT(stretch_curve[below]),
+                                     STRETCH_INT(stretch_recips[below])) >>
                      STRETCH_RECIP_BITS);
 }
 
@@ -89,7 +91,7 @@ STRETCH_INLINE int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t 
 {
     const int32_t from_low = stretch_saturate((int64_t)drive - STRETCH_DRIVE_LOW);
     int32_t at = stretch_saturate(stretch_product(from_low, STRETCH_PER_STEP) >> 32);
-    int32_t below;
+    int32_t below, knot;
     at = stretch_held(at, 0, (int32_t)(STRETCH_KNOTS - 1) * 65536);
     below = at >> 16;
     if (below > STRETCH_KNOTS - 2) {
@@ -97,8 +99,9 @@ STRETCH_INLINE int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t 
     }
     *segment = below;
     *place = at;
-    return stretch_curve[below] +
-           (int32_t)(stretch_product(stretch_curve[below + 1] - stretch_curve[below],
+    knot = STRETCH_INT(stretch_curve[below]);
+    return knot +
+           (int32_t)(stretch_product(STRETCH_INT(stretch_curve[below + 1]) - knot,
                                      at - below * 65536) >>
                      16);
 }
@@ -110,11 +113,11 @@ STRETCH_INLINE int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t 
     int64_t sum = stretch_product(STRETCH_LEAD, rate);
     int i;
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
-        sum += stretch_product(stretch_amplitudes[i], y - s->slow[i]);
+        sum += stretch_product(STRETCH_INT(stretch_amplitudes[i]), y - s->slow[i]);
     }
     for (i = 0; i < STRETCH_PLAYS; i++) {
-        const int32_t played = stretch_play(s->plays[i], y, stretch_radii[i]);
-        sum += stretch_product(stretch_play_weights[i], y - played);
+        const int32_t played = stretch_play(s->plays[i], y, STRETCH_INT(stretch_radii[i]));
+        sum += stretch_product(STRETCH_INT(stretch_play_weights[i]), y - played);
     }
     sum = (int64_t)y + (sum >> 20);
     if (sum > most) {
@@ -129,7 +132,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     int i;
     s->target = stretch_held(s->target + s->rate, STRETCH_LOW, STRETCH_HIGH);
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
-        s->slow[i] += stretch_part(s->target - s->slow[i], stretch_shares[i]);
+        s->slow[i] += stretch_part(s->target - s->slow[i], STRETCH_INT(stretch_shares[i]));
     }
 }
 
@@ -146,7 +149,7 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
         s->rate = s->rate < 0 ? s->rate : 0;
     }
     for (i = 0; i < STRETCH_PLAYS; i++) {
-        s->plays[i] = stretch_play(s->plays[i], s->target, stretch_radii[i]);
+        s->plays[i] = stretch_play(s->plays[i], s->target, STRETCH_INT(stretch_radii[i]));
     }
 }
 
@@ -160,31 +163,34 @@ STRETCH_INLINE int32_t stretch_pull(int32_t gain, int32_t surprise)
 /* Takes in a signal above its baseline; whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, int32_t signal)
 {
-    const int32_t first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
+    const int32_t first = STRETCH_INT(stretch_curve[0]);
+    const int32_t last = STRETCH_INT(stretch_curve[STRETCH_KNOTS - 1]);
     const int32_t *gains;
     int32_t segment, from, held, to, run, change, surprise, predicted;
     int at, i;
     predicted = stretch_forward(stretch_drive(s, s->target, s->rate), &segment, &from);
     to = stretch_inverse(signal, &held);
-    at = stretch_tangents[segment];
+    at = (int)STRETCH_INT(stretch_tangents[segment]);
     run = to > from ? to - from : from - to;
     change = held > predicted ? held - predicted : predicted - held;
     /* the secant, where it is steeper, over at least a hundredth of the way between knots */
     if (run > 65536 / 100) {
         const int64_t scaled = (int64_t)change * 65536;
-        while (at < STRETCH_SLOPES - 1 && scaled >= stretch_product(stretch_ends[at], run)) {
+        while (at < STRETCH_SLOPES - 1 && scaled >= stretch_product(STRETCH_INT(stretch_ends[at]), run)) {
             at++;
         }
     }
     /* a spike counts as a signal one whole curve away, no more */
     surprise = stretch_held(signal, first - (last - first), last + (last - first)) - predicted;
     gains = stretch_gains[at];
-    s->target = stretch_saturate((int64_t)s->target + stretch_pull(gains[0], surprise));
-    s->rate = stretch_held(stretch_saturate((int64_t)s->rate + stretch_pull(gains[1], surprise)),
-                           -((int32_t)1 << 26), (int32_t)1 << 26);
+    s->target = stretch_saturate((int64_t)s->target + stretch_pull(STRETCH_INT(gains[0]), surprise));
+    s->rate = stretch_held(
+        stretch_saturate((int64_t)s->rate + stretch_pull(STRETCH_INT(gains[1]), surprise)),
+        -((int32_t)1 << 26), (int32_t)1 << 26);
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
         s->slow[i] = stretch_held(
-            stretch_saturate((int64_t)s->slow[i] + stretch_pull(gains[2 + i], surprise)),
+            stretch_saturate((int64_t)s->slow[i] +
+                             stretch_pull(STRETCH_INT(gains[2 + i]), surprise)),
             -((int32_t)1 << 29), (int32_t)1 << 29);
     }
     stretch_hold(s);

@@ -53,18 +53,19 @@ STRETCH_INLINE float stretch_play(float before, float x, float radius)
 STRETCH_INLINE float stretch_inverse(float signal, float *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
-    float place;
-    *held = stretch_held(signal, stretch_curve[0], stretch_curve[STRETCH_KNOTS - 1]);
+    float place, knot;
+    *held = stretch_held(signal, STRETCH_FLOAT(stretch_curve[0]),
+                         STRETCH_FLOAT(stretch_curve[STRETCH_KNOTS - 1]));
     while (above - below > 1) {
         const int middle = (below + above) / 2;
-        if (stretch_curve[middle] <= *held) {
+        if (STRETCH_FLOAT(stretch_curve[middle]) <= *held) {
             below = middle;
         } else {
             above = middle;
         }
     }
-    place = (float)below +
-            (*held - stretch_curve[below]) / (stretch_curve[below + 1] - stretch_curve[below]);
+    knot = STRETCH_FLOAT(stretch_curve[below]);
+    place = (float)below + (*held - knot) / (STRETCH_FLOAT(stretch_curve[below + 1]) - knot);
     return STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
 }
 
@@ -74,14 +75,15 @@ STRETCH_INLINE float stretch_forward(float drive, float *tangent, float *held)
     const float place = stretch_held((drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP, 0.0f,
                                      (float)(STRETCH_KNOTS - 1));
     int below = (int)place;
-    float rise;
+    float rise, knot;
     if (below > STRETCH_KNOTS - 2) {
         below = STRETCH_KNOTS - 2;
     }
-    rise = stretch_curve[below + 1] - stretch_curve[below];
+    knot = STRETCH_FLOAT(stretch_curve[below]);
+    rise = STRETCH_FLOAT(stretch_curve[below + 1]) - knot;
     *tangent = rise * STRETCH_PER_STEP;
     *held = STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
-    return stretch_curve[below] + (place - (float)below) * rise;
+    return knot + (place - (float)below) * rise;
 }
 
 /* The drive of a target that stands at y now. */
@@ -90,11 +92,11 @@ STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
     float drive = y;
     int i;
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
-        drive = drive + stretch_amplitudes[i] * (y - s->slow[i]);
+        drive = drive + STRETCH_FLOAT(stretch_amplitudes[i]) * (y - s->slow[i]);
     }
     for (i = 0; i < STRETCH_PLAYS; i++) {
-        const float played = stretch_play(s->plays[i], y, stretch_radii[i]);
-        drive = drive + stretch_play_weights[i] * (y - played);
+        const float played = stretch_play(s->plays[i], y, STRETCH_FLOAT(stretch_radii[i]));
+        drive = drive + STRETCH_FLOAT(stretch_play_weights[i]) * (y - played);
     }
     return drive;
 }
@@ -105,7 +107,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     int i;
     s->target = stretch_held(s->target + STRETCH_PERIOD_S * s->rate, STRETCH_LOW, STRETCH_HIGH);
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
-        s->slow[i] = s->slow[i] + stretch_shares[i] * (s->target - s->slow[i]);
+        s->slow[i] = s->slow[i] + STRETCH_FLOAT(stretch_shares[i]) * (s->target - s->slow[i]);
     }
 }
 
@@ -122,7 +124,7 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
         s->rate = s->rate < 0.0f ? s->rate : 0.0f;
     }
     for (i = 0; i < STRETCH_PLAYS; i++) {
-        s->plays[i] = stretch_play(s->plays[i], s->target, stretch_radii[i]);
+        s->plays[i] = stretch_play(s->plays[i], s->target, STRETCH_FLOAT(stretch_radii[i]));
     }
 }
 
@@ -132,7 +134,7 @@ STRETCH_INLINE int stretch_nearest(float slope)
     int from = 0, to = STRETCH_SLOPES - 1;
     while (from < to) {
         const int middle = (from + to) / 2;
-        if (slope < stretch_ends[middle]) {
+        if (slope < STRETCH_FLOAT(stretch_ends[middle])) {
             to = middle;
         } else {
             from = middle + 1;
@@ -144,7 +146,8 @@ STRETCH_INLINE int stretch_nearest(float slope)
 /* Takes in a signed signal above its baseline; whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 {
-    const float first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
+    const float first = STRETCH_FLOAT(stretch_curve[0]);
+    const float last = STRETCH_FLOAT(stretch_curve[STRETCH_KNOTS - 1]);
     const float span = last - first;
     const float drive = stretch_drive(s, s->target) + STRETCH_LEAD_S * s->rate;
     const float *gains;
@@ -162,10 +165,10 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     /* a spike counts as a signal one whole curve away, no more */
     surprise = stretch_held(signal, first - span, last + span) - predicted;
     gains = stretch_gains[stretch_nearest(slope)];
-    s->target = s->target + gains[0] * surprise;
-    s->rate = s->rate + gains[1] * surprise;
+    s->target = s->target + STRETCH_FLOAT(gains[0]) * surprise;
+    s->rate = s->rate + STRETCH_FLOAT(gains[1]) * surprise;
     for (i = 0; i < STRETCH_RELAXATIONS; i++) {
-        s->slow[i] = s->slow[i] + gains[2 + i] * surprise;
+        s->slow[i] = s->slow[i] + STRETCH_FLOAT(gains[2 + i]) * surprise;
     }
     stretch_hold(s);
     return !(held < signal || held > signal);

@@ -4,13 +4,14 @@ typedef struct stretch_surface {
     float p00, p10, p01, p11, p02, p12, p03;
 } stretch_surface;
 
-static const stretch_surface stretch_surfaces[2] = STRETCH_SURFACES;
+static const stretch_surface stretch_surfaces[2] STRETCH_FLASH = STRETCH_SURFACES;
 
 /* The estimate, and its change per change of the signal. */
 STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
                                      uint8_t *outside)
 {
-    const stretch_surface *p = &stretch_surfaces[s->branch];
+    stretch_surface room;
+    const stretch_surface *p = STRETCH_LOADED(room, stretch_surfaces[s->branch]);
     const float v =
         stretch_clamp(x, p->signal_min, p->signal_max, STRETCH_SIGNAL_CLAMPED, outside) - p->offset;
     const float r =

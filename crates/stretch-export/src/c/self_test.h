@@ -11,21 +11,23 @@ typedef struct stretch_sample {
  * first that is not, from 1. */
 static STRETCH_APART int stretch_self_test(void)
 {
-    static const stretch_sample samples[STRETCH_SELF_TEST] = {
+    static const stretch_sample samples[STRETCH_SELF_TEST] STRETCH_FLASH = {
 @ROWS@
     };
     stretch_state state;
     int n;
     stretch_init(&state);
     for (n = 0; n < STRETCH_SELF_TEST; n++) {
+        stretch_sample room;
+        const stretch_sample *sample = STRETCH_LOADED(room, samples[n]);
         stretch_reading reading;
         uint8_t flags;
 @if pressure
-        stretch_set_pressure(&state, samples[n].pressure);
+        stretch_set_pressure(&state, sample->pressure);
 @end
-        reading = stretch_step(&state, samples[n].@INPUT@);
+        reading = stretch_step(&state, sample->@INPUT@);
         flags = (uint8_t)(reading.status | @FLAGS@);
-        if (flags != samples[n].flags || @DIFFERS@) {
+        if (flags != sample->flags || @DIFFERS@) {
             return n + 1;
         }
     }

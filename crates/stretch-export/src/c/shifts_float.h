@@ -31,8 +31,9 @@ static inline void stretch_shifts_init(stretch_shifts_state *b)
 STRETCH_INLINE float stretch_difference(const stretch_state *s, int k)
 {
     uint8_t clamped = 0;
-    float own = stretch_add(&s->of[k], k, stretch_alone[k], stretch_alone_constant[k], &clamped);
-    float others = stretch_without_constant[k];
+    float own = stretch_add(&s->of[k], k, stretch_alone[k], STRETCH_FLOAT(stretch_alone_constant[k]),
+                            &clamped);
+    float others = STRETCH_FLOAT(stretch_without_constant[k]);
     int j;
     for (j = 0; j < STRETCH_CHANNELS; j++) {
         if (j != k) {
@@ -70,8 +71,8 @@ static STRETCH_APART int stretch_shifts_step(stretch_shifts_state *b, const stre
     told->shifted = 0u;
     told->most = -1;
     for (k = 0; k < STRETCH_CHANNELS; k++) {
-        const float off = b->sums[k] * STRETCH_SHIFT_PER_BLOCK - stretch_shift_usual[k];
-        const float times = (off < 0.0f ? -off : off) / stretch_shift_limits[k];
+        const float off = b->sums[k] * STRETCH_SHIFT_PER_BLOCK - STRETCH_FLOAT(stretch_shift_usual[k]);
+        const float times = (off < 0.0f ? -off : off) / STRETCH_FLOAT(stretch_shift_limits[k]);
         told->off[k] = off;
         if (times > 1.0f) {
             told->shifted = (uint16_t)(told->shifted | (1u << k));

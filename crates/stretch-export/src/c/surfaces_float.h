@@ -31,9 +31,9 @@ static inline void stretch_init(stretch_state *s)
 STRETCH_INLINE int stretch_rate(stretch_state *s, float x, float *rate)
 {
     int j;
-    *rate = s->sums[0] + stretch_taps[0] * x;
+    *rate = s->sums[0] + STRETCH_FLOAT(stretch_taps[0]) * x;
     for (j = 1; j < STRETCH_WINDOW; j++) {
-        s->sums[j - 1] = s->sums[j] + stretch_taps[j] * x;
+        s->sums[j - 1] = s->sums[j] + STRETCH_FLOAT(stretch_taps[j]) * x;
     }
     if (s->remaining > 0) {
         s->remaining = (uint16_t)(s->remaining - 1u);

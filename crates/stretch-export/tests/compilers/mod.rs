@@ -1,6 +1,7 @@
 //! Compilers of C and C++, and programs around a header.
 
 use std::{
+    fs,
     io::Write as _,
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -63,10 +64,49 @@ pub(crate) fn compiled(
     let program = folder.join("harness");
     let mut command = Command::new(compiler.program);
     command.args(&compiler.arguments).args(defined).arg("-I").arg(folder).arg("-o").arg(&program);
-    command.arg(format!("{}/tests/{harness}", env!("CARGO_MANIFEST_DIR"))).arg("-lm");
-    let output = command.output().unwrap();
+    for source in harness.split(' ') {
+        command.arg(format!("{}/tests/{source}", env!("CARGO_MANIFEST_DIR")));
+    }
+    let output = command.arg("-lm").output().unwrap();
     assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
     program
+}
+
+/// As the Arduino IDE calls its compiler for an Uno, and as C.
+pub(crate) fn uno() -> [Compiler; 2] {
+    let uno = ["-mmcu=atmega328p", "-Os", "-DF_CPU=16000000", "-Wno-overlength-strings"];
+    [
+        compiler("avr-g++", &["-x", "c++", "-std=gnu++11"], &uno),
+        compiler("avr-gcc", &["-std=c99"], &uno),
+    ]
+}
+
+/// What a program for an Uno sends through its serial port, in the simulator.
+pub(crate) fn simulated(program: &Path) -> String {
+    let mut command = Command::new("simavr");
+    let output =
+        command.args(["-m", "atmega328p", "-f", "16000000"]).arg(program).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    // it colours every line, and shows the end of a line as a dot
+    let sent = text.split("\u{1b}[32m").skip(1).map(|line| line.split('\u{1b}').next().unwrap());
+    sent.map(|line| format!("{}\n", line.trim_end_matches(['.', '\n']))).collect()
+}
+
+/// What a harness on an Uno answers to as many lines of the input as its flash has room for, and how many those are.
+pub(crate) fn on_uno(
+    folder: &Path,
+    harness: &str,
+    defined: &[&str],
+    compiler: &Compiler,
+    input: &str,
+) -> String {
+    let lines = input.lines().scan(0, |bytes, line| {
+        *bytes += line.len() + 1;
+        (*bytes < 6000).then(|| format!("\"{line}\\n\"\n"))
+    });
+    fs::write(folder.join("input.h"), lines.collect::<String>()).unwrap();
+    let sources = format!("{harness} compilers/avr.c");
+    simulated(&compiled(folder, &sources, defined, compiler))
 }
 
 /// What the program prints for this input.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
-use stretch_calibrate::{FixedRecord, fixed_record, parse_adc};
+use stretch_calibrate::{FIXED_STEP, FixedRecord, fixed_record, parse_adc};
 use stretch_data::files::{FileError, Outputs, is_standard_output, write_whole};
 use stretch_export::{
     File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header,
@@ -98,7 +98,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     outputs.keep()?;
     if let Some((path, FixedRecord { bytes, read_as, .. })) = &fixed {
         let (out, count) = (path.display(), bytes.len());
-        tell(format!("wrote {out}: {count} bytes, a board reads it as {read_as}"))?;
+        tell(format!(
+            "wrote {out}: {count} bytes, a board reads it as {read_as}; an estimate has steps of {FIXED_STEP} in the reference's unit"
+        ))?;
     }
     match &c {
         Some((out, made, files)) if !is_standard_output(out) => {
@@ -160,8 +162,11 @@ fn stage(
 }
 
 fn explain(out: &Path, made: &Header, files: &[File], is_library: bool) -> anyhow::Result<()> {
-    let (out, Header { form, model, pressure, .. }) = (out.display(), made);
-    tell(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
+    let (out, Header { form, model, pressure, step, .. }) = (out.display(), made);
+    let step = step.as_ref().map_or_else(String::new, |step| format!(", in steps of {step}"));
+    tell(format!(
+        "wrote {out}: {model}, {form}{step}, a self-test of {SELF_TEST_SAMPLES} samples"
+    ))?;
     for File { path, .. } in files {
         tell(format!("  {path}"))?;
     }

@@ -1,9 +1,11 @@
 //! Reasons why there is no calibration.
 
-use stretch_core::DesignError;
+use stretch_core::{DesignError, Label};
 use stretch_filter::FilterError;
 use stretch_fit::FitError;
 use stretch_receptor::ReceptorError;
+
+use crate::FIXED_STEP;
 
 /// Why trials could not be calibrated on, or a calibration could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -151,6 +153,17 @@ pub enum CalibrateError {
         rate: String,
         /// The windows that are compiled in.
         windows: String,
+    },
+    /// An estimate in integers would have steps that are larger than the calibration's error, or coarse beside its range.
+    #[error(
+        "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a calibration that is off by {error:.2e}: \
+         give {reference} in a smaller unit, such as mm in place of m, and calibrate again"
+    )]
+    FixedStep {
+        /// Column of the reference.
+        reference: Label,
+        /// Error of the fit, in the unit of the reference.
+        error: f64,
     },
     /// All of the signal lies outside the converter's range.
     #[error(

@@ -22,9 +22,9 @@ pub use options::{
 };
 pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_gross_errors};
 pub use record::{
-    BoardReceptor, FixedRecord, RecordNumbers, calibration_bytes, calibration_from_edited_json,
-    calibration_from_json, calibration_seal, calibration_to_json, digest, fixed_record,
-    is_postcard, parse_adc, read_calibration, write_calibration,
+    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, calibration_bytes,
+    calibration_from_edited_json, calibration_from_json, calibration_seal, calibration_to_json,
+    digest, fit_error, fixed_record, is_postcard, parse_adc, read_calibration, write_calibration,
 };
 
 /// What other crates build calibrations of their own from.

@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use stretch_calibrate::{
-    CalibrateError, RecordNumbers, SpellingError, calibration_seal, fixed_record,
+    CalibrateError, FIXED_STEP, RecordNumbers, SpellingError, calibration_seal, fixed_record,
 };
 use stretch_core::{Branch, Calibration, Label, Model, Provenance, SampleRate, Target};
 use stretch_receptor::code::Adc;
@@ -78,6 +78,8 @@ pub struct Header {
     pub pressure: bool,
     /// Gauges of an array, which are sampled together; none of a calibration of one.
     pub array: Option<usize>,
+    /// In integers, the least step of an estimate with its unit.
+    pub step: Option<String>,
     /// Names of the branches: rising or inflation, falling or deflation.
     pub branches: [&'static str; 2],
 }
@@ -122,7 +124,9 @@ fn one(
         // what is missing in integers may be there in floats; a converter that does not fit is another matter
         Err(
             none @ ExportError::NoFixedForm(
-                CalibrateError::NoFixedForm { .. } | CalibrateError::FixedRate { .. },
+                CalibrateError::NoFixedForm { .. }
+                | CalibrateError::FixedRate { .. }
+                | CalibrateError::FixedStep { .. },
             ),
         ) => {
             let float = float(calibration, turns, options)?;
@@ -232,6 +236,15 @@ impl<'a> Source<'a> {
     }
 }
 
+impl Source<'_> {
+    /// The least step of an estimate: `0.001 mm`.
+    fn step(&self, form: Form) -> Option<String> {
+        let unit = comment_safe(self.reference.unit());
+        let step = format!("{FIXED_STEP} {unit}");
+        (form == Form::Fixed).then(|| step.trim_end().to_owned())
+    }
+}
+
 /// The parts in order.
 fn assembled(
     source: &Source<'_>,
@@ -273,7 +286,7 @@ fn assembled(
     text += self_test;
     text += "\n#endif\n";
     let branches = [Branch::Inflation, Branch::Deflation].map(|b| source.target.branch_name(b));
-    Header { text, form, model, pressure, array: None, branches }
+    Header { text, form, model, pressure, array: None, step: source.step(form), branches }
 }
 
 /// What the file is, for whoever opens it.
@@ -292,6 +305,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
     let libm = if has.contains(&"sd") { "of libm sqrtf alone (gcc wants -lm)" } else { "no libm" };
     let mut of = has.to_vec();
     of.extend((!has.contains(&"array")).then_some("one"));
+    of.extend((form == Form::Fixed).then_some("fixed"));
     kept(include_str!("c/opening.h"), &of)
         .replace("@SIGNAL@", &signal)
         .replace("@REFERENCE@", &reference)
@@ -300,6 +314,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
         .replace("@FORM@", &form.to_string())
         .replace("@TAKEN@", taken)
         .replace("@GIVEN@", &given)
+        .replace("@STEP@", &source.step(form).unwrap_or_default())
         .replace("@VERSION@", env!("CARGO_PKG_VERSION"))
         .replace("@FROM@", &from)
         .replace("@LIBM@", libm)
@@ -309,7 +324,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
 fn frame(source: &Source<'_>, options: &Options) -> String {
     let spec = options.adc.spec();
     let unit = comment_safe(source.reference.unit());
-    let period_us = (1e6 * source.sample_rate.period_s()).round() as i64;
+    let period_s = source.sample_rate.period_s();
     let mut constants = Constants::default();
     constants
         .word(
@@ -318,7 +333,13 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
             "of the record, as stretch export --calibration says it",
         )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
-        .word("PERIOD_US", format!("{period_us}L"), "from a sample to the next")
+        .define("PERIOD_NS", (1e9 * period_s).round() as i64, "from a sample to the next");
+    // below a microsecond there is nothing to count
+    if period_s >= 1e-6 {
+        let period_us = (1e6 * period_s).round() as i64;
+        constants.word("PERIOD_US", format!("{period_us}L"), "the same, rounded");
+    }
+    constants
         .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")
         .define("ADC_ZERO", spec.zero_v as f32, "the signal at code 0")
         .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "what a code adds to it");

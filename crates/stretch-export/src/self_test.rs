@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{BoardReceptor, FixedRecord};
+use stretch_calibrate::{BoardReceptor, FixedRecord, fit_error};
 use stretch_core::{Branch, Calibration, Crosstalk, Design, Label, Model, Stage, Volts};
 use stretch_receptor::{
     Receptor, Withheld,
@@ -63,24 +63,6 @@ impl Rounding {
         }
         Err(ExportError::Rounding { rms, error, reference: reference.clone() })
     }
-}
-
-/// RMSE of a calibration's fit in the unit of its reference, at least a thousandth of the range: a fit can be exact.
-fn fit_error(calibration: &Calibration) -> f64 {
-    let spec = calibration.spec();
-    let rmse = match &spec.model {
-        Model::Linear(line) => line.fit.rmse,
-        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
-            inflation.fit.rmse.max(deflation.fit.rmse)
-        }
-        Model::History(map) => map.fit.rmse,
-        Model::Observer(map) => map.fit.rmse,
-        Model::Diagnosed(map) => map.fit.rmse,
-        _ => 0.0,
-    };
-    let [low, high] = [spec.target_range.min(), spec.target_range.max()];
-    let span = (spec.target.to_reference(high) - spec.target.to_reference(low)).abs();
-    rmse.max(1e-3) * span
 }
 
 /// Status, branch and domain as the C packs them. Of a sample without a reading the branch is the last one.

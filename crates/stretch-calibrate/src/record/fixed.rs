@@ -3,9 +3,9 @@
 use std::{fmt, path::Path};
 
 use serde::Serialize;
-use stretch_core::{Calibration, Model, RateEstimator, Runner, Stage, record};
+use stretch_core::{Calibration, DesignError, Model, RateEstimator, Runner, Stage, record};
 use stretch_receptor::{
-    Withheld,
+    ReceptorError, Withheld,
     code::{
         Adc, AdcCode, AdcSpec, CodeReading, FIXED_BITS, FixedCalibration, FixedNumbers,
         FixedObserver, FixedReceptor, IntegerObserver,
@@ -16,6 +16,9 @@ use crate::{CalibrateError, SpellingError};
 
 /// Room for the largest record, an observer's with every number at its longest.
 const BYTES: usize = 1024;
+
+/// Least step of an estimate in integers, in the unit of the reference.
+pub const FIXED_STEP: f64 = 1e-3;
 
 /// The numbers that the step of a record uses, for an implementation in another language.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +52,8 @@ pub struct FixedRecord {
 /// [`CalibrateError::NoFixedForm`] for any other model,
 /// [`CalibrateError::FixedRate`] for a rate that no type was compiled for (an
 /// observer needs none), [`CalibrateError::OutsideConverter`] when all of the
-/// trials' signal lies outside the converter, [`CalibrateError::Fixed`] when a number
+/// trials' signal lies outside the converter, [`CalibrateError::FixedStep`] when a step of
+/// an estimate ([`FIXED_STEP`]) is more than the fit's error, [`CalibrateError::Fixed`] when a number
 /// does not fit its format.
 ///
 /// ```
@@ -76,21 +80,50 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     }
     let none = |model: String| Err(CalibrateError::NoFixedForm { model });
     match &calibration.spec().model {
-        Model::Linear(_) => rated(calibration, adc),
+        Model::Linear(_) | Model::Observer(_) => {}
         Model::Surfaces { inflation, deflation } => {
-            match [inflation, deflation].iter().find(|b| b.surface.as_poly13().is_none()) {
-                Some(branch) => none(branch.surface.degree().to_string()),
-                None => rated(calibration, adc),
+            let mut branches = [inflation, deflation].into_iter();
+            if let Some(branch) = branches.find(|b| b.surface.as_poly13().is_none()) {
+                return none(branch.surface.degree().to_string());
             }
         }
-        Model::Observer(_) => {
-            let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
-            made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
+        Model::History(_) => {
+            return none("a model that remembers, other than the observer,".into());
         }
-        Model::History(_) => none("a model that remembers, other than the observer,".into()),
-        Model::Diagnosed(_) => none("a diagnosed model".into()),
-        _ => none("this model".into()),
+        Model::Diagnosed(_) => return none("a diagnosed model".into()),
+        _ => return none("this model".into()),
     }
+    if FIXED_STEP > fit_error(calibration) {
+        return Err(too_coarse(calibration));
+    }
+    if !matches!(calibration.spec().model, Model::Observer(_)) {
+        return rated(calibration, adc);
+    }
+    let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
+    made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
+}
+
+fn too_coarse(calibration: &Calibration) -> CalibrateError {
+    let reference = calibration.spec().reference.clone();
+    CalibrateError::FixedStep { reference, error: fit_error(calibration) }
+}
+
+/// RMSE of a calibration's fit in the unit of its reference, at least a thousandth of the range: a fit can be exact.
+pub fn fit_error(calibration: &Calibration) -> f64 {
+    let spec = calibration.spec();
+    let rmse = match &spec.model {
+        Model::Linear(line) => line.fit.rmse,
+        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
+            inflation.fit.rmse.max(deflation.fit.rmse)
+        }
+        Model::History(map) => map.fit.rmse,
+        Model::Observer(map) => map.fit.rmse,
+        Model::Diagnosed(map) => map.fit.rmse,
+        _ => 0.0,
+    };
+    let [low, high] = [spec.target_range.min(), spec.target_range.max()];
+    let span = (spec.target.to_reference(high) - spec.target.to_reference(low)).abs();
+    rmse.max(1e-3) * span
 }
 
 /// Rates are part of a type; this program is compiled for these rates.
@@ -132,7 +165,13 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     adc: &Adc,
 ) -> Result<FixedRecord, CalibrateError> {
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
-    let fixed = fixed.map_err(CalibrateError::Fixed)?;
+    let fixed = fixed.map_err(|error| match error {
+        // steps that are coarse beside the range, where the fit is off by more than a step
+        ReceptorError::Calibration(DesignError::OutOfRange { field: "fixed.error", .. }) => {
+            too_coarse(calibration)
+        }
+        other => CalibrateError::Fixed(other),
+    })?;
     let read_as = format!("FixedCalibration<{WINDOW}, {DEGREE}>");
     made(read_as, &fixed, RecordNumbers::Rated(fixed.numbers()))
 }

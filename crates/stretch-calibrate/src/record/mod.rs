@@ -8,4 +8,6 @@ pub use file::{
     calibration_bytes, calibration_from_edited_json, calibration_from_json, calibration_seal,
     calibration_to_json, is_postcard, read_calibration, write_calibration,
 };
-pub use fixed::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
+pub use fixed::{
+    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, fit_error, fixed_record, parse_adc,
+};

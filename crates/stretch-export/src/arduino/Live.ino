@@ -11,6 +11,10 @@
 #error "the converter of this board has 10 bits: stretch export --adc 10,0,5 (from 0 to 5 V)"
 #endif
 
+#if !defined(STRETCH_PERIOD_US)
+#error "the period is below 1 us, which micros() cannot count: calibrate at a lower sample rate"
+#endif
+
 @if array
 const uint8_t pins[STRETCH_CHANNELS] = {@PINS@};
 const char *const signals[STRETCH_CHANNELS] = STRETCH_SIGNALS;

@@ -2,6 +2,9 @@
  *
  * Model @MODEL@, form @FORM@: @TAKEN@ in,
  * @GIVEN@ out; the same bits as on the computer.
+@if fixed
+ * The least step of an estimate is @STEP@.
+@end
  * Written by stretch @VERSION@ from a calibration of @FROM@.
  *
  *     stretch_state state;

@@ -1,0 +1,79 @@
+//! What an estimate in integers and a period resolve.
+
+use stretch_calibrate::{CalibrateError, fixed_record, parse_adc, read_calibration};
+use stretch_core::{Calibration, CalibrationSpec, Label, SampleRate, Target};
+use stretch_export::{ExportError, Form, Options, arduino_library, header};
+use stretch_receptor::example_observer;
+
+fn options(form: Option<Form>) -> Options {
+    Options { form, adc: parse_adc("12,0,3.3").unwrap() }
+}
+
+fn changed(calibration: Calibration, change: impl FnOnce(&mut CalibrationSpec)) -> Calibration {
+    let mut spec = calibration.into_spec();
+    change(&mut spec);
+    Calibration::new(spec).unwrap()
+}
+
+/// One of every model that has integers, of a length in millimetres.
+fn in_millimetres() -> impl Iterator<Item = Calibration> {
+    ["linear", "poly13", "observer", "observer-rest"].into_iter().map(|name| {
+        let root = env!("CARGO_MANIFEST_DIR");
+        read_calibration(format!("{root}/../../firmware/data/{name}.postcard").as_ref()).unwrap()
+    })
+}
+
+fn in_metres(calibration: Calibration) -> Calibration {
+    changed(calibration, |spec| {
+        let Target::Contraction { rest_length } = spec.target else { panic!("a length") };
+        spec.reference = Label::new("length_m").unwrap();
+        spec.target = Target::Contraction { rest_length: rest_length / 1000.0 };
+    })
+}
+
+#[test]
+fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_fit() {
+    for calibration in in_millimetres() {
+        let fixed = header(&calibration, &options(Some(Form::Fixed))).unwrap();
+        assert_eq!(fixed.step.as_deref(), Some("0.001 mm"), "{}", fixed.model);
+        assert!(
+            fixed.text.contains("The least step of an estimate is 0.001 mm."),
+            "{}",
+            fixed.text
+        );
+
+        let metres = in_metres(calibration);
+        let error = header(&metres, &options(Some(Form::Fixed))).unwrap_err().to_string();
+        for part in ["length_m", "steps of 0.001", "mm in place of m", "--form float"] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        let error = fixed_record(&metres, &options(None).adc).unwrap_err();
+        assert!(matches!(error, CalibrateError::FixedStep { .. }), "{error}");
+        // where no form is asked for, the one that resolves it is taken
+        let float = header(&metres, &options(None)).unwrap();
+        assert_eq!((float.form, float.step), (Form::Float, None));
+    }
+}
+
+#[test]
+fn a_period_is_never_stated_as_zero() -> Result<(), ExportError> {
+    for (hz, ns, us) in
+        [(100.0, 10_000_000, Some(10_000)), (1e3, 1_000_000, Some(1000)), (3e6, 333, None)]
+    {
+        let at_rate = changed(example_observer(), |spec| {
+            spec.sample_rate_hz = SampleRate::new(hz).unwrap();
+        });
+        let made = header(&at_rate, &options(Some(Form::Float)))?;
+        assert!(made.text.contains(&format!("#define STRETCH_PERIOD_NS INT64_C({ns}) ")), "{hz}");
+        match us {
+            Some(us) => {
+                assert!(made.text.contains(&format!("#define STRETCH_PERIOD_US {us}L ")), "{hz}")
+            }
+            None => assert!(!made.text.contains("STRETCH_PERIOD_US"), "{hz}"),
+        }
+        let library = arduino_library(&made);
+        let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
+        assert!(live.text.contains("#if !defined(STRETCH_PERIOD_US)\n#error"), "{hz}");
+    }
+    Ok(())
+}

@@ -103,7 +103,7 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
 
 /// A record whose output wanders by so many times its noise.
 fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64])]) -> Measured {
-    let recorder_drift = Some(SlowDrift { sd: 0.35, correlation_s: 2.0 });
+    let recorder_drift = Some(SlowDrift { sd: 0.3, correlation_s: 2.0 });
     let toy = Toy { recorder_drift, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden) };
     let drift = slow(times * toy.noise, correlation_s, (toy.samples(), toy.dt_s), seed);
     toy.measured(seed).rewritten(|_, outputs| {

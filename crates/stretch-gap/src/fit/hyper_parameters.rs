@@ -26,7 +26,7 @@ use crate::{
 /// Sizes that are tried, as multiples of what the simulator describes.
 const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
 /// Sizes that no recorder's drift has. Where one of them fits best, something else wanders, and nothing of it is taken for the recorder's.
-const BEYOND: [f64; 4] = [4.0, 6.4, 10.0, 16.0];
+const BEYOND: [f64; 5] = [3.2, 4.0, 6.4, 10.0, 16.0];
 /// Correlation times that are tried, s.
 const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
 /// Deviations of the priors of ln a and of ln tau: a factor of two, and of three.

@@ -12,7 +12,7 @@ const USED: (f64, usize) = (0.5, 24);
 const SETTLED_S: f64 = 2.0;
 
 /// Slow noise of a recorder (1 sd), in multiples of its noise: amplifiers flicker, and references drift with the room.
-const DRIFT: f64 = 0.35;
+const DRIFT: f64 = 0.3;
 /// Correlation time of that drift, s.
 const DRIFT_CORRELATION_S: f64 = 2.0;
 /// Most noise of a recorder, in multiples of what the rig file says: noise beyond it is not the recorder's.

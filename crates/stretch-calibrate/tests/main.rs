@@ -1,6 +1,7 @@
 //! The tests of stretch-calibrate from outside, one program: linking takes longer than most of them.
 
 mod diagnosed;
+mod doubts;
 mod offset;
 mod remembering;
 mod seal;

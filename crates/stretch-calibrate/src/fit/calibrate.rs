@@ -1,7 +1,5 @@
 //! From logged trials to a calibration.
 
-use std::collections::{HashMap, hash_map::Entry};
-
 use stretch_core::{Calibration, Provenance};
 use stretch_data::Trial;
 
@@ -23,7 +21,7 @@ pub struct Calibrated {
     pub calibration: Calibration,
     /// The report of the linear fit, or one report for each branch.
     pub fits: Vec<FitReport>,
-    /// Changes made to the data before the fit, one sentence each.
+    /// Changes made to the data before the fit, and doubts about them, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -87,32 +85,10 @@ pub(crate) fn calibrate_with(
     let names = trials.iter().map(|t| t.name.as_str());
     let columns = [options.signal.as_str(), options.reference.as_str()];
     let checksums: Vec<Option<u32>> = trials.iter().map(|t| t.checksum(&columns)).collect();
-    notes.extend(notes_on_copies(names.clone(), checksums.iter().copied()));
     let provenance =
         Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
     let calibration = prepared.calibration(model, provenance)?;
     Ok((Calibrated { calibration, fits, notes }, made))
-}
-
-/// A note for each trial that holds the samples of an earlier one, by the checksums of the trials.
-fn notes_on_copies<'a>(
-    names: impl IntoIterator<Item = &'a str>,
-    checksums: impl IntoIterator<Item = Option<u32>>,
-) -> Vec<String> {
-    let mut seen = HashMap::new();
-    let notes = names.into_iter().zip(checksums).filter_map(|(name, checksum)| {
-        match seen.entry(checksum?) {
-            Entry::Vacant(first) => {
-                first.insert(name);
-                None
-            }
-            Entry::Occupied(first) => Some(format!(
-                "{name} holds the samples of {}: they weigh double, and cross-validation judges a fit by what it was fitted on; name one of the two",
-                first.get()
-            )),
-        }
-    });
-    notes.collect()
 }
 
 /// Choices about a model that remembers, kept when the model is fitted to parts of the same data.

@@ -1,5 +1,6 @@
 //! Brings trials onto one even grid, with the rates that a live receptor has and the ranges of a calibration.
 
+mod doubts;
 mod gross_errors;
 mod series;
 mod trials;

@@ -9,7 +9,10 @@ use stretch_filter::RateFilter;
 
 use crate::{CalibrateError, Options};
 
-use super::series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series};
+use super::{
+    doubts::{Line, doubts},
+    series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series},
+};
 
 /// Parts of a trial with fewer samples have no rate.
 const SHORTEST: usize = 3;
@@ -48,6 +51,8 @@ impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
         let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
         notes.extend(rows.note());
+        let names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();
+        notes.extend(doubts(&names, &pieces, sample_rate.hz(), options));
         let target = target(options, &pieces)?;
         let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
             signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
@@ -206,11 +211,11 @@ fn align_turns(pieces: &mut [Piece], turn: f64) -> Option<usize> {
         seen.max - seen.min
     };
     let widest = pieces.iter().max_by(|a, b| width(a).total_cmp(&width(b)))?;
-    let [mean_signal, mean_reference, slope] = line(widest);
+    let widest = Line::of(std::iter::once(widest));
     let mut moved = 0;
     for piece in pieces {
-        let [signal, reference, _] = line(piece);
-        let off = mean_reference + slope * (signal - mean_signal) - reference;
+        let [signal, reference] = Line::of(std::iter::once(&*piece)).means;
+        let off = widest.at(signal) - reference;
         let shift = turn * (off / turn).round();
         if shift != 0.0 && shift.is_finite() {
             piece.1[1].iter_mut().for_each(|x| *x += shift);
@@ -218,18 +223,6 @@ fn align_turns(pieces: &mut [Piece], turn: f64) -> Option<usize> {
         }
     }
     (moved > 0).then_some(moved)
-}
-
-/// Means of signal and reference of a part, and the slope of the line through them by least squares.
-fn line((_, [signal, reference, _]): &Piece) -> [f64; 3] {
-    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-    let [at_signal, at_reference] = [mean(signal), mean(reference)];
-    let (mut across, mut along) = (0.0, 0.0);
-    for (v, x) in signal.iter().zip(reference) {
-        across += (v - at_signal) * (x - at_reference);
-        along += (v - at_signal).powi(2);
-    }
-    [at_signal, at_reference, if along > 0.0 { across / along } else { 0.0 }]
 }
 
 /// A trial on an even grid. The first `signals` of its columns must not wrap.
@@ -311,7 +304,7 @@ pub(crate) fn noise_gain(
 }
 
 /// Number of the trial; signal, reference and, where needed, the pressure.
-type Piece = (usize, [Vec<f64>; 3]);
+pub(super) type Piece = (usize, [Vec<f64>; 3]);
 
 fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
     let all = pieces.iter().flat_map(|(_, [_, reference, _])| reference.iter().copied());

@@ -1,0 +1,245 @@
+//! What makes one doubt a trial, alone and held against the others.
+
+use std::ops::RangeInclusive;
+
+use crate::Options;
+
+use super::{series::extent, trials::Piece};
+
+/// Correlation squared from which a trial has a line that can be held against another's: it explains more than it leaves.
+const HAS_LINE: f64 = 0.5;
+/// Slopes over that of another trial which hysteresis, another rate or another range bring about.
+const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
+/// Columns that differ at no sample by more than this share of their range are one column in other digits.
+const OTHER_DIGITS: f64 = 1e-3;
+/// Fewest readings in a row that make a signal that stands.
+const STANDS: usize = 5;
+/// Share of its range by which the reference must move on while the signal stands.
+const MOVES_ON: f64 = 0.1;
+/// A slower recording of some length is likely one of milliseconds, Hz.
+const SLOW_HZ: f64 = 0.5;
+/// Fewest samples that distinguish a slow recording from a wrong unit of time.
+const TELLING: usize = 50;
+
+/// What can be wrong with one trial: its line as it is and without that, beside the line of another, and what is said.
+type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
+
+const MISTAKES: [Mistake; 4] = [
+    (
+        |own, _| [own, Line { means: swap(own.means), spreads: swap(own.spreads), ..own }],
+        "{trial} has {signal} and {reference} exchanged, held against {other}: give its columns their names with stretch convert, or leave it out",
+    ),
+    (
+        // the zero of what was reversed is unknown
+        |own, other| {
+            let own = Line { means: other.means, ..own };
+            [own, Line { correlation: -own.correlation, ..own }]
+        },
+        "{trial} has {signal} or {reference} reversed, held against {other}: one falls with the other where it should rise, or rises where it \
+         should fall; turn its sign with stretch convert, or leave it out",
+    ),
+    (
+        |own, _| [own, own.times(1e-3)],
+        "{signal} of {trial} is about 1000 times that of {other}: is one in millivolts and the other in volts? Bring both into one unit with \
+         stretch convert --column '{signal}={signal}/1000'",
+    ),
+    (
+        |own, _| [own, own.times(1e3)],
+        "{signal} of {trial} is about a thousandth of that of {other}: is one in volts and the other in millivolts? Bring both into one unit with \
+         stretch convert --column '{signal}={signal}*1000'",
+    ),
+];
+
+/// The line through signal and reference by least squares, and how far both spread.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    /// Means of signal and reference.
+    pub(super) means: [f64; 2],
+    /// Standard deviations of signal and reference.
+    spreads: [f64; 2],
+    /// Correlation of signal and reference; 0 where one of them is constant.
+    correlation: f64,
+}
+
+impl Line {
+    /// The line of a trial's parts.
+    pub(super) fn of<'a>(parts: impl Iterator<Item = &'a Piece> + Clone) -> Self {
+        let pairs = parts.flat_map(|(_, [signal, reference, _])| signal.iter().zip(reference));
+        let count = pairs.clone().count().max(1) as f64;
+        let [v, x] = pairs.clone().fold([0.0; 2], |[v, x], (a, b)| [v + a, x + b]);
+        let means = [v / count, x / count];
+        let [mut along, mut up, mut across] = [0.0; 3];
+        for (v, x) in pairs {
+            let [v, x] = [v - means[0], x - means[1]];
+            along += v * v;
+            up += x * x;
+            across += v * x;
+        }
+        let correlation = across / (along * up).sqrt();
+        Self {
+            means,
+            spreads: [along, up].map(|squares| (squares / count).sqrt()),
+            correlation: if correlation.is_finite() { correlation } else { 0.0 },
+        }
+    }
+
+    fn slope(&self) -> f64 {
+        let slope = self.correlation * self.spreads[1] / self.spreads[0];
+        if slope.is_finite() { slope } else { 0.0 }
+    }
+
+    /// The reference at a signal.
+    pub(super) fn at(&self, signal: f64) -> f64 {
+        self.means[1] + self.slope() * (signal - self.means[0])
+    }
+
+    fn times(self, factor: f64) -> Self {
+        let [means, spreads] =
+            [self.means, self.spreads].map(|[signal, reference]| [factor * signal, reference]);
+        Self { means, spreads, ..self }
+    }
+
+    /// Root mean square of the distance to another line, over the samples of this one.
+    fn misfit(&self, other: &Self) -> f64 {
+        let off = self.means[1] - other.at(self.means[0]);
+        off.hypot((self.slope() - other.slope()) * self.spreads[0])
+    }
+
+    /// What is said if this line and another are one with a mistake, and two without.
+    fn mistake(self, other: Self) -> Option<&'static str> {
+        if [self, other].iter().any(|line| line.correlation.powi(2) < HAS_LINE) {
+            return None;
+        }
+        let is_usual = |line: &Self| USUAL_SLOPES.contains(&(line.slope() / other.slope()));
+        let explained = MISTAKES.iter().filter_map(|(lines, says)| {
+            let [own, without] = lines(self, other);
+            let [is, would] = [own, without].map(|line| line.misfit(&other));
+            let is_one = !is_usual(&own) && is_usual(&without) && would < 0.5 * is;
+            (is_one && is > 0.5 * other.spreads[1]).then_some((would, *says))
+        });
+        explained.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, says)| says)
+    }
+}
+
+fn swap([a, b]: [f64; 2]) -> [f64; 2] {
+    [b, a]
+}
+
+/// A trial's parts and line.
+struct Held<'a> {
+    name: &'a str,
+    parts: Vec<&'a Piece>,
+    line: Line,
+}
+
+impl Held<'_> {
+    /// Whether two trials are one, to the digits that one of them was saved with.
+    fn is_copy_of(&self, other: &Self) -> bool {
+        let mut both = self.parts.iter().zip(&other.parts);
+        self.parts.len() == other.parts.len()
+            && both.all(|((_, own), (_, its))| (0..2).all(|i| is_same(&own[i], &its[i])))
+    }
+
+    /// The value at which the signal stands while the reference moves on, away from where the signal reached that value.
+    fn stands_at(&self) -> Option<f64> {
+        let reach = |column: usize| {
+            let all = self.parts.iter().flat_map(|(_, columns)| columns[column].iter().copied());
+            extent(all)
+        };
+        let (signal, reference) = (reach(0), reach(1));
+        let enough = MOVES_ON * (reference.max - reference.min);
+        let ends = [(signal.max, 1.0), (signal.min, -1.0)];
+        let ends = ends.map(|(end, side)| (end, side * self.line.correlation.signum()));
+        let stands = |(end, way): (f64, f64)| {
+            self.parts.iter().any(|(_, [signal, reference, _])| {
+                let mut at = 0;
+                signal.chunk_by(|a, b| a == b).any(|run| {
+                    let began = at;
+                    at += run.len();
+                    let moves = |x: &f64| way * (x - reference[began]) > enough;
+                    // at its first sample a play may hold the signal
+                    let is_run = began > 0 && run.len() >= STANDS && run[0] == end;
+                    is_run && reference[began..at].iter().any(moves)
+                })
+            })
+        };
+        ends.into_iter().find(|end| stands(*end)).map(|(end, _)| end)
+    }
+}
+
+/// Whether two columns are equal to the digits that one of them was saved with.
+fn is_same(one: &[f64], other: &[f64]) -> bool {
+    let range = extent(one.iter().copied());
+    let most = OTHER_DIGITS * (range.max - range.min);
+    one.len() == other.len() && one.iter().zip(other).all(|(a, b)| (a - b).abs() <= most)
+}
+
+/// Sentences about trials that are likely not what they are taken for, each with what to do.
+pub(super) fn doubts(
+    names: &[&str],
+    pieces: &[Piece],
+    rate_hz: f64,
+    options: &Options,
+) -> Vec<String> {
+    let (signal, reference) = (options.signal.as_str(), options.reference.as_str());
+    let held = names.iter().enumerate().filter_map(|(trial, name)| {
+        let parts: Vec<&Piece> = pieces.iter().filter(|(of, _)| *of == trial).collect();
+        let line = Line::of(parts.iter().copied());
+        (!parts.is_empty()).then_some(Held { name, parts, line })
+    });
+    let held: Vec<Held<'_>> = held.collect();
+    let mut said = Vec::new();
+    let samples = pieces.iter().map(|(_, [signal, ..])| signal.len()).sum::<usize>();
+    if rate_hz < SLOW_HZ && samples >= TELLING && !options.is_table {
+        said.push(format!(
+            "the trials have {rate_hz:.4} samples a second: are their times milliseconds? Then give them in seconds (--time time_s:ms): the rates are 1000 \
+             times as high"
+        ));
+    }
+    let all = Line::of(pieces.iter()).spreads[1];
+    for trial in &held {
+        let name = trial.name;
+        if trial.parts.iter().all(|(_, [v, x, _])| is_same(v, x)) && trial.line.spreads[0] > 0.0 {
+            said.push(format!(
+                "{signal} equals {reference} in {name}: was one recorded in place of the other? A fit to it is right for that column only"
+            ));
+        } else if trial.line.spreads[0] == 0.0 && trial.line.spreads[1] > MOVES_ON * all {
+            let value = trial.line.means[0];
+            said.push(format!(
+                "{signal} is {value} throughout {name} while {reference} moves: is the sensor connected? If it was not, leave that trial out"
+            ));
+        } else if let Some(end) = trial.stands_at() {
+            said.push(format!(
+                "{signal} stands at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? What lies beyond \
+                 cannot be told from it; lower the gain, or leave that part out"
+            ));
+        }
+    }
+    let mistakes: Vec<Vec<_>> = held
+        .iter()
+        .map(|own| held.iter().map(|other| own.line.mistake(other.line)).collect())
+        .collect();
+    // the trial in doubt is that which more of the others contradict; of two it is the second
+    let rank = |i: usize| (mistakes[i].iter().flatten().count(), i);
+    for (i, own) in held.iter().enumerate() {
+        if let Some(first) = held[..i].iter().find(|first| own.is_copy_of(first)) {
+            said.push(format!(
+                "{} holds the samples of {}: they weigh double, and cross-validation judges a fit by what it was fitted on; name one of the two",
+                own.name, first.name
+            ));
+        }
+        let others = mistakes[i].iter().enumerate().filter(|(j, _)| rank(*j) < rank(i));
+        if let Some((says, other)) = others.filter_map(|(j, says)| Some(((*says)?, j))).next() {
+            let words = [
+                ("{trial}", own.name),
+                ("{other}", held[other].name),
+                ("{signal}", signal),
+                ("{reference}", reference),
+            ];
+            said.push(
+                words.iter().fold(says.to_owned(), |text, (key, word)| text.replace(key, word)),
+            );
+        }
+    }
+    said
+}

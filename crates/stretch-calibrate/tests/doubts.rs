@@ -1,0 +1,135 @@
+//! One trial that is not like the others is told, each mistake once, and no trial that is.
+
+use stretch_calibrate::{ModelKind, Options, calibrate};
+use stretch_data::{Channel, Trial};
+
+/// A muscle's length, in mm, and a gauge with a play, a curve and noise, in V.
+fn trial(number: u32) -> Trial {
+    let phase = f64::from(number);
+    let time_s: Vec<f64> = (0..2000).map(|n| 0.01 * f64::from(n)).collect();
+    let swing = |t: f64| 0.7 * (0.9 * t + phase).sin() + 0.3 * (2.3 * t + 2.0 * phase).sin();
+    let length_mm: Vec<f64> = time_s.iter().map(|t| 165.0 + 15.0 * swing(*t)).collect();
+    let mut held = length_mm[0];
+    let gauge = |(n, x): (usize, &f64)| {
+        held = held.clamp(x - 0.8, x + 0.8);
+        let noise = ((n as f64 + phase) * 78.233).sin() * 43_758.545;
+        let up = 180.0 - held;
+        1.24 + 0.03 * up + 3e-4 * up * up + 2e-3 * (noise - noise.floor())
+    };
+    let bridge_v = length_mm.iter().enumerate().map(gauge).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    Trial {
+        name: format!("t{number}.csv"),
+        time_s,
+        channels: vec![channel("length_mm", length_mm), channel("bridge_v", bridge_v)],
+    }
+}
+
+fn notes(trials: &[Trial]) -> Vec<String> {
+    // a line has no order to prefer
+    let options = Options { model: ModelKind::Linear, ..Options::default() };
+    calibrate(trials, &options).expect("a calibration").notes
+}
+
+const LENGTH: usize = 0;
+const SIGNAL: usize = 1;
+
+fn change(trial: &mut Trial, channel: usize, of: impl Fn(f64) -> f64) {
+    trial.channels[channel].values.iter_mut().for_each(|x| *x = of(*x));
+}
+
+type Spoil = fn(&mut Trial);
+
+#[test]
+fn one_trial_that_is_not_like_the_others_is_told_once() {
+    let members: [(&str, Spoil); 9] = [
+        ("t1.csv has bridge_v and length_mm exchanged, held against t0.csv", |t| {
+            let (length, signal) = t.channels.split_at_mut(SIGNAL);
+            std::mem::swap(&mut length[0].values, &mut signal[0].values);
+        }),
+        ("t1.csv has bridge_v or length_mm reversed, held against t0.csv", |t| {
+            change(t, SIGNAL, |v| 2.48 - v);
+        }),
+        ("t1.csv has bridge_v or length_mm reversed, held against t0.csv", |t| {
+            change(t, LENGTH, |x| 330.0 - x);
+        }),
+        ("bridge_v of t1.csv is about 1000 times that of t0.csv", |t| {
+            change(t, SIGNAL, |v| 1e3 * v);
+        }),
+        ("bridge_v of t1.csv is about a thousandth of that of t0.csv", |t| {
+            change(t, SIGNAL, |v| 1e-3 * v);
+        }),
+        ("bridge_v equals length_mm in t1.csv", |t| {
+            t.channels[SIGNAL].values = t.channels[LENGTH].values.clone();
+        }),
+        ("bridge_v is 1.5 throughout t1.csv while length_mm moves", |t| {
+            change(t, SIGNAL, |_| 1.5);
+        }),
+        ("bridge_v stands at 2 in t1.csv while length_mm moves on", |t| {
+            change(t, SIGNAL, |v| v.min(2.0));
+        }),
+        ("bridge_v stands at 1.5 in t1.csv while length_mm moves on", |t| {
+            change(t, SIGNAL, |v| v.max(1.5));
+        }),
+    ];
+    for (says, spoil) in members {
+        for count in [2, 4] {
+            let mut trials: Vec<Trial> = (0..count).map(trial).collect();
+            assert!(notes(&trials).is_empty(), "{:?}", notes(&trials));
+            spoil(&mut trials[1]);
+            let notes = notes(&trials);
+            assert!(notes.len() == 1 && notes[0].starts_with(says), "{says}: {notes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_trial_saved_again_with_other_digits_is_told() {
+    for digits in [3, 4, 17] {
+        let mut trials: Vec<Trial> = (0..3).map(trial).collect();
+        trials.push(Trial { name: "again.csv".into(), ..trials[1].clone() });
+        let scale = 10_f64.powi(digits);
+        change(&mut trials[3], SIGNAL, |v| (v * scale).round() / scale);
+        let notes = notes(&trials);
+        let says = "again.csv holds the samples of t1.csv: they weigh double";
+        assert!(notes.len() == 1 && notes[0].starts_with(says), "{digits}: {notes:?}");
+    }
+}
+
+#[test]
+fn times_of_milliseconds_are_asked_about() {
+    let mut slow = trial(0);
+    slow.time_s.iter_mut().for_each(|t| *t = 1e3 * *t + 0.25);
+    let notes = notes(&[slow]);
+    assert!(notes.len() == 1, "{notes:?}");
+    assert!(notes[0].starts_with("the trials have 0.1000 samples a second"), "{notes:?}");
+}
+
+#[test]
+fn trials_of_one_gauge_are_not_doubted() {
+    // other ends, a shift of the zero, coarse digits, a small movement after drift, a rest
+    let members: [Spoil; 5] = [
+        |t| {
+            change(t, LENGTH, |x| x + 12.0);
+            change(t, SIGNAL, |v| v - 0.36);
+        },
+        |t| change(t, SIGNAL, |v| v + 0.6),
+        |t| change(t, SIGNAL, |v| (40.0 * v).round() / 40.0),
+        |t| {
+            let drift = t.time_s.iter().map(|s| 0.01 * s).collect::<Vec<f64>>();
+            let at = t.channels[LENGTH].values.clone();
+            t.channels[LENGTH].values =
+                at.iter().zip(&drift).map(|(x, d)| 160.0 + 0.02 * x + 5.0 * d).collect();
+            t.channels[SIGNAL].values = drift.iter().map(|d| 1.9 + d).collect();
+        },
+        |t| {
+            change(t, LENGTH, |_| 170.0);
+            change(t, SIGNAL, |_| 1.57);
+        },
+    ];
+    for spoil in members {
+        let mut trials: Vec<Trial> = (0..4).map(trial).collect();
+        spoil(&mut trials[1]);
+        assert_eq!(notes(&trials), Vec::<String>::new());
+    }
+}

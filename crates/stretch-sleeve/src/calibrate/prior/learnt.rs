@@ -287,12 +287,21 @@ fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
         ),
     };
     let first = sessions.first().filter(|_| sessions.len() >= LEAST_SESSIONS).ok_or_else(few)?;
-    for session in sessions {
-        differs(session, first).map_or(Ok(()), |problem| {
+    for (k, session) in sessions.iter().enumerate() {
+        let wrong = differs(session, first).or_else(|| copy(session, &sessions[..k]));
+        wrong.map_or(Ok(()), |problem| {
             Err(SleeveError::Prior { file: session.name.clone(), problem })
         })?;
     }
     Ok(first)
+}
+
+/// That a session is one of those before it, which would count as often as it is given.
+fn copy(session: &Session, before: &[Session]) -> Option<String> {
+    let is_same = |one: &&Session| one.parts == session.parts && one.domains == session.domains;
+    before.iter().find(is_same).map(|one| {
+        format!("it holds the samples of {}: sessions that are one do not tell how sessions vary; give it once", one.name)
+    })
 }
 
 /// How a session differs from another one with which it cannot share a prior.
@@ -307,6 +316,15 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
             listed(&first.signals)
         ));
     }
+    if let Some(name) = elsewhere(&session.signals, &first.signals) {
+        return Some(format!(
+            "{name} is in another place among its signals ({}) than in {} ({}), and signals are taken by their places: write it again with \
+             stretch calibrate --session and that order",
+            session.signals.join(","),
+            first.name,
+            first.signals.join(",")
+        ));
+    }
     if unit_of(&session.reference) != unit_of(&first.reference) {
         return Some(format!(
             "its reference is {} and that of {} is {}: convert one of them (stretch convert), so that both are in one unit",
@@ -319,7 +337,20 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
             session.sample_rate_hz, first.name, first.sample_rate_hz, first.sample_rate_hz
         ));
     }
+    let span = |of: &Interval| of.max - of.min;
+    let steepness = |of: &Session, k: usize| span(&of.reference_range) / span(&of.domains[k][0]);
     let (own, other) = (session.correlations(), first.correlations());
+    let steeper = (0..own.len()).map(|k| (own[k], steepness(session, k) / steepness(first, k)));
+    if is_other_unit(steeper) {
+        return Some(format!(
+            "{} runs over {:.4} and in {} over {:.4}, beside the same signals: is one in radians and the other in degrees, or one in centimetres and \
+             the other in millimetres? Convert it (stretch convert), and write the session again",
+            session.reference,
+            span(&session.reference_range),
+            first.name,
+            span(&first.reference_range)
+        ));
+    }
     turned(own.into_iter().zip(other)).map(|opposite| {
         format!(
             "{opposite} of {} channels fall where those of {} rise: swap the wires of the bridge, or turn the signal's sign (leave one of the sessions out)",
@@ -327,6 +358,22 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
             first.name
         )
     })
+}
+
+/// The first signal that another list has at another place.
+pub(crate) fn elsewhere<'a>(signals: &'a [String], others: &[String]) -> Option<&'a str> {
+    let differs = |(place, name): &(usize, &String)| {
+        others.iter().position(|other| other == *name).is_some_and(|other| other != *place)
+    };
+    signals.iter().enumerate().find(differs).map(|(_, name)| name.as_str())
+}
+
+/// Whether the reference is in another unit, from the correlation of each channel with it and from its change over that of the channel, as a
+/// share of the usual: wearers differ by less than the nearest two units, of which one is ten of the other.
+pub(crate) fn is_other_unit(channels: impl Iterator<Item = (f64, f64)>) -> bool {
+    const USUAL: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+    let mut clear = channels.filter(|(correlation, _)| correlation.abs() > CLEAR).peekable();
+    clear.peek().is_some() && clear.all(|(_, steeper)| !USUAL.contains(&steeper))
 }
 
 /// How many channels follow the reference in the opposite direction, if they are more than those

@@ -7,6 +7,7 @@
 //! its movement.
 
 mod expected;
+mod gauges;
 mod landmarks;
 mod learnt;
 mod record;

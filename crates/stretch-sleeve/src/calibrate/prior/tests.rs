@@ -155,6 +155,11 @@ fn data_of_another_kind_are_refused_with_what_to_do() {
     };
     refused(&scaled(0, 1000.0), usual(), "another unit");
     refused(&scaled(2, 1000.0), usual(), "another unit");
+    refused(
+        &scaled(2, std::f64::consts::PI / 180.0),
+        usual(),
+        "angle_deg in radians and not in degrees",
+    );
     let turned = |t: &mut Trial| t.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
     refused(&turned, usual(), "swap the wires");
     let slower = |t: &mut Trial| t.time_s.iter_mut().for_each(|t| *t *= 2.0);
@@ -234,6 +239,32 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
     };
     refused(session(9, 0, 1.0), RenewOptions::default(), "no whole movement");
     refused(session(2, 9, 60.0), options, "one session in a thousand");
+    let exchanged = |mut trial: Trial| {
+        let (first, second) = trial.channels.split_at_mut(1);
+        std::mem::swap(&mut first[0].values, &mut second[0].values);
+        trial
+    };
+    let reversed = |mut trial: Trial, k: usize| {
+        trial.channels[k].values.iter_mut().for_each(|x| *x = 1.0 - *x);
+        trial
+    };
+    let order = RenewOptions { signals: vec!["s2".into(), "s1".into()], ..RenewOptions::default() };
+    refused(today.clone(), order, "s2 is in another place among its signals (s1,s2) than in s2,s1");
+    for wearer in [2, 9] {
+        let of = RenewOptions::of(&format!("w{wearer}"));
+        let today = session(wearer, 3, 60.0);
+        refused(exchanged(today.clone()), of.clone(), "s1 is what s2 was in its sessions");
+        for k in 0..2 {
+            let says = "s1 or s2 rises where it fell in its sessions";
+            refused(reversed(today.clone(), k), of.clone(), says);
+        }
+    }
+    for wearer in 0..9 {
+        let today = without(session(wearer, 1, 60.0));
+        let channels =
+            crate::calibrate::channels::Channels::without_reference(&[today], &prior.signals);
+        assert_eq!(prior.misplaced(&channels.unwrap()), None, "wearer {wearer}");
+    }
     let fit = calibrate_array(
         &[day(0), day(1), day(2)],
         &ArrayOptions {
@@ -265,4 +296,21 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
         *s = Session::new("w1_2", &[trial], &options).unwrap().0;
     };
     refused(&turned, "swap the wires");
+    refused(
+        &|s| *s = Session { name: "w1_2".into(), ..summed(1, 0, &["s1"]) },
+        "the samples of w1_0",
+    );
+    for (factor, says) in [(std::f64::consts::PI / 180.0, "radians"), (10.0, "centimetres")] {
+        let converted = |s: &mut Session| {
+            let mut trial = session(1, 2, 90.0);
+            trial.channels[2].values.iter_mut().for_each(|x| *x *= factor);
+            let options = SessionOptions::new(["s1"], "angle_deg").of("w1");
+            *s = Session::new("w1_2", &[trial], &options).unwrap().0;
+        };
+        refused(&converted, says);
+    }
+    let mut sessions: Vec<Session> = (0..3).map(|n| summed(1, n, &["s1", "s2"])).collect();
+    sessions[2] = summed(1, 2, &["s2", "s1"]);
+    let error = Prior::learn(&sessions).unwrap_err().to_string();
+    assert!(error.contains("w1_2") && error.contains("s2 is in another place"), "{error}");
 }

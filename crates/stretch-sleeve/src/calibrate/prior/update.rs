@@ -20,7 +20,7 @@ use crate::{
 
 use super::{
     expected::{ErrorSpread, Expected, mixed_gram},
-    learnt::{Prior, correlated, paths_in_words, turned},
+    learnt::{Prior, correlated, elsewhere, is_other_unit, paths_in_words, turned},
     tree::Normal,
 };
 
@@ -228,6 +228,13 @@ impl Prior {
                 signals.len()
             ));
         }
+        if let Some(name) = elsewhere(signals, &self.signals) {
+            return problem(format!(
+                "{name} is in another place among its signals ({}) than in {}, and signals are taken by their places: name them in its order",
+                self.signals.join(","),
+                signals.join(",")
+            ));
+        }
         if unit_of(reference) != unit_of(&self.reference) {
             return problem(format!(
                 "its reference is {} and that of these data is {reference}: convert the data (stretch convert), so that both are in one unit",
@@ -245,14 +252,26 @@ impl Prior {
                 .reference()
                 .map(|x| self.target_range.normalise(self.target.from_reference(x))),
         );
+        let problem =
+            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
-            return Err(SleeveError::Prior {
-                file: "the prior".into(),
-                problem: format!(
-                    "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
-                    self.reference
-                ),
-            });
+            return problem(format!(
+                "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
+                self.reference
+            ));
+        }
+        let share = (range.max - range.min) / (self.estimate.max - self.estimate.min);
+        let steeper = (0..self.signals.len()).map(|k| {
+            let (own, domain) = (extent(channels.signal(k)), self.domains[k][0]);
+            let follows = correlation(channels.signal(k), channels.reference());
+            (follows, share * (domain.max - domain.min) / (own.max - own.min))
+        });
+        if is_other_unit(steeper) {
+            return problem(format!(
+                "the reference of these data goes up by another unit than in its sessions, beside the same signals: is {} in radians and not in \
+                 degrees, or in centimetres and not in millimetres? Convert it (stretch convert)",
+                self.reference
+            ));
         }
         self.refuse_polarity(channels)
     }
@@ -282,7 +301,7 @@ impl Prior {
                 ));
             }
         }
-        Ok(())
+        self.misplaced(channels).map_or(Ok(()), problem)
     }
 
     /// Refuses data in which most channels that clearly follow the reference follow it in the

@@ -1,0 +1,99 @@
+//! Whether gauges stand in the places, and rise where they rose, in the sessions of a prior: by their signals alone.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::calibrate::{bank::Bank, channels::Channels, linear::inverse};
+
+use super::learnt::Prior;
+
+/// Signals are taken for exchanged or reversed if they are half as far from those of the sessions without that: a quarter of the square.
+const NEARER: f64 = 0.25;
+
+/// Mean and covariance of the signals of several gauges.
+struct Moments {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Moments {
+    /// Those of a prior's sessions, from the mean of `X'X`.
+    fn of_prior(prior: &Prior) -> Self {
+        let term = |k: usize| 1 + k * Bank::terms_a_channel();
+        let count = prior.domains.len();
+        let half = |k: usize| 0.5 * (prior.domains[k][0].max - prior.domains[k][0].min);
+        let gram = |a: usize, b: usize| prior.gram[(a, b)] / prior.gram[(0, 0)];
+        let covariance = DMatrix::from_fn(count, count, |a, b| {
+            let [i, j] = [term(a), term(b)];
+            half(a) * half(b) * (gram(i, j) - gram(0, i) * gram(0, j))
+        });
+        let mean = |k: usize, _| prior.domains[k][0].min + half(k) * (1.0 + gram(0, term(k)));
+        Self { mean: DVector::from_fn(count, mean), covariance }
+    }
+
+    fn of(channels: &Channels, count: usize) -> Self {
+        let samples = channels.reference().count().max(1) as f64;
+        let mean = DVector::from_fn(count, |k, _| channels.signal(k).sum::<f64>() / samples);
+        let covariance = DMatrix::from_fn(count, count, |a, b| {
+            let pairs = channels.signal(a).zip(channels.signal(b));
+            pairs.map(|(x, y)| (x - mean[a]) * (y - mean[b])).sum::<f64>() / samples
+        });
+        Self { mean, covariance }
+    }
+
+    /// The mean over samples of `(x - m)' C^-1 (x - m)`, `m` and `C^-1` those of a prior.
+    fn distance(&self, mean: &DVector<f64>, precision: &DMatrix<f64>) -> f64 {
+        let off = &self.mean - mean;
+        precision.component_mul(&self.covariance).sum() + off.dot(&(precision * &off))
+    }
+
+    fn exchanged(&self, a: usize, b: usize) -> Self {
+        let mut covariance = self.covariance.clone();
+        covariance.swap_rows(a, b);
+        covariance.swap_columns(a, b);
+        let mut mean = self.mean.clone();
+        mean.swap_rows(a, b);
+        Self { mean, covariance }
+    }
+
+    fn reversed(&self, k: usize) -> Self {
+        let mut covariance = self.covariance.clone();
+        covariance.row_mut(k).neg_mut();
+        covariance.column_mut(k).neg_mut();
+        Self { mean: self.mean.clone(), covariance }
+    }
+}
+
+impl Prior {
+    /// What is wrong with gauges that are like those of the sessions only if two are exchanged, or one is reversed.
+    pub(crate) fn misplaced(&self, channels: &Channels) -> Option<String> {
+        let prior = Moments::of_prior(self);
+        let precision = inverse(&prior.covariance)?;
+        let count = self.signals.len();
+        let own = Moments::of(channels, count);
+        let distance = |of: &Moments, mean: &DVector<f64>| of.distance(mean, &precision);
+        // the zero of a gauge that was reversed is unknown
+        let reversed = (0..count).map(|k| {
+            let without = own.reversed(k);
+            // of two gauges it cannot be told which
+            let which =
+                if count == 2 { self.signals.join(" or ") } else { self.signals[k].clone() };
+            let says =
+                format!("{which} rises where it fell in its sessions, beside the other gauges");
+            (distance(&without, &without.mean), distance(&own, &own.mean), says)
+        });
+        let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (b, a)));
+        let exchanged = pairs.map(|(a, b)| {
+            let without = own.exchanged(a, b);
+            let [first, second] = [&self.signals[a], &self.signals[b]];
+            let says = format!(
+                "{first} is what {second} was in its sessions, and {second} what {first} was"
+            );
+            (distance(&without, &prior.mean), distance(&own, &prior.mean), says)
+        });
+        let found = reversed.chain(exchanged).filter(|(without, is, _)| *without < NEARER * is);
+        let (_, _, says) = found.min_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+        Some(format!(
+            "{says}: is a gauge exchanged or reversed? Turn the wires, or give the columns the names and signs of the sessions (stretch convert)"
+        ))
+    }
+}

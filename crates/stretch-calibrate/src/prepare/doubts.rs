@@ -10,8 +10,8 @@ use super::{series::extent, trials::Piece};
 const HAS_LINE: f64 = 0.5;
 /// Slopes over that of another trial which hysteresis, another rate or another range bring about.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
-/// Columns that differ at no sample by more than this share of their range are one column in other digits.
-const OTHER_DIGITS: f64 = 1e-3;
+/// Decimals, or significant digits, that a file may have been saved with.
+const DIGITS: RangeInclusive<i32> = 0..=17;
 /// Fewest readings in a row that make a signal that stands.
 const STANDS: usize = 5;
 /// Share of its range by which the reference must move on while the signal stands.
@@ -83,6 +83,10 @@ impl Line {
         }
     }
 
+    fn is_clear(&self) -> bool {
+        self.correlation.powi(2) >= HAS_LINE
+    }
+
     fn slope(&self) -> f64 {
         let slope = self.correlation * self.spreads[1] / self.spreads[0];
         if slope.is_finite() { slope } else { 0.0 }
@@ -107,7 +111,7 @@ impl Line {
 
     /// What is said if this line and another are one with a mistake, and two without.
     fn mistake(self, other: Self) -> Option<&'static str> {
-        if [self, other].iter().any(|line| line.correlation.powi(2) < HAS_LINE) {
+        if ![self, other].iter().all(Self::is_clear) {
             return None;
         }
         let is_usual = |line: &Self| USUAL_SLOPES.contains(&(line.slope() / other.slope()));
@@ -142,6 +146,10 @@ impl Held<'_> {
 
     /// The value at which the signal stands while the reference moves on, away from where the signal reached that value.
     fn stands_at(&self) -> Option<f64> {
+        // of a signal that does not follow the reference nothing follows from where it stands
+        if !self.line.is_clear() {
+            return None;
+        }
         let reach = |column: usize| {
             let all = self.parts.iter().flat_map(|(_, columns)| columns[column].iter().copied());
             extent(all)
@@ -167,11 +175,28 @@ impl Held<'_> {
     }
 }
 
-/// Whether two columns are equal to the digits that one of them was saved with.
+/// Whether two columns are equal to the digits that one of them was saved with. Two runs of one motion are not, however alike.
 fn is_same(one: &[f64], other: &[f64]) -> bool {
-    let range = extent(one.iter().copied());
-    let most = OTHER_DIGITS * (range.max - range.min);
-    one.len() == other.len() && one.iter().zip(other).all(|(a, b)| (a - b).abs() <= most)
+    one.len() == other.len() && (one == other || is_rounded(one, other) || is_rounded(other, one))
+}
+
+/// Whether one column is the other to some decimals or some significant digits, and is not constant.
+fn is_rounded(coarse: &[f64], fine: &[f64]) -> bool {
+    let is_one = |step: &dyn Fn(f64) -> f64| {
+        coarse.iter().zip(fine).all(|(coarse, fine)| {
+            let step = step(*coarse);
+            let steps = coarse / step;
+            (steps - steps.round()).abs() < 1e-4 && (coarse - fine).abs() <= 0.5001 * step
+        })
+    };
+    let range = extent(coarse.iter().copied());
+    range.min < range.max
+        && DIGITS.into_iter().any(|digits| {
+            is_one(&|_| 10_f64.powi(-digits))
+                || is_one(&|x| {
+                    10_f64.powi(x.abs().max(f64::MIN_POSITIVE).log10().floor() as i32 - digits)
+                })
+        })
 }
 
 /// Sentences about trials that are likely not what they are taken for, each with what to do.

@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_calibrate::{Applied, Reach, not_its_own, pressure_column};
+use stretch_calibrate::{Applied, Seen, pressure_column};
 use stretch_core::{Calibration, Model};
 use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
-use stretch_receptor::{Domain, Reading, Withheld};
+use stretch_receptor::{Reading, Withheld};
 use stretch_recording::{ReadOptions, Recording, RowReader};
 use stretch_sleeve::{
     AppliedGauge, GaugeCalibration, LiveGauge, SleeveCalibration, Turns, Zero, apply_gauge,
@@ -17,7 +17,7 @@ use stretch_sleeve::{
 
 use super::{
     apply_several::apply_several,
-    reading::{Pace, Recorded, read_recording, with_notes_printed},
+    reading::{Recorded, read_recording, with_notes_printed},
     shared::RecordedInput,
 };
 use crate::{
@@ -101,13 +101,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let gauge = at_rate(&gauge, trial.rate_hz().unwrap_or(record_hz))?;
     let calibration = gauge.calibration();
     let applied = apply_gauge(&gauge, &trial, follow)?;
-    let mut pace = Pace::of(calibration);
-    let warning = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
     write_out(args.out.as_deref(), |out| write_all(calibration, &trial, &applied.applied, out))?;
     report(&gauge, &trial, &applied);
-    if let Some(warning) = warning {
-        warn(format!("stretch: {}: {warning}", trial.name));
-    }
     Ok(())
 }
 
@@ -134,60 +129,19 @@ fn at_rate(gauge: &GaugeCalibration, rate_hz: f64) -> anyhow::Result<GaugeCalibr
 fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let (calibration, applied) = (gauge.calibration(), &found.applied);
     let faults = applied.faults;
-    let mut seen = Seen::of(calibration);
-    let signal = trial.channel(calibration.spec().signal.as_str()).into_iter().flatten();
-    applied.readings.iter().zip(signal).for_each(|(reading, signal)| seen.take(reading, *signal));
+    let (seen, doubts) = applied.seen(calibration, trial);
     // a gap is counted up to what its count can hold
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
+    let Seen { samples, withheld, clamped, .. } = seen;
     warn(format!(
-        "{}; time stamps: {at_least}{} missing, {} early or late",
-        seen.line(),
-        faults.missing,
-        faults.jittered,
+        "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated; time stamps: {at_least}{} missing, {} early \
+         or late",
+        faults.missing, faults.jittered,
     ));
-    seen.doubt();
+    doubts.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
     let mut zero_watch = ZeroWatch::of(gauge, &trial.name);
     found.zeros.iter().for_each(|(time_s, zero)| zero_watch.take(*time_s, zero));
     zero_watch.end();
-}
-
-/// What came of the samples.
-#[derive(Debug)]
-struct Seen {
-    samples: u64,
-    withheld: u64,
-    clamped: u64,
-    reach: Reach,
-}
-
-impl Seen {
-    fn of(calibration: &Calibration) -> Self {
-        Self { samples: 0, withheld: 0, clamped: 0, reach: Reach::of(calibration) }
-    }
-
-    fn take(&mut self, reading: &Result<Reading, Withheld>, signal: f64) {
-        self.samples += 1;
-        self.reach.take(signal);
-        match reading {
-            Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
-            Err(_) => self.withheld += 1,
-        }
-    }
-
-    fn line(&self) -> String {
-        let Self { samples, withheld, clamped, .. } = self;
-        format!(
-            "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated"
-        )
-    }
-
-    /// Says so where the log does not look like one of the calibration's.
-    fn doubt(&self) {
-        let clamped = || not_its_own(self.clamped, self.samples - self.withheld);
-        if let Some(doubt) = self.reach.doubt().or_else(clamped) {
-            warn(format!("stretch: {doubt}"));
-        }
-    }
 }
 
 /// Answers each line as it comes.
@@ -222,7 +176,6 @@ fn live(
     say(rows.take_notes());
     let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));
     let mut zero_watch = ZeroWatch::of(gauge, "");
-    let mut pace = Pace::of(calibration);
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -230,11 +183,11 @@ fn live(
                     receptor.set_pressure(*pressure);
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
-                seen.take(&reading, row.values[0]);
+                let warning = seen.take(row.time_s, row.values[0], &reading);
                 if let Some(zero) = receptor.zero() {
                     zero_watch.take(row.time_s, &zero);
                 }
-                if let Some(warning) = pace.take(row.time_s) {
+                if let Some(warning) = warning {
                     warn(format!("stretch: {warning}"));
                 }
                 line.clear();
@@ -247,7 +200,7 @@ fn live(
         }
         say(rows.take_notes());
     }
-    seen.doubt();
+    seen.doubt().iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
     zero_watch.end();
     Ok(())
 }

@@ -2,16 +2,13 @@
 
 use std::path::PathBuf;
 
-use stretch_calibrate::{
-    Evaluation, MethodErrors, Reach, at_rate, beside_a_constant, evaluate, fitted_on, not_its_own,
-    off_throughout, read_calibration, worse_than_the_mean,
-};
+use stretch_calibrate::{Evaluation, MethodErrors, evaluate, evaluation_doubts, read_calibration};
 use stretch_data::Split;
 use stretch_report::{comparison_table, method_table};
 
 use super::{
     json::Json,
-    reading::{Pace, Recorded, read_trials, with_columns_to_name},
+    reading::{Recorded, read_trials, with_columns_to_name},
     shared::{say, short_name},
 };
 use crate::display::warn;
@@ -60,34 +57,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
     let evaluation = evaluate(&named, &trials)?;
     // on standard error, so that a table and JSON are what they were
-    for (name, calibration) in &calibrations {
-        let paces = trials.iter().filter_map(|trial| {
-            // a line and a curve are applied at the trial's own rate
-            let mut pace = Pace::of(&at_rate(calibration, trial.rate_hz()?).ok()?);
-            let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s))?;
-            Some(format!("{}: {told}", trial.name))
-        });
-        let doubts = paces.chain(fitted_on(calibration, &trials));
-        doubts.for_each(|doubt| warn(format!("stretch: {name}: {doubt}")));
-    }
-    let own = evaluation.pooled.iter().filter(|errors| errors.method != "raw");
-    for (errors, (_, calibration)) in own.zip(&calibrations) {
-        let mut reach = Reach::of(calibration);
-        let signals =
-            trials.iter().filter_map(|trial| trial.channel(calibration.spec().signal.as_str()));
-        signals.flatten().for_each(|value| reach.take(*value));
-        let outside = reach.doubt().or_else(|| not_its_own(errors.clamped, errors.samples));
-        for doubt in [
-            outside,
-            off_throughout(errors, &evaluation.unit),
-            worse_than_the_mean(errors),
-            beside_a_constant(errors),
-        ]
-        .into_iter()
-        .flatten()
-        {
-            warn(format!("stretch: {}: {doubt}", errors.method));
-        }
+    for doubt in evaluation_doubts(&named, &trials, &evaluation) {
+        warn(format!("stretch: {doubt}"));
     }
     args.json.answer(&evaluation, || print(&evaluation))
 }

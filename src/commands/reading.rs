@@ -1,13 +1,11 @@
-//! How recordings are read, and whether their samples come as often as a calibration takes them to: what the commands that take them share.
+//! How recordings are read: what the commands that take them share.
 
 use std::{
     path::{Path, PathBuf},
     str::FromStr,
 };
 
-use stretch_calibrate::PACE_TOLERANCE;
-use stretch_core::Calibration;
-use stretch_data::{DataError, DataSet, Split, Trial, rate_of};
+use stretch_data::{DataError, DataSet, Split, Trial};
 use stretch_recording::{DateOrder, ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
 use super::shared::progress;
@@ -184,61 +182,6 @@ pub(crate) fn read_trials(
     }
     bar.finish_and_clear();
     Ok(trials)
-}
-
-/// Number of intervals that determine the pace.
-const INTERVALS: usize = 51;
-
-/// The usual interval of a stream beside the calibration's.
-#[derive(Debug)]
-pub(super) struct Pace {
-    rate_hz: f64,
-    needs_signal_only: bool,
-    last_s: Option<f64>,
-    intervals_s: Vec<f64>,
-    is_told: bool,
-}
-
-impl Pace {
-    pub(super) fn of(calibration: &Calibration) -> Self {
-        let rate_hz = calibration.spec().sample_rate_hz.hz();
-        let needs_signal_only = calibration.spec().model.needs_signal_only();
-        Self { rate_hz, needs_signal_only, last_s: None, intervals_s: Vec::new(), is_told: false }
-    }
-
-    /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
-    /// time counts as one that is missing, so that a slower stream has right rates, but gaps; a faster
-    /// one has wrong rates.
-    pub(super) fn take(&mut self, time_s: f64) -> Option<String> {
-        let before_s = self.last_s.replace(time_s)?;
-        if self.is_told || time_s <= before_s {
-            return None;
-        }
-        self.intervals_s.push(time_s - before_s);
-        if self.intervals_s.len() < INTERVALS {
-            return None;
-        }
-        self.is_told = true;
-        let mut stamps_s = vec![0.0];
-        for interval_s in std::mem::take(&mut self.intervals_s) {
-            stamps_s.push(stamps_s[stamps_s.len() - 1] + interval_s);
-        }
-        let (found_hz, rate_hz) = (rate_of(&stamps_s)?, self.rate_hz);
-        if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
-            return None;
-        }
-        let what = if self.needs_signal_only {
-            "its estimates are right, the rates are not"
-        } else if found_hz > rate_hz {
-            "its rates, and estimates that rest on them, are wrong"
-        } else {
-            "the samples in between count as missing"
-        };
-        Some(format!(
-            "{found_hz:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
-             the log there with stretch convert --grid {rate_hz}"
-        ))
-    }
 }
 
 #[cfg(test)]

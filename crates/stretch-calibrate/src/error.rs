@@ -222,7 +222,7 @@ pub enum CalibrateError {
 }
 
 /// Share of a calibration's interval by which the usual interval of a log may differ: as much as counts as on time.
-pub const PACE_TOLERANCE: f64 = 0.2;
+pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 
 /// Why no sample of a trial has an estimate. Samples that come more slowly than a calibration expects have lost samples between them, and the
 /// rate estimator begins anew at each.

@@ -8,14 +8,14 @@ mod options;
 mod prepare;
 mod record;
 
-pub use error::{CalibrateError, PACE_TOLERANCE};
+pub use error::CalibrateError;
 pub use fit::{Calibrated, Coefficient, FitReport, Order, calibrate};
 pub use judge::{
-    Applied, Candidate, Comparison, Evaluation, Faults, Judged, LiveReceptor, MethodErrors,
-    ModelChoice, ModelRow, Reach, TrialErrors, apply, at_rate, beside_a_constant, candidate_models,
-    choose_among, choose_model, evaluate, explains_little, explains_nothing, fitted_on,
-    judge_model, m3_instructions, m3_instructions_fixed, not_its_own, off_throughout,
-    on_own_ranges, pressure_column, rank_signals, worse_than_the_mean,
+    Applied, Candidate, Comparison, Doubt, Evaluation, Faults, Judged, LiveReceptor, MethodErrors,
+    ModelChoice, ModelRow, Reach, Seen, TrialErrors, apply, at_rate, candidate_models,
+    choose_among, choose_model, evaluate, evaluation_doubts, explains_little, explains_nothing,
+    judge_model, m3_instructions, m3_instructions_fixed, on_own_ranges, pressure_column,
+    rank_signals,
 };
 pub use options::{
     Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate,

@@ -48,7 +48,7 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
 /// A sentence for a log most of whose samples lie outside the calibrated domain.
 ///
 /// Most means more than half: the estimates of such a log are those of the domain's ends more often than not.
-pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
+pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
             "{} % of the samples lie outside of what was calibrated and were held at its ends: is this a log of that \
@@ -59,7 +59,7 @@ pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
 }
 
 /// A sentence for estimates that err more than the mean of the reference does.
-pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
+pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
         format!(
@@ -75,7 +75,7 @@ const FAR_OFF_PERCENT: f64 = 5.0;
 /// A sentence for estimates whose error is mostly a constant: `bias^2` at least half of `rmse^2`, and a twentieth of the range.
 ///
 /// A reference in centimetres beside a calibration in millimetres looks like that, and so does a sensor that was mounted anew.
-pub fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
+pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
     (is_far && 2.0 * bias * bias >= rmse * rmse).then(|| {
@@ -91,7 +91,7 @@ pub fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
 }
 
 /// A sentence for estimates that were held against a reference that stands still, where no R^2 tells how good they are.
-pub fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
+pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     (!errors.r_squared.is_finite()).then(|| {
         format!(
             "the reference stands still, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
@@ -102,7 +102,7 @@ pub fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
 
 /// A sentence for trials that a calibration was fitted on; `None` where none is. A record holds the names of its first trials and the
 /// checksums of their samples: a trial is found again under another name, and a name that another trial has is told as well.
-pub fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
+pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
     let (provenance, columns) = (
         &calibration.spec().provenance,
         [calibration.spec().signal.as_str(), calibration.spec().reference.as_str()],

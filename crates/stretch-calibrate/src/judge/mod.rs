@@ -2,17 +2,16 @@
 
 mod acceptance;
 mod apply;
+mod doubt;
 mod evaluate;
 mod left_out;
 mod model_choice;
 mod model_words;
 mod reach;
 
-pub use acceptance::{
-    beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,
-    worse_than_the_mean,
-};
+pub use acceptance::{explains_little, explains_nothing};
 pub use apply::{Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column};
+pub use doubt::{Doubt, Seen, evaluation_doubts};
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use left_out::{Judged, judge_model};
 pub use model_choice::{

@@ -1,12 +1,19 @@
 //! Whether a log's signal lies in the range of a calibration, as given or in another unit.
 
-use stretch_core::{Calibration, Range};
+use stretch_core::{Calibration, Interval, Range};
 use stretch_data::unit_of;
+
+use crate::prepare::extent;
+
+use super::doubt::Doubt;
 
 /// Powers of ten by which a signal is multiplied for a trial: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
 /// Number of powers.
 const COUNT: usize = 19;
+
+/// Fewest samples that make an equal signal one that is not connected, and not one at rest on a coarse converter.
+const CONSTANT: u64 = 100;
 
 /// Samples of a signal beside the range of a calibration.
 ///
@@ -19,13 +26,16 @@ const COUNT: usize = 19;
 /// let (low, high) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
 /// (0..=100).for_each(|i| reach.take(1000.0 * (low + (high - low) * f64::from(i) / 100.0)));
 /// let doubt = reach.doubt().expect("none of them is inside");
-/// assert!(doubt.contains("101 of 101 samples") && doubt.contains("are they in mV?"), "{doubt}");
+/// assert_eq!(doubt.code, "other_unit");
+/// assert!(doubt.text.contains("101 of 101 samples") && doubt.text.contains("are they in mV?"), "{doubt}");
 /// ```
 #[derive(Debug, Clone)]
 pub struct Reach {
     range: Range<f64>,
     unit: String,
     samples: u64,
+    /// Least and greatest of them.
+    seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
 }
@@ -34,7 +44,8 @@ impl Reach {
     /// The counts of a calibration, before the first sample.
     pub fn of(calibration: &Calibration) -> Self {
         let unit = unit_of(calibration.spec().signal.as_str());
-        Self { range: calibration.spec().signal_range, unit, samples: 0, inside: [0; COUNT] }
+        let range = calibration.spec().signal_range;
+        Self { range, unit, samples: 0, seen: extent(std::iter::empty()), inside: [0; COUNT] }
     }
 
     /// Takes a sample; a missing sample is not counted.
@@ -43,14 +54,22 @@ impl Reach {
             return;
         }
         self.samples += 1;
+        self.seen = extent([self.seen.min, self.seen.max, signal].into_iter());
         for (power, inside) in POWERS.zip(&mut self.inside) {
             *inside += u64::from(self.range.contains(signal * ten_to(power)));
         }
     }
 
-    /// A sentence for a log most of whose samples lie outside. The sentence names the unit in which most samples
-    /// would lie inside, where there is one.
-    pub fn doubt(&self) -> Option<String> {
+    /// A doubt about a log whose samples are all equal, or most of whose samples lie outside. The sentence names the unit in which most
+    /// samples would lie inside, where there is one.
+    pub fn doubt(&self) -> Option<Doubt> {
+        if self.samples >= CONSTANT && self.seen.min >= self.seen.max {
+            let (count, value) = (thousands(self.samples), self.seen.min);
+            let text = format!(
+                "the signal is {value} in all of {count} samples: is the sensor connected, and is this its column?"
+            );
+            return Some(Doubt::new("constant_signal", text));
+        }
         let as_they_are = self.inside[COUNT / 2];
         let outside = self.samples - as_they_are;
         if 2 * outside <= self.samples {
@@ -63,21 +82,26 @@ impl Reach {
             "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were held at its ends"
         );
         let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
-        Some(match best.filter(|(_, inside)| 2 * inside > self.samples) {
+        let (code, text) = match best.filter(|(_, inside)| 2 * inside > self.samples) {
             Some((power, inside)) => {
                 let asked = in_other_unit(&self.unit, power)
                     .map_or("is the unit another".to_owned(), |unit| format!("are they in {unit}"));
                 let by = ten_to(power.abs());
                 let how = if power > 0 { "multiplied" } else { "divided" };
-                format!(
-                    "{sentence}: {asked}? {how} by {by}, {} would lie inside",
-                    thousands(inside)
+                let inside = thousands(inside);
+                (
+                    "other_unit",
+                    format!("{sentence}: {asked}? {how} by {by}, {inside} would lie inside"),
                 )
             }
-            None => format!(
-                "{sentence}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
+            None => (
+                "outside_range",
+                format!(
+                    "{sentence}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
+                ),
             ),
-        })
+        };
+        Some(Doubt::new(code, text))
     }
 }
 
@@ -154,7 +178,7 @@ mod tests {
         let doubt = |values: [f64; 3]| {
             let mut reach = Reach::of(&calibration);
             values.iter().for_each(|v| reach.take(*v));
-            reach.doubt()
+            reach.doubt().map(|doubt| doubt.text)
         };
         assert_eq!(doubt([middle, middle, 1e3 * middle]), None);
         assert_eq!(doubt([f64::NAN; 3]), None);
@@ -163,5 +187,18 @@ mod tests {
         assert!(other.contains("a log of that sensor"), "{other}");
         let other = doubt([1e2 * middle; 3]).expect("all are outside");
         assert!(other.contains("is the unit another? divided by 100, 3 would"), "{other}");
+    }
+
+    #[test]
+    fn a_signal_that_never_changes_is_told() {
+        let calibration = stretch_receptor::example_calibration();
+        let doubt = |count: usize, last: f64| {
+            let mut reach = Reach::of(&calibration);
+            (1..count).for_each(|_| reach.take(1.5));
+            reach.take(last);
+            reach.doubt().map(|doubt| doubt.code)
+        };
+        assert_eq!(doubt(100, 1.5), Some("constant_signal"));
+        assert_eq!([doubt(100, 1.6), doubt(99, 1.5)], [None; 2]);
     }
 }

@@ -1,0 +1,216 @@
+//! What makes one doubt estimates and their errors: values with codes, which each entry point shows in its own way.
+
+use std::fmt;
+
+use serde::Serialize;
+use stretch_core::Calibration;
+use stretch_data::{Trial, rate_of};
+use stretch_receptor::{Domain, Reading, Withheld};
+
+use super::{
+    acceptance::{beside_a_constant, fitted_on, not_its_own, off_throughout, worse_than_the_mean},
+    apply::{Applied, at_rate},
+    evaluate::Evaluation,
+    reach::Reach,
+};
+use crate::error::PACE_TOLERANCE;
+
+/// A doubt about a result. It is shown as its text.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Doubt {
+    /// Its name for programs, which does not change: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
+    /// `constant_error`, `worse_than_the_mean` or `constant_reference`.
+    pub code: &'static str,
+    /// A sentence for people, with what to do.
+    pub text: String,
+}
+
+impl Doubt {
+    pub(super) fn new(code: &'static str, text: String) -> Self {
+        Self { code, text }
+    }
+
+    /// The same, of a trial or a method that is named before it.
+    fn of(self, name: &str) -> Self {
+        Self { text: format!("{name}: {}", self.text), ..self }
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Counts of the samples that a calibration was applied to, and what they make one doubt.
+///
+/// ```
+/// use stretch_calibrate::{LiveReceptor, Seen};
+/// let calibration = stretch_receptor::example_calibration();
+/// let (mut seen, mut live) = (Seen::of(&calibration), LiveReceptor::new(&calibration)?);
+/// // a sensor that is not connected, logged twice as fast as the calibration's trials
+/// let doubts = (0..100).filter_map(|n| {
+///     let time_s = 0.005 * f64::from(n);
+///     seen.take(time_s, 1.5, &live.step(time_s, 1.5))
+/// });
+/// assert_eq!(doubts.map(|doubt| doubt.code).collect::<Vec<_>>(), ["other_rate"]);
+/// assert_eq!(seen.doubt().map(|doubt| doubt.code), Some("constant_signal"));
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+#[derive(Debug)]
+pub struct Seen {
+    /// All samples.
+    pub samples: u64,
+    /// Those without an estimate.
+    pub withheld: u64,
+    /// Those outside of what was calibrated.
+    pub clamped: u64,
+    reach: Reach,
+    pace: Pace,
+}
+
+impl Seen {
+    /// The counts of a calibration, before the first sample.
+    pub fn of(calibration: &Calibration) -> Self {
+        let (reach, pace) = (Reach::of(calibration), Pace::of(calibration));
+        Self { samples: 0, withheld: 0, clamped: 0, reach, pace }
+    }
+
+    /// Takes a sample, its time in seconds, and what came of it. Answers once, where samples come at another rate than those of the
+    /// calibration.
+    pub fn take(
+        &mut self,
+        time_s: f64,
+        signal: f64,
+        reading: &Result<Reading, Withheld>,
+    ) -> Option<Doubt> {
+        self.samples += 1;
+        self.reach.take(signal);
+        match reading {
+            Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
+            Err(_) => self.withheld += 1,
+        }
+        self.pace.take(time_s)
+    }
+
+    /// What the samples so far make one doubt: whether they are a log of the calibration's sensor.
+    pub fn doubt(&self) -> Option<Doubt> {
+        outside(&self.reach, self.clamped, self.samples - self.withheld)
+    }
+}
+
+fn outside(reach: &Reach, clamped: u64, samples: u64) -> Option<Doubt> {
+    let clamped = || not_its_own(clamped, samples).map(|text| Doubt::new("outside_range", text));
+    reach.doubt().or_else(clamped)
+}
+
+impl Applied {
+    /// Counts of a trial that this was made of, and what makes one doubt the estimates.
+    pub fn seen(&self, calibration: &Calibration, trial: &Trial) -> (Seen, Vec<Doubt>) {
+        let mut seen = Seen::of(&at_own_rate(calibration, trial));
+        let signal = trial.channel(calibration.spec().signal.as_str()).into_iter().flatten();
+        let samples = trial.time_s.iter().zip(signal).zip(&self.readings);
+        let pace = samples.filter_map(|((time_s, signal), reading)| {
+            Some(seen.take(*time_s, *signal, reading)?.of(&trial.name))
+        });
+        let pace: Vec<Doubt> = pace.collect();
+        let doubts = seen.doubt().into_iter().chain(pace).collect();
+        (seen, doubts)
+    }
+}
+
+/// A line and a curve are applied at the trial's own rate.
+fn at_own_rate(calibration: &Calibration, trial: &Trial) -> Calibration {
+    let own = trial.rate_hz().and_then(|rate_hz| at_rate(calibration, rate_hz).ok());
+    own.unwrap_or_else(|| calibration.clone())
+}
+
+/// What makes one doubt the errors of calibrations on trials, which [`evaluate`](crate::evaluate()) found: each sentence begins with the
+/// calibration's name.
+pub fn evaluation_doubts(
+    calibrations: &[(&str, &Calibration)],
+    trials: &[Trial],
+    evaluation: &Evaluation,
+) -> Vec<Doubt> {
+    let mut all = Vec::new();
+    for (name, calibration) in calibrations {
+        let paces = trials.iter().filter_map(|trial| {
+            let mut pace = Pace::of(&at_own_rate(calibration, trial));
+            Some(trial.time_s.iter().find_map(|time_s| pace.take(*time_s))?.of(&trial.name))
+        });
+        let fitted = fitted_on(calibration, trials).map(|text| Doubt::new("fitted_trials", text));
+        all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
+    }
+    // the first method is the raw signal
+    for (errors, (name, calibration)) in evaluation.pooled.iter().skip(1).zip(calibrations) {
+        let mut reach = Reach::of(calibration);
+        let signal = calibration.spec().signal.as_str();
+        let signals = trials.iter().filter_map(|trial| trial.channel(signal));
+        signals.flatten().for_each(|value| reach.take(*value));
+        let words = [
+            ("constant_error", off_throughout(errors, &evaluation.unit)),
+            ("worse_than_the_mean", worse_than_the_mean(errors)),
+            ("constant_reference", beside_a_constant(errors)),
+        ];
+        let said = words.into_iter().filter_map(|(code, text)| Some(Doubt::new(code, text?)));
+        let outside = outside(&reach, errors.clamped, errors.samples);
+        all.extend(outside.into_iter().chain(said).map(|doubt| doubt.of(name)));
+    }
+    all
+}
+
+/// Number of intervals that determine the pace.
+const INTERVALS: usize = 51;
+
+/// The usual interval of a stream beside the calibration's.
+#[derive(Debug)]
+struct Pace {
+    rate_hz: f64,
+    needs_signal_only: bool,
+    last_s: Option<f64>,
+    intervals_s: Vec<f64>,
+    is_told: bool,
+}
+
+impl Pace {
+    fn of(calibration: &Calibration) -> Self {
+        let rate_hz = calibration.spec().sample_rate_hz.hz();
+        let needs_signal_only = calibration.spec().model.needs_signal_only();
+        Self { rate_hz, needs_signal_only, last_s: None, intervals_s: Vec::new(), is_told: false }
+    }
+
+    /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
+    /// time counts as one that is missing, so that a slower stream has right rates, but gaps; a faster
+    /// one has wrong rates.
+    fn take(&mut self, time_s: f64) -> Option<Doubt> {
+        let before_s = self.last_s.replace(time_s)?;
+        if self.is_told || time_s <= before_s {
+            return None;
+        }
+        self.intervals_s.push(time_s - before_s);
+        if self.intervals_s.len() < INTERVALS {
+            return None;
+        }
+        self.is_told = true;
+        let mut stamps_s = vec![0.0];
+        for interval_s in std::mem::take(&mut self.intervals_s) {
+            stamps_s.push(stamps_s[stamps_s.len() - 1] + interval_s);
+        }
+        let (found_hz, rate_hz) = (rate_of(&stamps_s)?, self.rate_hz);
+        if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
+            return None;
+        }
+        let what = if self.needs_signal_only {
+            "its estimates are right, the rates are not"
+        } else if found_hz > rate_hz {
+            "its rates, and estimates that rest on them, are wrong"
+        } else {
+            "the samples in between count as missing"
+        };
+        let text = format!(
+            "{found_hz:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
+             the log there with stretch convert --grid {rate_hz}"
+        );
+        Some(Doubt::new("other_rate", text))
+    }
+}

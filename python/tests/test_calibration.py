@@ -111,3 +111,12 @@ def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
     with pytest.raises(stretch_gap.StretchError, match="no effect of the gauge"):
         stretch_gap.calibrate(*fitted, RATE_HZ, model="diagnosed")
     assert issubclass(stretch_gap.StretchError, ValueError)
+
+
+@pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+def test_stamps_with_a_unit_are_seconds(tested, poly13, unit):
+    nanoseconds = np.round(np.arange(tested[0].size) * 1e9 / RATE_HZ).astype("timedelta64[ns]")
+    stamps = nanoseconds.astype(f"timedelta64[{unit}]")
+    want = poly13.apply(tested[0], RATE_HZ).value
+    for given in (stamps, np.datetime64("2024-05-01") + stamps):
+        np.testing.assert_allclose(poly13.apply(tested[0], time_s=given).value, want, rtol=1e-9)

@@ -41,6 +41,10 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
         stamps: Array = np.arange(samples, dtype=np.float64) / float(rate_hz)
         return stamps
     assert time_s is not None
+    given = np.asarray(time_s)
+    if given.dtype.kind in "mM" and given.size:
+        # counted in the array's own unit, which is lost on the way to numbers
+        time_s = (given - given.flat[0]) / np.timedelta64(1, "s")
     stamps = column(time_s, f"time_s of {what}")
     same_length(stamps, samples, f"time_s of {what}")
     back = np.flatnonzero(np.diff(stamps) <= 0.0)

@@ -11,7 +11,7 @@ const HAS_LINE: f64 = 0.5;
 /// Slopes over that of another trial which hysteresis, another rate or another range bring about.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
 /// Decimals, or significant digits, that a file may have been saved with.
-const DIGITS: RangeInclusive<i32> = 0..=17;
+const DIGITS: RangeInclusive<i32> = 0..=12;
 /// Fewest readings in a row that make a signal that stands.
 const STANDS: usize = 5;
 /// Share of its range by which the reference must move on while the signal stands.

@@ -1,4 +1,4 @@
-//! A simulator that answers the same question differently is found out before it is believed.
+//! A simulator that does not answer what it is asked is found out before it is believed.
 
 use std::sync::{
     Arc,
@@ -8,17 +8,28 @@ use std::sync::{
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{GapError, Options, RandomGenerator, diagnose};
 use stretch_problem::{
-    Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
+    Ask, BlackBox, Checked, Diagnosable, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
 };
 
-/// A spring whose answers are altered by the number of the run.
-fn spring(altered: impl Fn(u64, &mut [f64]) + Send + Sync + 'static) -> BlackBox {
+/// Rows of a trial.
+const ROWS: usize = 3000;
+
+/// A spring in so many trials; its simulator has the compliance, the forces of the run, and the number of the run.
+fn springs(
+    trials: usize,
+    simulator: impl Fn(f64, &[f64], u64) -> Vec<f64> + Send + Sync + 'static,
+) -> BlackBox {
     let mut random = RandomGenerator::new(3, 0);
-    let time_s: Vec<f64> = (0..3000).map(|i| 0.01 * f64::from(i)).collect();
+    let time_s: Vec<f64> = (0..ROWS).map(|i| 0.01 * i as f64).collect();
     let force: Vec<f64> = time_s.iter().map(|t| 20.0 * (1.3 * t).sin() + 5.0 * t.cos()).collect();
-    let length = force.iter().map(|f| 2.1 * f + 0.05 * random.gauss()).collect();
     let channel = |name: &str, values| Channel { name: name.into(), values };
-    let channels = vec![channel("force_N", force.clone()), channel("length_mm", length)];
+    let mut trial = |at: usize| {
+        let length = force.iter().map(|f| 2.1 * f + 0.05 * random.gauss()).collect();
+        let channels = vec![channel("force_N", force.clone()), channel("length_mm", length)];
+        let name = if at == 0 { "spring.csv".to_owned() } else { format!("spring_{at}.csv") };
+        let trial = Trial { name, time_s: time_s.clone(), channels };
+        SessionTrial { start_s: 60.0 * at as f64, ..SessionTrial::new(trial) }
+    };
     let problem = Checked::new(ProblemSpec {
         stages: vec![StageEntry {
             name: "spring".into(),
@@ -34,49 +45,86 @@ fn spring(altered: impl Fn(u64, &mut [f64]) + Send + Sync + 'static) -> BlackBox
             ..Parameter::default()
         }],
         wrap: vec!["output.backlash".into()],
-        trials: vec![SessionTrial::new(Trial { name: "spring.csv".into(), time_s, channels })],
+        trials: (0..trials).map(&mut trial).collect(),
         ..ProblemSpec::default()
     });
     let runs = AtomicU64::new(0);
+    let forces = force.repeat(trials);
     let source = closure(move |ask: &Ask<'_>| {
-        let mut out: Vec<f64> = force.iter().map(|f| ask.parameters[0] * f).collect();
-        altered(runs.fetch_add(1, Ordering::Relaxed), &mut out);
-        Ok(out)
+        let run = runs.fetch_add(1, Ordering::Relaxed);
+        Ok(simulator(ask.parameters[0], &forces[..ask.trials * ROWS], run))
     });
     BlackBox::new(problem.expect("a problem"), Arc::new(source))
 }
 
-fn refused(bench: &BlackBox) -> String {
-    match diagnose(bench, &Options::default(), &|_| (), &|| false) {
-        Err(error @ GapError::Broken(_)) => error.to_string(),
-        other => panic!("{other:?}"),
+/// The spring as it is.
+fn sound(compliance: f64, force: &[f64]) -> Vec<f64> {
+    force.iter().map(|f| compliance * f).collect()
+}
+
+/// Noise without a seed, from a row on.
+fn noisy(compliance: f64, force: &[f64], run: u64) -> Vec<f64> {
+    let mut random = RandomGenerator::new(run, 1);
+    let mut out = sound(compliance, force);
+    out[1234..].iter_mut().for_each(|y| *y += 1e-3 * random.gauss());
+    out
+}
+
+/// A simulator that may not answer what it is asked: so many trials, the simulator, whether it is refused, and what is said of it.
+type Doubtful = (usize, fn(f64, &[f64], u64) -> Vec<f64>, bool, &'static [&'static str]);
+
+const REFUSED: [&str; 2] = [
+    "stage spring: the simulator answers the same question differently, ",
+    " in row 1234 of trial spring.csv; seed its random numbers, and begin every run from the same state",
+];
+
+const DOUBTFUL: [Doubtful; 7] = [
+    (1, noisy, true, &REFUSED),
+    (2, noisy, true, &REFUSED),
+    // a state that is carried from one run to the next
+    (
+        1,
+        |compliance, force, run| {
+            sound(compliance, force).iter().map(|y| y + 1e-6 * run as f64).collect()
+        },
+        true,
+        &["in row 0 of trial"],
+    ),
+    // an offset that depends on how long the run is
+    (
+        2,
+        |compliance, force, _| {
+            let offset = 1e-4 * force.len() as f64 / ROWS as f64;
+            sound(compliance, force).iter().map(|y| y + offset).collect()
+        },
+        false,
+        &["the same rows differently in runs over", "row 0 of trial spring.csv; let no sample"],
+    ),
+    (
+        1,
+        |_, force, _| sound(2.0, force),
+        false,
+        &[
+            "ignores the parameters of spring: its output is the same to the bit whatever compliance is",
+        ],
+    ),
+    // a sum in another order is no other answer
+    (1, |compliance, force, run| sound(compliance * (1.0 + 1e-15 * run as f64), force), false, &[]),
+    (2, |compliance, force, _| sound(compliance, force), false, &[]),
+];
+
+#[test]
+fn a_simulator_that_does_not_answer_what_it_is_asked_is_told() {
+    for (i, (trials, simulator, is_refused, says)) in DOUBTFUL.into_iter().enumerate() {
+        let bench = springs(trials, simulator);
+        let told = match diagnose(&bench, &Options::default(), &|_| (), &|| false) {
+            Err(error @ GapError::Broken(_)) if is_refused => error.to_string(),
+            Ok((found, _)) if !is_refused && found.named.is_empty() => {
+                bench.afterwards().join("\n")
+            }
+            other => panic!("{i}: {other:?}"),
+        };
+        assert_eq!(told.is_empty(), says.is_empty(), "{i}: {told}");
+        assert!(says.iter().all(|part| told.contains(part)), "{i}: {told}");
     }
-}
-
-#[test]
-fn noise_without_a_seed_is_told_with_both_values() {
-    let bench = spring(|run, out| {
-        let mut random = RandomGenerator::new(run, 1);
-        out[1234..].iter_mut().for_each(|y| *y += 1e-3 * random.gauss());
-    });
-    let said = refused(&bench);
-    let begins = "stage spring: the simulator answers the same question differently, ";
-    let ends = " in row 1234 of trial spring.csv; seed its random numbers, and begin every run from the same state";
-    assert!(said.starts_with(begins) && said.ends_with(ends), "{said}");
-    assert_eq!(bench.model_runs(), 2);
-}
-
-/// A state that is carried from one run to the next.
-#[test]
-fn a_state_that_is_not_reset_is_told() {
-    let bench = spring(|run, out| out[0] += 1e-6 * run as f64);
-    assert!(refused(&bench).contains("in row 0 of trial"));
-}
-
-/// A sum in another order is no other answer.
-#[test]
-fn rounding_is_no_difference() {
-    let bench = spring(|run, out| out.iter_mut().for_each(|y| *y *= 1.0 + 1e-15 * run as f64));
-    let (told, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
-    assert!(told.named.is_empty());
 }

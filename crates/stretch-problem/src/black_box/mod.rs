@@ -283,7 +283,7 @@ impl Simulator for BlackBox {
             self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
         match outputs {
             Ok(outputs) => {
-                self.undeclared.look(&self.problem, &self.runs, &inner, &moves);
+                self.undeclared.look(&self.problem, &self.runs, (&inner, &moves), &outputs);
                 self.set_line(stage, Linear::of(inner, &moves, &outputs));
             }
             // Without a linearisation every run is exact.

@@ -62,8 +62,9 @@ struct Made {
     kept: LruCache<Key, (usize, Answer)>,
     under_way: HashSet<Key>,
     count: usize,
-    /// Whether a run has been asked for twice.
+    /// Whether a run has been asked for twice, and in what a longer run differs from a shorter one.
     is_repeated: bool,
+    note: Option<String>,
 }
 
 /// A source and its answers.
@@ -92,7 +93,8 @@ impl Runs {
     ) -> Self {
         let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
         let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
-        let made = Made { kept, under_way: HashSet::new(), count: 0, is_repeated: false };
+        let made =
+            Made { kept, under_way: HashSet::new(), count: 0, is_repeated: false, note: None };
         let answers_all = source.answers_all();
         Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all, turns }
     }
@@ -111,7 +113,9 @@ impl Runs {
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {
-        self.source.notes()
+        let mut notes = self.source.notes();
+        notes.extend(self.lock().note.clone());
+        notes
     }
 
     fn lock(&self) -> MutexGuard<'_, Made> {
@@ -241,7 +245,8 @@ impl Runs {
         })
     }
 
-    /// Asks for the first run that was ever answered once more; where the source answers differently, that is the answer.
+    /// Asks for the first run that was ever answered once more, over fewer or more trials where there are several; where the source answers
+    /// the same question differently, that is the answer.
     fn repeat(
         &self,
         session: &RecordedSession,
@@ -258,14 +263,32 @@ impl Runs {
         made.count += 1;
         drop(made);
         let run = runs[at];
-        let samples = session.samples(run.trials);
         let first = std::mem::replace(&mut answers[at], Ok(Vec::new()));
         let first = first.and_then(|values| self.checked(session, run, values));
-        let second = self.asked(&[run]).pop().unwrap_or_else(|| Ok(Vec::new()));
         let stage = if self.answers_all { 0 } else { run.stage };
+        let again = |first: &[f64], trials: usize| {
+            let again = Inner { trials, ..run.clone() };
+            let second = self.asked(&[&again]).pop().unwrap_or_else(|| Ok(Vec::new()));
+            let second = self.checked(session, &again, second?)?;
+            repeated::alike(session, stage, [(run.trials, first), (trials, &second)])
+        };
+        let other = match run.trials {
+            own if !run.altered.is_empty() => own,
+            1 => session.trials.len(),
+            _ => 1,
+        };
         answers[at] = first.and_then(|first| {
-            let second = self.checked(session, run, second?)?;
-            repeated::alike(session, stage, [&first, &second], samples).map(|()| first)
+            let mut alike = again(&first, other);
+            if let (Err(why), true) = (&alike, other != run.trials) {
+                let is_changed = matches!(why, SourceError::Changed { .. });
+                let note = is_changed.then(|| why.to_string());
+                // where this is answered alike it is the length that makes the difference
+                alike = again(&first, run.trials);
+                let mut made = self.lock();
+                made.count += 1;
+                made.note = note.filter(|_| alike.is_ok());
+            }
+            alike.map(|()| first)
         });
     }
 

@@ -133,7 +133,9 @@ pub enum SourceError {
     },
     /// The same run was asked for twice and answered differently: no difference between two models could be believed.
     #[error(
-        "stage {stage}: the simulator answers the same question differently, {first} and then {second} in row {row} of trial {trial}; seed its random numbers, and begin every run from the same state"
+        "stage {stage}: the simulator answers {}, {first} and then {second} in row {row} of trial {trial}; {}",
+        question(.over),
+        if over[0] == over[1] { "seed its random numbers, and begin every run from the same state" } else { "let no sample depend on later ones" }
     )]
     Changed {
         /// The stage.
@@ -146,6 +148,8 @@ pub enum SourceError {
         first: f64,
         /// What was answered then.
         second: f64,
+        /// How many trials each of the two runs was over.
+        over: [usize; 2],
     },
     /// No more runs may be made.
     #[error("the budget of {budget} model runs is spent")]
@@ -153,6 +157,14 @@ pub enum SourceError {
         /// The budget.
         budget: usize,
     },
+}
+
+/// What was asked twice, over so many trials, and answered differently.
+fn question([first, second]: &[usize; 2]) -> String {
+    match first == second {
+        true => "the same question differently".to_owned(),
+        false => format!("the same rows differently in runs over {first} and over {second} trials"),
+    }
 }
 
 /// A user's simulator as a black box.

@@ -1,4 +1,4 @@
-//! Parameters that move the output of a stage in which they are not said to act.
+//! Parameters that move the output of a stage in which they are not said to act, and stages that none of their parameters moves.
 //!
 //! A diagnosis re-tunes a parameter by the stages that its `stages` name alone. Where a simulator answers all stages at once, the runs of its
 //! sensitivities hold the other outputs as well; the change of output t for one tolerance sd of a parameter, in multiples of the noise, is
@@ -9,7 +9,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 use stretch_data::listed;
@@ -26,18 +26,33 @@ const LEAST: f64 = 1.0;
 /// Names that a sentence lists.
 const LISTED: usize = 3;
 
-/// By parameter and by stage in which it is not said to act: the change of the output for one tolerance, in multiples of its noise.
 #[derive(Debug, Default)]
-pub(super) struct Undeclared(Mutex<BTreeMap<(usize, usize), f64>>);
+pub(super) struct Undeclared {
+    /// By parameter and by stage in which it is not said to act: the change of the output for one tolerance, in multiples of its noise.
+    others: Mutex<BTreeMap<(usize, usize), f64>>,
+    /// By stage with parameters to be re-tuned: whether none of them has moved its output by a bit.
+    unmoved: Mutex<BTreeMap<usize, bool>>,
+}
 
 impl Undeclared {
-    /// Takes what the runs of a linearisation, which were made, say of the stages beside its own; the first look at a parameter counts.
-    pub(super) fn look(&self, problem: &Checked, runs: &Runs, at: &Inner, moves: &[Move]) {
+    /// Takes what the runs of a linearisation, whose outputs these are, say of its stage and of the stages beside it; of these the first look
+    /// at a parameter counts.
+    pub(super) fn look(
+        &self,
+        problem: &Checked,
+        runs: &Runs,
+        (at, moves): (&Inner, &[Move]),
+        outputs: &[Arc<Vec<f64>>],
+    ) {
         let (about, session) = (problem.description(), problem.session());
+        if !moves.is_empty() {
+            let mut unmoved = self.unmoved.lock().unwrap_or_else(PoisonError::into_inner);
+            *unmoved.entry(at.stage).or_insert(true) &= outputs.iter().all(|o| *o == outputs[0]);
+        }
         if session.stages.len() < 2 || !runs.source().answers_all() {
             return;
         }
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.others.lock().unwrap_or_else(PoisonError::into_inner);
         for stage in 0..session.stages.len() {
             let is_new = |m: &&Move| {
                 let is_declared = about.stages[stage].parameters.contains(&m.parameter);
@@ -57,10 +72,21 @@ impl Undeclared {
         }
     }
 
-    /// What is to be declared, in sentences: one for all parameters that act in the same stages and move the same other one.
+    /// What is ignored and what is to be declared, in sentences: one for all parameters that act in the same stages and move the same other one.
     pub(super) fn notes(&self, problem: &Checked) -> Vec<String> {
         let about = problem.description();
-        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = self.others.lock().unwrap_or_else(PoisonError::into_inner);
+        let unmoved = self.unmoved.lock().unwrap_or_else(PoisonError::into_inner);
+        let ignored = unmoved.iter().filter(|(_, is_unmoved)| **is_unmoved).map(|(&stage, _)| {
+            let own = about.stages[stage].parameters.iter().map(|&p| &about.parameters[p]);
+            let tuned = own.filter(|p| p.sd > 0.0).map(|p| p.name.clone());
+            format!(
+                "the simulator ignores the parameters of {}: its output is the same to the bit whatever {} is; nothing could be re-tuned there, so \
+                 check that the simulator takes them",
+                about.stages[stage].name,
+                listed(&tuned.collect::<Vec<_>>())
+            )
+        });
         let mut alike: Vec<Alike<'_>> = Vec::new();
         for (&(parameter, stage), &multiple) in known.iter().filter(|(_, m)| **m > LEAST) {
             let said = about.stages.iter().filter(|s| s.parameters.contains(&parameter));
@@ -72,7 +98,7 @@ impl Undeclared {
                 None => alike.push(Alike { said, moves, own: vec![(multiple, name)] }),
             }
         }
-        alike.into_iter().map(Alike::sentence).collect()
+        ignored.chain(alike.into_iter().map(Alike::sentence)).collect()
     }
 }
 

@@ -6,8 +6,9 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 use serde::Serialize;
 use stretch_calibrate::{
-    CalibrateError, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust, SpellingError,
-    choose_model, parse_rate, pressure_column,
+    CalibrateError, Doubt, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust,
+    SpellingError, choose_model, evaluation_doubts, explains_little, explains_nothing, parse_rate,
+    pressure_column,
 };
 use stretch_core::{Calibration, Target};
 use stretch_data::{Channel, Trial};
@@ -126,6 +127,7 @@ pub(crate) fn calibrate(
             options.model = choice.model;
         }
         let mut made = stretch_calibrate::calibrate(&trials, &options)?;
+        made.notes.extend(explains_nothing(&made.fits).or_else(|| explains_little(&made.fits)));
         made.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
         let said = serde_json::to_string(&Made {
             model: options.model.to_string(),
@@ -139,22 +141,29 @@ pub(crate) fn calibrate(
     Ok((CalibrationRecord { gauge }, made.map_err(said)?))
 }
 
-/// Evaluates calibrations beside the raw signal; the answer is JSON.
+/// Evaluates calibrations beside the raw signal; the answer is JSON, and the codes and sentences of doubts.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
     calibrations: Vec<(String, PyRef<'_, CalibrationRecord>)>,
     recordings: Vec<Recording<'_>>,
-) -> PyResult<String> {
+) -> PyResult<(String, Vec<(&'static str, String)>)> {
     let trials = trials(&recordings);
     let calibrations: Vec<(String, Calibration)> =
         calibrations.iter().map(|(name, r)| (name.clone(), r.calibration().clone())).collect();
     let work = move || {
         let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
-        stretch_calibrate::evaluate(&named, &trials)
+        let evaluation = stretch_calibrate::evaluate(&named, &trials)?;
+        let doubts = evaluation_doubts(&named, &trials, &evaluation);
+        Ok::<_, CalibrateError>((evaluation, doubts))
     };
-    let evaluation = watched(py, work)?.map_err(said)?;
-    serde_json::to_string(&evaluation).map_err(said)
+    let (evaluation, doubts) = watched(py, work)?.map_err(said)?;
+    Ok((serde_json::to_string(&evaluation).map_err(said)?, pairs(doubts)))
+}
+
+/// Codes and sentences of doubts.
+fn pairs(doubts: Vec<Doubt>) -> Vec<(&'static str, String)> {
+    doubts.into_iter().map(|doubt| (doubt.code, doubt.text)).collect()
 }
 
 #[pymethods]
@@ -246,8 +255,12 @@ impl CalibrationRecord {
         let time_s = time_s.as_array().to_vec();
         let trial = Trial { name: "the recording".into(), time_s, channels };
         let calibration = self.calibration().clone();
-        let applied =
-            watched(py, move || stretch_calibrate::apply(&calibration, &trial))?.map_err(said)?;
+        let work = move || {
+            let applied = stretch_calibrate::apply(&calibration, &trial)?;
+            let (_, doubts) = applied.seen(&calibration, &trial);
+            Ok::<_, CalibrateError>((applied, doubts))
+        };
+        let (applied, doubts) = watched(py, work)?.map_err(said)?;
         let column = |of: &dyn Fn(&stretch_receptor::Reading) -> f64| {
             let values = applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, of));
             PyArray1::from_iter(py, values)
@@ -264,6 +277,7 @@ impl CalibrationRecord {
         answer.set_item("missing", applied.faults.missing)?;
         answer.set_item("jittered", applied.faults.jittered)?;
         answer.set_item("backwards", applied.faults.backwards)?;
+        answer.set_item("doubts", pairs(doubts))?;
         Ok(answer)
     }
 }

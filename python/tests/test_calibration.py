@@ -113,6 +113,31 @@ def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
     assert issubclass(stretch_gap.StretchError, ValueError)
 
 
+def test_doubts_are_warnings_with_codes(fitted, tested, poly13, recwarn):
+    signal, angle = tested
+
+    def codes():
+        said = [(one.category, one.message.code) for one in recwarn.list]
+        assert all(category is stretch_gap.DoubtWarning for category, _ in said)
+        assert all(one.filename == __file__ for one in recwarn.list)
+        recwarn.clear()
+        return [code for _, code in said]
+
+    stretch_gap.evaluate(poly13, signal, angle, RATE_HZ)
+    poly13.apply(signal)
+    assert codes() == []
+    poly13.apply(signal, 2 * RATE_HZ)
+    assert codes() == ["other_rate"]
+    poly13.apply(1000 * signal)
+    assert codes() == ["other_unit"]
+    poly13.apply(np.full_like(signal, signal[0]))
+    assert codes() == ["constant_signal"]
+    stretch_gap.evaluate(poly13, *fitted, RATE_HZ)
+    assert codes() == ["fitted_trials"]
+    stretch_gap.evaluate(poly13, signal, np.full_like(angle, angle[0]), RATE_HZ)
+    assert "constant_reference" in codes()
+
+
 @pytest.mark.parametrize("unit", ["ns", "us", "ms"])
 def test_stamps_with_a_unit_are_seconds(tested, poly13, unit):
     nanoseconds = np.round(np.arange(tested[0].size) * 1e9 / RATE_HZ).astype("timedelta64[ns]")

@@ -17,11 +17,13 @@ from .evaluation import Evaluation, evaluate
 from .fix import Fix, Prediction
 from .problem import Argument, Effect, Parameter, Stage, Trial
 from .reading import Recording, convert, read
+from .recordings import DoubtWarning
 
 __all__ = [
     "Argument",
     "Calibration",
     "Diagnosis",
+    "DoubtWarning",
     "Effect",
     "Estimate",
     "Evaluation",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _stretch, html
 from .outputs import replaceable
-from .recordings import Array, column, recordings, same_length, times
+from .recordings import Array, column, doubt, recordings, same_length, times
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis
@@ -126,7 +126,7 @@ class Calibration:
         """Estimates of a recording, sample by sample, as they would come live.
 
         Without `rate_hz` and `time_s` the recording is taken to be at the calibration's own rate. `pressure` is needed by a
-        calibration whose gauge depends on it.
+        calibration whose gauge depends on it. A `DoubtWarning` says where the recording does not look like one of that sensor.
         """
         values = column(signal, "signal")
         if rate_hz is None and time_s is None:
@@ -139,6 +139,7 @@ class Calibration:
             pressures = column(pressure, "pressure")
             same_length(pressures, values.size, "pressure")
         answer = self._record.apply(stamps, values, pressures)
+        doubt(answer["doubts"])
         faults = {key: answer[key] for key in ("missing", "jittered", "backwards")}
         return Estimate(answer["estimate"], answer["rate"], answer["sd"], answer["inside"], faults=faults, unit=self.unit)
 

@@ -9,7 +9,7 @@ from typing import Any
 from . import _stretch, html
 from .calibration import Calibration
 from .frames import frame
-from .recordings import recordings
+from .recordings import doubt, recordings
 
 
 class Evaluation:
@@ -73,7 +73,10 @@ def evaluate(
     pressure: Any = None,
     names: list[str] | None = None,
 ) -> Evaluation:
-    """Judges calibrations of one signal against the reference of recordings that they were not fitted on."""
+    """Judges calibrations of one signal against the reference of recordings that they were not fitted on.
+
+    A `DoubtWarning` says what makes one doubt the errors: another rate or unit, recordings that were fitted, a constant reference.
+    """
     named = {"calibration": calibrations} if isinstance(calibrations, Calibration) else dict(calibrations)
     if not named:
         raise _stretch.StretchError("there is no calibration to judge; give at least one")
@@ -82,4 +85,6 @@ def evaluate(
     if pressure is not None:
         columns["pressure_kpa"] = pressure
     records = [(name, calibration._record) for name, calibration in named.items()]
-    return Evaluation(json.loads(_stretch.evaluate(records, recordings(columns, rate_hz, time_s, names))))
+    answer, doubts = _stretch.evaluate(records, recordings(columns, rate_hz, time_s, names))
+    doubt(doubts)
+    return Evaluation(json.loads(answer))

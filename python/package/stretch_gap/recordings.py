@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from ._stretch import StretchError
 
 Array = NDArray[np.float64]
+
+
+class DoubtWarning(UserWarning):
+    """A doubt about data or estimates; `code` is its name for programs, as `other_rate`, and does not change."""
+
+    def __init__(self, text: str, code: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def doubt(doubts: Iterable[tuple[str, str]], stacklevel: int = 3) -> None:
+    """Warns of doubts, each a code and a sentence, on the line of the user's call."""
+    for code, text in doubts:
+        warnings.warn(DoubtWarning(text, code), stacklevel=stacklevel)
 
 
 def column(values: ArrayLike, what: str) -> Array:

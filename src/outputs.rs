@@ -21,17 +21,14 @@ fn option(argument: &Arg) -> Option<&str> {
     argument.get_long().filter(|_| is_path)
 }
 
-/// Why most outputs replace no recording.
-const NONE: &str = "what would replace it is none";
-
 /// An output that was asked for.
 struct Output {
     option: String,
     path: PathBuf,
     /// How such a file is called in the help: `cal.json`.
     example: String,
-    /// Why it may replace no recording, where the command makes recordings.
-    keeps_recordings: Option<&'static str>,
+    /// Whether a recording may be replaced: one that the command made before, but none that somebody recorded.
+    replaces_recordings: bool,
 }
 
 fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
@@ -39,17 +36,12 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
         let Some(name) = option(argument).filter(|name| OUTPUTS.contains(name)) else { continue };
         let example = argument.get_value_names().unwrap_or_default().concat();
         let paths = matches.get_many::<PathBuf>(argument.get_id().as_str());
-        let keeps_recordings = match command.get_name() {
-            // estimates have words in their rows and are not taken for a recording
-            "apply" => Some(NONE),
-            "convert" if !matches.get_flag("force") => Some("only --force replaces it"),
-            _ => None,
-        };
         found.extend(paths.into_iter().flatten().map(|path| Output {
             option: format!("--{name}"),
             path: path.clone(),
             example: example.clone(),
-            keeps_recordings,
+            // estimates have words in their rows and are not taken for a recording
+            replaces_recordings: !["apply", "convert"].contains(&command.get_name()),
         }));
     }
     if let Some((name, matches)) = matches.subcommand()
@@ -67,17 +59,16 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
 pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
     let mut outputs = Vec::new();
     named(command, matches, &mut outputs);
-    for Output { option, path, example, keeps_recordings } in &outputs {
+    for Output { option, path, example, replaces_recordings } in &outputs {
         let ending = Path::new(example).extension();
         let is_expected = ending.is_some() && path.extension() == ending;
         let such_as = ending.map_or(String::new(), |_| format!(", such as {example}"));
         ensure!(
-            (keeps_recordings.is_none() && (is_expected || example.contains(".csv")))
+            (*replaces_recordings && (is_expected || example.contains(".csv")))
                 || !is_recording(path),
-            "{option} {}: this file is a recording, and {}; name another file{such_as} (a shell makes of {option} *.csv the names of all \
-             recordings)",
-            path.display(),
-            keeps_recordings.unwrap_or(NONE)
+            "{option} {}: this file is a recording, which is not replaced; name another file{such_as}, or remove this one first (a shell \
+             makes of {option} *.csv the names of all recordings)",
+            path.display()
         );
     }
     Ok(guard_inputs(outputs.into_iter().map(|output| (output.option, output.path)))?)

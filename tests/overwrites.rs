@@ -30,7 +30,7 @@ const OVER_INPUTS: [(&str, &str); 35] = [
     ("apply --calibration cal.json a.csv --out OUT", "cal.json"),
     ("evaluate --calibration cal.json a.csv --json=OUT", "a.csv"),
     ("evaluate --calibration cal.json a.csv --json=OUT", "cal.json"),
-    ("convert a.csv --force --out OUT", "a.csv"),
+    ("convert a.csv --out OUT", "a.csv"),
     ("convert a.csv --from-zero --out OUT", "a.csv"),
     ("diagnose bench --report OUT", "bench/arbitrary_1.csv"),
     ("diagnose bench --fix OUT", "bench/dataset.toml"),
@@ -97,8 +97,8 @@ fn a_refusal_names_the_option_and_the_input() {
     let scratch = inputs();
     for (line, parts) in [
         (
-            "convert a.csv --force --out ./a.csv",
-            ["a.csv: cannot open it", "--out ./a.csv would overwrite it"],
+            "convert a.csv --out ./a.csv",
+            ["--out ./a.csv: this file is a recording", "remove this one first"],
         ),
         (
             "apply --calibration cal.json a.csv --out cal.json",
@@ -110,7 +110,7 @@ fn a_refusal_names_the_option_and_the_input() {
         ),
         (
             "convert --out a.csv b.csv",
-            ["--out a.csv: this file is a recording", "only --force replaces it"],
+            ["--out a.csv: this file is a recording", "name another file"],
         ),
         (
             "calibrate a.csv --out x.json --report ./x.json",
@@ -168,7 +168,6 @@ fn what_is_no_loss_is_done() {
         "apply --calibration cal.json a.csv --out estimate.csv",
         "apply --calibration cal.json b.csv --out estimate.csv",
         "convert a.csv --out out.csv",
-        "convert b.csv --out out.csv --force",
         // in its own place, by design
         "export --calibration cal.json --seal",
         "init logs --force",

@@ -43,9 +43,6 @@ pub(crate) struct Args {
     /// Let the time begin at zero
     #[arg(long)]
     from_zero: bool,
-    /// Replace a recording
-    #[arg(long)]
-    force: bool,
     /// Where the trial goes, - for standard output
     #[arg(long, value_name = "trial.csv")]
     out: PathBuf,

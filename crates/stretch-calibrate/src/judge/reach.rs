@@ -54,7 +54,8 @@ impl Reach {
             return;
         }
         self.samples += 1;
-        self.seen = extent([self.seen.min, self.seen.max, signal].into_iter());
+        self.seen.min = self.seen.min.min(signal);
+        self.seen.max = self.seen.max.max(signal);
         for (power, inside) in POWERS.zip(&mut self.inside) {
             *inside += u64::from(self.range.contains(signal * ten_to(power)));
         }

@@ -21,6 +21,11 @@ const SLOW_HZ: f64 = 0.5;
 /// Fewest samples that distinguish a slow recording from a wrong unit of time.
 const TELLING: usize = 50;
 
+/// Most trials that each is held against: of more, some from all over.
+const OTHERS: usize = 32;
+/// Trials next in the mean of the reference that each is compared with, to find copies.
+const NEXT: usize = 8;
+
 /// What can be wrong with one trial: its line as it is and without that, beside the line of another, and what is said.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
@@ -199,6 +204,25 @@ fn is_rounded(coarse: &[f64], fine: &[f64]) -> bool {
         })
 }
 
+/// For each trial an earlier one that it is a copy of.
+fn copies(held: &[Held<'_>]) -> Vec<Option<usize>> {
+    let mean = |i: usize| held[i].line.means[1];
+    let mut sorted: Vec<usize> = (0..held.len()).collect();
+    sorted.sort_by(|a, b| mean(*a).total_cmp(&mean(*b)));
+    let mut first: Vec<Option<usize>> = vec![None; held.len()];
+    for (place, &i) in sorted.iter().enumerate() {
+        for &j in sorted[place + 1..].iter().take(NEXT) {
+            let (early, late) = (i.min(j), i.max(j));
+            if first[late].is_none_or(|before| early < before)
+                && held[late].is_copy_of(&held[early])
+            {
+                first[late] = Some(early);
+            }
+        }
+    }
+    first
+}
+
 /// Sentences about trials that are likely not what they are taken for, each with what to do.
 pub(super) fn doubts(
     names: &[&str],
@@ -207,11 +231,13 @@ pub(super) fn doubts(
     options: &Options,
 ) -> Vec<String> {
     let (signal, reference) = (options.signal.as_str(), options.reference.as_str());
-    let held = names.iter().enumerate().filter_map(|(trial, name)| {
-        let parts: Vec<&Piece> = pieces.iter().filter(|(of, _)| *of == trial).collect();
-        let line = Line::of(parts.iter().copied());
-        (!parts.is_empty()).then_some(Held { name, parts, line })
-    });
+    let mut parts = vec![Vec::new(); names.len()];
+    pieces.iter().for_each(|piece| parts[piece.0].push(piece));
+    let held =
+        names.iter().zip(parts).filter(|(_, parts)| !parts.is_empty()).map(|(name, parts)| {
+            let line = Line::of(parts.iter().copied());
+            Held { name, parts, line }
+        });
     let held: Vec<Held<'_>> = held.collect();
     let mut said = Vec::new();
     let samples = pieces.iter().map(|(_, [signal, ..])| signal.len()).sum::<usize>();
@@ -240,21 +266,23 @@ pub(super) fn doubts(
             ));
         }
     }
+    let others = || (0..held.len()).step_by(held.len().div_ceil(OTHERS).max(1));
     let mistakes: Vec<Vec<_>> = held
         .iter()
-        .map(|own| held.iter().map(|other| own.line.mistake(other.line)).collect())
+        .map(|own| others().map(|j| (j, own.line.mistake(held[j].line))).collect())
         .collect();
     // the trial in doubt is that which more of the others contradict; of two it is the second
-    let rank = |i: usize| (mistakes[i].iter().flatten().count(), i);
+    let rank = |i: usize| (mistakes[i].iter().filter(|(_, says)| says.is_some()).count(), i);
+    let copies = copies(&held);
     for (i, own) in held.iter().enumerate() {
-        if let Some(first) = held[..i].iter().find(|first| own.is_copy_of(first)) {
+        if let Some(first) = copies[i].map(|first| &held[first]) {
             said.push(format!(
                 "{} holds the samples of {}: they weigh double, and cross-validation judges a fit by what it was fitted on; name one of the two",
                 own.name, first.name
             ));
         }
-        let others = mistakes[i].iter().enumerate().filter(|(j, _)| rank(*j) < rank(i));
-        if let Some((says, other)) = others.filter_map(|(j, says)| Some(((*says)?, j))).next() {
+        let others = mistakes[i].iter().filter(|(j, _)| rank(*j) < rank(i));
+        if let Some((says, other)) = others.filter_map(|(j, says)| Some(((*says)?, *j))).next() {
             let words = [
                 ("{trial}", own.name),
                 ("{other}", held[other].name),

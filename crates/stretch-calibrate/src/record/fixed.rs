@@ -121,9 +121,14 @@ pub fn fit_error(calibration: &Calibration) -> f64 {
         Model::Diagnosed(map) => map.fit.rmse,
         _ => 0.0,
     };
+    rmse.max(1e-3) * span(calibration)
+}
+
+/// The range of the target in the unit of the reference.
+fn span(calibration: &Calibration) -> f64 {
+    let spec = calibration.spec();
     let [low, high] = [spec.target_range.min(), spec.target_range.max()];
-    let span = (spec.target.to_reference(high) - spec.target.to_reference(low)).abs();
-    rmse.max(1e-3) * span
+    (spec.target.to_reference(high) - spec.target.to_reference(low)).abs()
 }
 
 /// Rates are part of a type; this program is compiled for these rates.
@@ -165,13 +170,14 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     adc: &Adc,
 ) -> Result<FixedRecord, CalibrateError> {
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
-    let fixed = fixed.map_err(|error| match error {
-        // steps that are coarse beside the range, where the fit is off by more than a step
-        ReceptorError::Calibration(DesignError::OutOfRange { field: "fixed.error", .. }) => {
-            too_coarse(calibration)
-        }
-        other => CalibrateError::Fixed(other),
-    })?;
+    let fixed =
+        fixed.map_err(|error| match error {
+            // a step of more than what the arithmetic may be off by; otherwise the converter is too coarse
+            ReceptorError::Calibration(DesignError::OutOfRange {
+                field: "fixed.error", ..
+            }) if FIXED_STEP > 1e-4 * span(calibration) => too_coarse(calibration),
+            other => CalibrateError::Fixed(other),
+        })?;
     let read_as = format!("FixedCalibration<{WINDOW}, {DEGREE}>");
     made(read_as, &fixed, RecordNumbers::Rated(fixed.numbers()))
 }

@@ -142,7 +142,8 @@ fn with_gxx_a_board_of_another_converter_is_refused_with_the_option_that_names_i
     let calibration = calibrated(&scratch, &["--model", "poly13"]);
     // of a library for AVR
     fs::create_dir(scratch.path("avr")).unwrap();
-    scratch.write("avr/pgmspace.h", "#define PROGMEM\n");
+    scratch
+        .write("avr/pgmspace.h", "#include <string.h>\n#define PROGMEM\n#define memcpy_P memcpy\n");
     for (adc, refused) in [("12,0,3.3", true), ("10,0,5", false)] {
         let library = scratch.path(adc);
         runs(export(&calibration, &library).args(["--arduino", "--adc", adc]));

@@ -75,7 +75,7 @@ def evaluate(
 ) -> Evaluation:
     """Judges calibrations of one signal against the reference of recordings that they were not fitted on.
 
-    A `DoubtWarning` says what makes one doubt the errors: another rate or unit, recordings that were fitted, a constant reference.
+    A `DoubtWarning` says what makes one doubt the errors: another rate or unit, recordings that were fitted, a reference at rest.
     """
     named = {"calibration": calibrations} if isinstance(calibrations, Calibration) else dict(calibrations)
     if not named:
@@ -85,6 +85,8 @@ def evaluate(
     if pressure is not None:
         columns["pressure_kpa"] = pressure
     records = [(name, calibration._record) for name, calibration in named.items()]
-    answer, doubts = _stretch.evaluate(records, recordings(columns, rate_hz, time_s, names))
+    # arrays without names are known again by their samples, not by the name that a fitted one has
+    trials = recordings(columns, rate_hz, time_s, names, "judged recording")
+    answer, doubts = _stretch.evaluate(records, trials)
     doubt(doubts)
     return Evaluation(json.loads(answer))

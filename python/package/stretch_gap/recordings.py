@@ -90,8 +90,12 @@ def recordings(
     rate_hz: float | None,
     time_s: Any,
     names: Sequence[str] | None = None,
+    unnamed: str = "recording",
 ) -> list[dict[str, Any]]:
-    """Recordings as the native part takes them; `columns` gives one array each, or one list of arrays each."""
+    """Recordings as the native part takes them; `columns` gives one array each, or one list of arrays each.
+
+    Without `names` each is called by `unnamed` and its number.
+    """
     first_name, first = next(iter(columns.items()))
     many = is_many(first)
     given = {name: list(values) if many else [values] for name, values in columns.items()}
@@ -102,7 +106,7 @@ def recordings(
     stamps = [None] * count if time_s is None else list(time_s) if is_many(time_s) else [time_s] * count
     if len(stamps) != count:
         raise StretchError(f"time_s has {len(stamps)} recordings, {first_name} {count}; give as many")
-    called = list(names) if names is not None else [f"recording {i + 1}" if many else "the recording" for i in range(count)]
+    called = list(names) if names is not None else [f"{unnamed} {i + 1}" if many else f"the {unnamed}" for i in range(count)]
     if len(called) != count:
         raise StretchError(f"{len(called)} names for {count} recordings; give one each")
     made = []

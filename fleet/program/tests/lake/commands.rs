@@ -54,7 +54,12 @@ fn no_answer_is_written_over_what_it_was_made_from() {
                 told.contains("it is a file that this command reads"),
                 "{line}, {over}: {told}"
             );
-            assert!(tree(&lake) == before, "{line}, {over}");
+            // sums that help the next command may be added
+            let after = tree(&lake);
+            assert!(
+                before.iter().all(|(name, bytes)| after.get(name) == Some(bytes)),
+                "{line}, {over}"
+            );
         }
     }
 }

@@ -11,8 +11,8 @@
 //! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance beside the others'
 //! greatest: a record that fits at one level alone says less than one that fits at many.
 //!
-//! A recorder need not drift: a = 0 is one of its sizes. It has no drift that is larger than its noise. Where such a drift fits best, something
-//! else wanders, and a is 0: a gap has to stay one, and a prior alone would only make it dear. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
+//! A recorder need not drift: a = 0 is one of its sizes. A recorder's drift is smaller than its noise. If a larger drift fits best, the recorder
+//! is not the cause, and a is 0, so that the gap remains: a prior alone only lowers the likelihood of such a drift. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
 //! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
 //! the noise alone.
 
@@ -25,7 +25,7 @@ use crate::{
 
 /// Sizes that are tried, as multiples of what the simulator describes.
 const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
-/// Sizes that no recorder's drift has. Where one of them fits best, something else wanders, and nothing of it is taken for the recorder's.
+/// Sizes that no recorder's drift has. If one of them fits best, the recorder is not the cause, and no drift is assumed.
 const BEYOND: [f64; 5] = [3.2, 4.0, 6.4, 10.0, 16.0];
 /// Correlation times that are tried, s.
 const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
@@ -52,7 +52,7 @@ impl Metric {
             let all = fits.iter().copied().zip(&tried);
             let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
             if BEYOND.contains(&metric.loose()[which].level.size) {
-                best = best.with(|i, own| if i == which { NONE } else { own }, roles);
+                best = best.with(|i, own| if i == which { Level::NONE } else { own }, roles);
             } else {
                 gained += most - before;
                 best = metric.clone();
@@ -124,9 +124,6 @@ impl Metric {
     }
 }
 
-/// No drift at all.
-pub(crate) const NONE: Level = Level { size: 0.0, time_s: 1.0 };
-
 /// Levels that a nuisance may have; a recorder need not drift at all.
 fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
     let times_s: Vec<f64> = match loose.drift {
@@ -134,10 +131,10 @@ fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
         Some(_) => TIMES_S.into(),
         None => vec![loose.level.time_s],
     };
-    loose.parameter.is_none().then_some(NONE).into_iter().chain(levels(times_s, SIZES))
+    loose.parameter.is_none().then_some(Level::NONE).into_iter().chain(levels(times_s, SIZES))
 }
 
-/// Levels that only something else than a recorder can have.
+/// Levels that are too large for a recorder.
 fn beyond(loose: &Loose) -> impl Iterator<Item = Level> {
     loose.parameter.is_none().then(|| levels(TIMES_S.into(), BEYOND)).into_iter().flatten()
 }

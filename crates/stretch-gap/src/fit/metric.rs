@@ -15,7 +15,6 @@ use std::sync::Arc;
 
 use crate::{
     fit::{
-        hyper_parameters::NONE,
         noise_level::NoiseLevel,
         nuisance::{Drifting, Knots, Nuisance, Patch},
     },
@@ -72,6 +71,11 @@ pub(crate) struct Level {
     pub(crate) time_s: f64,
 }
 
+impl Level {
+    /// No nuisance.
+    pub(crate) const NONE: Self = Self { size: 0.0, time_s: 1.0 };
+}
+
 /// A residual or a sensitivity over whole segments, in multiples of the noise, ready for products.
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
@@ -109,9 +113,8 @@ impl Metric {
                 metric.noise.sd.iter().map(|sd| if sd.is_finite() { drift.sd } else { 0.0 });
             let (column, clock) = (column.collect(), always());
             let knots = knots_of(&clock, roles, simulator.dt_s());
-            let level = NONE;
             let (parameter, clock, drift) = (None, clock.into(), Some(drift));
-            let is_by_tick = false;
+            let (level, is_by_tick) = (Level::NONE, false);
             metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level, knots });
         }
         let plain = match parameters.is_empty() {

@@ -1,5 +1,7 @@
 //! Errors of one model on parts of the trials that are left out of its fit in turn.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use stretch_core::{Calibration, Model};
 use stretch_data::Trial;
@@ -8,7 +10,7 @@ use stretch_metrics::lag;
 use crate::{
     CalibrateError, ModelKind, Options,
     fit::{Choice, TABLE_PARTS, calibrate_with},
-    prepare::{extent, rows, sample_rate_hz},
+    prepare::{LEAST_TRIALS, extent, fold_of, rows, sample_rate_hz},
 };
 
 use super::apply::apply;
@@ -17,8 +19,6 @@ use super::apply::apply;
 const GAP_S: f64 = 2.0;
 /// Samples of warm-up that no model is judged on.
 const SETTLE: usize = 20;
-/// Fewer trials than this are cut into parts.
-pub(crate) const LEAST_TRIALS: usize = 3;
 /// Number of parts that each trial is cut into where there are few trials.
 pub(crate) const PARTS: usize = 6;
 /// A turn counts when the reference has come back by this share of its range.
@@ -54,11 +54,10 @@ fn reverses(reference: &[f64]) -> bool {
     turns >= LEAST_TURNS
 }
 
-/// A part of the data whose samples are left out together: samples `from..to` of a trial.
+/// Data that are left out together: the same samples of some trials.
 struct Fold {
-    trial: usize,
-    from: usize,
-    to: usize,
+    trials: Vec<usize>,
+    samples: Range<usize>,
 }
 
 /// The cross-validation of one model, from which [`choose_among`](crate::choose_among) chooses. The value serialises as JSON, so that
@@ -107,24 +106,10 @@ pub fn judge_model(
     for fold in folds(trials, &options) {
         let rest = without(trials, &fold, &options);
         let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
-        let trial = &trials[fold.trial];
-        let reference = trial.require(&options.reference)?;
-        let calibration = match options.is_table {
-            true => beyond_its_ends(calibrated.calibration, trial.require(&options.signal)?)?,
-            false => calibrated.calibration,
-        };
-        let applied = apply(&calibration, trial)?;
-        let estimates: Vec<f64> =
-            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
-        let period_s = 1.0 / sample_rate_hz(trial)?;
-        let which = match (trial.name.contains("pulse"), turning[fold.trial]) {
-            (true, true) => 1,
-            (false, true) => 0,
-            (_, false) => 2,
-        };
-        let settle = if options.is_table { 0 } else { SETTLE };
-        let judged = fold.from.max(settle).min(fold.to)..fold.to;
-        errors.take(&reference[judged.clone()], &estimates[judged], period_s, which);
+        for &index in &fold.trials {
+            let left_out = (&trials[index], fold.samples.clone());
+            errors.take_trial(&calibrated.calibration, left_out, turning[index], &options)?;
+        }
     }
     Ok(Judged { parameters, errors })
 }
@@ -136,18 +121,22 @@ pub(crate) fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, 
 }
 
 fn folds(trials: &[Trial], options: &Options) -> Vec<Fold> {
-    let parts = match trials.len() >= LEAST_TRIALS {
-        true => 1,
-        false if options.is_table => TABLE_PARTS,
-        false => PARTS,
-    };
+    if trials.len() >= LEAST_TRIALS {
+        let all = || 0..trials.len();
+        let last = all().map(fold_of).max().unwrap_or(0);
+        let whole = |fold| Fold {
+            trials: all().filter(|&trial| fold_of(trial) == fold).collect(),
+            samples: 0..usize::MAX,
+        };
+        return (0..=last).map(whole).collect();
+    }
+    let parts = if options.is_table { TABLE_PARTS } else { PARTS };
     let cut = |trial: usize| {
         let samples = trials[trial].len();
         let parts = parts.min(samples);
         (0..parts).map(move |part| Fold {
-            trial,
-            from: samples * part / parts,
-            to: samples * (part + 1) / parts,
+            trials: vec![trial],
+            samples: samples * part / parts..samples * (part + 1) / parts,
         })
     };
     (0..trials.len()).flat_map(cut).collect()
@@ -157,13 +146,12 @@ fn folds(trials: &[Trial], options: &Options) -> Vec<Fold> {
 fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
     let mut rest = Vec::new();
     for (index, trial) in trials.iter().enumerate() {
-        if index != fold.trial {
+        if !fold.trials.contains(&index) {
             rest.push(trial.clone());
             continue;
         }
         if options.is_table {
-            let stays: Vec<bool> =
-                (0..trial.len()).map(|i| i < fold.from || i >= fold.to).collect();
+            let stays: Vec<bool> = (0..trial.len()).map(|i| !fold.samples.contains(&i)).collect();
             let mut part = rows(trial, &stays);
             // no row was lost: they have no order
             part.time_s = (0..part.len()).map(|i| i as f64).collect();
@@ -171,7 +159,8 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
             continue;
         }
         let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
-        for span in [0..fold.from.saturating_sub(gap), fold.to.saturating_add(gap)..trial.len()] {
+        let Range { start, end } = fold.samples;
+        for span in [0..start.saturating_sub(gap), end.saturating_add(gap)..trial.len()] {
             // a short remainder is not fitted, because the estimators would hardly warm up on it
             if span.len() > 5 * SETTLE {
                 let stays: Vec<bool> = (0..trial.len()).map(|i| span.contains(&i)).collect();
@@ -209,6 +198,37 @@ impl Errors {
     /// Root mean square error over arbitrary motion (0), pulses (1) or ramps (2).
     pub(crate) fn rmse_of(&self, kind: usize) -> Option<f64> {
         root_mean(self.kinds[kind])
+    }
+
+    /// Takes in the errors of a calibration on samples of a trial that it was not fitted to.
+    fn take_trial(
+        &mut self,
+        calibration: &Calibration,
+        (trial, samples): (&Trial, Range<usize>),
+        turns: bool,
+        options: &Options,
+    ) -> Result<(), CalibrateError> {
+        let reference = trial.require(&options.reference)?;
+        let applied = match options.is_table {
+            true => {
+                let signals = trial.require(&options.signal)?;
+                apply(&beyond_its_ends(calibration.clone(), signals)?, trial)?
+            }
+            false => apply(calibration, trial)?,
+        };
+        let estimates: Vec<f64> =
+            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
+        let period_s = 1.0 / sample_rate_hz(trial)?;
+        let which = match (trial.name.contains("pulse"), turns) {
+            (true, true) => 1,
+            (false, true) => 0,
+            (_, false) => 2,
+        };
+        let settle = if options.is_table { 0 } else { SETTLE };
+        let end = samples.end.min(trial.len());
+        let judged = samples.start.max(settle).min(end)..end;
+        self.take(&reference[judged.clone()], &estimates[judged], period_s, which);
+        Ok(())
     }
 
     fn take(&mut self, truth: &[f64], estimate: &[f64], period_s: f64, which: usize) {
@@ -256,6 +276,21 @@ pub(crate) fn excess(parts: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_sample_is_left_out_once_in_few_folds() {
+        let trial = Trial { name: String::new(), time_s: vec![0.0; 60], channels: Vec::new() };
+        for (trials, most) in [(1, PARTS), (2, 2 * PARTS), (3, 3), (16, 16), (17, 16), (1000, 16)] {
+            let folds = folds(&vec![trial.clone(); trials], &Options::default());
+            assert!(folds.len() <= most, "{trials} trials: {} folds", folds.len());
+            let mut left_out = vec![0; trials];
+            for fold in &folds {
+                let samples = fold.samples.start..fold.samples.end.min(trial.len());
+                fold.trials.iter().for_each(|&index| left_out[index] += samples.len());
+            }
+            assert_eq!(left_out, vec![trial.len(); trials]);
+        }
+    }
 
     #[test]
     fn ramps_do_not_reverse() {

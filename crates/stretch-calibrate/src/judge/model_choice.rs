@@ -8,10 +8,11 @@ use stretch_data::{Trial, unit_of};
 use crate::{
     CalibrateError, Memory, ModelKind, Options,
     fit::{Calibrated, calibrate},
+    prepare::LEAST_TRIALS,
 };
 
 use super::{
-    left_out::{Errors, Judged, LEAST_TRIALS, PARTS, excess, judge_model, turning},
+    left_out::{Errors, Judged, PARTS, excess, judge_model, turning},
     model_words::{Grounds, why},
 };
 

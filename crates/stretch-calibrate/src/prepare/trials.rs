@@ -20,6 +20,18 @@ const SHORTEST: usize = 3;
 /// The most rows of all trials together that a calibration is fitted to: a day at 100 Hz, which takes about 2 GB.
 pub const MOST_ROWS: usize = 10_000_000;
 
+/// Fewest trials that are left out whole in a cross-validation; of fewer, parts are left out.
+pub(crate) const LEAST_TRIALS: usize = 3;
+
+/// The most folds that trials are left out in. Of more trials each fold holds several, because the time of one fit for each trial would grow
+/// with the square of their number.
+const MOST_FOLDS: usize = 16;
+
+/// The fold of each trial in a cross-validation that leaves whole trials out.
+pub(crate) fn fold_of(trial: usize) -> usize {
+    trial % MOST_FOLDS
+}
+
 /// Refuses trials that are too long to be fitted in memory.
 ///
 /// # Errors
@@ -121,8 +133,8 @@ impl Prepared {
         })?)
     }
 
-    /// Each series, and the number of the fold of each of its samples in cross-validation: each trial is a fold, or
-    /// each tenth of the samples when there are fewer than three trials.
+    /// Each series, and the number of the fold of each of its samples in cross-validation: that of its trial, or
+    /// each tenth of the samples when there are fewer than [`LEAST_TRIALS`] trials.
     pub(crate) fn folds(&self) -> impl Iterator<Item = (&Series, Vec<usize>)> {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         let total: usize = self.series.iter().map(|s| s.signal.len()).sum();
@@ -130,7 +142,8 @@ impl Prepared {
         self.series.iter().map(move |series| {
             let own = before..before + series.signal.len();
             before = own.end;
-            let fold = |place| if trials >= 3 { series.trial } else { place * 10 / total };
+            let whole = trials >= LEAST_TRIALS;
+            let fold = |place| if whole { fold_of(series.trial) } else { place * 10 / total };
             (series, own.map(fold).collect())
         })
     }

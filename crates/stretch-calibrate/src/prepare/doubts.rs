@@ -194,14 +194,13 @@ fn is_rounded(coarse: &[f64], fine: &[f64]) -> bool {
             (steps - steps.round()).abs() < 1e-4 && (coarse - fine).abs() <= 0.5001 * step
         })
     };
-    let range = extent(coarse.iter().copied());
-    range.min < range.max
-        && DIGITS.into_iter().any(|digits| {
-            is_one(&|_| 10_f64.powi(-digits))
-                || is_one(&|x| {
-                    10_f64.powi(x.abs().max(f64::MIN_POSITIVE).log10().floor() as i32 - digits)
-                })
-        })
+    let is_some = DIGITS.into_iter().any(|digits| {
+        is_one(&|_| 10_f64.powi(-digits))
+            || is_one(&|x| {
+                10_f64.powi(x.abs().max(f64::MIN_POSITIVE).log10().floor() as i32 - digits)
+            })
+    });
+    is_some && coarse.iter().any(|x| *x != coarse[0])
 }
 
 /// For each trial an earlier one that it is a copy of.

@@ -8,7 +8,7 @@ use crate::{
     DateOrder,
     stamps::{StampFault, looks_like_stamp, nanoseconds, order_of},
     text::header::Header,
-    text::row::{Fault, Field, Role, RowFault, field, number, numbers},
+    text::row::{Fault, Field, Role, RowFault, field, is_finite, number, numbers},
 };
 
 /// Longest whole number that is read as floating point: this project writes none longer, and clocks of nanoseconds are.
@@ -63,8 +63,11 @@ impl Dialect {
         let (delimiter, recorded) = (header.delimiter, header.recorded);
         // A comma between columns cannot stand in numbers, too.
         let mark = if delimiter == b',' { Mark::Point } else { Mark::Open };
-        let shown =
-            |(_, line): &(u64, Vec<u8>)| order_of(&text(cells(line, delimiter)?.get(time?)?));
+        let shown = |(_, line): &(u64, Vec<u8>)| {
+            let time = cells(line, delimiter)?.into_iter().nth(time?)?;
+            // most times are numbers, and reading each as two dates is slow
+            if is_finite(&time) { None } else { order_of(&text(&time)) }
+        };
         let date_order = date_order.or_else(|| rows.iter().find_map(shown));
         let (clock, spoilt) = (Clock::Open, Vec::new());
         Self { delimiter, recorded, time, date_order, mark, clock, is_plain: false, spoilt }
@@ -284,8 +287,8 @@ fn broken(line: &[u8], delimiter: u8) -> RowFault {
 
 /// Whether a cell is a number in either notation, or a time stamp.
 pub(crate) fn is_value(cell: &[u8], delimiter: u8) -> bool {
-    let with_commas = delimiter != b',' && number(&with_point(cell)).is_ok();
-    with_commas || number(cell).is_ok() || looks_like_stamp(&text(cell))
+    let with_commas = || delimiter != b',' && is_finite(&with_point(cell));
+    is_finite(cell) || with_commas() || looks_like_stamp(&text(cell))
 }
 
 /// A whole number, which may be long; not so long that a difference of two is too long.

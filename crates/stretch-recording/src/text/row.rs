@@ -105,6 +105,11 @@ pub(crate) fn numbers(line: &[u8], delimiter: u8, roles: &[Role], out: &mut [f64
     at >= line.len()
 }
 
+/// Whether a whole field spells a finite number. This is cheaper than [`number`], which words what is wrong.
+pub(crate) fn is_finite(content: &[u8]) -> bool {
+    fast_float2::parse::<f64, _>(content).is_ok_and(f64::is_finite)
+}
+
 /// The finite number that a whole field spells.
 pub(crate) fn number(content: &[u8]) -> Result<f64, Fault> {
     match fast_float2::parse::<f64, _>(content) {

@@ -199,7 +199,7 @@ impl Finder<'_> {
         fits: impl Fn(&[Cow<'_, [u8]>]) -> bool,
     ) -> Option<(u8, usize)> {
         let share = |delimiter: u8| {
-            let cells = cells(line, delimiter).filter(|cells| fits(cells))?;
+            let cells = cells(line, delimiter).filter(|cells| cells.len() > 1 && fits(cells))?;
             let is_number = |cell: &[u8]| {
                 is_value(cell, delimiter) || fast_float2::parse::<f64, _>(cell).is_ok()
             };
@@ -207,8 +207,7 @@ impl Finder<'_> {
             let values = cells.iter().filter(|cell| is_number(cell)).count();
             // `Sample rate,100` above a table is no row of it.
             let begins = cells.first().is_some_and(|cell| is_number(cell));
-            let is_row =
-                cells.len() > 1 && (2 * values > filled || (begins && 2 * values >= filled));
+            let is_row = 2 * values > filled || (begins && 2 * values >= filled);
             is_row.then_some((delimiter, cells.len(), values as f64 / filled as f64))
         };
         let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {
@@ -216,7 +215,8 @@ impl Finder<'_> {
             let is_sure = matches!(best.0, b';' | b'\t' | b'|');
             if next.2 > best.2 && !is_sure { next } else { best }
         };
-        let found = SEPARATORS.into_iter().filter_map(share).reduce(better);
+        let is_here = |delimiter: &u8| *delimiter == BLANKS || line.contains(delimiter);
+        let found = SEPARATORS.into_iter().filter(is_here).filter_map(share).reduce(better);
         // Bare readings, whose samples are counted, are one column.
         let is_bare = || {
             let cell = line.trim_ascii();

@@ -10,6 +10,7 @@ use crate::{
         alike::{Errors, Read},
         coordinate::{Coordinate, coordinates},
         metric::{Column, Metric},
+        motion::depends_on_motion,
         noise_level::noise_levels,
         octaves::Octaves,
         score::{Misfit, samples_per_observation},
@@ -64,8 +65,11 @@ impl<'a> Comparison<'a> {
         let mut gained = 0.0;
         for stage in 0..self.metrics.len() {
             if !self.metrics[stage].loose().is_empty() {
-                let residual = self.residual_values(stage, model)?;
-                let (metric, more) = self.metrics[stage].adapted(&self.roles, &residual);
+                let output = self.runs.run(self.run_of(stage, model, None))?;
+                let residual = self.apart(stage, output.clone());
+                let dt_s = self.simulator().dt_s();
+                let moves = |left: &[f64]| depends_on_motion(&self.roles, left, &output, dt_s);
+                let (metric, more) = self.metrics[stage].adapted(&self.roles, &residual, moves);
                 self.metrics[stage] = metric;
                 gained += more;
             }

@@ -34,8 +34,13 @@ const SPREAD: (f64, f64) = (0.7, 1.1);
 
 impl Metric {
     /// The metric with nuisances of the greatest likelihood for a residual in multiples of the noise, and by how many nats it is greater than with
-    /// those of this one.
-    pub(crate) fn adapted(&self, roles: &SampleRoles, residual: &[f64]) -> (Self, f64) {
+    /// those of this one. A recorder does not drift if the residual depends on the motion.
+    pub(crate) fn adapted(
+        &self,
+        roles: &SampleRoles,
+        residual: &[f64],
+        depends_on_motion: impl Fn(&[f64]) -> bool,
+    ) -> (Self, f64) {
         let (mut best, mut gained) = (self.clone(), 0.0);
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
@@ -51,8 +56,16 @@ impl Metric {
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
             let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            if BEYOND.contains(&metric.loose()[which].level.size) {
-                best = best.with(|i, own| if i == which { Level::NONE } else { own }, roles);
+            let found = &metric.loose()[which];
+            let drifts = found.parameter.is_none() && found.level != Level::NONE;
+            let without = metric.with(|i, own| if i == which { Level::NONE } else { own }, roles);
+            let is_of_motion = || {
+                let mut left = residual.to_vec();
+                without.clean(roles, &mut left);
+                depends_on_motion(&left)
+            };
+            if BEYOND.contains(&found.level.size) || (drifts && is_of_motion()) {
+                best = without;
             } else {
                 gained += most - before;
                 best = metric.clone();
@@ -200,7 +213,7 @@ mod tests {
         let metric = Metric::with_drift(noise, drive.clone(), described, &roles, 0.01);
         for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
             let record = residual(size, time_s, &drive);
-            let (adapted, gained) = metric.adapted(&roles, &record);
+            let (adapted, gained) = metric.adapted(&roles, &record, |_| false);
             let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
             // The next one of the grid at most.
             assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
@@ -209,7 +222,7 @@ mod tests {
         }
         // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
         let record = residual(1.0, 3.0, &drive);
-        let (best, _) = metric.adapted(&roles, &record);
+        let (best, _) = metric.adapted(&roles, &record, |_| false);
         let evidence = best.evidence(&roles, &record, 1.0);
         let most = best.likelihood(&roles, &record);
         let count = (SIZES.len() * TIMES_S.len()) as f64;
@@ -222,8 +235,8 @@ mod tests {
         let begun = metric.evidence(&roles, &record, 1.0);
         approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
         // Noise alone: as little as there is, and nothing gained by a second look.
-        let (quiet, _) = metric.adapted(&roles, &residual(0.0, 1.0, &drive));
+        let (quiet, _) = metric.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false);
         assert!(quiet.loose()[0].level.size < 0.5);
-        assert_eq!(quiet.adapted(&roles, &residual(0.0, 1.0, &drive)).1, 0.0);
+        assert_eq!(quiet.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false).1, 0.0);
     }
 }

@@ -261,7 +261,7 @@ mod tests {
         let roles = SampleRoles { segments, block: 50, fit_trials: TRIALS, borrowed_test: false };
         let described = SlowDrift { sd: 3.0, correlation_s: 4.0 };
         let metric = Metric::with_drift(noise, drive, described, &roles, 0.01);
-        let (adapted, _) = metric.adapted(&roles, &residual);
+        let (adapted, _) = metric.adapted(&roles, &residual, |_| false);
         let mut clean = residual;
         adapted.clean(&roles, &mut clean);
         adapted.swings(&roles, &clean)[0]

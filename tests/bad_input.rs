@@ -6,10 +6,52 @@ use std::fs::File;
 use crate::support::{Scratch, calibrate, fails, program, stdout, stretch};
 
 #[test]
-fn a_missing_file() {
+fn what_cannot_be_read_or_written_is_named_and_nothing_is_written() {
     let scratch = Scratch::new();
-    let missing = scratch.path("nowhere.csv");
-    fails(&mut calibrate(&missing, &scratch.path("cal.json")), &["nowhere.csv", "open"]);
+    let good = std::fs::read_to_string(scratch.calibration("cal.json")).unwrap();
+    let at = good.find("\"dead_band\": ").unwrap() + "\"dead_band\": ".len();
+    let end = at + good[at..].find(',').unwrap();
+    scratch.write("newer.json", good.replace("\"schema\": 2", "\"schema\": 7"));
+    scratch.write("half.json", &good[..good.len() / 2]);
+    scratch.write("text.json", "not json");
+    scratch.write("null.json", format!("{}null{}", &good[..at], &good[end..]));
+    scratch.write("below.json", format!("{}-3.0{}", &good[..at], &good[end..]));
+    scratch.write("other.csv", "time_s,s1\n0,1\n0.01,2\n");
+    scratch.loops("a.csv", 20.0, 1.2);
+    std::fs::create_dir(scratch.path("folder")).unwrap();
+    let long = scratch.write("gigabyte.csv", "time_s,length_mm,bridge_v\n");
+    File::options().write(true).open(&long).unwrap().set_len(1 << 30).unwrap();
+    let before = scratch.names();
+    let run = |line: &str| {
+        let mut command = stretch();
+        command.current_dir(scratch.path("")).args(line.split(' '));
+        command
+    };
+    for (line, parts) in [
+        ("calibrate nowhere.csv --out new.json", &["nowhere.csv", "open"][..]),
+        ("calibrate gigabyte.csv --out new.json", &["gigabyte.csv", "row 2", "longer than"]),
+        ("calibrate a.csv --out a.csv/new.json", &["new.json", "cannot write"]),
+        ("calibrate a.csv --out folder", &["folder"]),
+        ("apply --calibration newer.json a.csv", &["newer.json", "schema is 7", "update"]),
+        ("apply --calibration half.json a.csv", &["half.json", "EOF"]),
+        ("apply --calibration text.json a.csv", &["text.json", "line 1"]),
+        ("apply --calibration null.json a.csv", &["null.json", "dead_band"]),
+        ("apply --calibration below.json a.csv", &["below.json", "dead_band", "-3"]),
+        ("apply --calibration cal.json other.csv", &["other.csv", "bridge_v", "s1"]),
+    ] {
+        fails(&mut run(line), parts);
+    }
+    for (option, hint) in [
+        ("--model poly77", "poly55"),
+        ("--rate savgol:11", "savgol:WINDOW,DEGREE"),
+        ("--robust both", "bisquare"),
+    ] {
+        let output = run(&format!("calibrate a.csv --out new.json {option}")).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains(hint), "{message}");
+    }
+    assert_eq!(scratch.names(), before);
 }
 
 #[test]
@@ -65,24 +107,6 @@ fn a_dash_is_standard_input_and_output_and_never_a_file() {
     assert_eq!(scratch.names(), ["cal.json", "plain.csv"], "a file called -");
 }
 
-#[test]
-fn a_line_of_a_gigabyte_is_not_read_whole() {
-    let scratch = Scratch::new();
-    let path = scratch.write("bad.csv", "time_s,length_mm,bridge_v\n");
-    File::options().write(true).open(&path).unwrap().set_len(1 << 30).unwrap();
-    fails(&mut calibrate(&path, &scratch.path("cal.json")), &["row 2", "longer than"]);
-}
-
-#[test]
-fn unwritable_output_and_a_folder_in_its_place() {
-    let scratch = Scratch::new();
-    let trial = scratch.loops("ramp.csv", 20.0, 1.2);
-    let under_a_file = trial.join("cal.json");
-    fails(&mut calibrate(&trial, &under_a_file), &["cal.json", "cannot write"]);
-    std::fs::create_dir(scratch.path("folder")).unwrap();
-    fails(&mut calibrate(&trial, &scratch.path("folder")), &["folder"]);
-}
-
 #[cfg(unix)]
 #[test]
 fn a_full_disk_leaves_nothing_half_written() {
@@ -103,53 +127,6 @@ fn a_full_disk_leaves_nothing_half_written() {
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(message.contains("out.csv") && message.contains("cannot write"), "{message}");
     assert_eq!(scratch.names(), before);
-}
-
-#[test]
-fn a_calibration_that_cannot_be_used() {
-    let scratch = Scratch::new();
-    let good = std::fs::read_to_string(scratch.calibration("cal.json")).unwrap();
-    let trial = scratch.loops("trial.csv", 5.0, 1.2);
-    let apply = |text: &str, parts: &[&str]| {
-        let record = scratch.write("spoilt.json", text);
-        let mut command = stretch();
-        command.arg("apply").arg("--calibration").arg(record).arg(&trial);
-        fails(&mut command, &[&["spoilt.json"], parts].concat());
-    };
-    apply(&good.replace("\"schema\": 2", "\"schema\": 7"), &["schema is 7", "update"]);
-    apply(&good[..good.len() / 2], &["EOF"]);
-    apply("not json", &["line 1"]);
-    let at = good.find("\"dead_band\": ").unwrap() + "\"dead_band\": ".len();
-    let end = at + good[at..].find(',').unwrap();
-    apply(&format!("{}null{}", &good[..at], &good[end..]), &["dead_band"]);
-    apply(&format!("{}-3.0{}", &good[..at], &good[end..]), &["dead_band", "-3"]);
-}
-
-#[test]
-fn a_trial_without_the_calibrations_signal() {
-    let scratch = Scratch::new();
-    let calibration = scratch.calibration("cal.json");
-    let other = scratch.write("other.csv", "time_s,s1\n0,1\n0.01,2\n");
-    let mut command = stretch();
-    command.arg("apply").arg("--calibration").arg(&calibration).arg(&other);
-    fails(&mut command, &["other.csv", "bridge_v", "s1"]);
-}
-
-#[test]
-fn an_option_that_is_misspelt_says_what_is_understood() {
-    let scratch = Scratch::new();
-    let trial = scratch.loops("trial.csv", 5.0, 1.2);
-    for (option, value, hint) in [
-        ("--model", "poly77", "poly55"),
-        ("--rate", "savgol:11", "savgol:WINDOW,DEGREE"),
-        ("--robust", "both", "bisquare"),
-    ] {
-        let output =
-            calibrate(&trial, &scratch.path("cal.json")).args([option, value]).output().unwrap();
-        assert_eq!(output.status.code(), Some(2));
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert!(message.contains(hint), "{message}");
-    }
 }
 
 #[test]

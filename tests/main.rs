@@ -1,12 +1,12 @@
 //! The tests of the program from outside, one program: linking takes longer than most of them.
 
 mod bad_input;
-mod bounded;
 mod corpus;
 mod demo;
 mod diagnose;
 mod diagnose_gauge;
 mod diagnosed;
+mod doubts;
 mod every_effect;
 mod export;
 mod fix;

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, fs};
 
-use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
+use crate::support::{Scratch, calibrate, fails, runs, stretch};
 use testkit::random::unit;
 
 /// The rows of a trial, each changed by its number.
@@ -19,13 +19,6 @@ fn changed(
         writeln!(out, "{}", cells.join(",")).unwrap();
     }
     scratch.write(name, out)
-}
-
-/// Standard error of a command that succeeds.
-fn warned(command: &mut assert_cmd::Command) -> String {
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    one_line(&String::from_utf8_lossy(&output.stderr))
 }
 
 #[test]
@@ -80,46 +73,4 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
         assert!(told.contains("explains nothing") && told.contains("--force"), "{told}");
         fs::remove_file(&out).unwrap();
     }
-}
-
-#[test]
-fn a_log_that_does_not_belong_to_the_record_is_said_to_be_none_of_its_own() {
-    let scratch = Scratch::new();
-    let record = scratch.calibration("cal.json");
-    let apply = |log: &std::path::Path| {
-        let mut command = stretch();
-        command.arg("apply").arg("--calibration").arg(&record).arg(log);
-        command.arg("--out").arg(scratch.path("out.csv"));
-        warned(&mut command)
-    };
-    let evaluate = |log: &std::path::Path| {
-        let mut command = stretch();
-        command.arg("evaluate").arg("--calibration").arg(&record).arg(log);
-        warned(&mut command)
-    };
-    let own = scratch.loops("own.csv", 20.0, 1.0);
-    assert!(apply(&own).contains("outside of what was calibrated"), "the count is always told");
-    for said in [apply(&own), evaluate(&own)] {
-        assert!(!said.contains("is this a log of that"), "{said}");
-    }
-    // millivolts for volts
-    let other_unit = changed(&scratch, "millivolts.csv", |_, cells| {
-        cells[2] = format!("{:.2}", 1000.0 * cells[2].parse::<f64>().unwrap());
-    });
-    for said in [apply(&other_unit), evaluate(&other_unit)] {
-        assert!(said.contains("samples lie outside the range of the calibration"), "{said}");
-        assert!(said.contains("are they in mV? divided by 1000,"), "{said}");
-    }
-    // metres for millimetres
-    let other_reference = changed(&scratch, "metres.csv", |_, cells| {
-        cells[1] = format!("{:.7}", 0.001 * cells[1].parse::<f64>().unwrap());
-    });
-    let said = evaluate(&other_reference);
-    assert!(said.contains("errs more than the mean of the reference would"), "{said}");
-    assert!(said.contains("does not belong to that calibration"), "{said}");
-    // live, at the end of the stream
-    let mut command = stretch();
-    command.args(["apply", "-", "--calibration"]).arg(&record);
-    let said = warned(command.write_stdin(fs::read(&other_unit).unwrap()));
-    assert!(said.contains("are they in mV?"), "{said}");
 }

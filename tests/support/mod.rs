@@ -112,6 +112,15 @@ pub(crate) fn runs(command: &mut Command) -> String {
     unbroken(&prints(command))
 }
 
+/// What a command that succeeds says on standard error, in one line.
+#[track_caller]
+pub(crate) fn warned(command: &mut Command) -> String {
+    let output = command.output().expect("the program runs");
+    let told = one_line(&String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{told}");
+    told
+}
+
 /// What a command prints for other programs.
 #[track_caller]
 pub(crate) fn prints(command: &mut Command) -> String {

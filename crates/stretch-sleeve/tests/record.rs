@@ -7,7 +7,10 @@ use serde_json::{Value, json};
 use stretch_calibrate::{calibration_from_json, calibration_to_json, read_calibration};
 use stretch_core::{record, strategies};
 use stretch_receptor::example_calibration;
-use stretch_sleeve::{GaugeCalibration, SleeveCalibration, Turns, describe_record, seal_record};
+use stretch_sleeve::{
+    GaugeCalibration, SleeveCalibration, Turns, array_bytes, describe_record, example_array,
+    seal_record,
+};
 
 /// Levels at which movements turn.
 fn turns() -> impl Strategy<Value = Turns> {
@@ -146,7 +149,9 @@ fn records_of_schema_1_are_sealed_when_asked() {
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();
         assert!(!describe_record(&path).unwrap().is_sealed);
-        assert_eq!(seal_record(&path).unwrap().calibration(), &calibration);
+        let sealed = seal_record(&path).unwrap();
+        let SleeveCalibration::One(sealed) = sealed else { panic!("one gauge") };
+        assert_eq!(sealed.calibration(), &calibration);
         assert!(describe_record(&path).unwrap().is_sealed);
         assert_eq!(read_calibration(&path).unwrap(), calibration);
     }
@@ -169,6 +174,7 @@ fn a_hand_edit_is_told_apart_and_sealed_again() {
     assert!(message.contains("edited or damaged") && message.contains("--seal"), "{message}");
     let sealed = seal_record(&path).unwrap();
     assert_eq!(read_calibration(&path).unwrap().spec().dead_band, 0.125);
+    let SleeveCalibration::One(sealed) = sealed else { panic!("one gauge") };
     assert_eq!(sealed.turns(), Some(&some_turns()));
     // a digest that went with the edit
     edit("\"digest\"", "\"digesd\"");
@@ -178,6 +184,41 @@ fn a_hand_edit_is_told_apart_and_sealed_again() {
     // a seal is no pardon
     let message = seal_record(&path).unwrap_err().to_string();
     assert!(message.contains("dead_band"), "{message}");
+}
+
+#[test]
+fn records_with_sorted_fields_or_an_edit_are_told_as_such_and_sealed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cal.json");
+    let one = SleeveCalibration::One(Box::new(with_turns()));
+    let bytes = array_bytes(&example_array()).unwrap();
+    let several = SleeveCalibration::Many(Box::new(record::load(&bytes).unwrap()));
+    for (calibration, edited) in [
+        (&one, None),
+        (&one, Some("/dead_band")),
+        (&several, None),
+        (&several, Some("/all/constant")),
+    ] {
+        let text = calibration.bytes(&path).unwrap();
+        let mut value: Value = serde_json::from_slice(&text).unwrap();
+        if let Some(field) = edited {
+            *value.pointer_mut(field).unwrap() = json!(0.125);
+        }
+        // as jq -S writes it
+        fs::write(&path, value.to_string()).unwrap();
+        let message = SleeveCalibration::read(&path).unwrap_err().to_string();
+        let says =
+            "or its fields were sorted; check every number, then renew it with: stretch export";
+        assert!(message.contains(says) && message.contains("and its text gives"), "{message}");
+        let sealed = seal_record(&path).unwrap();
+        assert_eq!(SleeveCalibration::read(&path).unwrap(), sealed);
+        assert_eq!(&sealed == calibration, edited.is_none());
+        // no seal is a pardon
+        value["of_tomorrow"] = json!(1);
+        fs::write(&path, value.to_string()).unwrap();
+        let message = seal_record(&path).unwrap_err().to_string();
+        assert!(message.contains("of_tomorrow"), "{message}");
+    }
 }
 
 #[test]

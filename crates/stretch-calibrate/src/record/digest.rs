@@ -48,13 +48,27 @@ pub fn split(text: &str) -> (String, Option<String>) {
     }
 }
 
-/// Why a digest is not that of its text.
-pub const CHANGED: &str = "it was edited or damaged, or its fields were sorted";
-
-/// The object of a record whose digest is that of its text; `None` for one that was edited or damaged.
-pub fn verified(text: &str) -> Option<String> {
+/// The object of a record whose digest is that of its text.
+///
+/// # Errors
+/// What is wrong with the digest, and the advice: what to do.
+pub fn verified(text: &str, advice: &str) -> Result<String, String> {
     let (object, found) = split(text);
-    (found == Some(digest(&object))).then_some(object)
+    let computed = digest(&object);
+    match found {
+        Some(found) if found == computed => Ok(object),
+        Some(found) => Err(format!(
+            "its digest is {found} and its text gives {computed}: it was edited or damaged, or its fields were sorted; {advice}"
+        )),
+        None => Err(format!("it has no digest; {advice}")),
+    }
+}
+
+/// What to do about a calibration whose digest is not that of its text.
+pub fn how_to_renew(file: &str) -> String {
+    format!(
+        "check every number, then renew it with: stretch export --calibration {file} --seal; or calibrate again"
+    )
 }
 
 /// The value of an object without its digest.

@@ -197,18 +197,24 @@ impl SleeveCalibration {
             return several.or_else(|_| one());
         }
         let text = String::from_utf8(bytes).unwrap_or_default();
-        let (object, _) = digest::split(&text);
-        let value: Option<serde_json::Value> = serde_json::from_str(&object).ok();
-        if value.is_none_or(|value| value.get("channels").is_none()) {
+        if !is_of_several(&text) {
             return one();
         }
         let file = path.display().to_string();
-        let damaged =
-            || format!("its digest is not that of its text: {}; calibrate again", digest::CHANGED);
-        let object = digest::verified(&text).ok_or_else(|| unusable(&file, damaged()))?;
-        let several = digest::parse(&object).map_err(|error| unusable(&file, error))?;
+        let object = digest::verified(&text, &digest::how_to_renew(&file));
+        Self::of_several(&object.map_err(|error| unusable(&file, error))?, &file)
+    }
+
+    /// The record of several gauges in an object without its digest.
+    fn of_several(object: &str, name: &str) -> Result<Self, CalibrateError> {
+        let several = digest::parse(object).map_err(|error| unusable(name, error))?;
         Ok(Self::Many(Box::new(several)))
     }
+}
+
+fn is_of_several(text: &str) -> bool {
+    let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
+    value.is_some_and(|value| value.get("channels").is_some())
 }
 
 fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
@@ -216,25 +222,30 @@ fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
     CalibrateError::Record { file: file.to_owned(), problem }
 }
 
-/// Checks a record of one gauge that was edited by hand or has an earlier schema, and writes the
-/// record again under a seal of the current schema. A damaged record in postcard is refused,
-/// because postcard cannot be edited by hand.
+/// Checks a record of one gauge or of several that was edited by hand or has an earlier schema, and
+/// writes the record again under a seal of the current schema. A damaged record in postcard is
+/// refused, because postcard cannot be edited by hand.
 ///
 /// # Errors
-/// The errors of [`GaugeCalibration::read`] except that of the digest, and those of writing.
-pub fn seal_record(path: &Path) -> Result<GaugeCalibration, CalibrateError> {
+/// The errors of [`SleeveCalibration::read`] except that of the digest, and those of writing.
+pub fn seal_record(path: &Path) -> Result<SleeveCalibration, CalibrateError> {
     let text = read_whole(path).ok().and_then(|bytes| String::from_utf8(bytes).ok());
-    let gauge = match text.filter(|_| !is_postcard(path)) {
-        Some(text) => {
-            let file = path.display().to_string();
-            let calibration = calibration_from_edited_json(&text, &file)?;
-            GaugeCalibration::with_turns_of(&text, &file, calibration)?
+    let file = path.display().to_string();
+    let record = match text.filter(|_| !is_postcard(path)) {
+        Some(text) if is_of_several(&text) => {
+            SleeveCalibration::of_several(&digest::split(&text).0, &file)?
         }
-        None => GaugeCalibration::read(path)?,
+        Some(text) => {
+            let calibration = calibration_from_edited_json(&text, &file)?;
+            let gauge = GaugeCalibration::with_turns_of(&text, &file, calibration)?;
+            SleeveCalibration::One(Box::new(gauge))
+        }
+        None => SleeveCalibration::read(path)?,
     };
+    let bytes = record.bytes(path)?;
     rewrites(path);
-    gauge.write(path)?;
-    Ok(gauge)
+    write_whole(path, |out| out.write_all(&bytes))?;
+    Ok(record)
 }
 
 /// The kind and the seal of a record.

@@ -16,10 +16,12 @@ use super::{
     tree::Known,
 };
 
-fn problem(file: &str, problem: impl std::fmt::Display) -> SleeveError {
-    let problem = format!(
-        "this is no prior that can be used: {problem}; learn it again with stretch sleeve learn"
-    );
+/// What a file is, and how it is made again.
+const PRIOR: [&str; 2] = ["prior", "learn it again with stretch sleeve learn"];
+const SESSION: [&str; 2] = ["session", "write it again with stretch calibrate --session"];
+
+fn problem([what, again]: [&str; 2], file: &str, problem: impl std::fmt::Display) -> SleeveError {
+    let problem = format!("this is no {what} that can be used: {problem}; {again}");
     SleeveError::Prior { file: file.to_owned(), problem }
 }
 
@@ -29,9 +31,9 @@ impl Prior {
     /// # Errors
     /// [`SleeveError::Prior`] with the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, SleeveError> {
-        let (prior, file): (Self, _) = opened(path)?;
+        let (prior, file): (Self, _) = opened(PRIOR, path)?;
         if prior.schema != SCHEMA {
-            return Err(problem(&file, "it was written by another release"));
+            return Err(problem(PRIOR, &file, "it was written by another release"));
         }
         let terms = 1 + prior.domains.len() * Bank::terms_a_channel();
         let has_domain = |d: &Vec<Interval>| !d.is_empty() && d.iter().all(|d| d.min < d.max);
@@ -46,7 +48,7 @@ impl Prior {
             && prior.levels.iter().chain([&prior.gram]).all(is_whole);
         match is_good {
             true => Ok(prior),
-            false => Err(problem(&file, "its numbers are not as many as its channels need")),
+            false => Err(problem(PRIOR, &file, "its numbers are not as many as its channels need")),
         }
     }
 
@@ -55,30 +57,28 @@ impl Prior {
     /// # Errors
     /// Never, because all of its numbers are finite.
     pub fn to_json(&self) -> Result<String, SleeveError> {
-        sealed(self, "prior")
+        sealed(PRIOR, self, "prior")
     }
 }
 
 /// An object in JSON with its digest as the last field.
-fn sealed(record: &impl Serialize, name: &str) -> Result<String, SleeveError> {
-    let object = serde_json::to_string(record).map_err(|error| problem(name, error))?;
-    digest::join(&object).ok_or_else(|| problem(name, "it is no object"))
+fn sealed(what: [&str; 2], record: &impl Serialize, name: &str) -> Result<String, SleeveError> {
+    let object = serde_json::to_string(record).map_err(|error| problem(what, name, error))?;
+    digest::join(&object).ok_or_else(|| problem(what, name, "it is no object"))
 }
 
 /// The object of a file whose digest is that of its text.
-fn opened<T: for<'d> Deserialize<'d>>(path: &Path) -> Result<(T, String), SleeveError> {
+fn opened<T: for<'d> Deserialize<'d>>(
+    what: [&str; 2],
+    path: &Path,
+) -> Result<(T, String), SleeveError> {
     let file = path.display().to_string();
-    let bytes = read_whole(path).map_err(|error| problem(&file, error))?;
-    let text = String::from_utf8(bytes).map_err(|error| problem(&file, error))?;
-    let damaged = || {
-        format!(
-            "its digest is not that of its text: {}; learn it again, or take an unchanged copy",
-            digest::CHANGED
-        )
-    };
-    let object = digest::verified(&text).ok_or_else(|| problem(&file, damaged()))?;
-    let value = digest::parse(&object).map_err(|error| problem(&file, error))?;
-    Ok((value, file))
+    let unusable = |error: &dyn std::fmt::Display| problem(what, &file, error);
+    let bytes = read_whole(path).map_err(|error| unusable(&error))?;
+    let text = String::from_utf8(bytes).map_err(|error| unusable(&error))?;
+    let object = digest::verified(&text, "take an unchanged copy if there is one");
+    let value = digest::parse(&object.map_err(|error| unusable(&error))?);
+    Ok((value.map_err(|error| unusable(&error))?, file))
 }
 
 impl Session {
@@ -87,7 +87,7 @@ impl Session {
     /// # Errors
     /// [`SleeveError::Prior`] with the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, SleeveError> {
-        let (session, file): (Self, _) = opened(path)?;
+        let (session, file): (Self, _) = opened(SESSION, path)?;
         session.check(&file)?;
         Ok(session)
     }
@@ -97,7 +97,7 @@ impl Session {
     /// # Errors
     /// Never, because all of its numbers are finite.
     pub fn to_json(&self) -> Result<String, SleeveError> {
-        sealed(self, &self.name)
+        sealed(SESSION, self, &self.name)
     }
 }
 

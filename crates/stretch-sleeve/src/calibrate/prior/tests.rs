@@ -141,6 +141,27 @@ fn a_prior_and_a_session_are_what_they_were_after_writing_and_reading() {
 }
 
 #[test]
+fn sorted_fields_of_a_prior_and_of_a_session_are_told_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.json");
+    let prior_error = || Prior::read(&path).map(drop).unwrap_err().to_string();
+    let session_error = || Session::read(&path).map(drop).unwrap_err().to_string();
+    let (prior, session) = (prior(&["s1"]).to_json(), summed(0, 0, &["s1"]).to_json());
+    let members: [(_, &dyn Fn() -> String, _); 2] = [
+        (prior, &prior_error, "learn it again with stretch sleeve learn"),
+        (session, &session_error, "write it again with stretch calibrate --session"),
+    ];
+    for (text, error, again) in members {
+        let value: serde_json::Value = serde_json::from_str(&text.unwrap()).unwrap();
+        std::fs::write(&path, value.to_string()).unwrap();
+        let error = error();
+        let says =
+            format!("or its fields were sorted; take an unchanged copy if there is one; {again}");
+        assert!(error.contains(&says) && error.contains("file.json"), "{error}");
+    }
+}
+
+#[test]
 fn data_of_another_kind_are_refused_with_what_to_do() {
     let prior = prior(&["s1"]);
     let refused = |change: &dyn Fn(&mut Trial), options: UpdateOptions, says: &str| {

@@ -1,6 +1,6 @@
 //! One trial that is not like the others is told, each mistake once, and no trial that is.
 
-use stretch_calibrate::{ModelKind, Options, calibrate};
+use stretch_calibrate::{LiveReceptor, ModelKind, Options, Seen, calibrate};
 use stretch_data::{Channel, Trial};
 
 /// A muscle's length, in mm, and a gauge with a play, a curve and noise, in V.
@@ -142,4 +142,34 @@ fn trials_of_one_gauge_are_not_doubted() {
     let turns = torque.time_s.iter().map(|t| f64::max((5.3 * t).sin(), 0.0)).collect();
     torque.channels[SIGNAL].values = turns;
     assert_eq!(notes(&[torque]), Vec::<String>::new());
+}
+
+/// Of a stream at 400 Hz, the rate that is told is the rate of the rows that stay if those that go back in time are left out, as files
+/// leave them out.
+#[test]
+fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
+    const LATE: f64 = 1.4;
+    let calibration = stretch_receptor::example_calibration();
+    let regular = |n: usize| n as f64;
+    // name, number of periods at a row, rate in Hz
+    let members: [(&str, &dyn Fn(usize) -> f64, f64); 6] = [
+        ("every third is late", &|n| regular(n) + LATE * f64::from(n % 3 == 1), 266.7),
+        ("every third is early", &|n| regular(n) - LATE * f64::from(n % 3 == 1), 266.7),
+        ("pairs are exchanged", &|n| regular(n ^ 1), 200.0),
+        ("one pair in three is exchanged", &|n| regular(n - n % 3 + [0, 2, 1][n % 3]), 266.7),
+        ("a buffer held the first", &|n| regular(n) + 1e6 * f64::from(n == 0), 400.0),
+        ("the clock begins anew", &|n| regular(n) + 1e6 * f64::from(n < 20), 400.0),
+    ];
+    for (name, periods, rate_hz) in members {
+        let mut seen = Seen::of(&calibration);
+        let mut live = LiveReceptor::new(&calibration).expect("a receptor");
+        let doubt = (0..200).find_map(|n| {
+            let time_s = periods(n) / 400.0;
+            seen.take(time_s, 1.5, &live.step(time_s, 1.5))
+        });
+        let text = doubt.expect(name).text;
+        let (found, _) = text.split_once(' ').expect(name);
+        let found_hz: f64 = found.parse().expect(name);
+        assert!((found_hz / rate_hz - 1.0).abs() < 0.03, "{name}: {text}");
+    }
 }

@@ -209,6 +209,36 @@ pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     Some(rate).filter(|rate| rate.is_finite())
 }
 
+/// The samples that must be left out for the others to be in order; as few as possible.
+///
+/// ```
+/// assert_eq!(stretch_data::out_of_order(&[9.0, 0.0, 0.1, 0.3, 0.2, 0.4]), [0, 3]);
+/// assert!(stretch_data::out_of_order(&[0.0, 0.1, 0.1]).is_empty());
+/// ```
+pub fn out_of_order(times: &[f64]) -> Vec<usize> {
+    // longest run that does not fall: the last sample of the best run of each length, and what comes before each sample
+    let (mut ends, mut before): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (i, time) in times.iter().enumerate() {
+        let length = ends.partition_point(|end| times[*end] <= *time);
+        before.push(length.checked_sub(1).map_or(usize::MAX, |last| ends[last]));
+        match ends.get_mut(length) {
+            Some(end) => *end = i,
+            None => ends.push(i),
+        }
+    }
+    let mut kept = ends.last().copied().unwrap_or(usize::MAX);
+    let mut left_out = Vec::new();
+    for i in (0..times.len()).rev() {
+        if i == kept {
+            kept = before[i];
+        } else {
+            left_out.push(i);
+        }
+    }
+    left_out.reverse();
+    left_out
+}
+
 /// A time that was computed from others of up to `largest_s`, with the fewest decimals that say it: two units in the last
 /// place of the largest are nobody's measurement.
 ///

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 use stretch_core::Calibration;
-use stretch_data::{Trial, rate_of};
+use stretch_data::{Trial, out_of_order, rate_of};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
@@ -167,8 +167,8 @@ const INTERVALS: usize = 51;
 struct Pace {
     rate_hz: f64,
     needs_signal_only: bool,
-    last_s: Option<f64>,
-    intervals_s: Vec<f64>,
+    /// Those of the first samples, until they tell.
+    stamps_s: Vec<f64>,
     is_told: bool,
 }
 
@@ -176,26 +176,27 @@ impl Pace {
     fn of(calibration: &Calibration) -> Self {
         let rate_hz = calibration.spec().sample_rate_hz.hz();
         let needs_signal_only = calibration.spec().model.needs_signal_only();
-        Self { rate_hz, needs_signal_only, last_s: None, intervals_s: Vec::new(), is_told: false }
+        Self { rate_hz, needs_signal_only, stamps_s: Vec::new(), is_told: false }
     }
 
     /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
     /// time counts as one that is missing, so that a slower stream has right rates, but gaps; a faster
     /// one has wrong rates.
     fn take(&mut self, time_s: f64) -> Option<Doubt> {
-        let before_s = self.last_s.replace(time_s)?;
-        if self.is_told || time_s <= before_s {
+        if self.is_told || !time_s.is_finite() || self.stamps_s.last() == Some(&time_s) {
             return None;
         }
-        self.intervals_s.push(time_s - before_s);
-        if self.intervals_s.len() < INTERVALS {
+        self.stamps_s.push(time_s);
+        if self.stamps_s.len() <= INTERVALS {
             return None;
         }
         self.is_told = true;
-        let mut stamps_s = vec![0.0];
-        for interval_s in std::mem::take(&mut self.intervals_s) {
-            stamps_s.push(stamps_s[stamps_s.len() - 1] + interval_s);
+        let mut stamps_s = std::mem::take(&mut self.stamps_s);
+        // a row that goes back in time is left out of a file, too
+        for at in out_of_order(&stamps_s).into_iter().rev() {
+            stamps_s.remove(at);
         }
+        stamps_s.dedup();
         let (found_hz, rate_hz) = (rate_of(&stamps_s)?, self.rate_hz);
         if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
             return None;

@@ -8,7 +8,7 @@ mod order;
 mod spread;
 pub(crate) mod unit;
 
-use stretch_data::Place;
+use stretch_data::{Place, out_of_order};
 
 use crate::{
     ReadOptions, RecordingError,
@@ -199,7 +199,7 @@ pub(crate) fn read(
     stamps.per_second = Some(per_second);
     if steps.back > 0 {
         notes.extend(order::unroll(stamps, steps.tick, per_second));
-        let stale = order::stale(&stamps.counts);
+        let stale = out_of_order(&stamps.counts);
         leave_out(file, track, &stale, "is not in the order of the others", options, notes)?;
     } else {
         let unset = order::before_the_clock_was_set(&stamps.counts, steps.tick);

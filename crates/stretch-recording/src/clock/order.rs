@@ -65,31 +65,6 @@ pub(super) fn note(row: u64, added_s: f64, times: usize) -> String {
     }
 }
 
-/// The samples that must be left out for the others to be in order; as few as possible.
-pub(super) fn stale(counts: &[f64]) -> Vec<usize> {
-    // longest run that does not fall: the last sample of the best run of each length, and what comes before each sample
-    let (mut ends, mut before): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
-    for (i, count) in counts.iter().enumerate() {
-        let length = ends.partition_point(|end| counts[*end] <= *count);
-        before.push(length.checked_sub(1).map_or(usize::MAX, |last| ends[last]));
-        match ends.get_mut(length) {
-            Some(end) => *end = i,
-            None => ends.push(i),
-        }
-    }
-    let mut kept = ends.last().copied().unwrap_or(usize::MAX);
-    let mut left_out = Vec::new();
-    for i in (0..counts.len()).rev() {
-        if i == kept {
-            kept = before[i];
-        } else {
-            left_out.push(i);
-        }
-    }
-    left_out.reverse();
-    left_out
-}
-
 /// How many of the first samples were stamped before the clock was set: the gap behind them is many times what follows.
 pub(super) fn before_the_clock_was_set(counts: &[f64], step: f64) -> usize {
     let Some(last) = counts.last() else { return 0 };

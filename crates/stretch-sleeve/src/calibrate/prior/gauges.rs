@@ -1,8 +1,13 @@
 //! Whether gauges stand in the places, and rise where they rose, in the sessions of a prior: by their signals alone.
 
 use nalgebra::{DMatrix, DVector};
+use stretch_calibrate::toolkit::extent;
+use stretch_data::Trial;
 
-use crate::calibrate::{bank::Bank, channels::Channels, linear::inverse};
+use crate::{
+    SleeveError,
+    calibrate::{bank::Bank, channels::Channels, linear::inverse},
+};
 
 use super::learnt::Prior;
 
@@ -64,6 +69,27 @@ impl Moments {
 }
 
 impl Prior {
+    /// A session as it would be with all gauges reversed: about zero, as turned wires do it, and about the middle of each signal.
+    pub(crate) fn mirrored(
+        &self,
+        trials: &[Trial],
+        signals: &[String],
+        channels: &Channels,
+    ) -> Result<[Channels; 2], SleeveError> {
+        let about = |twice_middle: &dyn Fn(usize) -> f64| {
+            let mut mirrored = trials.to_vec();
+            for channel in mirrored.iter_mut().flat_map(|trial| &mut trial.channels) {
+                if let Some(k) = signals.iter().position(|name| *name == channel.name) {
+                    let sum = twice_middle(k);
+                    channel.values.iter_mut().for_each(|x| *x = sum - *x);
+                }
+            }
+            Channels::without_reference(&mirrored, signals)
+        };
+        let ends = |k: usize| extent(channels.signal(k));
+        Ok([about(&|_| 0.0)?, about(&|k| ends(k).min + ends(k).max)?])
+    }
+
     /// What is wrong with gauges that are like those of the sessions only if two are exchanged, or one is reversed.
     pub(crate) fn misplaced(&self, channels: &Channels) -> Option<String> {
         let prior = Moments::of_prior(self);

@@ -104,6 +104,18 @@ pub struct Assumed {
 /// Mean rows at the landmarks.
 type Rows = [DVector<f64>; LANDMARKS];
 
+/// What the landmarks of a session make of the coefficients.
+struct OnLandmarks {
+    after: Normal,
+    rows: Rows,
+    distance: f64,
+}
+
+/// The note on a movement whose ends and rest are the same from either side.
+const REVERSED: &str = "without a reference it cannot be told whether all gauges are reversed, because the signals fit the earlier sessions \
+                        then, too: look whether the estimate rises where the reference does, or give ten seconds of reference (stretch \
+                        calibrate --prior)";
+
 impl Prior {
     /// Renews a calibration by the ends and the rests of a movement, without any reference.
     ///
@@ -128,16 +140,18 @@ impl Prior {
         let values = values.ok_or_else(undetermined)?;
         let bank = Bank::new(self.domains.clone());
         self.refuse_standing(&bank, &channels, &normal, &values)?;
-        let mut after = normal.clone();
-        let (mut rows, mut distance) = (self.rows(&bank, &channels, &normal.mean), 0.0);
-        for _ in 0..2 {
-            (after, distance) =
-                moved(&normal, &rows, &values, self.noise).ok_or_else(undetermined)?;
-            rows = self.rows(&bank, &channels, &after.mean);
-        }
-        self.refuse_unseen(distance, options)?;
+        let own = self.onto_landmarks(&channels, &normal, &values);
+        let OnLandmarks { after, rows, distance } = own.ok_or_else(undetermined)?;
+        let mirrored = self.mirrored(trials, signals, &channels)?;
+        let is_seen = |mirrored: &Channels| {
+            let found = self.onto_landmarks(mirrored, &normal, &values);
+            found.is_some_and(|found| found.distance <= UNSEEN)
+        };
+        let may_be_reversed = mirrored.iter().any(is_seen);
+        self.refuse_unseen(distance, options, may_be_reversed)?;
         let mut notes = channels.notes.clone();
         notes.extend(self.whom(&options.path, known));
+        notes.extend(may_be_reversed.then(|| REVERSED.to_owned()));
         let predicted = after.covariance.component_mul(&self.gram).sum() + self.noise;
         let variance = predicted * self.spread(0.0, known > 0).widening;
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
@@ -164,6 +178,22 @@ impl Prior {
         // both sessions differ from their wearer, as sessions do
         let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);
         Ok((Normal { mean: DVector::from_vec(weights), covariance }, known))
+    }
+
+    /// The coefficients after the landmarks, which are found with those before and once more with the result.
+    fn onto_landmarks(
+        &self,
+        channels: &Channels,
+        before: &Normal,
+        values: &[Landmark],
+    ) -> Option<OnLandmarks> {
+        let bank = Bank::new(self.domains.clone());
+        let mut rows = self.rows(&bank, channels, &before.mean);
+        let (first, _) = moved(before, &rows, values, self.noise)?;
+        rows = self.rows(&bank, channels, &first.mean);
+        let (after, distance) = moved(before, &rows, values, self.noise)?;
+        rows = self.rows(&bank, channels, &after.mean);
+        Some(OnLandmarks { after, rows, distance })
     }
 
     /// The mean rows at the landmarks that some coefficients find.
@@ -209,7 +239,12 @@ impl Prior {
         })
     }
 
-    fn refuse_unseen(&self, distance: f64, options: &RenewOptions) -> Result<(), SleeveError> {
+    fn refuse_unseen(
+        &self,
+        distance: f64,
+        options: &RenewOptions,
+        may_be_reversed: bool,
+    ) -> Result<(), SleeveError> {
         if distance <= UNSEEN {
             return Ok(());
         }
@@ -217,12 +252,17 @@ impl Prior {
             true => String::new(),
             false => format!(" of {}", options.path.join("/")),
         };
+        let why = match may_be_reversed {
+            true => {
+                "they would not be if all gauges were reversed: turn the wires or the signs of the columns (stretch convert), or"
+            }
+            false => "another movement, sensor or polarity;",
+        };
         Err(SleeveError::Prior {
             file: "these data".into(),
             problem: format!(
                 "the ends and rests of their signals are further from those of the sessions{of} than one session in a thousand is (squared \
-                 distance {distance:.1}, at most {UNSEEN}): another movement, sensor or polarity; give ten seconds of reference or more \
-                 (stretch calibrate --prior)"
+                 distance {distance:.1}, at most {UNSEEN}): {why} give ten seconds of reference or more (stretch calibrate --prior)"
             ),
         })
     }

@@ -10,14 +10,28 @@ use crate::{
 
 const HZ: f64 = 50.0;
 
-/// A session of one wearer: two gauges with gain, zero and a memory of 0.3 s, one angle.
+/// A session of one wearer whose movement is the same from either side.
 fn session(wearer: usize, number: usize, seconds: f64) -> Trial {
+    let swings = |t: f64, phase: f64| {
+        45.0 + 30.0 * (1.3 * t + phase).sin() + 10.0 * (0.37 * t * t.sqrt()).sin()
+    };
+    gauged(wearer, number, seconds, swings)
+}
+
+/// A session of one wearer whose movement rests at its low end.
+fn resting(wearer: usize, number: usize, seconds: f64) -> Trial {
+    let rests = |t: f64, phase: f64| 10.0 + 70.0 * (1.3 * t + phase).sin().max(0.0).powi(2);
+    gauged(wearer, number, seconds, rests)
+}
+
+/// Two gauges with gain, zero and a memory of 0.3 s on an angle of a time and a phase.
+fn gauged(wearer: usize, number: usize, seconds: f64, moves: impl Fn(f64, f64) -> f64) -> Trial {
     let gain = 1.0 + 0.2 * (wearer as f64 * 2.3).sin() + 0.02 * number as f64;
     let zero = 0.1 * (wearer as f64 * 1.7).cos() + 0.01 * number as f64;
     let count = (seconds * HZ) as usize;
     let time_s: Vec<f64> = (0..count).map(|n| n as f64 / HZ).collect();
     let phase = (3 * wearer + number) as f64;
-    let angle = |t: f64| 45.0 + 30.0 * (1.3 * t + phase).sin() + 10.0 * (0.37 * t * t.sqrt()).sin();
+    let angle = |t: f64| moves(t, phase);
     let mut slow = angle(0.0);
     let (mut first, mut second) = (Vec::new(), Vec::new());
     for (n, &t) in time_s.iter().enumerate() {
@@ -35,16 +49,26 @@ fn session(wearer: usize, number: usize, seconds: f64) -> Trial {
     }
 }
 
+type Simulated = fn(usize, usize, f64) -> Trial;
+
 fn summed(wearer: usize, number: usize, signals: &[&str]) -> Session {
-    let trial = session(wearer, number, 90.0);
+    summed_of(session, wearer, number, signals)
+}
+
+fn summed_of(simulated: Simulated, wearer: usize, number: usize, signals: &[&str]) -> Session {
+    let trial = simulated(wearer, number, 90.0);
     let options = SessionOptions::new(signals.to_vec(), "angle_deg").of(&format!("w{wearer}"));
     Session::new(&trial.name, std::slice::from_ref(&trial), &options).unwrap().0
 }
 
 fn prior(signals: &[&str]) -> Prior {
+    prior_of(session, signals)
+}
+
+fn prior_of(simulated: Simulated, signals: &[&str]) -> Prior {
     let sessions: Vec<Session> = (0..5)
         .flat_map(|wearer| (0..3).map(move |number| (wearer, number)))
-        .map(|(wearer, number)| summed(wearer, number, signals))
+        .map(|(wearer, number)| summed_of(simulated, wearer, number, signals))
         .collect();
     Prior::learn(&sessions).unwrap()
 }
@@ -297,6 +321,46 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
     let foreign =
         RenewOptions { calibration: Some(fit.unwrap().calibration), ..RenewOptions::of("w2") };
     refused(today, foreign, "not made of this prior");
+}
+
+#[test]
+fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_told() {
+    const ALIKE: Simulated = session;
+    const RESTS: Simulated = resting;
+    let note = "cannot be told whether all gauges are reversed";
+    let refusal = "they would not be if all gauges were reversed: turn the wires";
+    // the movement, the signals, what is subtracted from, and what is said
+    let members: [(Simulated, &[&str], Option<f64>, Result<Option<&str>, &str>); 10] = [
+        (ALIKE, &["s1"], None, Ok(Some(note))),
+        (ALIKE, &["s1"], Some(1.0), Ok(Some(note))),
+        (ALIKE, &["s1", "s2"], None, Ok(Some(note))),
+        (ALIKE, &["s1", "s2"], Some(1.2), Ok(Some(note))),
+        (ALIKE, &["s1", "s2"], Some(0.0), Err(refusal)),
+        (RESTS, &["s1"], None, Ok(None)),
+        (RESTS, &["s1"], Some(1.0), Err(refusal)),
+        (RESTS, &["s1", "s2"], None, Ok(None)),
+        (RESTS, &["s1", "s2"], Some(1.2), Err(refusal)),
+        (RESTS, &["s1", "s2"], Some(0.0), Err(refusal)),
+    ];
+    for (simulated, signals, subtracted_from, says) in members {
+        let prior = prior_of(simulated, signals);
+        let mut today = simulated(9, 1, 60.0);
+        today.channels.truncate(2);
+        let values = today.channels.iter_mut().flat_map(|channel| &mut channel.values);
+        values.for_each(|x| *x = subtracted_from.map_or(*x, |sum| sum - *x));
+        let renewed = prior.renew(&[today], &RenewOptions::default());
+        let member = format!("{signals:?} subtracted from {subtracted_from:?}");
+        match (renewed, says) {
+            (Ok(renewed), Ok(says)) => {
+                let is_noted = renewed.notes.iter().any(|found| found.contains(note));
+                assert_eq!(is_noted, says.is_some(), "{member}: {:?}", renewed.notes);
+            }
+            (Err(error), Err(says)) => {
+                assert!(error.to_string().contains(says), "{member}: {error}")
+            }
+            (found, _) => panic!("{member}: {:?}", found.map(|renewed| renewed.summary)),
+        }
+    }
 }
 
 #[test]

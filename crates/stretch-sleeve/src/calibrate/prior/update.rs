@@ -296,7 +296,8 @@ impl Prior {
                 .fold((0usize, 0usize), |(n, far_off), x| (n + 1, far_off + usize::from(far(x))));
             if 2 * outside > all {
                 return problem(format!(
-                    "{name} ran from {:.4} to {:.4} in its sessions, and most of these samples lie far outside: is the signal in another unit, or another gauge?",
+                    "{name} ran from {:.4} to {:.4} in its sessions, and most of these samples lie far outside: is the signal in another \
+                     unit, or reversed, or another gauge?",
                     domain.min, domain.max
                 ));
             }

@@ -73,4 +73,24 @@ stretch export --calibration "$fresh/observer.json" --c "$fresh/header" >/dev/nu
 node "$fresh/frames.mjs" >"$fresh/linked.txt"
 stretch listen --port - --calibration "$fresh/poly13.json" --out "$fresh/linked.csv" \
     <"$fresh/linked.txt" >/dev/null 2>"$fresh/linked.told"
+# and what makes one doubt a calibration on a trial: a name, what becomes of its columns, and the trial that it is made of
+doubted=$fresh/doubted
+mkdir "$doubted"
+for model in linear poly13; do
+    stretch calibrate "$bench"/inflation_50.csv "$bench"/deflation_50.csv --model "$model" --out "$doubted/$model.json" >/dev/null
+done
+doubt() {
+    awk -F, -v OFS=, "NR > 1 { $2 } 1" "$bench/$3.csv" >"$doubted/$1.csv"
+    stretch evaluate --calibration "$doubted/linear.json" --calibration "$doubted/poly13.json" "$doubted/$1.csv" >/dev/null 2>"$doubted/$1.told"
+}
+doubt none '' arbitrary_1
+doubt millivolts '$6 *= 1000' arbitrary_1
+doubt twice_as_fast '$1 /= 2' arbitrary_1
+doubt standing_reference '$5 = 170' arbitrary_1
+doubt mounted_anew '$5 += 20' arbitrary_1
+doubt not_connected '$6 = 1.5' arbitrary_1
+doubt fitted '' inflation_50
+# a stream twice as fast, of a sensor that is not connected
+awk -F, -v OFS=, 'NR == 1 { print $1, $6 } NR > 1 { print $1 / 2, 1.5 }' "$bench/arbitrary_1.csv" >"$fresh/doubted.txt"
+stretch apply --calibration "$fresh/poly13.json" - <"$fresh/doubted.txt" >/dev/null 2>"$fresh/doubted.told"
 node "$fresh/page.mjs" ${SHOTS:+--shots "$SHOTS"} "$target/page/index.html" "$bench" "$fresh" ../firmware/golden.txt

@@ -73,15 +73,17 @@ const calibration = {
       [m.model, shown(m.rmse), shown(m.rmse_arbitrary), shown(m.rmse_pulses), shown(m.rmse_ramps), m.problem ?? String(m.parameters)];
     tell.table("rows", made.models.map(row), made.models.findIndex((m) => m.model === made.model));
     tell.table("errors", []);
+    tell.list("doubts", []);
     html("judged-on").textContent = "";
     html("unit").textContent = made.unit;
   },
 
-  /** @param {{evaluation: {unit: string, trials: {trial: string}[], pooled: MethodErrors[]}, held_out: boolean}} judgement */
-  judgement({ evaluation: { unit, trials, pooled }, held_out }) {
+  /** @param {{evaluation: {unit: string, trials: {trial: string}[], pooled: MethodErrors[]}, doubts: {text: string}[], held_out: boolean}} judgement */
+  judgement({ evaluation: { unit, trials, pooled }, doubts, held_out }) {
     const row = (/** @type {MethodErrors} */ e) =>
       [e.method, shown(e.average_error_percent, 3), shown(e.rmse), e.r_squared.toFixed(4).replace("-", "−"), shown(e.lag_s, 3)];
     tell.table("errors", pooled.map(row), pooled.length - 1);
+    tell.list("doubts", doubts.map((doubt) => doubt.text));
     const names = trials.map((t) => t.trial);
     const own = pooled[pooled.length - 1];
     const where = held_out ? "on recordings that were not fitted" : "on what was fitted: for an honest figure drop another recording and choose “only test” for it above";

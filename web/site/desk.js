@@ -32,7 +32,7 @@
     },
     heard(bytes, now) {
       const rows = live.take(bytes, now);
-      return { rows, lines: live.lines(), status: live.status() };
+      return { rows, lines: live.lines(), status: live.status(), doubts: live.doubts() };
     },
   };
 

@@ -32,6 +32,7 @@ const live = {
     live.hand = new Hand(() => {});
     live.rows = [];
     live.lines = [await live.hand.call("listen", form, input("adc").value, Number(input("line-rate").value), state.record)];
+    tell.list("live-doubts", []);
     await port.open({ baudRate: Number(input("baud").value) });
     html("listening").hidden = false;
     button("save-trial").hidden = false;
@@ -60,12 +61,13 @@ const live = {
     }
   },
 
-  /** @param {{rows: Float64Array, lines: string, status: string}} heard */
-  heard({ rows, lines, status }) {
+  /** @param {{rows: Float64Array, lines: string, status: string, doubts: string}} heard */
+  heard({ rows, lines, status, doubts }) {
     for (let i = 0; i + 2 < rows.length; i += 3) live.rows.push([rows[i], rows[i + 1], rows[i + 2]]);
     if (live.rows.length > 2 * MOST_ROWS) live.rows.splice(0, live.rows.length - MOST_ROWS);
     if (lines) live.lines.push(lines);
     html("link").textContent = status;
+    tell.list("live-doubts", doubts.split("\n").filter(Boolean));
     if (live.isDrawn) {
       live.isDrawn = false;
       requestAnimationFrame(live.draw);

@@ -3,7 +3,8 @@
  * held against what the program writes of the same files.
  * node page.mjs [--shots DIR] PAGE.html BENCH WANTED GOLDEN
  *   BENCH a data set, WANTED a folder with what the program made of it: poly13.json, observer.json, header/stretch.h, diagnosis.json;
- *   and of linked.txt, which a board sent: linked.csv, linked.told
+ *   and of linked.txt, which a board sent: linked.csv, linked.told; of trials and a stream that make one doubt, what it said of them:
+ *   doubted/*.csv, doubted/*.told, doubted.txt, doubted.told
  */
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -179,6 +180,27 @@ const refused = async () => {
   await page.context().close();
 };
 
+/** What the program said on standard error, whose lines break at a terminal's width. */
+const toldBy = (name) => text(join(wanted, name)).replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").split("\u0000").map((one) => one.trim()).filter(Boolean);
+
+/** What makes one doubt an evaluation is said in the program's words. */
+const doubted = async () => {
+  const members = readdirSync(join(wanted, "doubted")).filter((name) => name.endsWith(".csv"));
+  check(members.length > 6, `members: ${members.join(", ")}`);
+  for (const member of members) {
+    const page = await opened(member);
+    await put(page, [join(bench, "inflation_50.csv"), join(bench, "deflation_50.csv"), join(wanted, "doubted", member)]);
+    await page.getByLabel(`use of ${member}`).selectOption("test");
+    await page.selectOption("#model", "poly13");
+    await press(page, "calibrate");
+    const found = await page.locator("#doubts li").allTextContents();
+    const told = toldBy(`doubted/${member.replace(".csv", ".told")}`);
+    check(told.length > 0 === (member !== "none.csv"), `${member}: the program said ${told.join("; ")}`);
+    check(found.join("\n") === told.join("\n"), `${member}: the page doubts ${found.join("; ")}, the program ${told.join("; ")}`);
+    await page.context().close();
+  }
+};
+
 /** Layout and contrast, from a phone to a desk. */
 const looks = async () => {
   for (const [width, scheme] of [[390, "light"], [390, "dark"], [1280, "light"], [1280, "dark"]]) {
@@ -229,11 +251,22 @@ const live = async () => {
   await send(Array.from({ length: 500 }, (_, i) => `${(1.5 + 0.2 * Math.sin(i / 30)).toFixed(4)}\r\n`).join("") + "noise\n");
   await until(page, () => document.getElementById("link").textContent.startsWith("501 lines, 1 without"));
   await until(page, () => / mm$/.test(document.getElementById("length").textContent));
+  check(await page.locator("#live-doubts li").count() === 0, "nothing makes one doubt them");
   const numbers = await saved(page, "save-trial");
   check(numbers.text.split("\n").length === 502 && numbers.text.startsWith("time_s,bridge_v,reference,estimate_mm\n0,1.5,,\n"), "numbers are recorded");
   check(await page.locator("#trace").evaluate((c) => new Set(c.getContext("2d").getImageData(0, 0, c.width, c.height).data).size > 4), "and drawn");
-  await page.evaluate(() => { window.testPort.close(); window.testPort.push = null; });
-  await until(page, () => document.getElementById("connect").textContent === "Connect");
+  const disconnect = async () => {
+    await page.evaluate(() => { window.testPort.close(); window.testPort.push = null; });
+    await until(page, () => document.getElementById("connect").textContent === "Connect");
+  };
+  await disconnect();
+  await connect("numbers");
+  const stream = text(join(wanted, "doubted.txt"));
+  await send(stream);
+  await until(page, (count) => document.getElementById("link").textContent.startsWith(`${count} lines`), stream.split("\n").length - 1);
+  const doubts = (await page.locator("#live-doubts li").allTextContents()).join("\n");
+  check(doubts === toldBy("doubted.told").join("\n"), `of a stream the page doubts ${doubts}, the program ${toldBy("doubted.told").join("\n")}`);
+  await disconnect();
   await connect("frames");
   await send(text(join(wanted, "linked.txt")));
   // what the program said of them
@@ -278,7 +311,7 @@ const fast = async () => {
   await page.context().close();
 };
 
-const steps = { bits, same, stranger, refused, looks, live, fast };
+const steps = { bits, same, stranger, refused, doubted, looks, live, fast };
 const only = process.env.ONLY?.split(",");
 for (const [name, step] of Object.entries(steps)) {
   if (only && !only.includes(name)) continue;

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
-    Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options, calibrate,
-    candidate_models, choose_among, evaluate, explains_little, explains_nothing, judge_model,
-    parse_adc, without_gross_errors,
+    Calibrated, Cause, Doubt, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options,
+    calibrate, candidate_models, choose_among, evaluate, evaluation_doubts, explains_little,
+    explains_nothing, judge_model, parse_adc, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
 use stretch_export::gauge_header;
@@ -94,10 +94,11 @@ pub(crate) struct Made {
     judged: Option<(Calibrated, Judgement)>,
 }
 
-/// Errors, and whether they are those of trials that were not fitted.
+/// Errors, what makes one doubt them, and whether they are those of trials that were not fitted.
 #[derive(Debug, Serialize)]
 pub(crate) struct Judgement {
     evaluation: Evaluation,
+    doubts: Vec<Doubt>,
     held_out: bool,
 }
 
@@ -169,8 +170,12 @@ impl Made {
                 shown.push((&name, &self.calibrated.calibration));
             }
             let held_out = !test.is_empty();
-            let evaluation = evaluate(&shown, if held_out { &test } else { &self.trials })?;
-            self.judged = Some((linear, Judgement { evaluation, held_out }));
+            let judged_on = if held_out { &test } else { &self.trials };
+            let evaluation = evaluate(&shown, judged_on)?;
+            let mut doubts = evaluation_doubts(&shown, judged_on, &evaluation);
+            // the page says itself that without a test trial the fitted ones are judged
+            doubts.retain(|doubt| held_out || doubt.code != "fitted_trials");
+            self.judged = Some((linear, Judgement { evaluation, doubts, held_out }));
         }
         match &self.judged {
             Some((_, judgement)) => Ok(judgement),

@@ -3,12 +3,12 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{LiveReceptor, calibration_from_json, parse_adc};
+use stretch_calibrate::{Doubt, LiveReceptor, Seen, calibration_from_json, parse_adc};
 use stretch_core::{Calibration, Runner, Volts};
 use stretch_data::push_number;
 use stretch_link::{Answer, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
-    Receptor,
+    Reading, Receptor,
     code::{Adc, AdcCode},
 };
 use wasm_bindgen::prelude::*;
@@ -105,6 +105,15 @@ impl Live {
                 format!("{} lines, {} without numbers", numbers.lines, numbers.damaged)
             }
         }
+    }
+
+    /// What makes one doubt the estimates so far, as `stretch apply` says it of a stream: a sentence a line.
+    pub fn doubts(&self) -> String {
+        let Source::Numbers(Numbers { applied: Some(applied), .. }) = &self.source else {
+            return String::new();
+        };
+        let doubts = applied.pace.iter().cloned().chain(applied.seen.doubt());
+        doubts.map(|doubt| format!("{doubt}\n")).collect()
     }
 }
 
@@ -237,7 +246,29 @@ struct Numbers {
     lines: u64,
     damaged: u64,
     samples: u64,
-    receptor: Option<LiveReceptor>,
+    applied: Option<Applied>,
+}
+
+/// A calibration on these numbers.
+#[derive(Debug)]
+struct Applied {
+    receptor: LiveReceptor,
+    seen: Seen,
+    /// That samples come at another rate.
+    pace: Option<Doubt>,
+}
+
+impl Applied {
+    fn new(calibration: &Calibration) -> Result<Self, Said> {
+        let receptor = LiveReceptor::new(calibration)?;
+        Ok(Self { receptor, seen: Seen::of(calibration), pace: None })
+    }
+
+    fn step(&mut self, time_s: f64, signal: f64) -> Option<Reading> {
+        let reading = self.receptor.step(time_s, signal);
+        self.pace = self.seen.take(time_s, signal, &reading).or(self.pace.take());
+        reading.ok()
+    }
 }
 
 impl Numbers {
@@ -251,7 +282,7 @@ impl Numbers {
             lines: 0,
             damaged: 0,
             samples: 0,
-            receptor: calibration.map(LiveReceptor::new).transpose()?,
+            applied: calibration.map(Applied::new).transpose()?,
         })
     }
 
@@ -269,7 +300,7 @@ impl Numbers {
             return None;
         };
         self.samples += 1;
-        let reading = self.receptor.as_mut().and_then(|r| r.step(time_s, signal).ok());
+        let reading = self.applied.as_mut().and_then(|applied| applied.step(time_s, signal));
         push(lines, time_s);
         lines.push(',');
         push(lines, signal);

@@ -154,7 +154,7 @@ pub enum CalibrateError {
         /// The windows that are compiled in.
         windows: String,
     },
-    /// An estimate in integers would have steps that are larger than the calibration's error, or coarse beside its range.
+    /// An estimate in integers would have steps that are larger than the calibration's error, or coarse for its range.
     #[error(
         "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a calibration that is off by {error:.2e}: \
          give {reference} in a smaller unit, such as mm in place of m, and calibrate again"

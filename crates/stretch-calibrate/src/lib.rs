@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
 
-// prepare <- fit <- judge; records stand on their own
+// prepare <- fit <- judge; records depends on none of them
 mod error;
 mod fit;
 mod judge;

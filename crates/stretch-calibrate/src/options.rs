@@ -102,7 +102,7 @@ impl SpellingError {
 }
 
 impl ModelKind {
-    /// The names that `--model` takes for trials with a time, simplest first; poly13 stands for all surfaces.
+    /// The names that `--model` takes for trials with a time, simplest first; poly13 represents all surfaces.
     ///
     /// ```
     /// use stretch_calibrate::ModelKind;
@@ -324,7 +324,7 @@ impl Cause {
     }
 }
 
-/// What the models of a choice are, in one sentence, for whoever sees their names for the first time.
+/// One sentence about the models of a choice, for users who see their names for the first time.
 ///
 /// ```
 /// use stretch_calibrate::{MODELS_IN_WORDS, Memory};

@@ -141,7 +141,7 @@ fn without_a_diagnosis_it_is_no_candidate() {
     assert!(error.contains("wander_0") && error.contains("pressure_kpa"), "{error}");
 }
 
-/// A bend is in the curve, and a drift in the baseline: neither has a number of its own.
+/// A bend is in the curve, and a drift in the baseline: neither has a separate number.
 #[test]
 fn causes_without_numbers_are_calibrated() {
     for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {

@@ -1,4 +1,4 @@
-//! One trial that is not like the others is told, each mistake once, and no trial that is.
+//! A trial that is not like the others is reported, each mistake once. No other trial is.
 
 use stretch_calibrate::{LiveReceptor, ModelKind, Options, Seen, calibrate};
 use stretch_data::{Channel, Trial};

@@ -9,7 +9,7 @@ mod wrapped;
 
 use stretch_core::Calibration;
 
-/// A calibration as its record holds it: checksums of trials stand in JSON alone.
+/// A calibration as its record holds it: only JSON holds the checksums of trials.
 fn as_held(calibration: &Calibration, name: &str) -> Calibration {
     assert_eq!(
         calibration.spec().provenance.checksums().len(),

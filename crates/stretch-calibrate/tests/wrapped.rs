@@ -3,7 +3,7 @@
 use stretch_calibrate::{Calibrated, Options, calibrate, evaluate};
 use stretch_data::{Channel, Trial};
 
-/// An angle about 170 deg, from 110 to 230 deg, beside a sensor that follows it.
+/// An angle about 170 deg, from 110 to 230 deg, with a sensor that follows it.
 fn trial(scale: f64, turn: f64, names: [&str; 2]) -> Trial {
     let time_s: Vec<f64> = (0..3000).map(|n| 0.01 * f64::from(n)).collect();
     let angle: Vec<f64> = time_s.iter().map(|t| 170.0 + 60.0 * (0.7 * t).sin()).collect();

@@ -74,7 +74,7 @@ const FAR_OFF_PERCENT: f64 = 5.0;
 
 /// A sentence for estimates whose error is mostly a constant: `bias^2` at least half of `rmse^2`, and a twentieth of the range.
 ///
-/// A reference in centimetres beside a calibration in millimetres looks like that, and so does a sensor that was mounted anew.
+/// This happens with a reference in centimetres and a calibration in millimetres, and with a sensor that was mounted again.
 pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
@@ -90,7 +90,7 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
     })
 }
 
-/// A sentence for estimates that were held against a reference that stands still, where no R^2 tells how good they are.
+/// A sentence for estimates that were compared with a constant reference, where no R^2 says how good they are.
 pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     (!errors.r_squared.is_finite()).then(|| {
         format!(
@@ -101,7 +101,7 @@ pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
 }
 
 /// A sentence for trials that a calibration was fitted on; `None` where none is. A record holds the names of its first trials and the
-/// checksums of their samples: a trial is found again under another name, and a name that another trial has is told as well.
+/// checksums of their samples: a trial is found again under another name, and a name that another trial has is reported as well.
 pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
     let (provenance, columns) = (
         &calibration.spec().provenance,

@@ -191,7 +191,7 @@ pub fn at_rate(calibration: &Calibration, rate_hz: f64) -> Result<Calibration, C
     Ok(Calibration::new(spec)?)
 }
 
-/// The column of the pressure, where a calibration needs one beside its signal.
+/// The column of the pressure, if a calibration needs one in addition to its signal.
 pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
     match &calibration.spec().model {
         Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),

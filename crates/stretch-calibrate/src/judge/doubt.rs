@@ -162,7 +162,7 @@ pub fn evaluation_doubts(
 /// Number of intervals that determine the pace.
 const INTERVALS: usize = 51;
 
-/// The usual interval of a stream beside the calibration's.
+/// The usual interval of a stream, and that of the calibration.
 #[derive(Debug)]
 struct Pace {
     rate_hz: f64,

@@ -240,7 +240,7 @@ impl Tally {
                 tally.agreement.push(truth, estimate);
             }
         }
-        // the warm-up stands at the start, and the estimates behind it are one piece without a hole
+        // the warm-up is at the start, and the estimates after it have no gap
         let start = method.values.iter().position(|x| !x.is_nan()).unwrap_or(reference.len());
         let (truth, estimate) = (&reference[start..], &method.values[start..]);
         let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);

@@ -192,7 +192,7 @@ pub(crate) struct Found {
     pub(crate) numbers: usize,
     /// The errors, or why there are none.
     pub(crate) errors: Result<Errors, String>,
-    /// Root mean square error; not a number where it cannot be told.
+    /// Root mean square error; not a number if it is not known.
     pub(crate) rmse: f64,
 }
 

@@ -15,7 +15,7 @@ const COUNT: usize = 19;
 /// Fewest samples that make an equal signal one that is not connected, and not one at rest on a coarse converter.
 const CONSTANT: u64 = 100;
 
-/// Samples of a signal beside the range of a calibration.
+/// Samples of a signal compared with the range of a calibration.
 ///
 /// ```
 /// use stretch_calibrate::Reach;
@@ -122,7 +122,7 @@ fn in_other_unit(unit: &str, power: i32) -> Option<String> {
     });
     let (base, own) = split?;
     let meant = PREFIXES.iter().find(|(_, p)| *p == own + power);
-    // nobody writes cV
+    // no unit is written cV
     let is_used = |prefix: &&str| *prefix != "c" || base == "m";
     meant.map(|(prefix, _)| *prefix).filter(is_used).map(|prefix| format!("{prefix}{base}"))
 }

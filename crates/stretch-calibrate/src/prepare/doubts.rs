@@ -12,9 +12,9 @@ const HAS_LINE: f64 = 0.5;
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
 /// Decimals, or significant digits, that a file may have been saved with.
 const DIGITS: RangeInclusive<i32> = 0..=12;
-/// Fewest readings in a row that make a signal that stands.
+/// Least number of equal readings in a row at which a signal counts as stuck.
 const STANDS: usize = 5;
-/// Share of its range by which the reference must move on while the signal stands.
+/// Share of its range by which the reference must move on while the signal is stuck.
 const MOVES_ON: f64 = 0.1;
 /// A slower recording of some length is likely one of milliseconds, Hz.
 const SLOW_HZ: f64 = 0.5;
@@ -26,7 +26,8 @@ const OTHERS: usize = 32;
 /// Trials next in the mean of the reference that each is compared with, to find copies.
 const NEXT: usize = 8;
 
-/// What can be wrong with one trial: its line as it is and without that, beside the line of another, and what is said.
+/// A possible mistake in one trial: a function from its line and that of another trial to its line as it is and without the mistake,
+/// and the message.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
 const MISTAKES: [Mistake; 4] = [
@@ -149,9 +150,9 @@ impl Held<'_> {
             && both.all(|((_, own), (_, its))| (0..2).all(|i| is_same(&own[i], &its[i])))
     }
 
-    /// The value at which the signal stands while the reference moves on, away from where the signal reached that value.
+    /// The value at which the signal is stuck while the reference moves on, away from where the signal reached that value.
     fn stands_at(&self) -> Option<f64> {
-        // of a signal that does not follow the reference nothing follows from where it stands
+        // if the signal does not follow the reference, its value says nothing
         if !self.line.is_clear() {
             return None;
         }

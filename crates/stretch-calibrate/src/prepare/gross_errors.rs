@@ -131,7 +131,7 @@ mod tests {
                 "{gross:?} {found:?}"
             );
         }
-        // these values lie beside the range, but not beyond a hole
+        // these values are outside the range, but no gap separates them from it
         assert_eq!(with(&[200.0, 140.0]), None);
         // two levels at which a muscle is held are no gross errors
         let held: Vec<f64> =

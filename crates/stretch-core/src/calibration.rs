@@ -8,7 +8,7 @@ use crate::{
 
 /// The schema of calibration records that this release writes.
 ///
-/// 1: without a seal. 2: the same fields under a checksum, which whoever loads the bytes checks
+/// 1: without a seal. 2: the same fields under a checksum, which is checked when the bytes are loaded
 /// (`record::load`, or `stretch_calibrate::read_calibration`). Release 0.1.0 also wrote schema 3, in bytes, for calibrations
 /// that held where movements turn; these are records of `stretch-sleeve` now.
 pub const CALIBRATION_SCHEMA: u32 = 2;

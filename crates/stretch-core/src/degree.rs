@@ -64,7 +64,7 @@ impl Degree {
         if self.rate > self.volts { self.rate } else { self.volts }
     }
 
-    /// The highest power of the voltage that stands beside `rate^i`.
+    /// The highest power of the voltage in a term with `rate^i`.
     pub const fn volts_beside(self, i: u8) -> u8 {
         let left = self.total().saturating_sub(i);
         if left < self.volts { left } else { self.volts }

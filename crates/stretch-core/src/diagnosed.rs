@@ -113,7 +113,7 @@ pub struct DiagnosedMap {
     pub lowpass_s: Option<[f64; 2]>,
     /// The signal shows the target of so many seconds before.
     pub skew_s: f64,
-    /// How plays stand when a stream begins at the lower and at the upper end of `estimate_domain`, and on a line between: 1 as if the
+    /// The states of plays when a stream begins at the lower and at the upper end of `estimate_domain`, and on a line between: 1 as if the
     /// target had come up from far below, -1 from far above.
     #[cfg_attr(feature = "serde", serde(rename = "wound"))]
     pub initial_hysteresis: [f64; 2],
@@ -123,7 +123,7 @@ pub struct DiagnosedMap {
     pub drive_domain: Interval,
     /// Standard deviation of the signal around the model, in the signal's unit.
     pub noise: f64,
-    /// Spectral density of the rate's wandering, in 1/s^3 of normalised target.
+    /// Spectral density of the rate's random walk, in 1/s^3 of normalised target.
     pub agility: f64,
     /// Time in which a rate forgets itself, s.
     pub steady_s: f64,

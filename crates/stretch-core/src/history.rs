@@ -38,7 +38,7 @@ pub struct HistoryShape {
 
 impl HistoryShape {
     /// How many terms, the constant counted; at most one more than
-    /// [`MAX_HISTORY_TERMS`], which stands for too many.
+    /// [`MAX_HISTORY_TERMS`], which means too many.
     pub fn terms(self) -> usize {
         let mut terms = 1;
         self.each_product(|_, _| terms += 1);

@@ -50,7 +50,7 @@ pub struct ObserverMap {
     pub play_weights: Values<MAX_OBSERVER_PLAYS>,
     /// Standard deviation of the signal around the model, in the signal's unit.
     pub noise: f64,
-    /// Spectral density of the rate's wandering, in 1/s^3 of normalised target.
+    /// Spectral density of the rate's random walk, in 1/s^3 of normalised target.
     pub agility: f64,
     /// The normalised targets that the fit saw.
     pub estimate_domain: Interval,

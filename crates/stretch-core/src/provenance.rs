@@ -2,7 +2,7 @@
 
 use crate::Label;
 
-/// What a calibration was made of, for whoever reads the record in a year.
+/// What a calibration was made of, for those who read the record in a year.
 ///
 /// The date is the caller's: this crate has no clock.
 ///
@@ -39,7 +39,7 @@ impl Provenance {
     }
 
     /// The same with CRC-32C of the samples of each of the first [`Provenance::NAMED_TRIALS`], which tell a trial under another
-    /// name. They stand in JSON alone: a board has no trials to compare.
+    /// name. Only JSON holds them, because a board has no trials to compare.
     ///
     /// ```
     /// use stretch_core::Provenance;

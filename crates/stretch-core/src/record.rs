@@ -9,7 +9,7 @@
 //! (Koopman, DSN 2002): it finds every error of up to three bits, in records below 655 bytes of
 //! up to five, every burst of up to 32 bits, and lets one other damage in 2^32 through.
 //!
-//! A seal says that the bytes are those that were written, not that somebody meant well.
+//! A seal says that the bytes are those that were written, not that their author meant well.
 
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Where the signal stands at rest, followed as it drifts.
+//! The value of the signal at rest, followed as it drifts.
 
 use crate::{
     DesignError,

@@ -37,7 +37,7 @@ unit! {
 
 /// How many samples a second a stream has: finite and above zero.
 ///
-/// A type of its own, so that a cutoff frequency cannot stand in its place.
+/// It is a separate type, so that a cutoff frequency cannot be passed instead.
 ///
 /// ```
 /// use stretch_core::SampleRate;

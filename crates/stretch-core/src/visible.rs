@@ -1,9 +1,9 @@
 //! Which characters can be seen.
 
-/// Whether a character is one that nobody sees as itself: it controls a terminal or ends a line, turns the text around it, or hides.
+/// Whether a character is not shown as itself: it controls a terminal or ends a line, turns the text around it, or hides.
 ///
-/// Names of columns and units come from files of anybody. Whoever writes them into code, onto a page or a terminal leaves such characters
-/// out or writes an escape, so that what is read is what is there.
+/// Names of columns and units come from files of unknown origin. Code that writes them into a program, a page or a terminal leaves such
+/// characters out or writes an escape, so that readers see what is there.
 ///
 /// ```
 /// use stretch_core::is_hidden;

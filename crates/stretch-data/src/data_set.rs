@@ -23,7 +23,7 @@ pub struct DataSet {
     pub name: String,
     /// Nominal samples a second.
     pub rate_hz: f64,
-    /// Rig file beside it; the built-in rig when absent.
+    /// Rig file next to it; the built-in rig when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<String>,
     /// The trials in the order in which they were recorded.
@@ -102,9 +102,9 @@ impl DataSet {
         Ok(set)
     }
 
-    /// Parses the text of a `dataset.toml`; `name` stands for the file in messages.
+    /// Parses the text of a `dataset.toml`; messages call the file `name`.
     ///
-    /// Each file is named once and stands in the folder, `rate_hz` is above 0, openings are
+    /// Each file is named once and is in the folder, `rate_hz` is above 0, openings are
     /// 0..1, and there is at least one trial. Keys that the format does not know are passed
     /// over.
     ///
@@ -155,7 +155,7 @@ impl DataSet {
         })
     }
 
-    /// The rig file beside it, if it names one.
+    /// The rig file next to it, if it names one.
     ///
     /// # Errors
     /// As [`RigFile::read`].
@@ -285,7 +285,7 @@ impl TrialEntry {
         self.check_digest(&folder.as_ref().join(FILE), found)
     }
 
-    /// The same of the bytes of a file that stands in no folder.
+    /// The same for the bytes of a file that is in no folder.
     ///
     /// # Errors
     /// [`DataError::Key`] with both digests.

@@ -4,7 +4,7 @@ use std::{fmt, fs, io, path::Path};
 
 use crate::files::FileError;
 
-/// Where in a file something stands.
+/// A place in a file.
 ///
 /// Rows count from 1 and include the header, as an editor shows them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,7 +61,7 @@ pub enum DataError {
         /// The field.
         value: String,
     },
-    /// Time that stands still or goes back.
+    /// Time that stays the same or goes back.
     #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: leave that row out, or split the recording there", if .time_s == .previous_s { "stands still" } else { "goes back" })]
     TimeNotRising {
         /// Where.
@@ -123,9 +123,9 @@ pub enum DataError {
     Key {
         /// The file.
         file: String,
-        /// The row, where the key stands in one.
+        /// The row, if the key is in one.
         row: Option<u64>,
-        /// The key with the tables that it stands in: `trial[2].file`.
+        /// The key with the tables that contain it: `trial[2].file`.
         key: String,
         /// What is wrong and what to do.
         problem: String,
@@ -221,7 +221,7 @@ pub fn shown(content: &[u8]) -> String {
 /// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
 /// ```
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // a longer name is nobody's, and the distance takes the product of two lengths
+    // no name is longer, and the time for the distance is proportional to the product of two lengths
     let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
     let name = short(name);
     let edits = |one: &str| match one.strip_prefix(&name) {

@@ -28,7 +28,7 @@ pub struct EvenSpec {
     pub shortest: usize,
     /// Longest gap that is bridged, s, where the commands are the same on both sides of it; three samples always are then.
     pub bridged_s: f64,
-    /// Whether three samples are bridged where a valve switched between them as well, though nobody knows when.
+    /// Whether up to three missing samples are bridged even if a valve switched meanwhile at an unknown time.
     pub over_switches: bool,
 }
 
@@ -101,7 +101,7 @@ pub struct Even {
     pub rows: Rows,
     /// By column, the turn by which it wrapped, in its unit: its values are unwrapped.
     pub turns: Vec<Option<f64>>,
-    /// Sentences: gaps, parts left out, uneven time stamps, angles that wrapped. None where the trial was even.
+    /// Sentences: gaps, parts left out, uneven time stamps, angles that wrapped. Empty if the trial was even.
     pub notes: Vec<String>,
 }
 
@@ -297,7 +297,7 @@ impl Clock {
         out
     }
 
-    /// The grid with every sample on a point of its own; none where one comes too early or too late for that.
+    /// The grid with every sample on a separate point; `None` if one comes too early or too late for that.
     fn points(&self, time_s: &[f64]) -> Option<Vec<Point>> {
         let mut points: Vec<Point> = Vec::with_capacity(time_s.len());
         let (mut early, mut late) = (0.0_f64, 0.0_f64);

@@ -131,8 +131,8 @@ impl EvenSession {
     /// Brings columns of trials onto one even grid, as [`Trial::even`]; the first trial's rate is the session's.
     ///
     /// Trials go in the order of their `start_s`. Where that does not rise, they go in the order given, with pauses of 15 s.
-    /// Gaps of up to half a second are bridged where the commands are the same on both sides, none where a valve switched
-    /// meanwhile: when it did, nobody knows, and one sample of a wrong flow stays in the chamber for seconds.
+    /// Gaps of up to half a second are bridged if the commands are the same on both sides. They are not bridged if a valve switched meanwhile:
+    /// the time of the switch is unknown, and one sample of a wrong flow stays in the chamber for seconds.
     /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
     ///
     /// # Errors

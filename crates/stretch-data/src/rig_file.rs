@@ -10,7 +10,7 @@ use serde::{
 
 use crate::{DataError, Remarks, TomlFile, files::write_whole};
 
-/// The contents of a `rig.toml`: names are checked by whoever simulates it.
+/// The contents of a `rig.toml`: the simulator checks the names.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RigFile {
     /// `"gauge"` for a gauge alone; absent for a whole rig.
@@ -124,7 +124,7 @@ impl<'de> Deserialize<'de> for EffectEntry {
 }
 
 impl RigFile {
-    /// Reads a rig file. Whether the names are those of a rig is for whoever simulates it.
+    /// Reads a rig file. The simulator checks whether the names are those of a rig.
     ///
     /// # Errors
     /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with the key.
@@ -132,7 +132,7 @@ impl RigFile {
         TomlFile::read(path)?.parse()
     }
 
-    /// Parses the text of a rig file; `name` stands for the file in messages.
+    /// Parses the text of a rig file; messages call the file `name`.
     ///
     /// # Errors
     /// As [`RigFile::read`].
@@ -166,7 +166,7 @@ impl RigFile {
         self.to_toml_with(&Remarks::default())
     }
 
-    /// The text of the rig file with comments beside its entries; it reads back to the same.
+    /// The text of the rig file with comments at its entries; it reads back to the same.
     pub fn to_toml_with(&self, remarks: &Remarks) -> String {
         remarks.write(self)
     }

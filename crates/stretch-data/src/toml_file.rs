@@ -51,7 +51,7 @@ pub struct TomlFile {
 }
 
 impl TomlFile {
-    /// A text; `file` stands for it in messages. A byte-order mark is passed over.
+    /// A text; messages call it `file`. A byte-order mark is passed over.
     pub fn new(file: &str, text: &str) -> Self {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         Self { file: file.to_owned(), text: text.to_owned() }
@@ -81,7 +81,7 @@ impl TomlFile {
         }
     }
 
-    /// The value that the text holds. A single text stands for a list of one text, and numbers are finite.
+    /// The value that the text holds. A single text is read as a list of one text, and numbers are finite.
     ///
     /// # Errors
     /// [`DataError::NotToml`], or [`DataError::Key`] for what `T` does not accept.
@@ -160,7 +160,7 @@ fn find<'a, 'i>(
     found
 }
 
-/// A value; a single text stands for a list of one text, and every number is finite.
+/// A value; a single text is read as a list of one text, and every number is finite.
 #[derive(Clone, Copy)]
 struct Node<'de>(&'de DeValue<'de>);
 

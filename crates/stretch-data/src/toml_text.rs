@@ -31,7 +31,7 @@ pub struct Remarks {
 }
 
 impl Remarks {
-    /// A value as TOML with these comments: tables of the top have a header of their own, tables inside stand in one line. Numbers read back
+    /// A value as TOML with these comments: tables at the top have their own header, tables inside are written in one line. Numbers read back
     /// to the same bits.
     ///
     /// # Panics

@@ -4,7 +4,7 @@ use std::iter;
 
 use crate::{DataError, Place, data_set::CRC};
 
-/// A recording: time stamps and, beside them, named channels of the same length.
+/// A recording: time stamps and named channels of the same length.
 ///
 /// Channels carry their unit as the last part of their name (`length_mm`,
 /// `bridge_v`, `angle_deg`), as in the file they came from.
@@ -239,8 +239,8 @@ pub fn out_of_order(times: &[f64]) -> Vec<usize> {
     left_out
 }
 
-/// A time that was computed from others of up to `largest_s`, with the fewest decimals that say it: two units in the last
-/// place of the largest are nobody's measurement.
+/// A time that was computed from others of up to `largest_s`, with the fewest decimals that say it: a difference of two units in the last
+/// place of the largest is no measurement.
 ///
 /// ```
 /// use stretch_data::tidy_time;

@@ -34,7 +34,7 @@ pub struct Wrap {
 }
 
 impl Wrap {
-    /// How a column wraps; none where it does not.
+    /// How a column wraps; `None` if it does not.
     ///
     /// The unit in the column's name says what a turn is, in degrees or radians. A column without a unit has a turn of 360 or 2 pi, and lies
     /// within (-1/2, 1/2) or (0, 1) turns. The jumps of a column that wraps are a turn, but for the motion between two samples; the

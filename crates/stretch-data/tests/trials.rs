@@ -182,7 +182,7 @@ proptest! {
         prop_assert_eq!(tidy_time(exact, 0.0), exact);
     }
 
-    /// The unit of a column is what stands behind its last underscore, with every `per` before it.
+    /// The unit of a column is the text after its last underscore, with every `per` before it.
     #[test]
     fn a_unit_ends_a_name(name in "[a-z]{1,6}(_[a-o]{1,4})?", top in "[a-o]{1,3}", below in prop::option::of("[q-z]{1,3}")) {
         let spelt = below.map_or(top.clone(), |below| format!("{top}_per_{below}"));

@@ -13,7 +13,7 @@ use tempfile::Builder;
 
 use super::{FileError, folder::replace};
 
-/// Temporary names of this process with the paths that they stand for. Those of folders stay here because messages may name them.
+/// Temporary names of this process with the paths that they will replace. Those of folders stay here because messages may name them.
 ///
 /// The lock is held while a temporary name is made or becomes a target's name. Ctrl-C takes it and never gives it back: what has
 /// its name by then keeps it, and nothing gets one afterwards.
@@ -112,7 +112,7 @@ impl Draft {
         } else {
             let made = builder.tempfile_in(folder_of(&real)).map_err(without_path)?;
             let (file, temporary) = made.keep()?;
-            // where files cannot be locked, nobody cleans up
+            // if files cannot be locked, no process cleans up
             let _ = file.try_lock();
             (temporary, Some(file))
         };

@@ -29,7 +29,7 @@ struct Guard {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Identity(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] PathBuf);
 
-/// None of what holds no data of its own: pipes, devices, folders, nothing.
+/// `None` for what holds no data itself: pipes, devices, folders, missing files.
 #[cfg(unix)]
 fn identity_of(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
     use std::os::unix::fs::MetadataExt;
@@ -132,7 +132,7 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     let path = path.as_ref();
     let mut guard = guard();
     let (Some(guard), Some(own)) = (guard.as_mut(), identity(path)) else { return Ok(()) };
-    // first of all, so that whoever does not look at an error still writes nothing over it
+    // first of all, so that a caller who ignores an error still does not overwrite it
     guard.inputs.insert(own.clone(), path.to_owned());
     match guard.outputs.iter().find(|(_, there)| there.as_ref() == Some(&own)) {
         Some((shown, _)) => Err(io::Error::other(format!(

@@ -17,13 +17,13 @@ use super::{
 
 /// Writes a file whole or not at all.
 ///
-/// `fill` writes into a temporary file beside the target, which takes the target's name
+/// `fill` writes into a temporary file next to the target, which takes the target's name
 /// only when everything has reached the disk. After any error (a full disk, a folder that may
 /// not be written to, an error of `fill`) the old file is still there. A symbolic link stays one: the
 /// file that it points to is replaced. Output is buffered.
 ///
 /// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
-/// the bytes come; a pipe that nobody reads is refused after two seconds, and so are standard
+/// the bytes come; a pipe without a reader is refused after two seconds, and so are standard
 /// input and disks. What a reader of these does not take because it has gone is no error.
 ///
 /// A file that this process has read as an input is not written over ([`guard_inputs`](super::guard_inputs)).
@@ -51,7 +51,7 @@ pub fn write_whole(
 
 /// Writes a folder whole or not at all.
 ///
-/// `fill` gets an empty folder beside the target and writes into it; then all of it is
+/// `fill` gets an empty folder next to the target and writes into it; then all of it is
 /// synced and takes the target's name. After any error the target is as it was.
 ///
 /// A target that holds something is refused unless `force` is set. With `force` it is replaced: files of the same name
@@ -105,7 +105,7 @@ pub fn write_folder<E: From<FileError>>(
 pub struct Outputs(Vec<Draft>);
 
 impl Outputs {
-    /// Writes a file beside its target. What goes to standard output or into a pipe is written at once.
+    /// Writes a file next to its target. What goes to standard output or into a pipe is written at once.
     ///
     /// # Errors
     /// As [`write_whole`]; two files of one name.
@@ -163,7 +163,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes a folder beside its target, as [`write_folder`].
+    /// Writes a folder next to its target, as [`write_folder`].
     ///
     /// # Errors
     /// As [`write_folder`], or what `fill` says.

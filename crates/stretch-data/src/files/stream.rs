@@ -24,7 +24,7 @@ pub fn is_standard_output(path: impl AsRef<Path>) -> bool {
     path.as_ref().as_os_str() == "-" || is_one_of(path.as_ref(), STDOUT)
 }
 
-/// What bytes can go to as they come; none where the path is that of a file, or of nothing yet.
+/// A target that takes bytes as they come; `None` if the path is that of a file, or does not exist yet.
 ///
 /// Standard output is not opened again: where it is redirected into a file, that would
 /// begin to write at its start again.

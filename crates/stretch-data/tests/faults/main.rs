@@ -107,7 +107,7 @@ fn fails_at_every_call(job: Job, and_on: bool, exchanges: bool) -> usize {
             assert_eq!(message.matches("No space left on device").count(), 1, "{message}");
         }
         if !acted {
-            // nothing stays beside it
+            // no file is left next to it
             assert_eq!(tree(scratch.path()), expected[1], "{case}");
             return at;
         }

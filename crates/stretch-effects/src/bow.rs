@@ -130,7 +130,7 @@ pub static CURVE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A gain that bends with what is beside the signal.
+/// A gain that bends with a second signal.
 pub static GAIN_CURVE: Kind = Kind {
     name: "gain_curve",
     title: "a bent gain",

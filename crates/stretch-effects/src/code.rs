@@ -247,7 +247,7 @@ impl Sketch {
             inputs.insert(0, "s");
         }
         let _ = writeln!(out, "\n\ndef {name}({}):", inputs.join(", "));
-        // Constants are local, so that the code of several effects can stand in one file.
+        // Constants are local, so that the code of several effects can be written into one file.
         for c in &self.constants {
             let unit = Language::Python.comment(&c.unit);
             let _ = writeln!(out, "    {} = {}  {unit}", c.name, literal(c.value));

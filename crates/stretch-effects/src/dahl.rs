@@ -47,7 +47,7 @@ pub struct Dahl {
     pub back: f64,
     /// Half of the play between the position and the contact, in the unit of the position.
     pub w: f64,
-    /// The load at which the force is `f`; none where no load matters.
+    /// The load at which the force is `f`; `None` if the load does not matter.
     pub load_size: Option<f64>,
 }
 

@@ -25,7 +25,7 @@ use crate::{
 pub struct Offset {
     /// At the session's start, in the unit of the signal.
     pub at_start: f64,
-    /// How it wanders, units/s.
+    /// Rate of the drift, units/s.
     pub per_s: f64,
 }
 
@@ -56,7 +56,7 @@ pub static OFFSET: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A zero that wanders.
+/// A zero that drifts.
 pub static DRIFT: Kind = Kind {
     name: "drift",
     title: "drift of the zero",

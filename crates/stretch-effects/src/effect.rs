@@ -12,7 +12,7 @@ use crate::{
     sketch::Sketch,
 };
 
-/// What an effect needs beside the input of its stage.
+/// What an effect needs in addition to the input of its stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// The pressure inside the muscle.
@@ -43,14 +43,14 @@ pub enum Acts {
         kind: &'static Kind,
         /// Where.
         place: Place,
-        /// The kind's values; none where they are the effect's.
+        /// The kind's values; `None` if they are the effect's.
         values: Option<Values>,
     },
-    /// As a term of its own, which no kind is.
+    /// A separate term, which belongs to no kind.
     Own {
         /// Where and how, with values that are not off.
         action: fn(&[f64], &Surroundings<'_>) -> Action,
-        /// How somebody would type it.
+        /// How a user would type it.
         sketch: Option<fn(&[f64], &Surroundings<'_>) -> Sketch>,
     },
 }
@@ -101,7 +101,7 @@ pub struct Effect {
     pub parameters: &'static [EffectParameter],
     /// Where and how it acts.
     pub acts: Acts,
-    /// What it needs beside the stage's own input.
+    /// What it needs in addition to the stage's own input.
     pub needs: Option<Need>,
     /// Names of effects that are hard to tell from it.
     pub twins: &'static [&'static str],
@@ -110,7 +110,7 @@ pub struct Effect {
     pub starts: Option<Starts>,
     /// What a gauge alone changes of ranges and starts, in its units.
     pub alone: fn(&Alone, &mut Search),
-    /// How a diagnosed calibration inverts it; none where it cannot.
+    /// How a diagnosed calibration inverts it; `None` if it cannot.
     pub live: Option<Live>,
 }
 
@@ -131,7 +131,7 @@ impl Effect {
         live: None,
     };
 
-    /// The kind that it is, with its place; none where it is a term of its own.
+    /// Its kind and place; `None` if it is a separate term.
     pub fn at(&self) -> Option<(&'static Kind, Place)> {
         match self.acts {
             Acts::At { kind, place, .. } => Some((kind, place)),
@@ -154,7 +154,7 @@ impl Effect {
         }
     }
 
-    /// How somebody would type it with these values; none where nobody has written that down.
+    /// How a user would type it with these values; `None` if the kind has no such text.
     pub fn sketch(&self, values: &[f64], around: &Surroundings<'_>) -> Option<Sketch> {
         match self.acts {
             Acts::At { kind, place, values: of } => {
@@ -176,7 +176,7 @@ impl Effect {
         self.is_kind(|kind| kind.drifts)
     }
 
-    /// Whether the true length cannot be told from what the reference shows (play in the reference).
+    /// Whether the true length does not follow from what the reference shows (play in the reference).
     pub fn hides_input(&self) -> bool {
         self.stage == RigStage::Reference && self.is_kind(|kind| kind.hides_input)
     }
@@ -304,13 +304,13 @@ impl Search {
     /// `least` tells the rate that it needs with some values.
     pub fn at_rate(&mut self, least: impl Fn(&[f64]) -> f64, rate_hz: f64) -> Option<f64> {
         let needed = self.starts.iter().map(|s| least(s)).fold(f64::INFINITY, f64::min);
-        // A rate told by rounded stamps may miss its own value by a little.
+        // A rate that was computed from rounded time stamps has a small error.
         self.starts.retain(|start| least(start) <= rate_hz * (1.0 + 1e-6));
         self.starts.is_empty().then_some(needed)
     }
 }
 
-/// What the live map of an effect depends on beside its numbers.
+/// What the live map of an effect depends on in addition to its numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
     /// Whether the target falls while the strain rises, as a contraction does.

@@ -21,7 +21,7 @@ pub struct Extent {
     pub session_s: f64,
     /// Step of which the values are most nearly multiples.
     pub lattice: f64,
-    /// Least and greatest value of what the effect looks at beside the channel.
+    /// Least and greatest value of the second signal that the effect looks at.
     pub beside: [f64; 2],
     /// Least and greatest value of what loads a contact.
     pub load: [f64; 2],
@@ -29,7 +29,7 @@ pub struct Extent {
 
 impl Extent {
     /// Of a channel of which nothing but its least and its greatest value is known: at 100 Hz, a minute a trial and ten a session, from
-    /// one end to the other in a second, and nothing but itself beside it.
+    /// one end to the other in a second, with itself as the second signal.
     pub const fn between(low: f64, high: f64) -> Self {
         let (quickest, lattice) = (high - low, 0.01 * (high - low));
         let (beside, load) = ([low, high], [low, high]);
@@ -77,7 +77,7 @@ impl Extent {
         self.load[0].abs().max(self.load[1].abs()).max(f64::MIN_POSITIVE)
     }
 
-    /// Largest absolute value of what is looked at beside.
+    /// Largest absolute value of the second signal.
     pub fn beside_size(&self) -> f64 {
         self.beside[0].abs().max(self.beside[1].abs())
     }

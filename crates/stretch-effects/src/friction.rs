@@ -35,7 +35,7 @@ pub struct Friction {
     pub more: f64,
     /// Velocity up to which that lasts.
     pub slow: f64,
-    /// Velocity at which the direction is told; 0 for at once.
+    /// Velocity at which the direction counts as known; 0 for any velocity.
     pub width: f64,
     /// By which share more it rubs forward than backward, halved.
     pub lopsided: f64,
@@ -129,7 +129,7 @@ pub static STRIBECK_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Velocity at which the direction is told.
+/// Velocity at which the direction counts as known.
 pub(crate) fn width(v: f64) -> EffectParameter {
     EffectParameter::formed("width", "velocity", 1e-4 * v..=0.1 * v, 0.01 * v).log()
 }
@@ -143,7 +143,7 @@ fn stribeck(v: &[f64]) -> Friction {
 }
 
 impl Friction {
-    /// With the velocity beside the signal.
+    /// With the velocity as the second signal.
     fn sketch(&self, signals: &Signals) -> Sketch {
         let [x, v] = [&signals.x, &signals.beside].map(|q| &*q.unit);
         let viscous = ("B", self.viscous, "force/velocity");
@@ -185,7 +185,7 @@ impl Friction {
 pub struct LoadFriction {
     /// Force per load.
     pub mu: f64,
-    /// Velocity at which the direction is told, above 0.
+    /// Velocity at which the direction counts as known, above 0.
     pub width: f64,
 }
 

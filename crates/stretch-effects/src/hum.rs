@@ -92,7 +92,7 @@ pub static HUM: Kind = Kind {
 /// Frequency of the mains.
 const MAINS: EffectParameter =
     EffectParameter::shape("f", "Hz", 50.0, 60.0, 50.0).linear().with_role(Role::Choice);
-/// On samples at twice the mains' frequency a hum is as large as the sine of its phase: one that stands for all.
+/// On samples at twice the mains' frequency a hum is as large as the sine of its phase, so one phase represents all.
 const PHASE: EffectParameter = EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0)
     .linear()
     .with_role(Role::Found { stand_in: FRAC_PI_4 });
@@ -122,7 +122,7 @@ pub(crate) static MAINS_HUM: Effect = Effect {
 /// Window in which the phase is taken as steady, s.
 const WINDOW_S: f64 = 1.0;
 
-/// A hum of known amplitude and frequency whose phase nothing foretells.
+/// A hum of known amplitude and frequency whose phase cannot be predicted.
 ///
 /// ```
 /// use stretch_effects::WanderingLine;
@@ -142,7 +142,7 @@ pub struct WanderingLine {
 
 impl WanderingLine {
     /// Adds to samples that may be fitted the hum whose phase in each second is the one that the measured record shows: as much of
-    /// the residual at the line's frequency as the amplitude allows; noise shrinks what it cannot tell. Each sample is foretold by
+    /// the residual at the line's frequency as the amplitude allows; noise shrinks what it hides. Each sample is predicted from
     /// the others of its second. `noise` is one standard deviation of the measured samples, which are as many as the simulated ones or more.
     pub fn follow(&self, measured: &[f64], noise: f64, dt_s: f64, simulated: &mut [f64]) {
         let (a, f) = (self.a, self.f_hz);

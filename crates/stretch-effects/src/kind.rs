@@ -11,7 +11,7 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// On which side of a stage a kind stands.
+/// The side of a stage at which a kind acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// In front of the stage, on one of its inputs.
@@ -20,7 +20,7 @@ pub enum Side {
     Output,
 }
 
-/// What a kind looks at beside the channel that it changes.
+/// The second signal that a kind looks at, in addition to the channel that it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beside {
     /// Nothing.
@@ -84,7 +84,7 @@ pub struct Line {
 pub struct Signals {
     /// The channel.
     pub x: Quantity,
-    /// What it looks at beside it.
+    /// The second signal that it looks at.
     pub beside: Quantity,
     /// The channel that loads it, where it looks at one.
     pub load: Quantity,
@@ -92,14 +92,14 @@ pub struct Signals {
     pub dt_s: f64,
 }
 
-/// How somebody would type a kind with these values at a place.
+/// How a user would type a kind with these values at a place.
 pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
 
-/// A kind of effect: an operator and what it means. At a place (a side of a stage of somebody's simulator, the strain of a gauge) it is
+/// A kind of effect: an operator and what it means. At a place (a side of a stage of a user's simulator, the strain of a gauge) it is
 /// an effect.
 ///
-/// One `static` holds all of it, in one file with its operator. What it is called, what its parameters are and how far they go, from the
-/// [`Extent`] of the channel that it acts on; where it is looked for; what is hard to tell from it; how somebody would type it.
+/// One `static` holds all of it, in one file with its operator: its name, its parameters and their ranges, which follow from the
+/// [`Extent`] of the channel that it acts on; where it is looked for; what is hard to distinguish from it; how a user would type it.
 ///
 /// ```
 /// use stretch_effects::{Extent, Side, kind_named};
@@ -121,7 +121,7 @@ pub struct Kind {
     pub equation: &'static str,
     /// Where `wrap = "all"` puts it.
     pub usual: &'static [Side],
-    /// What it looks at beside the channel.
+    /// The second signal that it looks at.
     pub beside: Beside,
     /// Whether it opposes a motion: behind a stage it is added to the force, in front of one it is subtracted.
     pub opposes: bool,
@@ -132,7 +132,7 @@ pub struct Kind {
     pub starts: Option<Starts>,
     /// The operator with these values.
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
-    /// How somebody would type it; none where nobody has written that down.
+    /// How a user would type it; `None` if that is not written down.
     pub sketch: Option<Sketched>,
     /// Kinds that are hard to tell from it on the same channel.
     pub twins: &'static [&'static str],
@@ -142,7 +142,7 @@ pub struct Kind {
     pub counts_session: bool,
     /// Whether it is a law of session time, so that trials outside the time that was fitted are extrapolated.
     pub drifts: bool,
-    /// Whether its input cannot be told from its output.
+    /// Whether its input does not follow from its output.
     pub hides_input: bool,
     /// Whether it asks for steps shorter than a sample where a measured input drives its stage.
     pub needs_fine_steps: bool,
@@ -150,7 +150,7 @@ pub struct Kind {
     pub find: Option<Find>,
     /// The line that it leaves where they may not be found; none for all but hum.
     pub line: Option<fn(&[f64]) -> Line>,
-    /// Least sample rate, Hz, at which it shows as itself with these values; none where any rate will do. Below it the kind is
+    /// Least sample rate, Hz, at which it shows as itself with these values; `None` if any rate will do. Below it the kind is
     /// not looked for.
     pub shown_from_hz: Option<fn(&[f64]) -> f64>,
 }

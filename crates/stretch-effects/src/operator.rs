@@ -17,7 +17,7 @@ pub enum Start {
         /// Seconds of rest between the trials.
         rest_s: f64,
     },
-    /// With the hysteresis state that a motion left which nobody recorded: +1 as if the input had come up to its first value from far
+    /// With the hysteresis state that an unrecorded motion left: +1 as if the input had come up to its first value from far
     /// below, -1 as if it had come from far above, 0 settled; any value between is a share of that reach. A memory that counts the whole
     /// session (the travel of a gauge) goes on as in [`Start::Carried`].
     Hysteresis(f64),

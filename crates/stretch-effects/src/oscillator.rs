@@ -19,7 +19,7 @@ pub struct Swing {
     pub damping: f64,
     /// Damping that grows with the speed, as a fluid's does: m y'' loses drag |y'| y', s over the signal's unit.
     pub drag: f64,
-    /// Dry friction, as a guide's: how far off its rest the mass may stand, in the signal's unit.
+    /// Dry friction, such as a guide's: how far off its rest the mass may stay, in the signal's unit.
     pub dry: f64,
 }
 
@@ -226,14 +226,14 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A link behind a flexible joint: a spring and a damper stand between the motor's side x and the link's side y,
+/// A link behind a flexible joint: a spring and a damper are between the motor's side x and the link's side y,
 ///
 /// ```text
 /// m^2 y'' = x - y + 2 damping m (x' - y')
 /// ```
 ///
 /// exact for an input that is linear between nodes: about a ramp the link swings freely. It differs from an
-/// [`Oscillator`](crate::Oscillator), whose damper stands between the mass and the ground, by following a ramp without trailing it, and by
+/// [`Oscillator`](crate::Oscillator), whose damper is between the mass and the ground, by following a ramp without trailing it, and by
 /// passing on more of what is quick. Remembers position, velocity and the last input.
 ///
 /// Source: Spong 1987, doi:10.1115/1.3143860.

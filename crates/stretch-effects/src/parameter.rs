@@ -35,7 +35,7 @@ pub enum Role {
     Choice,
     /// What a record alone can tell (the phase of a hum): no part of a diagnosis' answer.
     Found {
-        /// Stands in for it where there is no record.
+        /// Replaces it if there is no record.
         stand_in: f64,
     },
 }

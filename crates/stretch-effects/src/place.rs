@@ -56,7 +56,7 @@ impl fmt::Display for RigStage {
     }
 }
 
-/// Where in a rig a kind stands.
+/// The place in a rig at which a kind acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Static contraction of the muscle, before its lag.
@@ -65,7 +65,7 @@ pub enum Place {
     MovingContraction,
     /// Gauge strain.
     Strain,
-    /// Resistance of the gauge, the strain beside it.
+    /// Resistance of the gauge, with the strain as the second signal.
     Resistance,
     /// Amplified voltage.
     Volts,
@@ -143,7 +143,7 @@ const MOVING: Quantity = Quantity::new("x", "1", "contraction k, behind the lag 
 pub struct Surroundings<'a> {
     /// Steps of time.
     pub grid: &'a Grid,
-    /// Strain that stands for e0: the pre-stretch, 1 for a gauge alone.
+    /// Strain that is used as e0: the pre-stretch, 1 for a gauge alone.
     pub strain_scale: f64,
     /// Stroke of the strain, for what begins as a move left it: (1 + e0) k_max, 1 for a gauge alone.
     pub strain_stroke: f64,
@@ -184,7 +184,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// A signal of the rig, or what stands in its place in a gauge alone.
+    /// A signal of the rig, or the signal that replaces it in a gauge alone.
     fn signal(&self, rig: (&'static str, &'static str), alone: &'static str) -> Quantity {
         match self.strain_unit == 1.0 {
             true => Quantity::new("x", rig.0, rig.1),

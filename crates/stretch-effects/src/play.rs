@@ -162,7 +162,7 @@ pub(crate) static POT_BACKLASH: Effect = Effect {
 /// Replaces the output of a backlash of half-width `w` by an input that would have made it.
 ///
 /// While the output moves, the input is w ahead of it. After each turn the output dwells at its extreme while
-/// the input crosses the play; there the input is unknown and is led over linearly. Turns and dwells are told with a
+/// the input crosses the play; there the input is unknown and is led over linearly. Turns and dwells are detected with a
 /// band of w/10 (at least a millionth of the record's range): the record has to be smoother than that.
 pub(crate) fn unplay(w: f64, signal: &mut [f64]) {
     let (low, high) = signal.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -192,7 +192,7 @@ struct Turn {
     direction: f64,
 }
 
-/// Extremes between moves of more than `band`; the first stands at the record's start.
+/// Extremes between moves of more than `band`; the first is at the record's start.
 fn turns(signal: &[f64], band: f64) -> Vec<Turn> {
     let mut turns = alloc::vec![Turn { at: 0, direction: 0.0 }];
     let mut extreme = 0;

@@ -1,4 +1,4 @@
-//! An operator as somebody would type it into a simulator of their own: in C, Python or MATLAB, a dozen lines with the state in sight.
+//! An operator as users would type it into their own simulator: in C, Python or MATLAB, a dozen lines with the state in sight.
 
 use alloc::{borrow::Cow, format, string::String, vec, vec::Vec};
 use core::fmt;
@@ -80,7 +80,7 @@ pub struct Cell {
     pub begins: &'static str,
 }
 
-/// An operator, told in the one notation from which its code is written.
+/// An operator, written in the one notation from which its code is written.
 ///
 /// A line of `body` is `let n = ...`, `var n = ...`, `n = ...`, `if ...`, `else` or `end`; functions are those that C, Python and
 /// MATLAB share, `s.n` is a state and `v[i]` the sample i, from 0, of a record. The output is called `y`.
@@ -168,7 +168,7 @@ impl Sketch {
         self
     }
 
-    /// The initial state in words; none where there is no state.
+    /// The initial state in words; `None` if there is no state.
     ///
     /// ```
     /// use stretch_effects::{Extent, Quantity, Signals, kind_named};

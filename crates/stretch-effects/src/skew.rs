@@ -23,8 +23,8 @@ pub struct SkewSpec {
     pub empty: f64,
 }
 
-/// Reads a signal `skew_s + rate t` before every sample, t since the trial began, by cubics through four nodes (Lagrange);
-/// the last value is held beyond the end, of the first one what is not `empty` before the beginning; beside an end the cubic becomes a line.
+/// Reads a signal `skew_s + rate t` before every sample, t since the trial began, by cubics through four nodes (Lagrange). The last value
+/// is held beyond the end, the share `1 - empty` of the first value before the beginning. Next to an end the cubic becomes a line.
 ///
 /// ```
 /// use stretch_effects::{Grid, Skew, SkewSpec};

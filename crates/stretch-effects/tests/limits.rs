@@ -39,7 +39,7 @@ proptest! {
         prop_assert!(rises_at_most_as_much(&found));
         for (x, y) in found.0.iter().zip(&found.1) {
             prop_assert!((..=high + ROUNDING).contains(y));
-            // The upper knee lowers what the lower one let stand.
+            // The upper knee lowers what the lower one left.
             prop_assert!(*y >= low - width * 2.0_f64.ln() - ROUNDING);
             if *x > low + 40.0 * width && *x < high - 40.0 * width {
                 prop_assert_eq!(x, y, "far from both ends it is the value itself");

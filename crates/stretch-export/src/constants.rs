@@ -54,7 +54,7 @@ impl Constants {
 
     /// `#define NAME value`, with what it is.
     pub(crate) fn define(&mut self, name: &str, value: impl Literal, what: &str) -> &mut Self {
-        // a sign would join whatever stands before it
+        // a sign would join whatever is before it
         let value = match value.c() {
             negative if negative.starts_with('-') => format!("({negative})"),
             value => value,

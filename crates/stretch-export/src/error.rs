@@ -10,7 +10,7 @@ use crate::Form;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// A model that nobody has written in C.
+    /// A model that has no C code.
     #[error(
         "{model} has no form in C; those that have are linear, poly13, curve, observer, observer+rest and diagnosed: calibrate with one of them as --model"
     )]

@@ -289,7 +289,7 @@ fn assembled(
     Header { text, form, model, pressure, array: None, step: source.step(form), branches }
 }
 
-/// What the file is, for whoever opens it.
+/// What the file is, for readers who open it.
 fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String {
     let signal = comment_safe(&source.signal);
     let reference = comment_safe(source.reference.as_str());

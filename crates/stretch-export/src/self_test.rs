@@ -16,7 +16,7 @@ use crate::{ExportError, Form, part::kept};
 pub(crate) const SAMPLES: usize = 200;
 /// Larger than any sample: one that did not come (`STRETCH_NO_VOLTS`).
 const NO_VOLTS: f32 = 2e18;
-/// What stands in the flags beside the status.
+/// What the flags hold in addition to the status.
 const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Up and down once in this many samples.
 const PERIOD: usize = 70;
@@ -238,8 +238,8 @@ impl Rows {
         self.line.clear();
     }
 
-    /// The table and the test: the fields of a row, that which is the input, what of a reading stands in the flags
-    /// beside its status, and what must not hold.
+    /// The table and the test: the fields of a row, that which is the input, what of a reading is in the flags
+    /// in addition to its status, and what must not hold.
     fn text(mut self, fields: &str, input: &str, flags: &str, differs: &str) -> String {
         self.end_line();
         include_str!("c/self_test.h")

@@ -395,7 +395,7 @@ fn shapes_and_signs_give_the_same_bits() {
     holds("a curve of degree 5", &curve, Form::Float, &compilers);
 }
 
-/// A zero that is told and followed: within a limit that the samples stay in now and then, and one that they reach.
+/// A zero that is reported and followed: within a limit that the samples stay in now and then, and one that they reach.
 #[test]
 fn a_zero_gives_the_same_bits() {
     zeros(&strict_c());

@@ -68,7 +68,7 @@ fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f3
         .array("uint8_t", "extends", &extends);
 }
 
-/// What the channels are held against beside each other.
+/// What the channels are compared with, in addition to each other.
 fn watched<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let count = numbers.channels;
     let of = &numbers.of[..count];

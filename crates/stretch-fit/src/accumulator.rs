@@ -157,7 +157,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         samples.into_iter().try_for_each(|sample| self.push(sample))
     }
 
-    /// Adds many samples that stand in columns, as many as the shortest has: all of them, or none. The same as pushing each, bit
+    /// Adds many samples that are given as columns, as many as the shortest has: all of them, or none. The same as pushing each, bit
     /// for bit, in less time.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ impl<const TERMS: usize> Basis<TERMS> {
         if terms > TERMS {
             return Err(FitError::TooManyTerms { terms, room: TERMS });
         }
-        // each term is one that stands before it, times the rate or the voltage
+        // each term is an earlier term, times the rate or the voltage
         let powers = exponents::<TERMS>(degree);
         let mut steps = [(0, false); TERMS];
         for k in 1..terms {

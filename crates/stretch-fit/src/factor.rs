@@ -398,7 +398,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         self.restrict(degree)?.fit()
     }
 
-    /// What a column adds to those before it stands on the diagonal; it must
+    /// What a column adds to those before it is on the diagonal; it must
     /// exceed rounding: of the reflections, whose errors walk at random from
     /// fold to fold (a tenth of what is allowed, measured over 1e6 samples in
     /// blocks of 8 and more), and, for powers of the voltage, of the samples'

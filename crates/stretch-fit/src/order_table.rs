@@ -42,7 +42,7 @@ pub struct Excess<T> {
 /// An order with its row, or with the reason why it cannot be fitted.
 pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 
-/// A chosen order beside its neighbours: next lower, chosen, next higher.
+/// A chosen order with its neighbours: next lower, chosen, next higher.
 ///
 /// The lowest order that satisfies the acceptance criterion is the one with the fewest terms whose excess
 /// over the best order's cross-validated mean squared error is within one
@@ -80,7 +80,7 @@ pub struct OrderTable<T> {
 }
 
 impl<T: Real> OrderTable<T> {
-    /// The orders beside `chosen`: one less and one more in the voltage, one
+    /// The orders next to `chosen`: one less and one more in the voltage, one
     /// less and one more in the rate, and `chosen` itself, by rising number of
     /// terms. For poly13: poly03, poly12, poly13, poly14, poly23.
     pub fn neighbours(chosen: Degree) -> impl Iterator<Item = Degree> {

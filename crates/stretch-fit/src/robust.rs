@@ -227,7 +227,7 @@ fn median_of_largest<T: Real>(values: &mut [T], terms: usize) -> T {
     (lower + upper) / T::from_f64(2.0)
 }
 
-/// The value that would stand at `place` if sorted; those before it are moved
+/// The value that would be at `place` if sorted; those before it are moved
 /// before it.
 fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
     if values.is_empty() {

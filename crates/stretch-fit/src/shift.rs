@@ -1,6 +1,6 @@
 //! Moving the voltage's origin.
 //!
-//! Powers of raw volts that vary little beside their mean are nearly parallel
+//! Powers of raw volts that vary little compared with their mean are nearly parallel
 //! (1.23 to 1.25 V: condition 1e8). Powers of `volts - centre` are not, and
 //! with a centre near the data the subtraction is exact. Terms that share a
 //! power of the rate turn into each other by the binomial theorem; in the

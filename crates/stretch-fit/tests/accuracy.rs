@@ -107,7 +107,7 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
     }
 }
 
-/// Raw counts about an offset: the root mean square error of a fit, if there is one, beside that of its surface.
+/// Raw counts about an offset: the root mean square errors of a fit, if there is one, as stated and as found from its surface.
 fn stated_and_found(offset: f64, half: f64, cubic: Degree) -> Option<(f64, f64)> {
     let sample = |k: u32| {
         let x = f64::from(k % 201) / 100.0 - 1.0;

@@ -358,7 +358,7 @@ fn finite_or_refused<T: Real>(
     Ok(())
 }
 
-/// A trial with noise of its own; `k` numbers it.
+/// A trial with its own noise; `k` numbers it.
 fn trial(k: u32, degree: Degree, truth: impl Fn(f64, f64) -> f64) -> Factor<f64, 21> {
     let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(degree).unwrap();
     let mut state = u64::from(k) * 2_654_435_761 + 1;

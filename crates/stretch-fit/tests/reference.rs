@@ -124,7 +124,7 @@ fn prediction_bounds() {
             ("observation_everywhere", bounds.observation_everywhere(rate, volts)),
         ] {
             assert!(near(bounds.estimate, at("estimate"), tol::FIT_STATISTICS), "{what}");
-            // Estimate less bound: half widths of 1e-6 beside estimates of 1.
+            // Estimate less bound: half widths of 1e-6 at estimates of 1.
             let allowed = tol::FIT_STATISTICS + tol::F64_ROUNDING / at(what);
             for half in [bounds.estimate - bounds.lower, bounds.upper - bounds.estimate] {
                 assert!(near(half, at(what), allowed), "{what}, row {row}: {half} wide");

@@ -51,7 +51,7 @@ use crate::{
     },
 };
 
-/// Diagnoses a simulator beside its measurements.
+/// Diagnoses a simulator with its measurements.
 ///
 /// `progress` takes in words what goes on. `stop` is asked between simulations; once it says yes, the
 /// diagnosis ends with [`GapError::Stopped`].
@@ -219,7 +219,7 @@ impl<'a> Searched<'a> {
     }
 }
 
-/// Searches, once more where the nuisances turn out to be others beside what was found.
+/// Searches for the best set of effects, and once more if noise levels or parameters change when they are estimated anew with that set.
 fn search<'a>(
     task: Task<'a>,
     problem: PreparedProblem<'a>,
@@ -257,8 +257,8 @@ fn search<'a>(
     Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })
 }
 
-/// The errors of the record or of the rig file that stand above the best set of effects, and what was found with the first of them in its
-/// place: an error has one number and leaves noise. None where the effects stand.
+/// Errors of the record or of the rig file that explain more than the best set of effects, and what was found with the first of them
+/// in place of the set: an error has one number and leaves noise. `None` if the set of effects explains more.
 fn doubt(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -275,7 +275,7 @@ fn doubt(
     Ok(weigh_errors(doubted, suspect, doubts.errors, found, thresholds))
 }
 
-/// How strong each effect would have to be to be named; none where the record carries no name at all, or no more runs may be made.
+/// How strong each effect would have to be to be named; `None` if the record carries no name at all, or no more runs may be made.
 fn limits(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -467,7 +467,7 @@ fn report(
         stages: with_causes(location.stages, &shares, &naming.named, simulator),
         ..location
     };
-    // What a page needs beside the answer counts as none of its cost.
+    // What a page needs in addition to the answer does not count as cost of the answer.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
         evidence.responses = if_possible(responses)?.unwrap_or_default();
@@ -518,7 +518,7 @@ fn report(
 /// Slices that are reported of what a partial answer leaves.
 const REPORTED_SLICES: usize = 3;
 
-/// What the first candidate leaves of the held-out gap, and where it stands out.
+/// What the first candidate leaves of the held-out gap, and where it is largest.
 fn unexplained(
     simulator: &dyn Simulator,
     evidence: &Evidence,

@@ -45,7 +45,7 @@ impl Default for Options {
     }
 }
 
-/// The variable of the environment that says how many threads there are where nobody asks for a number.
+/// The variable of the environment that says how many threads there are if no number is asked for.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
 
 /// How many threads are started where so many are asked for: at most one a core. Where 0 are asked for it is what `RAYON_NUM_THREADS` says,
@@ -72,7 +72,7 @@ fn said() -> Option<usize> {
 /// Caps the threads that all else shares, where `RAYON_NUM_THREADS` asks for more than there are cores. A program calls it once at its begin.
 pub fn cap_threads() {
     if said().is_some_and(|said| said > cores()) {
-        // where somebody has begun already, the number stays what it is
+        // if threads were started already, their number stays what it is
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(0)).build_global();
     }
 }

@@ -201,7 +201,7 @@ fn gross_errors_are_no_noise_of_a_coarse_converter() {
     }
 }
 
-/// What is missing is named beside gross errors as without them, and they are counted.
+/// What is missing is named with gross errors as without them, and they are counted.
 #[test]
 fn gross_errors_hide_no_effect() {
     for (size, row) in [(5.0, 1), (-40.0, 1), (5.0, 3)] {

@@ -101,7 +101,7 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
     }
 }
 
-/// A record whose output wanders by so many times its noise.
+/// A record whose output drifts by so many times its noise.
 fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64])]) -> Measured {
     let recorder_drift = Some(SlowDrift { sd: 0.3, correlation_s: 2.0 });
     let toy = Toy { recorder_drift, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden) };
@@ -126,7 +126,7 @@ fn slow_noise_of_a_recorder_is_no_gap() {
     }
 }
 
-/// A recorder does not wander by more than its noise: that is a gap, however slow.
+/// A drift larger than the noise of a recorder is a gap, however slow.
 #[test]
 fn what_wanders_by_more_than_noise_stays_a_gap() {
     for (times, correlation_s) in [(2.0, 1.0), (2.0, 3.0), (5.0, 10.0)] {
@@ -139,7 +139,7 @@ fn what_wanders_by_more_than_noise_stays_a_gap() {
     }
 }
 
-/// An effect as large as the slow noise beside it is told from it, because the two have not the same course.
+/// An effect as large as the slow noise is distinguished from it, because the two have different courses.
 #[test]
 fn an_effect_beside_slow_noise_is_found() {
     for seed in 0..5 {

@@ -13,7 +13,7 @@ fn refused(record: &Measured) -> GapError {
     diagnose(record, &Options::default(), &|_| (), &|| false).expect_err("it is refused")
 }
 
-/// An oscillator whose step of integration may be doubled within a sample of 50 ms, beside little noise.
+/// An oscillator whose step of integration may be doubled within a sample of 50 ms, with little noise.
 fn oscillator(step_s: f64) -> Toy {
     Toy { dt_s: 0.05, noise: 0.001, step_s, ..Toy::of(&[Law::Oscillator]) }
 }
@@ -28,7 +28,7 @@ fn an_integrator_that_is_too_coarse_is_refused() {
         }
         other => panic!("{other}"),
     }
-    // Beside noise a thousand times as large, that is nothing; and a tenth of the step moves a hundredth as much.
+    // With noise a thousand times as large, that is nothing; and a tenth of the step moves a hundredth as much.
     let noisy = Toy { noise: 1.0, ..oscillator(0.025) };
     assert!(noisy.measured(1).diagnosed().0.named.is_empty());
     assert!(oscillator(0.0025).measured(1).diagnosed().0.named.is_empty());
@@ -206,7 +206,7 @@ fn budgeted(budget: Option<usize>) -> (Diagnosis, usize) {
     (told, record.runs())
 }
 
-/// A budget that does not last is told, with what was made; what is named then stands on what was fitted until then.
+/// A budget that does not last is reported, with the runs that were made. Names are then based on the fits until then.
 #[test]
 fn a_budget_that_is_spent_is_told() {
     let (free, needed) = budgeted(Some(usize::MAX));
@@ -231,7 +231,7 @@ fn a_budget_that_is_spent_is_told() {
     }
 }
 
-/// Where runs are not counted, none are told; with room enough the answer is the same.
+/// If runs are not counted, no number is reported; with room enough the answer is the same.
 #[test]
 fn a_budget_that_lasts_alters_no_name() {
     let (free, _) = budgeted(None);

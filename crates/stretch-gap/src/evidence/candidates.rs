@@ -30,7 +30,7 @@ use crate::{
 /// A set of effects that was held against the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
-    /// Effects of the set, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
+    /// Effects of the set, the strongest first; `unknown` is any cause that the catalogue lacks, and is always the last candidate.
     pub effects: Vec<String>,
     /// Probability among the candidates.
     pub probability: f64,
@@ -43,7 +43,7 @@ pub struct Candidate {
     /// Excess that the set leaves, of the fitted and the test trials the greater.
     #[serde(default)]
     pub left: f64,
-    /// Whether the strongest effect of the set stands at an end of its range.
+    /// Whether the strongest effect of the set is at an end of its range.
     #[serde(default)]
     pub at_bound: bool,
     /// Closed-gap fraction.
@@ -145,7 +145,7 @@ pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
 /// [`LEAST_CLOSED`] of the gap is dropped. Where every set leaves more than noise and model discrepancy would, `function` is asked for what the
-/// catalogue lacks, beside the set with the greatest score.
+/// catalogue lacks, in addition to the set with the greatest score.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
@@ -371,7 +371,7 @@ mod tests {
         assert_eq!([leaves(3.0, 18.4), leaves(3.0, 3.84), leaves(0.0, 0.69)], [true, false, true]);
     }
 
-    /// A threshold that is off may stand outside of its range: it is its own end.
+    /// A threshold that is off may be outside of its range: it is its own end.
     #[test]
     fn a_value_outside_of_its_range_is_an_end() {
         let spec = EffectParameter::sized("threshold", "V", 1.0..=2.0).off_at(9.0);

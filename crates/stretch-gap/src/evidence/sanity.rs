@@ -5,7 +5,7 @@
 //! * *gross misfit*: more of a channel's variance is left on the test trials than a missing effect leaves
 //!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)): another rig, or a column that is not what its name says. The share is that of
 //!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
-//! * *at bounds*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
+//! * *at bounds*: two parameters of a stage are at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
 //!
 //! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise. No noise does that, so it was
@@ -57,7 +57,7 @@ pub(crate) struct AtBounds {
     pub(crate) ended: Vec<usize>,
     /// Excess that is left on the test trials.
     pub(crate) left: f64,
-    /// Excess over the fitted trials with the best effects, and with these parameters set loose and no effect; none where
+    /// Excess over the fitted trials with the best effects, and with these parameters set loose and no effect; `None` if
     /// there is no effect to compare with.
     pub(crate) rivals: Option<(f64, f64)>,
 }
@@ -87,7 +87,7 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
     let sd = &problem.compare.metrics[stage].noise.sd;
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
     for segment in evidence.roles.of_role(Role::Test) {
-        // What was not measured counts for nothing, whatever stands in its place, and neither does a gross error.
+        // What was not measured counts for nothing, whatever value is in its place, and neither does a gross error.
         for i in (segment.from..segment.to).filter(|i| sd[*i].is_finite()) {
             count += 1.0;
             sum += measured[i];
@@ -96,7 +96,7 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
         }
     }
     let variance = squares - sum * sum / f64::max(count, 1.0);
-    // What is noise is nobody's fault.
+    // Noise is no misfit.
     let noise = count * traces.noise * traces.noise;
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }

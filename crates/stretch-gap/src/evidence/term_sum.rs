@@ -8,7 +8,7 @@
 //! S_f = sum over stages of (N/2m) ln(X_nominal/X) - ((k + j)/2) ln(blocks) - k ln M - d
 //! ```
 //!
-//! where d is what [deviations](crate::fit::deviations) of its own effects' forms add to the best
+//! where d is what [deviations](crate::fit::deviations) of the forms of its effects add to the best
 //! set. A sum of any terms has to explain more than another form of the effects would. If it does,
 //! the cause is outside the catalogue.
 

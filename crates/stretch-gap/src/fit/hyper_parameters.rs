@@ -8,7 +8,7 @@
 //! ```
 //!
 //! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
-//! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance beside the others'
+//! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance with the others at their
 //! greatest: a record that fits at one level alone says less than one that fits at many.
 //!
 //! A recorder need not drift: a = 0 is one of its sizes. A recorder's drift is smaller than its noise. If a larger drift fits best, the recorder
@@ -74,7 +74,7 @@ impl Metric {
         (best, gained)
     }
 
-    /// ln of the likelihood beside noise that is `noise` times as large, a and tau integrated over:
+    /// ln of the likelihood with noise that is `noise` times as large, a and tau integrated over:
     ///
     /// ```text
     /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
@@ -101,13 +101,13 @@ impl Metric {
         own + (0..self.loose().len()).map(one).sum::<f64>()
     }
 
-    /// L of the module's head beside noise that is `noise` times as large.
+    /// L of the module's head with noise that is `noise` times as large.
     fn beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
         self.likelihood_beside(roles, residual, noise) - price
     }
 
-    /// The likelihood beside noise that is `noise` times as large: V/s has nuisances that much smaller.
+    /// The likelihood with noise that is `noise` times as large: V/s has nuisances that much smaller.
     fn likelihood_beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
             return self.likelihood(roles, residual);

@@ -1,18 +1,19 @@
 //! Isolated outliers: what one sample or a few in a row say and none of their neighbours is the recorder's, not the rig's.
 //!
-//! In the residual r, in multiples of the noise, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the motion stands out.
+//! In the residual r, in multiples of the noise, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the
+//! motion becomes visible.
 //! A sample is isolated where it is off both neighbours to the same side,
 //!
 //! ```text
 //! min(|r_i - r_(i-1)|, |r_i - r_(i+1)|) > 8 max(1, s),     s = median of |steps| within half a second / 0.954
 //! ```
 //!
-//! with the deviation s of the noise that the steps beside it show, so that a hum is not isolated. A step or a kink of a gap is off
-//! one neighbour only. So are all of [`RUN`] samples in a row or fewer (an encoder's glitch) that are that far off both samples beside
+//! with the deviation s of the noise that the steps near it show, so that a hum is not isolated. A step or a kink of a gap is off
+//! one neighbour only. So are all of [`RUN`] samples in a row or fewer (an encoder's glitch) that are that far off both samples next to
 //! the run, where these two differ by a quarter of that at most, and where the simulator moves by a quarter of it at most on either
 //! side: what follows a command late or not at all also leaves a few samples in a row, but there the simulator has a step. What is
 //! isolated counts for nothing, as what was lost. Where more than one of [`RARE`] are isolated they are no exceptions, and count; runs
-//! do where there are too many beside single ones.
+//! count where there are too many in addition to single ones.
 
 use std::{collections::BTreeSet, ops::Range};
 
@@ -27,7 +28,7 @@ const RARE: usize = 200;
 
 /// Most samples of a run.
 const RUN: usize = 5;
-/// Share of its height by which what a run stands on may move.
+/// Share of its height by which the signal on either side of a run may differ.
 const LEVEL: f64 = 0.25;
 
 /// Samples of a residual in multiples of the noise that are isolated within their trials, in order; `moves` are the simulator's own
@@ -63,7 +64,7 @@ pub(crate) fn isolated(
     }
 }
 
-/// Whether the samples between the first of a span and the one at its end are a run that stands alone.
+/// Whether the samples between the first of a span and the one at its end are an isolated run.
 fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
     let (before, after) = (span.start, span.end);
     if after >= r.len() {
@@ -128,7 +129,7 @@ mod tests {
         assert!(none_of(&often).is_empty());
     }
 
-    /// Two to five samples in a row, on whatever they stand; six are an event of the rig, and so is what does not come back.
+    /// Two to five samples in a row, at any level; six are an event of the rig, and so is what does not come back.
     #[test]
     fn a_few_values_in_a_row_are_found_and_what_lasts_longer_is_left() {
         for (length, height) in [(2, 30.0), (3, -25.0), (4, 1e6), (5, 40.0)] {

@@ -53,7 +53,7 @@ pub(crate) struct Fitted {
     pub(crate) coordinates: Vec<(Coordinate, [f64; 2])>,
     /// N of the module's head.
     pub(crate) normal: DMatrix<f64>,
-    /// Whether it stood still with sensitivities of where it stands, each simulated: a further fit from here would end at once.
+    /// Whether it stopped with sensitivities that were all simulated at its last point: a further fit from here would end at once.
     pub(crate) is_settled: bool,
     /// Fall of the cost in the last iteration, nats.
     pub(crate) last_fall: f64,
@@ -133,7 +133,7 @@ impl Comparison<'_> {
             descent.last_fall = before - descent.cost;
             let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
             descent.is_settled = is_still && renew && self.simulator().model_runs().is_none();
-            // With old sensitivities a stand-still may only mean that they are old.
+            // With old sensitivities no progress may only mean that they are old.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
             }
@@ -202,12 +202,12 @@ struct Descent<'a, 'b> {
     stages: &'a [usize],
     coordinates: Vec<(Coordinate, [f64; 2])>,
     model: Model,
-    /// Parameters near which steps may be taken; none where each is a run of its own.
+    /// Parameters near which steps may be taken; `None` if each is a separate run.
     near: Option<Vec<f64>>,
     /// The residual of each stage, in the order of `stages`.
     residuals: Vec<Column>,
     cost: f64,
-    /// Sensitivities by coordinate, then by stage; none where a coordinate does not act.
+    /// Sensitivities by coordinate, then by stage; `None` if a coordinate does not act.
     columns: Vec<Vec<Option<Column>>>,
     /// N, undamped.
     normal: DMatrix<f64>,

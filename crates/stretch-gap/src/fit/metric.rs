@@ -35,7 +35,7 @@ pub(crate) struct Metric {
     pub(crate) noise: NoiseLevel,
     /// Parameters of the stage that drift or are offset in each trial.
     loose: Vec<Loose>,
-    /// The nuisance of each segment; none where no parameter of the stage is loose.
+    /// The nuisance of each segment; `None` if no parameter of the stage is loose.
     nuisances: Vec<Option<Nuisance>>,
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct Loose {
     clock: Arc<[u32]>,
     /// The slow drift of the parameter as the simulator describes it; none for an offset.
     pub(crate) drift: Option<SlowDrift>,
-    /// Whether each tick of the clock has an offset of its own, as large as the simulator describes it.
+    /// Whether each tick of the clock has a separate offset, as large as the simulator describes it.
     pub(crate) is_by_tick: bool,
     /// Size and correlation time that the drift is taken to have.
     pub(crate) level: Level,
@@ -182,7 +182,7 @@ impl Metric {
         &self.loose
     }
 
-    /// Standard deviation of the recorder's drift, in multiples of the noise, and its correlation time, s; none where there is none.
+    /// Standard deviation of the recorder's drift, in multiples of the noise, and its correlation time, s; `None` without a drift.
     pub(crate) fn recorder_drift(&self) -> Option<(f64, f64)> {
         let own =
             self.loose.iter().find(|loose| loose.parameter.is_none() && loose.level.size > 0.0)?;

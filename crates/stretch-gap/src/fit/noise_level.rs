@@ -100,7 +100,7 @@ fn noise_level(
             sd.push((own + local).sqrt().max(1e-12));
         }
     }
-    // What was not measured weighs nothing, and what stands alone.
+    // What was not measured weighs nothing, and neither does an isolated outlier.
     for (sd, _) in sd.iter_mut().zip(&simulator.record().is_lost).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
     }

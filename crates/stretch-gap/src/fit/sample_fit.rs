@@ -32,7 +32,7 @@ use crate::{
     },
 };
 
-/// Most descents, each with sensitivities of its own.
+/// Most descents, each with its own sensitivities.
 const ROUNDS: usize = 4;
 /// Fall of the cost, nats, below which a further descent is not worth its runs.
 const LEAST_FALL: f64 = 0.03;

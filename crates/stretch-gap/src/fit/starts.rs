@@ -38,7 +38,7 @@ const SPREAD: f64 = 2.0;
 const DESCENTS: usize = 3;
 /// Times the cost of the re-tuning up to which the cost at a place is near it.
 const NEAR: f64 = 2.0;
-/// Descents one behind the other, each with sensitivities of its own.
+/// Descents one after the other, each with its own sensitivities.
 const ROUNDS: usize = 4;
 /// Parts of the trials that a descent grows over.
 const PARTS: [f64; 4] = [0.1, 0.2, 0.4, 0.7];
@@ -66,7 +66,7 @@ pub struct Starts {
 }
 
 impl Starts {
-    /// That the starts disagree, in words; none where they agree.
+    /// That the starts disagree, in words; `None` if they agree.
     pub fn note(&self) -> Option<String> {
         let Self { tried, agreed } = self;
         (agreed < tried).then(|| {
@@ -136,7 +136,7 @@ impl PreparedProblem<'_> {
     }
 }
 
-/// Where a re-tuning may begin beside the one that was made.
+/// Where a further re-tuning may begin.
 enum Places<'m> {
     /// Anywhere within the tolerances, drawn from a seed.
     Tolerances(u64),
@@ -144,7 +144,7 @@ enum Places<'m> {
     At(&'m Model),
 }
 
-/// A model whose re-tuned parameters leave less than those of `nominal`, none where there is none; and how the starts agreed.
+/// A model whose re-tuned parameters leave less than those of `nominal`, `None` if there is none; and how the starts agreed.
 ///
 /// Groups of stages whose gap is at most `least_gap` are left as they are.
 fn better_start(
@@ -226,7 +226,7 @@ impl StartSearch<'_, '_> {
         models
     }
 
-    /// Costs of some models, each over the whole and over the beginning of the trials, in one batch; none where one cannot be simulated.
+    /// Costs of some models, each over the whole and over the beginning of the trials, in one batch; `None` if one cannot be simulated.
     fn costs(
         &self,
         models: &[Model],
@@ -240,7 +240,7 @@ impl StartSearch<'_, '_> {
         Ok(models.iter().zip(there).map(cost).collect())
     }
 
-    /// Where descents from a model end, one behind the other as long as something is gained; none where it cannot be simulated.
+    /// Where descents from a model end, one after the other as long as the cost falls; `None` if it cannot be simulated.
     fn descended(
         &self,
         compare: &Comparison<'_>,
@@ -268,7 +268,7 @@ impl StartSearch<'_, '_> {
         Ok(best)
     }
 
-    /// Where a descent over growing parts of the trials ends; none where a part is left unexplained.
+    /// Where a descent over growing parts of the trials ends; `None` if a part is left unexplained.
     fn grown(&self, mut model: Model) -> Result<Option<Fitted>, GapError> {
         let gap_of = |misfits: &[Misfit]| misfits.iter().map(|m| gap(m.fit)).sum::<f64>();
         let stages = self.group.iter().map(|stage| self.compare.residual(*stage, self.nominal));

@@ -1,7 +1,7 @@
-//! Does what drifts swing? A line beside the drift, weighed against the drift alone.
+//! Does a parameter that drifts swing? Compares a drift with a spectral line with the drift alone.
 //!
 //! A drift that is adapted to the record takes a swing of its parameter for a quick drift, so that no gap is left. What
-//! [cleaning](crate::fit::metric::Metric::clean) leaves of a residual r is V^-1 r, and V holds the adapted drift. The hypothesis beside it: in segment k the
+//! [cleaning](crate::fit::metric::Metric::clean) leaves of a residual r is V^-1 r, and V holds the adapted drift. The alternative hypothesis: in segment k the
 //! parameter swings with one frequency f and amplitude s, and a phase of the segment's own,
 //!
 //! ```text
@@ -12,7 +12,7 @@
 //!
 //! with V the larger, where the median |q|^2 of the frequencies around f is larger than it predicts: what another form of an effect leaves is no line
 //! (Rasmussen and Williams 2006, section 2.7; without a drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is the
-//! mean over amplitudes of a quarter to twice the drift and over all frequencies, of which those whose |q|^2 stands out most among
+//! mean over amplitudes of a quarter to twice the drift and over all frequencies, of which those whose |q|^2 exceeds most that of
 //! their neighbours are computed and the others taken for 0, so that it errs to the side of the drift. The odds before the data are even.
 
 use std::f64::consts::TAU;
@@ -35,7 +35,7 @@ pub(crate) struct Swing {
     pub(crate) hertz: f64,
     /// Amplitude, in the parameter's unit.
     pub(crate) amplitude: f64,
-    /// Probability beside that of the drift alone.
+    /// Probability compared with that of the drift alone.
     pub(crate) probability: f64,
 }
 
@@ -201,7 +201,7 @@ impl Heard {
     }
 }
 
-/// Root mean square over segments of the likeliest amplitude, each as it is told.
+/// Root mean square over segments of the likeliest amplitude, each weighed by its information.
 fn rms_amplitude(heard: &[Heard], precision: f64) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for own in heard {

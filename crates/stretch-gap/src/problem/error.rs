@@ -59,7 +59,7 @@ pub enum GapError {
         /// The values that it was asked for; empty where they are not known.
         asked: String,
     },
-    /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
+    /// The simulator is gone, or gives answers without a question: nothing that it said since can be relied on.
     #[error(transparent)]
     Broken(Box<dyn std::error::Error + Send + Sync>),
     /// Probabilities of the hypotheses are no numbers.
@@ -85,7 +85,7 @@ pub enum GapError {
     Stopped,
 }
 
-/// What an answer can do without: none where a run for it failed, or may not be made any more.
+/// What an answer can do without: `None` if a run for it failed, or may not be made any more.
 pub(crate) fn if_possible<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
     match found {
         Err(error) if error.is_of_runs() => Ok(None),
@@ -93,7 +93,7 @@ pub(crate) fn if_possible<T>(found: Result<T, GapError>) -> Result<Option<T>, Ga
     }
 }
 
-/// What a search can do without: none where a run for it failed.
+/// What a search can do without: `None` if a run for it failed.
 pub(crate) fn unless_lost<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
     match found {
         Err(error) if error.is_lost() => Ok(None),

@@ -34,12 +34,12 @@ const SHARES: usize = 19;
 
 /// Medians of the sizes of differences beyond which one is a gross error: 8 standard deviations of normal noise.
 const GROSS: f64 = 12.0;
-/// Fits of the waves of the mains beside gross errors, each with what the last one left.
+/// Fits of the waves of the mains with gross errors, each with what the last one left.
 const ROUNDS: usize = 4;
 /// Relative rounding of a second difference: four operations, and the values' own.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Noise of a channel, in its unit: white noise, and an Ornstein-Uhlenbeck process beside it.
+/// Noise of a channel, in its unit: white noise plus an Ornstein-Uhlenbeck process.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Noise {
     white: f64,
@@ -105,7 +105,7 @@ impl Noise {
 
     /// Estimates noise from windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. Where they are not still,
     /// because something moves on by itself, only the quicker half of the waves is looked at, and of slow noise nothing is said.
-    /// None where there are too few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
+    /// `None` if there are too few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
     ///
     /// ```
     /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
@@ -346,7 +346,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 /// other; how many samples' worth of white noise went with them. `beside` are the differences before and behind the stretch, 0 where there
 /// are none.
 ///
-/// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; where one stands in
+/// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; if one remains in
 /// what is left, the waves are fitted to that again. It makes differences of either sign one behind the other, where a kink of the
 /// motion makes one alone.
 pub(crate) fn take_waves_out(
@@ -371,7 +371,7 @@ pub(crate) fn take_waves_out(
         taken = 0.0;
         let gross: Vec<usize> = (0..values.len()).filter(|i| is_gross(values, *i, most)).collect();
         for shown in mains(dt_s) {
-            // What shows as a slow wave cannot be told from motion.
+            // A slow wave cannot be distinguished from motion.
             if shown < 0.15 || values.len() < 20 {
                 continue;
             }
@@ -434,7 +434,7 @@ mod tests {
         approx::assert_abs_diff_eq!(trimmed_mean(1.0), 1.0, epsilon = 1e-12);
     }
 
-    /// A stated level that the record bears out stands; one that it does not gives way.
+    /// A stated level is kept if the record confirms it, and replaced if not.
     #[test]
     fn what_is_stated_is_a_hypothesis() {
         for seed in 0..20 {

@@ -88,7 +88,7 @@ impl<'a> Runs<'a> {
         self.simulator
     }
 
-    /// Whether the simulator's budget allows no more than what the answer itself needs; whoever asks goes no further then.
+    /// Whether the simulator's budget allows no more than what the answer itself needs; optional work is then left out.
     pub(crate) fn is_spent(&self) -> bool {
         let is_spent = self.simulator.model_runs().is_some_and(|runs| runs.is_spent);
         self.was_cut.fetch_or(is_spent, Ordering::Relaxed);
@@ -203,7 +203,7 @@ impl<'a> Runs<'a> {
         .collect()
     }
 
-    /// One run on an input that was not measured; none where the stage cannot.
+    /// One run on an input that was not measured; `None` if the stage cannot.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
         let done = self.simulator.simulate_on(self.stepped(run), input, &mut out);

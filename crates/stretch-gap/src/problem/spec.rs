@@ -111,7 +111,7 @@ impl ParameterSpec {
     }
 }
 
-/// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
+/// Tolerances at which a parameter counts as at its end: two of the five or so of a stage do so by chance in one rig of a few
 /// thousand.
 const END: f64 = 2.75;
 

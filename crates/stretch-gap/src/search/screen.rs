@@ -10,7 +10,7 @@
 //! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
 //! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
 //! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
-//! A threshold changes nothing up to where the signal reaches it, and soon too much beyond: of a state inside a simulator nobody knows where that is. Where
+//! A threshold changes nothing up to where the signal reaches it, and soon too much beyond: for a state inside a simulator that place is unknown. Where
 //! its starts were not chosen for the effect, and go from one that changes nothing to one that does more than twice too much, places between the two
 //! are screened as well.
 //! A kink bends the change, so gains only say what a fit may be spent on.
@@ -45,7 +45,7 @@ pub(crate) struct Screened {
     pub(crate) effect: usize,
     /// Starting points for a fit, the best first, with the reduction of the cost each promises.
     pub(crate) starts: Vec<(Vec<f64>, f64)>,
-    /// <d,d> at each start of the catalogue, in its order; none where nothing changes.
+    /// <d,d> at each start of the catalogue, in its order; `None` if nothing changes.
     pub(crate) sizes: Vec<Option<f64>>,
 }
 
@@ -136,7 +136,7 @@ impl Comparison<'_> {
         Ok(Screened { effect, starts, sizes })
     }
 
-    /// <d,d> and <d,r> of the change d that an effect makes at each of some values; none where it makes none or cannot be simulated.
+    /// <d,d> and <d,r> of the change d that an effect makes at each of some values; `None` if it makes none or cannot be simulated.
     pub(crate) fn changes(
         &self,
         ground: &Ground,
@@ -213,8 +213,8 @@ impl Comparison<'_> {
     }
 }
 
-/// Places between the last start of a threshold that changes nothing and the first that does too much, with every shape; none where a start does about
-/// as much as the residual asks for, or somebody chose the starts.
+/// Places between the last start of a threshold that changes nothing and the first that does too much, with every shape; no place if a start
+/// does about as much as the residual asks for, or if the starts were chosen for the effect.
 fn jumped_over(spec: &EffectSpec, tried: &[Tried]) -> Vec<Vec<f64>> {
     let threshold = spec.parameters[0].off().filter(|off| *off != 0.0);
     let Some(off) = threshold else { return Vec::new() };

@@ -1,8 +1,8 @@
 //! The search: forward selection, backward pruning, and rivals in every slot.
 //!
-//! Greedy selection is dangerously sure of a strong effect that stands in for several small ones, so the search looks back three
-//! times: sets are pruned with the rest fitted anew from the larger set, every effect of the best set is held against rivals
-//! fitted in its place, and a rival that stands better takes it, from which the search goes on.
+//! Greedy selection is dangerously sure of a strong effect that replaces several small ones, so the search looks back three times:
+//! sets are pruned with the rest fitted anew from the larger set; every effect of the best set is compared with alternatives
+//! fitted in its place; and an alternative with a better score replaces it, from which the search goes on.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -24,7 +24,7 @@ const KEPT: usize = 8;
 const KEPT_LATER: usize = 5;
 /// Leaders whose twins are kept with them.
 const LEADERS: usize = 4;
-/// Rivals looked at for an effect that stands alone, and for one among others.
+/// Rivals looked at for a single effect, and for one among others.
 pub(crate) const RIVALS: (usize, usize) = (6, 3);
 /// Share of the least rise that a screen must promise: where the change bends it promises too little.
 const PROMISE: f64 = 0.1;
@@ -75,7 +75,7 @@ impl<'a> Search<'a> {
         Self { problem, acceptance, sets, depth, is_thorough: true, looked: Vec::new() }
     }
 
-    /// The same, fitting only what a screen promises: enough to size nuisances beside it.
+    /// The same, fitting only what a screen promises: enough to estimate the noise levels with it.
     pub(crate) fn quick(self) -> Self {
         Self { is_thorough: false, ..self }
     }
@@ -111,8 +111,8 @@ impl<'a> Search<'a> {
         self.second_line(begun, first, progress)
     }
 
-    /// A set held against its rivals: one that stands better in the place of another takes it, for the strongest comes first and may
-    /// have stood in for several.
+    /// Compares a set with its alternatives. One with a better score replaces an effect of the set, because the strongest effect comes first
+    /// and may have replaced several.
     pub(crate) fn rivalled(
         &mut self,
         mut best: Hypothesis,
@@ -164,8 +164,8 @@ impl<'a> Search<'a> {
         self.looked_at(&self.problem.nominal.model)
     }
 
-    /// The better of a set of several and of what grows from the runner-up of its first round: a strong effect that stands in for two
-    /// others is replaced in no slot, for each of the two alone is worse than it.
+    /// The better of a set of several and of what grows from the runner-up of its first round: a strong effect that replaces two
+    /// others is replaced in no slot, because each of the two alone is worse than it.
     fn second_line(
         &mut self,
         begun: usize,

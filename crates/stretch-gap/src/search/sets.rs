@@ -34,11 +34,11 @@ const PROMISING_START: f64 = 0.3;
 pub(crate) const LEFT: f64 = 1.0;
 /// Places in the range of a parameter that is searched in equal ratios.
 const PLACES: usize = 6;
-/// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.
+/// Share of the best candidate's rise, and nats in addition, within which a candidate may still win once it is fitted to the end.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
 
-/// A set with one effect more, and whether its fit [stood still](Fitted::is_settled).
+/// A set with one effect more, and whether its fit [is settled](Fitted::is_settled).
 struct Extended {
     set: Hypothesis,
     is_settled: bool,
@@ -95,7 +95,7 @@ impl<'a> Sets<'a> {
         (stages, own)
     }
 
-    /// A set of another problem, fitted in this one from where it stands there.
+    /// A set of another problem, fitted in this one from its values there.
     pub(crate) fn refit(&mut self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
         if set.effects.is_empty() {
             return Ok(self.problem.nominal.clone());
@@ -122,7 +122,7 @@ impl<'a> Sets<'a> {
         Ok(self.join(set, set.effects.clone(), &stages, fitted))
     }
 
-    /// Fits from a model, or where that cannot be simulated from the same effects beside the parameters of `base`: a rough fit takes
+    /// Fits from a model, or if that cannot be simulated, from the same effects with the parameters of `base`: a rough fit takes
     /// its steps on a linearisation, which leads to where a simulator cannot follow.
     fn fit(
         &self,
@@ -252,7 +252,7 @@ impl<'a> Sets<'a> {
     }
 
     /// A set fitted from the parameters as shipped: at the starts of one of its effects, and with each of that effect's parameters that is
-    /// searched in equal ratios at [`PLACES`] of its range. None where that ends no better.
+    /// searched in equal ratios at [`PLACES`] of its range. `None` if that ends no better.
     fn begun_as_shipped(
         &self,
         set: &Hypothesis,
@@ -391,7 +391,7 @@ impl<'a> Sets<'a> {
         Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
-    /// Fits to the end of what may still win; none where it cannot be simulated.
+    /// Fits to the end of what may still win; `None` if it cannot be simulated.
     fn fine(
         &self,
         base: &Hypothesis,
@@ -467,7 +467,7 @@ const FAR: f64 = 1.5;
 /// A model with one more effect, in which parameters that re-tuning took far are as shipped; none if re-tuning took none far.
 ///
 /// Re-tuning takes up what it can of an effect, for example a valve's dead band by a smaller least opening. The effect then has nothing left
-/// to do, and no small step of both leads back. So the effect begins once with these parameters as shipped, at whichever of its own starts
+/// to do, and no small step of both leads back. So the effect begins once with these parameters as shipped, at the one of its starts that
 /// costs least there.
 pub(crate) fn start_at_shipped(
     problem: &PreparedProblem<'_>,

@@ -46,7 +46,7 @@ pub struct Unexplained {
     pub share: f64,
     /// Stage where most of it sits.
     pub stage: String,
-    /// Slices of that stage where it stands out, the loudest first.
+    /// Slices of that stage where the gap is largest, the largest first.
     pub sits: Vec<String>,
 }
 
@@ -107,7 +107,7 @@ pub struct Diagnosis {
     pub cut_short: Option<Vec<String>>,
     /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
     pub named: Vec<String>,
-    /// Effects that may stand in the place of one that is named: in the smallest sets that hold 95 % of the probability.
+    /// Effects that may replace one that is named: those in the smallest sets that hold 95 % of the probability.
     #[serde(default)]
     pub tied: Vec<String>,
     /// Effects that were found but close less than counts: `least_gap`.
@@ -133,7 +133,7 @@ pub struct Diagnosis {
     /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
-    /// How firmly each effect of the sets that were weighed stands in the most probable one, the firmest first.
+    /// How firmly each effect of the sets that were weighed belongs to the most probable one, the firmest first.
     #[serde(default)]
     pub stabilities: Vec<EffectStability>,
     /// Size of the gap.
@@ -142,7 +142,7 @@ pub struct Diagnosis {
     /// Gap that 19 of 20 records like this one stay below in which nothing is missing.
     #[serde(default)]
     pub null_band: f64,
-    /// How strong each effect of the catalogue would have to be to be named, in the catalogue's order; empty where something is named and nobody
+    /// How strong each effect of the catalogue would have to be to be named, in the catalogue's order; empty where something is named and no one
     /// [asked](crate::Options::detection_limits), and where the record carries no name.
     #[serde(default)]
     pub detection_limits: Vec<DetectionLimit>,
@@ -165,7 +165,7 @@ pub struct Diagnosis {
     /// Those of the notes that say why a gap may be there although none was found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reservations: Vec<Note>,
-    /// Rows that it stands on, of those that were read.
+    /// Rows that it is based on, of those that were read.
     #[serde(default)]
     pub rows_used: RowsUsed,
     /// Simulations of one stage that it took, simpler methods left out.

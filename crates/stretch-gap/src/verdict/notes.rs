@@ -189,7 +189,7 @@ fn span_s(
 /// Most effects that are listed in words.
 const LISTED: usize = 6;
 
-/// The effects of which the least share of the range would have been named, with their limits; none where no effect would have been.
+/// The effects of which the least share of the range would have been named, with their limits; `None` if no effect would have been.
 pub(crate) fn detection_limit_note(
     limits: &[DetectionLimit],
     effects: &[EffectSpec],

@@ -1,7 +1,7 @@
-//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one behind the other, beside a record that the same
+//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one after the other, with a record that the same
 //! equations made with other parameters, hidden effects and noise of a known size.
 //!
-//! A [`Toy`] is plain data: a test alters what it needs and asks for the record. Everything that depends on the trait [`Simulator`] stands
+//! A [`Toy`] is plain data: a test alters what it needs and asks for the record. Everything that depends on the trait [`Simulator`] is
 //! in this folder. The crate's own unit tests use it, too.
 //!
 //! ```text
@@ -28,7 +28,7 @@ pub(crate) fn texts(notes: &[Note]) -> Vec<String> {
     notes.iter().map(Note::to_string).collect()
 }
 
-/// A simulator and the bench beside it.
+/// A simulator and its bench.
 #[derive(Debug, Clone)]
 pub(crate) struct Toy {
     /// Its stages: the first is driven by the column `x`, every other by what was measured of the one before.
@@ -45,7 +45,7 @@ pub(crate) struct Toy {
     pub(crate) courses: Vec<(usize, Vec<f64>)>,
     /// Standard deviation of the noise of every output.
     pub(crate) noise: f64,
-    /// What the simulator says that the noise is, as a multiple of it; none where the record has to tell.
+    /// What the simulator says that the noise is, as a multiple of it; `None` if it follows from the record.
     pub(crate) stated: Option<f64>,
     /// Slow drift that the simulator says its recorder may have.
     pub(crate) recorder_drift: Option<SlowDrift>,

@@ -11,7 +11,7 @@ use stretch_gap::{
     RandomGenerator, RecordFacts, Recorded, Run, Simulator, diagnose,
 };
 
-/// A toy beside its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
+/// A toy with its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub(crate) toy: Toy,
@@ -20,7 +20,7 @@ pub(crate) struct Measured {
     pub(crate) x: Vec<f64>,
     /// By stage, the column `y0`, `y1` and so on.
     pub(crate) outputs: Vec<Vec<f64>>,
-    /// Simulations that were made, those beside a corrected column as well.
+    /// Simulations that were made, those with a corrected column as well.
     runs: Arc<AtomicUsize>,
 }
 
@@ -51,7 +51,7 @@ impl Measured {
         Self { toy, description, x, outputs, runs: Arc::default() }
     }
 
-    /// The same toy beside a record that says something else of `x` and of the outputs.
+    /// The same toy with a record that says something else of `x` and of the outputs.
     pub(crate) fn rewritten(self, by: impl FnOnce(&mut Vec<f64>, &mut [Vec<f64>])) -> Self {
         let Self { toy, mut x, mut outputs, .. } = self;
         by(&mut x, &mut outputs);
@@ -72,7 +72,7 @@ impl Measured {
         self.runs.load(Ordering::Relaxed)
     }
 
-    /// The same toy beside a column as it was before an error.
+    /// The same toy with a column as it was before an error.
     fn without(&self, column: &str, error: Distortion) -> Option<Self> {
         let (mut x, mut outputs) = (self.x.clone(), self.outputs.clone());
         let values = match column {

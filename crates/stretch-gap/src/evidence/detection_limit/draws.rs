@@ -276,8 +276,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The probe and those that can replace it, the most similar first; of its own effect only the
-/// first.
+/// The probe and those that can replace it, the most similar first. Of the probes of its own effect only the first is taken.
 fn against(inputs: LimitInputs<'_>, probes: &Probes, own: usize) -> Vec<usize> {
     let compare = &inputs.problem.compare;
     let product = |a: &Probe, b: &Probe| -> f64 {

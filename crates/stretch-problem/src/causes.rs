@@ -69,8 +69,8 @@ impl Causes {
 }
 
 /// The effects of the gauge and its reference in the first candidate of a diagnosis, with values in shares of the reference's range:
-/// values of the whole rig are divided by its strokes, values of a gauge alone stay as they are. There are none where no effect is
-/// missing, and none where the recording is wrong.
+/// values of the whole rig are divided by its strokes, values of a gauge alone stay as they are. The list is empty if no effect is
+/// missing, or if the recording is wrong.
 ///
 /// The first candidate is taken even where the verdict does not name it: a calibration finds out on trials left out whether its effects help.
 pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {

@@ -23,7 +23,7 @@ pub enum ProblemError {
     Unknown {
         /// Entry that holds the name.
         owner: String,
-        /// Kind of the entry that the name should stand for.
+        /// Kind of the entry that the name should match.
         what: &'static str,
         /// The name.
         name: String,
@@ -134,7 +134,7 @@ impl ProblemError {
         Self::Implausible { column: column.into(), found: found.into(), hint: hint.into() }
     }
 
-    /// A column that stands still.
+    /// A column that stays constant.
     pub(crate) fn dead(column: impl Into<String>, found: String) -> Self {
         Self::implausible(column, found, "the channel is dead: check the sensor and its cable")
     }

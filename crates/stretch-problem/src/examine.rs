@@ -31,7 +31,7 @@ pub struct Examined {
     pub diagnosis: Diagnosis,
     /// The evidence for the diagnosis, from which a report draws.
     pub evidence: Evidence,
-    /// The experiment that would tell rivals apart; none where no experiment was looked for or found.
+    /// The experiment that would distinguish the alternatives; `None` if no experiment was looked for or found.
     pub experiment: Option<Trial>,
     /// The named effects, as code to type.
     pub implementations: Vec<Implementation>,
@@ -93,7 +93,7 @@ impl Problem {
             report("what the gap costs a calibration");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
-            // where runs fail, or may not be made any more, what was found is told without it
+            // where runs fail, or may not be made any more, what was found is reported without it
             diagnosis.transfer = match transfer(self.simulator(), &evidence, asked) {
                 Err(error) if error.is_of_runs() => None,
                 found => found?,
@@ -161,7 +161,7 @@ pub fn diagnosis_schema() -> Value {
     settings.into_generator().into_root_schema_for::<Written<'_>>().to_value()
 }
 
-/// JSON has no number that is not finite: null stands for it.
+/// JSON has no number that is not finite: it is written as null.
 #[derive(Debug, Clone)]
 struct NumbersMayBeNull;
 

@@ -13,10 +13,10 @@ use stretch_sim::{Effect, SimError, Tolerance};
 use crate::black_box::ProblemSpec;
 
 /// A rig file or a problem's file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
-/// parameter and form. Comments beside the entries say where each entry comes from.
+/// parameter and form. Comments at the entries say where each entry comes from.
 ///
 /// A tolerance is one standard deviation of the fit, and never wider than the tolerance before. A tolerance is right if the model is right.
-/// Where two parameters stand in for one another, the interval of each is given with the other one free; the two together are narrower.
+/// If two parameters can replace one another, the interval of each is given with the other one free; the two together are narrower.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The file.
@@ -37,7 +37,7 @@ pub enum Fixed {
 }
 
 impl Fix {
-    /// The text of the file as it stands at `path`, comments included.
+    /// The text of the file as it is written at `path`, comments included.
     pub fn text(&self, path: &Path) -> String {
         match &self.file {
             Fixed::Rig(rig) => rig.to_toml_with(&self.remarks),
@@ -321,7 +321,7 @@ fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
             sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
         }
         let [cc, cs, ss, rc, rs] = sums;
-        // A quadrature that is not seen has no power: a millionth of the whole stands for it.
+        // A quadrature that is not seen has no power: a millionth of the whole is taken instead.
         let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
         let (cc, ss) = (cc + ridge, ss + ridge);
         let determinant = cc * ss - cs * cs;

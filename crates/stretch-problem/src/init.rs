@@ -181,7 +181,7 @@ fn text(
     out + &trials_of(trials)
 }
 
-/// What stands in place of a stage where nothing looks measured.
+/// The text in place of a stage if no column looks measured.
 const NO_OUTPUT: &str = "
 # No output is proposed: every column that moves is called like a command. Name the one that was measured:
 # [[stage]]
@@ -235,7 +235,7 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
 }
 
 /// The column at which a stage rubs, and the key that it is: the output where it is a position, an angle or a speed, else another column
-/// that was measured. None where commands are known and none may be a force or a torque.
+/// that was measured. `None` if commands are known and none may be a force or a torque.
 fn rubbing<'a>(
     output: &'a str,
     commands: &[&str],
@@ -253,7 +253,7 @@ fn rubbing<'a>(
     })
 }
 
-/// The noise of an output while its commands stand still, in all recordings but those that are tested on.
+/// The noise of an output while its commands are constant, in all recordings but those that are tested on.
 fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<Noise> {
     let fitted = &trials[..trials.len() - tested(trials)];
     let dt_s = 1.0 / fitted.first()?.1.rate_hz()?;
@@ -327,7 +327,7 @@ mod tests {
             let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
             stage(columns, &[("a".into(), trial(&names))])
         };
-        // The command stands behind the measurement, and the encoder is so coarse that it holds its values.
+        // The command is in a column behind the measurement, and the encoder is so coarse that it holds its values.
         let coarse = of(&[column("angle_deg", true), column("command_V", false)]);
         assert!(coarse.contains("output = \"angle_deg\"\n"), "{coarse}");
         assert!(coarse.contains("inputs = [\"command_V\"]"), "{coarse}");

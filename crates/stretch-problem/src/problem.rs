@@ -1,4 +1,4 @@
-//! One problem: any simulator beside one session of recordings.
+//! One problem: any simulator with one session of recordings.
 
 use std::{fmt::Debug, num::NonZeroUsize, path::Path, sync::Arc};
 
@@ -18,7 +18,7 @@ use crate::{
     worker::Workers,
 };
 
-/// A simulator beside its recordings, with everything that [`Problem::examine`] asks. A new kind of simulator implements this trait.
+/// A simulator with its recordings, with everything that [`Problem::examine`] asks. A new kind of simulator implements this trait.
 pub trait Diagnosable: Simulator + Debug + Send {
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     fn notes(&self) -> Vec<String>;
@@ -43,7 +43,7 @@ pub trait Diagnosable: Simulator + Debug + Send {
         stage.map(|stage| self.measured(stage).to_vec()).or_else(columns).or_else(signals)
     }
 
-    /// The experiment that would tell the rivals of a diagnosis apart; none where no candidate does, or the simulator predicts none.
+    /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no candidate does, or the simulator predicts none.
     ///
     /// # Errors
     /// The errors of the simulator.
@@ -63,7 +63,7 @@ pub trait Diagnosable: Simulator + Debug + Send {
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix>;
 }
 
-/// A simulator beside one session of recordings, ready to be [examined](Problem::examine).
+/// A simulator with one session of recordings, ready to be [examined](Problem::examine).
 #[derive(Debug)]
 pub struct Problem {
     /// Name of the data.
@@ -84,7 +84,7 @@ pub struct Reading<'a> {
     pub rig: Option<&'a Path>,
     /// Columns of reference and signal, of a gauge alone or of a stage that is a sensor.
     pub columns: Option<(&'a str, &'a str)>,
-    /// A column by which runs are told apart ([`Problem::by_column`]), which is read beside those of the problem.
+    /// A column that distinguishes runs ([`Problem::by_column`]), which is read in addition to those of the problem.
     pub by: Option<&'a str>,
     /// How recordings are read, in place of what the data say.
     pub recorded: Option<&'a ReadOptions>,
@@ -101,7 +101,7 @@ impl Problem {
     /// workers of a simulator that is not built in are started if the path names the problem's file, and not if it names its folder.
     ///
     /// # Errors
-    /// Files that cannot be read, names that stand for nothing, options that mean nothing to the simulator, and a folder whose `problem.toml`
+    /// Files that cannot be read, names that match nothing, options that mean nothing to the simulator, and a folder whose `problem.toml`
     /// would run a program.
     pub fn read(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
         let Some(file) = ProblemSpec::at(path)? else { return Self::built_in(path, reading) };
@@ -190,7 +190,7 @@ impl Problem {
         Self { name: name.into(), ..self }
     }
 
-    /// The simulator beside its measurements.
+    /// The simulator with its measurements.
     pub fn simulator(&self) -> &dyn Simulator {
         &*self.source
     }

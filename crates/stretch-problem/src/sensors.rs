@@ -1,4 +1,4 @@
-//! Several sensors of one recorder beside one reference, in one problem.
+//! Several sensors of one recorder with one reference, in one problem.
 
 use std::{path::Path, sync::Arc};
 
@@ -26,11 +26,11 @@ struct Line {
     size: f64,
 }
 
-/// Several sensors that one recorder recorded beside one reference: of each y = offset + gain e, with e the reference over its range. All
+/// Several sensors that one recorder recorded together with one reference: of each y = offset + gain e, with e the reference over its range. All
 /// kinds of effects are looked for behind each, and what the recorder's clock does to all of them at once (`record.skew`,
 /// `record.clock_drift`).
 ///
-/// One signal at a time a shift stands beside everything else that makes a loop; several that are late alike have one cause.
+/// In one signal, a shift cannot be distinguished from other causes of a loop. Several signals with the same shift have one cause.
 ///
 /// # Errors
 /// Columns that are missing or dead, trials that cannot be brought onto one grid.

@@ -5,11 +5,11 @@ use stretch_gap::Diagnosis;
 use stretch_sim::{RigStage, effect_named};
 
 /// What an effect is, as a noun: `the gauge's hysteresis` for `gauge_hysteresis`, `backlash at the output` for `output.backlash`. A name that no
-/// catalogue has, such as an effect of one's own simulator, stands for itself.
+/// catalogue has, such as an effect of one's own simulator, is returned as it is.
 pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
     let Some((place, kind)) = name.rsplit_once('.') else {
         let is_ours = |stage: &str| RigStage::ALL.iter().any(|own| own.name() == stage);
-        // a simulator of somebody's own may call something else by the same name
+        // a user's own simulator may call something else by the same name
         let is_ours = diagnosis.location.stages.iter().all(|s| is_ours(&s.stage));
         let own = effect_named(name).filter(|_| is_ours);
         return own.map_or(name, |effect| effect.title).to_owned();
@@ -37,7 +37,7 @@ pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
     out
 }
 
-/// A sentence to stand below equations: what `mean_rev`, `play` and braces mean. `None` where no equation has one of them.
+/// A sentence to be shown below equations: what `mean_rev`, `play` and braces mean. `None` where no equation has one of them.
 ///
 /// ```
 /// use stretch_problem::notation;

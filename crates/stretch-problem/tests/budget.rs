@@ -72,7 +72,7 @@ fn spec(input_noise: f64, lag: usize) -> ProblemSpec {
     }
 }
 
-/// Diagnoses within a budget; how often the simulator was run stands beside it.
+/// Diagnoses within a budget; also returns how often the simulator was run.
 fn within(spec: ProblemSpec, budget: Option<usize>) -> (Result<Diagnosis, GapError>, usize) {
     let problem = Checked::new(spec).unwrap();
     let measured = problem.session().column("force_N").unwrap().to_vec();

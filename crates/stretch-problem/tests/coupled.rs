@@ -1,4 +1,4 @@
-//! Stages that hang together: what stands in front of one stage acts on the outputs of others.
+//! Coupled stages: what acts in front of one stage acts on the outputs of others.
 
 use std::sync::Arc;
 

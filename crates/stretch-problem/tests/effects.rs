@@ -35,7 +35,7 @@ static RIPPLE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The same beside the rig.
+/// The same kind as an effect in the record of the rig.
 static CHARGER: Effect = Effect {
     name: "charger_ripple",
     words: "a charger swings the bridge",
@@ -65,7 +65,7 @@ fn simulator(rig: &Rig, count: usize, catalogue: &Catalogue) -> RigSimulator {
     RigSimulator::new(RigSetup { session, rig: Rig::default(), catalogue }).unwrap()
 }
 
-/// A gauge alone beside a pressure, so that every effect of a gauge can act.
+/// A gauge alone with a pressure, so that every effect of a gauge can act.
 fn gauge() -> GaugeSimulator {
     GaugeSimulator::new(&GaugeSetup {
         trials: &recorded(&Rig::default(), 1),

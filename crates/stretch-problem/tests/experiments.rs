@@ -8,7 +8,7 @@ use stretch_sim::Catalogue;
 /// Noises by which a prediction, in steps of 10 ms, may lie off a simulation in steps of 2.5 ms.
 const SAME: f64 = 1.0;
 
-/// A rig beside an arbitrary trial.
+/// A rig with an arbitrary trial.
 fn rig() -> RigSimulator {
     let plan = stretch_sim::TrialPlan::arbitrary(1, 5);
     let mut session = stretch_sim::Session::new(&Default::default(), &Default::default()).unwrap();
@@ -64,7 +64,7 @@ fn every_experiment_is_replayed_from_its_columns() {
         // Length and voltage in noises; there is no pressure here.
         let predicted = rig.predict(&nominal, &setting).unwrap();
         for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&predicted) {
-            // A vented muscle shows the voltage of its own pressure where the candidate lets the pressure follow a course of its own.
+            // A vented muscle shows the voltage of its own pressure if the candidate lets the pressure follow a separate course.
             let noise = if column == "length_mm" { 0.05 } else { 0.002 };
             let shown = trial.channel(column).unwrap();
             let worst = shown.iter().zip(values).map(|(a, b)| (a / noise - b).abs());

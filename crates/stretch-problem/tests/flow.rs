@@ -1,5 +1,5 @@
 //! The one flow, by toy simulators: a line, an oscillator's command, a delay. What is named is written into the problem, after which it
-//! agrees; what is asked for beside the diagnosis is there for any simulator.
+//! agrees; what is asked for in addition to the diagnosis is there for any simulator.
 
 use std::sync::Arc;
 
@@ -175,7 +175,7 @@ fn what_stands_in_front_of_a_simulator_is_written_as_well() {
     assert!(agrees(&again), "{}", again.diagnosis.sentence);
 }
 
-/// Before the first command arrives a plant stands where an idle command left it, which no recording tells.
+/// Before the first command arrives a plant is where an idle command left it, which no recording shows.
 #[test]
 fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
     let late = |x: &[f64]| {

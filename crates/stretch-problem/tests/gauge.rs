@@ -260,7 +260,7 @@ fn what_the_catalogue_lacks_is_not_given_a_name_but_shares_are_told() {
         // It sits where the direction changes: rising and falling are no twin halves of a curve.
         assert!(d.location.slices.iter().any(|s| s.by == "regime" && s.stands_out));
     }
-    // A struck entry whose twin is not in the catalogue either.
+    // A removed entry whose twin is not in the catalogue either.
     let d = run(&trials(Fault::Wear, 1.0, 3, 11), &["gauge_softening", "thermal_drift"]);
     assert!(!d.named.contains(&"gauge_softening".to_owned()));
     assert_ne!(d.verdict, VerdictKind::NoGap);
@@ -268,7 +268,7 @@ fn what_the_catalogue_lacks_is_not_given_a_name_but_shares_are_told() {
 
 #[test]
 fn play_in_the_reference_is_never_given_another_name() {
-    // Inside of the play nobody knows where the gauge is: more may be left than form explains.
+    // Inside of the play the position of the gauge is unknown: more may be left than form explains.
     let found = all(&[31, 32], |&seed| run(&trials(Fault::LooseReference, 1.0, 3, seed), &[]));
     for d in found {
         assert!(

@@ -46,7 +46,7 @@ struct Case {
 #[derive(Debug)]
 struct Answer {
     verdict: String,
-    /// Told as it should be.
+    /// Answered as it should be.
     is_right: bool,
     /// Names that are not there.
     is_wrong: bool,
@@ -138,7 +138,7 @@ fn cases() -> Vec<Case> {
                 ..within("supply 5 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.05))
             },
             case("supply 30 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.3), SUPPLY),
-            // Pre-stretch, trim and gain stand in for one another.
+            // Pre-stretch, trim and gain replace one another.
             within("pre-stretch half of the rig file's", p, InRig(Key::E0, 2.0)),
             case(
                 "inlet five times the rig file's",
@@ -384,7 +384,7 @@ fn an_error_is_told_though_rows_are_lost() {
     approx::assert_abs_diff_eq!(probability(&first), probability(&lost), epsilon = PROBABILITY);
 }
 
-/// The whole table, as it stands in book/src/results/record.md.
+/// The whole table, as it is in book/src/results/record.md.
 #[test]
 #[ignore = "forty diagnoses, minutes; ./ci.sh runs it"]
 fn no_error_is_given_the_name_of_an_effect() {

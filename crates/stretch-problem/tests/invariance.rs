@@ -10,7 +10,7 @@ use stretch_gap::{Diagnosis, Model, Options, Run, Simulator, VerdictKind, diagno
 use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams};
 
-/// A rig as it stands in its file, and effects that the real one has.
+/// A rig as it is in its file, and effects that the real one has.
 struct Case {
     name: &'static str,
     effects: EffectSet,
@@ -270,7 +270,7 @@ fn a_trial_at_another_excitation_is_no_gap() {
     assert!(blind.gap.retuned > 1.0, "{}", blind.sentence);
 }
 
-/// Gaps that leave less than half of the rows carry no name, and the answer says on what it stands.
+/// Gaps that leave less than half of the rows carry no name, and the answer says on how many rows it is based.
 #[test]
 fn few_rows_carry_no_name() {
     let mut trials = session(&own_rig(), &effect("amplifier_lowpass", &[("tau", 0.08)]), true, 9);

@@ -11,7 +11,7 @@ use stretch_problem::{Problem, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN, TURNED};
 
-/// The stock rig beside trials.
+/// The stock rig with trials.
 fn setup<'a>(trials: &[SessionTrial], catalogue: &'a Catalogue) -> RigSetup<'a> {
     let session = RigSession::new(trials).expect("a session");
     RigSetup { session, rig: Rig::default(), catalogue }

@@ -13,7 +13,7 @@ fn recorded(late_s: f64, drift: f64, slip_deg: f64) -> Vec<SessionTrial> {
     moved(late_s, drift, slip_deg, 0.0)
 }
 
-/// Those trials, with a movement of so many degrees below the sensors, which wanders within seconds and which nothing recorded.
+/// Those trials, with a movement of so many degrees below the sensors, which drifts within seconds and which nothing recorded.
 fn moved(late_s: f64, drift: f64, slip_deg: f64, below_deg: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let angle = |t: f64| {

@@ -1,4 +1,4 @@
-//! A simulator in other units than the record is told as such.
+//! A simulator in other units than the record is reported as such.
 
 use std::sync::Arc;
 

@@ -92,7 +92,7 @@ impl<'a> Acting<'a> {
     }
 }
 
-/// The effects of a model where there is no recording: typical values stand for those that would be found in a recording.
+/// The effects of a model without a recording: typical values replace those that would be found in a recording.
 pub(crate) fn unrecorded(
     base: &EffectSet,
     rows: &[&'static Effect],

@@ -61,7 +61,7 @@ fn replace_outliers(values: &mut [f64]) -> usize {
     outliers.len()
 }
 
-/// Standard deviation from the median size, which is 0.6745 standard deviations of a normal variable; none where most values are 0.
+/// Standard deviation from the median size, which is 0.6745 standard deviations of a normal variable; `None` if most values are 0.
 fn deviation(off: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = off.iter().map(|d| d.abs()).collect();
     let middle = sizes.len() / 2;

@@ -28,7 +28,7 @@ const FAR: f64 = 5.0;
 /// Share of what the output ever does by which it moves at least in a trial that begins with a step.
 const MOVES: f64 = 0.1;
 
-/// By trial, the command from before a step at its first sample; none where a trial begins otherwise, or nothing says which it was.
+/// By trial, the command from before a step at its first sample; `None` if a trial begins otherwise, or the command is unknown.
 pub(crate) type Before = Vec<Option<f64>>;
 
 /// What is known of the beginnings of all trials of a stage.

@@ -97,7 +97,7 @@ impl Around {
     /// A catalogue without some effects; a wrapper is also named by its kind or its place.
     ///
     /// # Errors
-    /// A name that stands for no effect of the catalogue.
+    /// A name that matches no effect of the catalogue.
     pub(crate) fn without(
         &self,
         catalogue: Vec<Entry>,
@@ -201,7 +201,7 @@ pub(crate) fn own_effects(
             let [min, max] = a.range;
             // what is searched in equal ratios never reaches the 0 at which it does nothing
             let is_off = |off: f64| (min..=max).contains(&off) || a.is_log && off == 0.0;
-            // an empty range is told as one by whoever fits it
+            // an empty range is reported by the fit
             if let Some(off) = a.off.filter(|off| min < max && !is_off(*off)) {
                 return Err(ProblemError::value(
                     format!("effect {name}"),

@@ -28,7 +28,7 @@ pub struct Checked {
     about: Description,
     session: RecordedSession,
     pub(crate) columns: Columns,
-    /// A column by which runs are told apart, which no effect looks at.
+    /// A column that distinguishes runs, which no effect looks at.
     pub(crate) by: Option<(String, Vec<f64>)>,
     pub(crate) stages: Vec<StageEntry>,
     /// Noise of the inputs of each stage.
@@ -184,7 +184,7 @@ impl Checked {
         self.placed(effect)?.sketch(values, self.grid.dt_s())
     }
 
-    /// The index of the wrapper behind an effect of the catalogue, if that wrapper stands on this side of the stage.
+    /// The index of the wrapper behind an effect of the catalogue, if that wrapper acts on this side of the stage.
     pub(crate) fn around(&self, effect: usize, stage: usize, side: Side) -> Option<usize> {
         let is_here = |at: usize| self.is_at(at, stage, side);
         match self.acting[effect] {
@@ -211,7 +211,7 @@ impl Checked {
         (site.stage, site.side) == (stage, side)
     }
 
-    /// Whether a wrapper stands in front of its stage.
+    /// Whether a wrapper acts in front of its stage.
     pub(crate) fn is_in_front(&self, wrapper: usize) -> bool {
         self.wrappers[wrapper].site.side == Side::Input
     }
@@ -469,7 +469,7 @@ fn check_known(
 }
 
 /// Checks what is stated of columns against what was recorded in them: a unit that the column's own name contradicts, and a noise greater
-/// than all that the column ever does, beside which nothing could be seen.
+/// than the whole change of the column, which would hide everything.
 fn check_stated(
     stages: &[StageEntry],
     inputs: &[Input],

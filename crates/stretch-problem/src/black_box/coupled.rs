@@ -1,14 +1,14 @@
 //! Stages that hang together inside a simulator: which outputs move where the inputs of one stage are altered.
 //!
 //! A simulator that runs as a whole carries an altered input of one stage on to the outputs of others: an arm's angle carries a share of the
-//! joint before. So what stands in front of a stage acts on every output that it moves. For each column that drives one stage alone and has
-//! wrappers in front of it, one run with the column as one of them alters it most, y', beside the run as shipped, y, tells which stages t move:
+//! joint before. So a wrapper in front of a stage acts on every output that it moves. For each column that drives one stage alone and has
+//! wrappers in front of it, one run with the column as one of them alters it most, y', and the run as shipped, y, show which stages t move:
 //!
 //! ```text
 //! sqrt(mean over all samples of (y'_t - y_t)^2) > 0.02 sd_t        sd_t  the noise of the output of stage t
 //! ```
 //!
-//! A column that several stages share is passed over: each of them has wrappers of its own in front of it.
+//! A column that several stages share is passed over: each of them has its own wrappers in front of it.
 
 use stretch_data::listed;
 use stretch_effects::Side;
@@ -33,15 +33,15 @@ const LEFT_OUT: &str = "this is left out, for the simulator takes altered inputs
 /// What the wrappers in front of the stages act on.
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
-    /// The problem's description, with every stage that an effect moves; none where each moves its own stage alone.
+    /// The problem's description, with every stage that an effect moves; `None` if each moves its own stage alone.
     pub(super) about: Option<Description>,
-    /// By wrapper, the stages beside its own on which it acts.
+    /// By wrapper, the stages on which it acts in addition to its own.
     beside: Vec<Vec<usize>>,
     /// What moves what, in a sentence.
     pub(super) note: Option<String>,
 }
 
-/// Columns, each as the wrapper in front of it that alters it most begins; none where the source answers one stage at a time, or takes no
+/// Columns, each as the wrapper in front of it that alters it most begins; empty if the source answers one stage at a time, or takes no
 /// inputs.
 pub(super) fn probes(problem: &Checked, source: &dyn Source) -> Vec<Altered> {
     let session = problem.session();
@@ -53,7 +53,7 @@ pub(super) fn probes(problem: &Checked, source: &dyn Source) -> Vec<Altered> {
     columns.filter_map(|(stage, input)| probe(problem, stage, input)).collect()
 }
 
-/// A column as the wrapper in front of it that alters it most begins; none where no wrapper alters it.
+/// A column as the wrapper in front of it that alters it most begins; `None` if no wrapper alters it.
 fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     let trials = Trials { grid: &problem.grid, parts: &problem.parts };
     let mut columns: Vec<Vec<f64>> = problem.stage_inputs(stage).map(<[f64]>::to_vec).collect();

@@ -118,7 +118,7 @@ impl BlackBox {
         session.stages[stage].inputs.iter().map(of).collect()
     }
 
-    /// Wrappers that stand around a stage in an experiment, on one of its sides, with their values.
+    /// Wrappers that act around a stage in an experiment, on one of its sides, with their values.
     fn around<'a>(
         &'a self,
         run: &Run<'a>,

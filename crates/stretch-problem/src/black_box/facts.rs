@@ -6,7 +6,7 @@ use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUs
 
 use super::{columns::Columns, source::RecordedSession};
 
-/// Range of the delays that skews of the catalogue stand for, s.
+/// Range of the delays that skews of the catalogue represent, s.
 const SKEW_S: [f64; 2] = [-0.2, 0.2];
 
 /// The facts of recordings.
@@ -44,7 +44,7 @@ fn signals(session: &RecordedSession) -> Vec<Recorded> {
     out
 }
 
-/// The outputs of the stages, and every other column but commands: a command may stand still while the rest moves, and nothing is wrong
+/// The outputs of the stages, and every other column but commands: a command may stay constant while the rest moves, and nothing is wrong
 /// with such a command.
 fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<'static>> {
     let stages = about.stages.iter().enumerate();

@@ -43,7 +43,7 @@ fn digits(x: f64) -> String {
     format!("{x:.places$}")
 }
 
-/// Families among the effects that a diagnosis names and those that may stand in their place.
+/// Families among the effects that a diagnosis names and those that may replace them.
 pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
     let effects = &problem.description().effects;
     let kind = |name: &str| {

@@ -37,7 +37,7 @@ impl BlackBox {
         self.driven_by(run, stages.filter_map(|stage| self.altered(run, stage)).collect())
     }
 
-    /// The inputs of a stage as they are altered for a run; none where they stay as they are.
+    /// The inputs of a stage as they are altered for a run; `None` if they stay as they are.
     fn altered(&self, run: &Run<'_>, stage: usize) -> Option<Altered> {
         let problem = &self.problem;
         let is_own = stage == run.stage;

@@ -35,7 +35,7 @@ pub(crate) struct Move {
 }
 
 impl Linear {
-    /// The runs that a linearisation takes beside the run at p_0: each parameter with a tolerance is moved alone, downwards at its upper bound.
+    /// The runs that a linearisation takes in addition to the run at p_0: each parameter with a tolerance is moved alone, downwards at its upper bound.
     pub(crate) fn moves(at: &Inner, own: &[usize], specs: &[ParameterSpec]) -> Vec<Move> {
         let tuned = own.iter().copied().filter(|&p| specs[p].sd > 0.0);
         tuned

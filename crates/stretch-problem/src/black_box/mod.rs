@@ -134,7 +134,7 @@ impl BlackBox {
     }
 
     /// The least number of runs with which there is an answer: of every stage the run as shipped, one a parameter, and the draws of the
-    /// noise of its inputs; one for each column that may move the outputs of several stages, and one without what always stands in
+    /// noise of its inputs; one for each column that may move the outputs of several stages, and one without the effects that always act in
     /// front of these; one run is repeated.
     pub fn least_runs(&self) -> usize {
         let stages = &self.problem.description().stages;

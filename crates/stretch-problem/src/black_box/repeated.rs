@@ -1,6 +1,6 @@
 //! Whether a source answers the same question twice alike, and a run over more trials begins as one over fewer.
 //!
-//! A diagnosis stands on differences between runs. A simulator that draws random numbers without a seed, or carries its state from one run
+//! A diagnosis is based on differences between runs. A simulator that draws random numbers without a seed, or carries its state from one run
 //! to the next, makes differences of its own, which would be named as effects. So the first run that a source answers is asked for
 //! once more, in a call of its own: a worker then has made a run in between. Where there are several trials, it is asked for over the first
 //! one alone, or over all if that was the first question. A difference between runs of two lengths alone is a note: solvers that choose their steps make one.

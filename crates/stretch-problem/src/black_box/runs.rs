@@ -133,14 +133,14 @@ impl Runs {
         }
     }
 
-    /// The output of a run that was made; none where it was not, or is not kept.
+    /// The output of a run that was made; `None` if it was not, or is not kept.
     pub(crate) fn kept(&self, session: &RecordedSession, run: &Inner) -> Option<Arc<Vec<f64>>> {
         let made = self.lock();
         let kept = made.kept.peek(&self.key(run))?;
         self.part(session, run, kept)?.ok()
     }
 
-    /// The part of an answer that a run asks for; none where the answer covers fewer trials.
+    /// The part of an answer that a run asks for; `None` if the answer covers fewer trials.
     fn part(
         &self,
         session: &RecordedSession,
@@ -166,7 +166,7 @@ impl Runs {
 
     /// Outputs of some runs; new runs are made in one batch.
     ///
-    /// A run that another thread is making is waited for. The source is asked from a thread of its own, so that no parallel iterator of the
+    /// A run that another thread is making is waited for. The source is asked from a separate thread, so that no parallel iterator of the
     /// source can take up work that waits for that same source.
     pub(crate) fn outputs(&self, session: &RecordedSession, wanted: &[Inner]) -> Vec<Answer> {
         let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
@@ -234,7 +234,7 @@ impl Runs {
         self.done.notify_all();
     }
 
-    /// What the source answers, asked from a thread of its own.
+    /// What the source answers, asked from a separate thread.
     fn asked(&self, runs: &[&Inner]) -> Vec<Result<Vec<f64>, SourceError>> {
         let others: Vec<Vec<AlteredColumn<'_>>> = runs.iter().map(|run| others(run)).collect();
         let asks: Vec<Ask<'_>> = runs.iter().zip(&others).map(|(run, o)| ask(run, o)).collect();
@@ -338,12 +338,12 @@ impl Runs {
     }
 }
 
-/// The altered stage that a run is asked for: its own, else the first; none where every input is as measured.
+/// The altered stage that a run is asked for: its own, else the first; `None` if every input is as measured.
 fn asked_for(run: &Inner) -> Option<&Altered> {
     run.altered.iter().find(|a| a.stage == run.stage).or(run.altered.first())
 }
 
-/// Altered columns of the stages beside the one that a run is asked for.
+/// Altered columns of the stages other than the one that a run is asked for.
 fn others(run: &Inner) -> Vec<AlteredColumn<'_>> {
     let own = asked_for(run).map(|a| a.stage);
     let all = run.altered.iter().flat_map(|a| a.which.iter().map(move |&input| (a, input)));

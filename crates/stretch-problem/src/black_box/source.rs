@@ -75,7 +75,7 @@ pub struct Ask<'a> {
     pub parameters: &'a [f64],
     /// Every value of the user's own effects, in the problem's order; the `off` value where an effect is off.
     pub effects: &'a [f64],
-    /// Columns that drive the stage, in the stage's order, each over the trials asked for; none where the columns are as measured.
+    /// Columns that drive the stage, in the stage's order, each over the trials asked for; `None` if the columns are as measured.
     pub inputs: Option<&'a [Vec<f64>]>,
     /// Columns that drive other stages and are altered as well; empty unless the source [takes inputs of several
     /// stages](Source::takes_inputs_of_several).

@@ -98,10 +98,10 @@ pub struct ProblemSpec {
     /// The recordings; needed unless the simulator is built in.
     #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<TrialFile>,
-    /// Kinds of effects of the user's own, which `wrap` may name beside the kinds of the catalogue.
+    /// Kinds of effects of the user's own, which `wrap` may name in addition to the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,
-    /// A column by which runs are told apart, which no effect looks at.
+    /// A column that distinguishes runs, which no effect looks at.
     #[serde(skip)]
     pub by: Option<String>,
     /// Recordings in memory; [`ProblemSpec::load`] reads these.
@@ -113,7 +113,7 @@ pub struct ProblemSpec {
 pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side: the simulator takes no altered inputs (inputs = false in a worker's hello)";
 
 impl ProblemSpec {
-    /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` stands for what can be behind the
+    /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` means the effects that can be behind the
     /// simulator, and noise of its inputs is not drawn. `None` where the problem asks for nothing else anyway.
     pub fn only_behind(&self) -> Option<Self> {
         let is_noisy = |input: &Input| input.noise > 0.0;
@@ -194,7 +194,7 @@ pub struct Parameter {
     pub alone: Option<f64>,
 }
 
-/// An effect that the simulator has itself. The keys of its one argument stand here; an effect of several arguments has a table
+/// An effect that the simulator has itself. The keys of its one argument are given here; an effect of several arguments has a table
 /// `[[effect.argument]]` with these keys for each.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "WrittenEffect", into = "WrittenEffect")]

@@ -25,7 +25,7 @@ const PREFIX: &str = "state.";
 const LEAKS: [f64; 2] = [10.0, 10.0];
 
 impl ProblemSpec {
-    /// The problem with effects on declared states beside its own, as far as `wrap` asks for them: `all`, `state.all`, or names such as
+    /// The problem with effects on declared states in addition to its own, as far as `wrap` asks for them: `all`, `state.all`, or names such as
     /// `state.level.spill`. The patterns are taken out of `wrap`. Each state has three effects, which the simulator makes:
     ///
     /// | effect | its value v, after every step of the simulator | off at |
@@ -37,7 +37,7 @@ impl ProblemSpec {
     /// Effects that the problem has already are left as they are: a fix holds their values.
     ///
     /// # Errors
-    /// A pattern that stands for no declared state, a state whose range is empty.
+    /// A pattern that matches no declared state, a state whose range is empty.
     pub fn with_states(mut self, states: &[State]) -> Result<Self, ProblemError> {
         let (asked, wrap): (Vec<String>, Vec<String>) =
             std::mem::take(&mut self.wrap).into_iter().partition(|name| name.starts_with(PREFIX));

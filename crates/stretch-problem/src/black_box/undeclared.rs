@@ -35,8 +35,8 @@ pub(super) struct Undeclared {
 }
 
 impl Undeclared {
-    /// Takes what the runs of a linearisation, whose outputs these are, say of its stage and of the stages beside it; of these the first look
-    /// at a parameter counts.
+    /// Learns from the runs of a linearisation, whose outputs these are, which parameters move its stage and the other stages. Of these
+    /// stages the first look at a parameter counts.
     pub(super) fn look(
         &self,
         problem: &Checked,

@@ -54,12 +54,12 @@ impl Heterogeneity {
     }
 }
 
-/// A run that stands apart from the others, which agree without it.
+/// A run that differs from the others, which agree without it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Apart {
     /// Name of the run.
     pub run: String,
-    /// Names of the values in which it stands apart.
+    /// Names of the values in which it differs.
     pub values: Vec<String>,
     /// By how many standard deviations, for each.
     pub deviations: Vec<f64>,
@@ -141,7 +141,7 @@ pub(super) fn values(runs: &[Run]) -> Vec<Heterogeneity> {
     out
 }
 
-/// Runs that stand apart from the mean of the others.
+/// Runs that differ from the mean of the others.
 pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     let mut asked: Vec<(usize, usize, f64, bool)> = Vec::new();
     for value in 0..fitted(runs).len() {

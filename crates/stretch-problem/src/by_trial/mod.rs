@@ -35,7 +35,7 @@ pub struct ByTrial {
     pub runs: Vec<RunFit>,
     /// By value: whether it is the same in all runs that tell it.
     pub values: Vec<Heterogeneity>,
-    /// Runs that stand apart from the others.
+    /// Runs that differ from the others.
     pub apart: Vec<Apart>,
 }
 

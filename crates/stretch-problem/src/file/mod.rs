@@ -36,8 +36,8 @@ impl ProblemSpec {
         Ok(Self { folder, ..spec })
     }
 
-    /// Reads the problem's file that a path stands for: the path itself where it ends in `.toml`, or the `problem.toml` of a folder that is
-    /// no data set. None where the path stands for no problem's file.
+    /// Reads the problem's file that a path names: the path itself if it ends in `.toml`, or the `problem.toml` of a folder that is
+    /// no data set. `None` if the path names no problem's file.
     ///
     /// # Errors
     /// As [`ProblemSpec::read`].
@@ -96,7 +96,7 @@ impl ProblemSpec {
     /// The text of the file at `path`, with comments on its entries; the text reads back to the same problem. Where its files are relative
     /// to another folder than that of `path`, the text names that folder.
     ///
-    /// Comments on parameters stand under the table `parameter`.
+    /// Comments on parameters are under the table `parameter`.
     pub fn to_toml_with(&self, path: &Path, remarks: &Remarks) -> String {
         let mut remarks = remarks.clone();
         if self.simulator.is_none() {

@@ -17,7 +17,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     e: Vec<f64>,
-    /// Whether gauge blocks stand in for the reference.
+    /// Whether gauge blocks replace the reference.
     is_known: bool,
     /// Share of the pressure's range, where one is applied.
     pressure: Vec<f64>,

@@ -1,4 +1,4 @@
-//! A gauge alone beside a reference: a rig of one stage.
+//! A gauge alone with a reference: a rig of one stage.
 
 mod experiments;
 mod facts;
@@ -178,7 +178,7 @@ impl GaugeSimulator {
         let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.about.dt_s)?;
         let mut memory = gauge.memory();
-        // Nobody knows what was done to the gauge before the session.
+        // The motion of the gauge before the session is unknown.
         let mut start = Start::Hysteresis(run.model.parameters[INITIAL_STATE]);
         let mut from = 0;
         for (i, trial) in self.session.trials[..run.trials].iter().enumerate() {

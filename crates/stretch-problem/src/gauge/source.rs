@@ -14,7 +14,7 @@ const USUAL: (&str, &str) = ("length_mm", "bridge_v");
 
 impl GaugeSimulator {
     /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and signal; without them
-    /// `length_mm` and `bridge_v` are taken. None where the path holds no gauge alone: nothing says that it does, and the trials have openings.
+    /// `length_mm` and `bridge_v` are taken. `None` if the path holds no gauge alone: nothing says that it does, and the trials have openings.
     ///
     /// A gauge alone is recognised by its columns, by a rig file of `kind = "gauge"` (given, or named by the data set), or by trials
     /// without openings.
@@ -62,7 +62,7 @@ impl GaugeSimulator {
     }
 }
 
-/// Reference and signal; none where the trial is of a whole rig.
+/// Reference and signal; `None` if the trial is of a whole rig.
 fn columns_of<'a>(
     first: &Trial,
     named: Option<(&'a str, &'a str)>,

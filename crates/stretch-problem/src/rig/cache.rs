@@ -1,7 +1,7 @@
 //! Intermediate results that several runs share: pressures of the chamber, lengths of the muscle.
 //!
 //! Runs that differ in the muscle alone share the chamber's pressure. Runs that differ in the gauge alone share the simulated pressure and
-//! length that stand in for channels without a measurement.
+//! length that replace channels without a measurement.
 
 use std::{
     hash::Hash,
@@ -41,7 +41,7 @@ impl RigCache {
     }
 }
 
-/// Everything that the outputs of some stages depend on; `others` are the numbers of a run beside parameters and effects.
+/// Everything that the outputs of some stages depend on; `others` are the numbers of a run in addition to parameters and effects.
 pub(super) fn causes(
     stages: &[RigStage],
     params: &RigParams,

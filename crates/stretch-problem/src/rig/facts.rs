@@ -1,4 +1,4 @@
-//! The facts of a rig's recording that a diagnosis takes beside stages, parameters, effects and trials.
+//! The facts of a rig's recording that a diagnosis takes in addition to stages, parameters, effects and trials.
 
 use stretch_gap::{Description, MotionSpec, ParameterSpec, RecordFacts, Recorded, RowsUsed};
 use stretch_sim::{Key, RigStage};
@@ -69,7 +69,7 @@ fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize,
 }
 
 /// The clocks of parameters that drift. The supply reaches the chamber through the inlet alone: while the inlet is shut, the clock of the
-/// supply stands still. The clock of the lead of commands advances with every switch.
+/// supply stops. The clock of the lead of commands advances with every switch.
 fn drift_clocks(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
     let trials = &session.trials;
     let switches = || trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet)).collect();

@@ -54,7 +54,7 @@ pub struct RigSetup<'a> {
     pub catalogue: &'a Catalogue,
 }
 
-/// A whole rig beside its recorded session.
+/// A whole rig with its recorded session.
 #[derive(Debug, Clone)]
 pub struct RigSimulator {
     base: RigParams,

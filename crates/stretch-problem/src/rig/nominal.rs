@@ -42,7 +42,7 @@ pub(super) fn parameters(
         ParameterSpec {
             least: 0.15 * nominal,
             drift,
-            // These four parameters stand in for one another in the nominal rig.
+            // These four parameters can replace one another in the nominal rig.
             is_evidence: !matches!(key, Key::E0 | Key::R0 | Key::VExc | Key::G),
             ..ParameterSpec::new(info.name, info.unit, nominal)
                 .within(rig.tolerances[key as usize].sd(nominal))

@@ -76,7 +76,7 @@ pub(super) fn record_columns(
 }
 
 impl RigSimulator {
-    /// The rig with a session in which one column is corrected; none where the column drives no stage. The measured outputs stay as they
+    /// The rig with a session in which one column is corrected; `None` if the column drives no stage. The measured outputs stay as they
     /// are.
     pub(super) fn with_corrected(&self, column: &str, error: Distortion) -> Option<Self> {
         let dt_s = self.about.dt_s;

@@ -28,7 +28,7 @@ const LENGTH_KPA: f64 = 3.0;
 /// Error of that pressure amid a motion, kPa (1 sd).
 const MOVING_KPA: f64 = 10.0;
 
-/// Everything that a run needs beside the rig.
+/// Everything that a run needs in addition to the rig.
 pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
     pub(super) params: RigParams,
@@ -43,7 +43,7 @@ pub(super) struct Setting<'a> {
     /// Share of the settled state in the initial state of the muscle, 0 to 1.
     pub(super) initial_muscle: f64,
     pub(super) input_noise: Option<u64>,
-    /// Input of the stage that stands in for the measured one, all trials end to end.
+    /// Input of the stage that replaces the measured one, all trials end to end.
     pub(super) given: Option<&'a [f64]>,
     pub(super) kind: RigStage,
 }

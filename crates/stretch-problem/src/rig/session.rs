@@ -264,7 +264,7 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
 const AGAINST: f64 = 0.5;
 
 impl RigSession {
-    /// Checks that an open inlet shortens the muscle and an open outlet lengthens it, and that no channel stands still while the muscle moves.
+    /// Checks that an open inlet shortens the muscle and an open outlet lengthens it, and that no channel stays constant while the muscle moves.
     fn check_directions(&self) -> Result<(), ProblemError> {
         let span = |values: &[f64]| {
             let (low, high) = ends(values);

@@ -1,4 +1,4 @@
-//! Simulated channels that stand in for channels without a measurement; a result is kept for runs with the same causes.
+//! Simulated channels that replace channels without a measurement; a result is kept for runs with the same causes.
 
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ impl Setting<'_> {
         self.rig.found.lengths.or_make(key, make)
     }
 
-    /// The numbers that a run depends on beside parameters and effects: leads of the commands, and pressures at the start of the first trials.
+    /// The numbers that a run depends on in addition to parameters and effects: leads of the commands, and pressures at the start of the first trials.
     fn begun(&self, count: usize) -> impl Iterator<Item = f64> {
         self.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
     }

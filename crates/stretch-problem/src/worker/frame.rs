@@ -101,7 +101,7 @@ impl WorkerFrame {
         Ok(Self { header, body: body.chunks_exact(8).map(number).collect() })
     }
 
-    /// The first frame of some bytes, and the number of its bytes; none where bytes are still missing.
+    /// The first frame of some bytes, and the number of its bytes; `None` if bytes are still missing.
     ///
     /// # Errors
     /// As [`Prefix::parse`] and [`WorkerFrame::parse`].

@@ -19,7 +19,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Starts a command in a group of its own.
+    /// Starts a command in a separate process group.
     #[cfg(unix)]
     pub(super) fn spawn(command: &mut Command) -> io::Result<Self> {
         use std::os::unix::process::CommandExt as _;

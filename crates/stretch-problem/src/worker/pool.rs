@@ -72,7 +72,7 @@ impl WorkersSpec {
         })
     }
 
-    /// The command for messages, in one line: a part that holds white space or what is not printed stands in quotation marks, and the
+    /// The command for messages, in one line: a part that holds white space or what is not printed is put in quotation marks, and the
     /// text of the worker for Python objects is left out.
     pub(crate) fn shown(&self) -> String {
         let part = |part: &String| match part.as_str() {

@@ -64,7 +64,7 @@ impl Process {
                 }
             }
         });
-        // An answer that nobody asked for waits in the pipe.
+        // An answer without a question waits in the pipe.
         let (answered, from) = sync_channel(1);
         let most_bytes = Arc::new(AtomicU64::new(NO_BODY));
         let most = Arc::clone(&most_bytes);

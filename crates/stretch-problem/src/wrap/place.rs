@@ -14,7 +14,7 @@ use crate::{
     error::ProblemError,
 };
 
-/// A channel of a stage that wrappers can stand on.
+/// A channel of a stage that wrappers can act on.
 #[derive(Debug, Clone)]
 pub(crate) struct Site {
     pub(crate) stage: usize,
@@ -131,7 +131,7 @@ pub(crate) fn placed(
     Ok(all)
 }
 
-/// The error for a pattern that stands for no wrapper.
+/// The error for a pattern that matches no wrapper.
 fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     // `load_friction(load_N)` is friction, too
     let kind = pattern.split('(').next().unwrap_or(pattern);
@@ -229,7 +229,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
     loads.filter(|(x, _)| moves(x)).map(|load| with(Some(rubs), Some(load))).collect()
 }
 
-/// Why a kind is not looked for on a channel, in a sentence; none where it has nothing to do there.
+/// Why a kind is not looked for on a channel, in a sentence; `None` without a reason to report.
 fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<String> {
     let stage = among.stages[site.stage];
     let own = || sites.iter().filter(|other| other.stage == site.stage);
@@ -297,7 +297,7 @@ fn is_usual(kind: &Kind, site: &Site, among: &Among<'_>) -> bool {
     kind.usual.contains(&site.side) && !is_lag
 }
 
-/// All names by which a user may ask for a wrapper of a kind; `all` stands for a usual one.
+/// All names by which a user may ask for a wrapper of a kind; `all` names a usual one.
 fn aliases(
     (kind, is_usual): (&Kind, bool),
     site: &Site,
@@ -326,7 +326,7 @@ fn aliases(
 }
 
 impl Placed {
-    /// Whether a name or a pattern (`all`) stands for the wrapper.
+    /// Whether a name or a pattern (`all`) names the wrapper.
     pub(crate) fn is_called(&self, name: &str) -> bool {
         self.name == name || self.aliases.iter().any(|alias| alias == name)
     }
@@ -429,7 +429,7 @@ impl Placed {
         for ((range, start_s), before) in parts.zip(before) {
             let before = before.and_then(Option::as_mut);
             let lead = usize::from(before.is_some());
-            // what is looked at beside the channel was at its first value before
+            // the second signal was at its first value before
             let led = |x: &[f64]| [&x[..lead.min(x.len())], x].concat();
             let mut signal = led(&channel[range.clone()]);
             if let (Some(first), Some(before)) = (signal.first_mut(), &before) {

@@ -97,7 +97,7 @@ pub(crate) fn hidden() -> Vec<Hidden> {
         (
             "input.offset",
             Box::new(|u, _| {
-                // The servo stands still until it is commanded, so that an offset of the command is none of the angle.
+                // The servo rests until it is commanded, so that an offset of the command is none of the angle.
                 plain(&u.iter().map(|u| u + 0.5).collect::<Vec<_>>(), 0.0)
             }),
         ),

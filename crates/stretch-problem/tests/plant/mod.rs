@@ -1,4 +1,4 @@
-//! A toy plant, a servo of first order, beside recordings in which each wrapper was hidden in turn.
+//! A toy plant, a servo of first order, with recordings in which each wrapper was hidden in turn.
 
 mod hidden;
 
@@ -143,7 +143,7 @@ const MANY: [&str; 8] = [
     "output.saturation",
 ];
 
-/// Effects of a servo's drive and of its recorder, beside which the servo alone is agreed with.
+/// Effects of a servo's drive and of its recorder, in addition to which a servo without any of them still agrees.
 const DRIVE: [&str; 4] =
     ["input.profile", "input.firmware_dead_band", "output.flexible_joint", "output.clock_drift"];
 

@@ -22,7 +22,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads a trial of a data set from the bytes of its file, which stands in no folder.
+    /// Reads a trial of a data set from the bytes of its file, which is in no folder.
     ///
     /// # Errors
     /// As [`Recording::of_entry`].
@@ -47,7 +47,7 @@ impl Recording {
         Self::session_by(set, |entry| Self::of_entry(entry, &folder, options))
     }
 
-    /// Every trial of a data set, read by `read`: for files that stand in no folder.
+    /// Every trial of a data set, read by `read`: for files that are in no folder.
     ///
     /// # Errors
     /// Those of `read`.

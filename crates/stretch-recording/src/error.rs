@@ -79,7 +79,7 @@ pub enum RecordingError {
         /// The name.
         column: String,
     },
-    /// A name that a line end or another control character stands in.
+    /// A name that contains a line end or another control character.
     #[error(
         "{at}: the name \"{value}\" holds a control character; if the lines end in CR alone, save the file with LF"
     )]
@@ -89,7 +89,7 @@ pub enum RecordingError {
         /// The name, shortened.
         value: String,
     },
-    /// Text where a number should stand.
+    /// Text where a number should be.
     #[error("{at}: \"{value}\" is not a number; correct it or remove that row")]
     NotANumber {
         /// Where.
@@ -181,7 +181,7 @@ pub enum RecordingError {
         /// Names given.
         given: usize,
     },
-    /// A rate at which nobody records.
+    /// A rate at which no recorder works.
     #[error(
         "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between {least_hz:e} and {most_hz:e}; say what its numbers count with --time {column}:s, :ms, :us, :ns, :min, :h or :d, or the rate with --sample-rate HZ"
     )]
@@ -368,7 +368,7 @@ impl RecordingError {
         Self::Convert { file: file.to_owned(), format, command, extra }
     }
 
-    /// Whether time stood still or went back.
+    /// Whether time stayed the same or went back.
     pub fn is_time(&self) -> bool {
         matches!(self, Self::Data(DataError::TimeNotRising { .. }))
     }

@@ -101,7 +101,7 @@ pub(crate) fn joined(
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<Recording, RecordingError> {
-    // Every clock that is taken shortens what all of them cover: those that nobody asks for are not.
+    // Every clock that is taken shortens what all of them cover: clocks without a requested column are not taken.
     if tracks.len() > 1 && !options.required().is_empty() {
         let is_asked = |c: &Channel| options.required().contains(&c.name);
         let (needed, other): (Vec<_>, Vec<_>) =
@@ -400,7 +400,7 @@ fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, Re
     Ok((0..=count as u64).map(|i| at(i).min(to_s)).collect())
 }
 
-/// Takes instants out of the grid that stand where a track has a gap: a line across it would be invented.
+/// Takes out the instants of the grid at which a track has a gap: a line across it would be invented.
 fn leave_gaps(grid: &mut Vec<f64>, track: &Timed) {
     let longest_s = BRIDGED / track.rate_hz();
     let mut gaps = track.time_s.windows(2).filter(|t| t[1] - t[0] > longest_s).peekable();

@@ -68,7 +68,7 @@ const NANOSECONDS: [&str; 5] = ["nsec", "nsecs", "nanosec", "nanosecs", "nanosec
 /// The time of a table that LabVIEW writes.
 const LABVIEW_TIME: &str = "x_value";
 
-/// The unit in this project's spelling: `mm`, `n`, `m_per_s2`, `percent`; empty for a pure number, none where it is no unit.
+/// The unit in this project's spelling: `mm`, `n`, `m_per_s2`, `percent`; empty for a pure number, `None` if it is no unit.
 pub(crate) fn unit(text: &str) -> Option<String> {
     let text = text.trim();
     if matches!(text, "" | "-" | "1" | "--") {
@@ -124,8 +124,8 @@ pub fn tidy_column(name: &str) -> String {
     tidy(name, None).unwrap_or_else(|| name.to_owned())
 }
 
-/// A name with its unit as its last part, from `Pos (mm)`, `force[N]`, `pos, mm` or from a unit that stands below it;
-/// none where the name says no unit in such a way.
+/// A name with its unit as its last part, from `Pos (mm)`, `force[N]`, `pos, mm` or from a unit below it;
+/// `None` if the name says no unit in such a way.
 pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
     let (base, unit) = match below.filter(|b| !b.is_empty()) {
         Some(below) => (name, unit(unbracketed(below))?),
@@ -140,7 +140,7 @@ pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
     })
 }
 
-/// A name without the unit that stands behind it, and that unit.
+/// A name without the unit behind it, and that unit.
 fn bracketed(name: &str) -> Option<(&str, String)> {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']'), ('{', '}')] {
@@ -170,7 +170,7 @@ pub(crate) fn are_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     any
 }
 
-/// How likely a name is that of the time, 0 first; none where it is not.
+/// How likely a name is that of the time, 0 first; `None` if it is not.
 pub(crate) fn time_rank(name: &str) -> Option<usize> {
     let name = words(name);
     let known = |name: &str| TIMES.iter().position(|time| *time == name);
@@ -214,7 +214,7 @@ pub(crate) fn clock_of(name: &str) -> Option<String> {
     for time in TIMES {
         let tail = last.strip_suffix(time).and_then(|tag| tag.strip_suffix('_'));
         let head = last.strip_prefix(time).and_then(|tag| tag.strip_prefix('_'));
-        // `us` and `ms` beside a name are units of something else.
+        // `us` and `ms` next to a name are units of something else.
         let found = tail.or(head).filter(|_| !matches!(time, "us" | "ms"));
         if let Some(found) = found.filter(|f| !f.is_empty() && time.len() > best) {
             (best, tag) = (time.len(), Some(found));

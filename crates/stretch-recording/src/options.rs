@@ -121,7 +121,7 @@ pub struct ReadOptions {
     pub(crate) date_order: Option<DateOrder>,
 }
 
-/// What the time is called unless somebody says otherwise.
+/// What the time is called unless an option says otherwise.
 pub(crate) const TIME: &str = "time_s";
 
 impl Default for ReadOptions {

@@ -57,7 +57,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads a recording from any stream; `name` stands for the file.
+    /// Reads a recording from any stream; messages call it `name`.
     ///
     /// # Errors
     /// As [`Recording::read`].

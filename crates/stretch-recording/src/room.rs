@@ -8,7 +8,7 @@ use std::{
 
 /// Memory that any file may take, bytes.
 const ANY: u64 = 192 << 20;
-/// What a file may take beyond that, in multiples of its own size: with its bytes themselves there are four.
+/// What a file may take beyond that, in multiples of its size: with its bytes themselves there are four.
 const TIMES: u64 = 3;
 /// The largest file of arrays, which are read whole, and the most numbers of a table of text, bytes.
 const LARGEST: u64 = 4 << 30;
@@ -22,7 +22,7 @@ const PIECE: u64 = 1 << 20;
 /// Bytes of a packed stream that have been unpacked so far.
 pub(crate) type Packed = Cell<u64>;
 
-/// Memory that what is read of a file may take beside the file's own bytes.
+/// Memory that the data of a file may take in addition to the bytes of the file.
 #[derive(Debug)]
 pub(crate) struct Room {
     most: u64,
@@ -60,7 +60,7 @@ impl Room {
         self.take((count as u64).saturating_mul(size_of::<f64>() as u64))
     }
 
-    /// Takes room for what every recording has beside its channels: its time, and for its rate the steps of that.
+    /// Takes room for what every recording has in addition to its channels: its time, and for its rate the steps of that.
     pub(crate) fn take_time(&mut self, rows: usize) -> Result<(), String> {
         self.take_numbers(rows.saturating_mul(2))
     }

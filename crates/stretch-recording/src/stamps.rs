@@ -12,8 +12,8 @@ pub(crate) enum StampFault {
     DayOrMonth,
 }
 
-/// Nanoseconds that a stamp stands for: since 1970 for a date, since midnight for a time of day.
-/// A date without a zone counts as UTC. Where a point stands between the numbers of a date, the day comes first.
+/// The nanoseconds of a stamp: since 1970 for a date, since midnight for a time of day.
+/// A date without a zone counts as UTC. If a point is between the numbers of a date, the day comes first.
 pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, StampFault> {
     use jiff::{Timestamp, civil::DateTime, civil::Time, tz::TimeZone};
     if let Ok(stamp) = text.parse::<Timestamp>() {

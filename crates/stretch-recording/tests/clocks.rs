@@ -74,7 +74,7 @@ fn units_that_are_open_are_asked_for() {
         let error = read_as(&text, &ReadOptions::new()).expect_err("two meanings").to_string();
         assert!(error.contains(&format!("--time {name}:s")), "{error}");
     }
-    // Whoever says what is counted is believed.
+    // An option that says what is counted is believed.
     let text = table("time", |_, t| format!("{:.1}", t * 1e3));
     let options = ReadOptions::new().time("time").time_unit(TimeUnit::Milliseconds);
     is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-9, "");
@@ -207,7 +207,7 @@ fn repeated_and_coarse_stamps_are_spread() {
     // the first second is not whole
     let late = |_: usize, t: f64| format!("{}", (1_714_564_800.4 + t + 1e-9).floor());
     is_at_50_hz(&read(&table("timestamp", late)), 0, 1e-6, "50 a second");
-    // stamps that stood still while the clock went on
+    // stamps that stayed the same while the clock went on
     let stuck = |i: usize, t: f64| format!("{:.2}", if (100..130).contains(&i) { 2.0 } else { t });
     is_at_50_hz(&read(&table("time_s", stuck)), 0, 1e-9, "29 rows have the stamp");
     // lost samples are no ticks, not even regular ones
@@ -421,7 +421,7 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
     let one = read_as(&text, &ReadOptions::new().require("/cmd/data")).unwrap();
     assert_eq!(one.trial.len(), 300);
     assert!((one.trial.rate_hz().unwrap() - RATE_HZ).abs() < 1e-6);
-    // a slow column beside a fast one
+    // a slow column next to a fast one
     let slow = table("time_s,length_mm", |i, t| {
         if i % 5 == 0 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
     });
@@ -430,7 +430,7 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
     assert_eq!(trial.len(), 396);
     let length = trial.require("length_mm").unwrap();
     assert!(length.iter().zip(&trial.time_s).all(|(x, t)| (x - 100.0 - t).abs() < 1e-9));
-    // A sensor that is lost has no clock of its own.
+    // A sensor that is lost has no separate clock.
     let lost = table("time_s,length_mm", |i, t| {
         if i < 250 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
     });

@@ -47,7 +47,7 @@ impl Dialect {
     fn names(&self, bare: &[(&str, &str)]) -> Vec<String> {
         let name = |(name, unit): &(&str, &str)| match self.units {
             Units::InNames => format!("{name}_{unit}"),
-            // Blanks between columns cannot stand in names that are not quoted.
+            // Blanks between columns cannot be in names that are not quoted.
             Units::Brackets if self.is_quoted => format!("\"{name} ({unit})\""),
             Units::Brackets => format!("{name}[{unit}]"),
             Units::Row if self.is_quoted => format!("\"{name}\""),
@@ -91,7 +91,7 @@ proptest! {
     #[test]
     fn a_table_in_any_dialect(trial in strategies::rig_trial(2..40), dialect in dialect()) {
         let text = dialect.write(&trial);
-        // A name that says its unit in capitals is asked for as it stands.
+        // A name that says its unit in capitals is asked for as it is written.
         let capital = dialect.units == Units::InNames;
         let bridge = if capital { "bridge_V" } else { "bridge_v" };
         let options = ReadOptions::new().require("length_mm").require(bridge);

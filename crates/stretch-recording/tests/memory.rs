@@ -1,6 +1,6 @@
 //! Peak memory of every reader: four times the file and 256 MB at most, or a refusal.
 //!
-//! Each file is read by a process of its own, which tells the most memory that it had. The files are such as take most for their size: what
+//! Each file is read by a separate process, which reports the most memory that it had. The files are such as take most for their size: what
 //! they hold repeats, and numbers of a byte have eight in memory.
 #![cfg(target_os = "linux")]
 
@@ -8,10 +8,10 @@ use std::{fs, path::Path, process::Command};
 
 use flate2::{Compression, write::GzEncoder};
 
-/// Memory that any file may take beside four times its size, bytes.
+/// Memory that any file may take in addition to four times its size, bytes.
 const BESIDE: u64 = 256 << 20;
 
-/// Reads a file in a process of its own: the most memory that it had, bytes, and what came of it.
+/// Reads a file in a separate process: the most memory that it had, bytes, and what came of it.
 ///
 /// The example `peak_memory` reads, which `cargo test` builds with the tests.
 fn peak(path: &Path) -> (u64, String) {

@@ -8,7 +8,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// The trial as somebody may have recorded it: 100 samples a second, and names that are no numbers.
+/// The trial as a user may have recorded it: 100 samples a second, and names that are no numbers.
 fn as_recorded(mut trial: Trial) -> Trial {
     trial.time_s = (0..trial.len()).map(|i| i as f64 / 100.0).collect();
     for (i, channel) in trial.channels.iter_mut().enumerate() {

@@ -102,7 +102,7 @@ impl Recording {
 }
 
 impl Array {
-    /// Rows and columns; none where it has more than two lengths above 1, or no values: beside a length of 0 any other may be told.
+    /// Rows and columns; `None` if it has more than two lengths above 1, or no values, because with a length of 0 the others can be anything.
     fn matrix(&self) -> Option<(usize, usize)> {
         if self.values.is_empty() {
             return None;
@@ -117,7 +117,7 @@ impl Array {
     }
 
     /// Number of its columns over `samples` instants, whichever way it lies, and the steps to the next sample and to the next column;
-    /// none where it has another length.
+    /// `None` if it has another length.
     fn layout(&self, samples: usize) -> Option<(usize, usize, usize)> {
         let (rows, columns) = self.matrix()?;
         let (count, step, next) = match (rows == samples, columns == samples) {
@@ -128,9 +128,9 @@ impl Array {
         (count <= MOST_COLUMNS).then_some((count, step, next))
     }
 
-    /// Its columns over `samples` instants; none where it has another length.
+    /// Its columns over `samples` instants; `None` if it has another length.
     ///
-    /// Rows are moved from the last to the first, block by block, and what was moved is given back: beside the array itself there is never
+    /// Rows are moved from the last to the first, block by block, and what was moved is given back: in addition to the array itself there is never
     /// more than a block.
     fn into_columns(mut self, samples: usize) -> Option<Vec<Channel>> {
         let (count, step, next) = self.layout(samples)?;
@@ -287,7 +287,7 @@ fn parts(path: &str) -> (&str, &str) {
     path.rsplit_once(['/', '.']).unwrap_or(("", path))
 }
 
-/// The clock of an array: of its length, and by its name the nearest; none where two are as near.
+/// The clock of an array: of its length, and with the nearest name; `None` if two are as near.
 fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     let fits = clocks.iter().enumerate().filter_map(|(i, clock)| {
         array.layout(clock.array.values.len())?;
@@ -320,7 +320,7 @@ fn nearness(name: &str, of: &str) -> usize {
     }
 }
 
-/// Arrays without a clock, at a rate that the file or somebody says.
+/// Arrays without a clock, at a rate that the file or an option says.
 fn counted(
     file: &str,
     others: Vec<Array>,

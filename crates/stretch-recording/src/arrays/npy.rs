@@ -16,7 +16,7 @@ use crate::{
 
 type Tracks = (Vec<Track>, Vec<String>);
 
-/// Reads one array: columns with names, or those that somebody names.
+/// Reads one array: columns with names, or those that an option names.
 pub(crate) fn read(
     (bytes, mut room): (Vec<u8>, Room),
     file: &str,
@@ -91,7 +91,7 @@ pub(crate) fn read_archive(
     tracks(file, arrays, notes, options)
 }
 
-/// The columns of a matrix by the names that somebody gives.
+/// The columns of a matrix by the names that an option gives.
 fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     let (rows, columns) = match array.shape[..] {
         [rows] => (rows, 1),
@@ -118,7 +118,7 @@ fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     Ok(names.iter().enumerate().map(one).collect())
 }
 
-/// A number in memory: where it stands in an item, and how it is written.
+/// A number in memory: where it is in an item, and how it is written.
 #[derive(Debug, Clone, PartialEq)]
 struct Kind {
     is_big: bool,
@@ -171,7 +171,7 @@ struct Head {
     fields: Vec<Place>,
     shape: Vec<usize>,
     is_fortran: bool,
-    /// Number of its items, bytes of each, and where the first stands.
+    /// Number of its items, bytes of each, and where the first is.
     count: usize,
     item: usize,
     begin: usize,

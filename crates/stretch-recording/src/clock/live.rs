@@ -40,7 +40,7 @@ pub(crate) struct LiveClock {
     pub(crate) notes: Vec<String>,
 }
 
-/// A time that stands still or goes back.
+/// A time that stays the same or goes back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NotRising {
     pub(crate) time_s: f64,
@@ -68,7 +68,7 @@ impl LiveClock {
     /// Seconds of the next sample, whose stamp is a count from an origin.
     ///
     /// # Errors
-    /// Time stands still or goes back. The clock goes on from there.
+    /// Time stays the same or goes back. The clock goes on from there.
     pub(crate) fn take(&mut self, row: u64, count: f64, origin: f64) -> Result<f64, NotRising> {
         let sample = self.samples;
         self.samples += 1;

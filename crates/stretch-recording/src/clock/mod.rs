@@ -21,7 +21,7 @@ use crate::{
 
 /// Seconds since 1970 in any recording; no recorder runs for three years.
 pub(crate) const EPOCH_S: f64 = 1e8;
-/// Samples that may be lost where a clock rolls over or stands still, and one; as many as a live receptor bridges.
+/// Samples that may be lost where a clock rolls over or stops, plus one; as many as a live receptor bridges.
 pub(crate) const BRIDGED: f64 = 4.5;
 
 /// A column of time as it was recorded.

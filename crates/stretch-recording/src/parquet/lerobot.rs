@@ -1,4 +1,4 @@
-//! LeRobot's data sets: Parquet tables of episodes, with what their columns mean in `meta/info.json` beside them.
+//! LeRobot's data sets: Parquet tables of episodes, with what their columns mean in `meta/info.json` next to them.
 
 use std::{io::Read, path::Path};
 

@@ -23,7 +23,7 @@ pub(crate) struct Columns {
     counts: Vec<f64>,
     rows: Rows,
     kept: Vec<Kept>,
-    /// Whether columns are kept that nobody asks for.
+    /// Whether columns are kept that were not requested.
     keeps_all: bool,
     /// Samples with a field that is no number.
     holes: Vec<usize>,

@@ -13,10 +13,10 @@ use crate::{
 
 /// Longest whole number that is read as floating point: this project writes none longer, and clocks of nanoseconds are.
 const EXACT_DIGITS: usize = 17;
-/// Separator that stands for runs of blanks and tabs.
+/// Separator that represents runs of blanks and tabs.
 pub(crate) const BLANKS: u8 = b' ';
 
-/// What stands between a number's whole part and its fraction.
+/// What is between a number's whole part and its fraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mark {
     /// No number had a fraction yet.
@@ -61,7 +61,7 @@ impl Dialect {
         rows: &[(u64, Vec<u8>)],
     ) -> Self {
         let (delimiter, recorded) = (header.delimiter, header.recorded);
-        // A comma between columns cannot stand in numbers, too.
+        // A comma between columns cannot be in numbers, too.
         let mark = if delimiter == b',' { Mark::Point } else { Mark::Open };
         let shown = |(_, line): &(u64, Vec<u8>)| {
             let time = cells(line, delimiter)?.into_iter().nth(time?)?;
@@ -151,7 +151,7 @@ impl Dialect {
         out: &mut [f64],
     ) -> Result<(), RowFault> {
         let cells = cells(line, self.delimiter).ok_or_else(|| broken(line, self.delimiter))?;
-        // A separator may stand behind the last field.
+        // A separator may follow the last field.
         let is_trailed = cells.last().is_some_and(|cell| cell.is_empty());
         let most = roles.len() + usize::from(is_trailed);
         if !(self.recorded..=most).contains(&cells.len()) {
@@ -167,7 +167,7 @@ impl Dialect {
             };
             out[column] = match value {
                 Ok(value) => value,
-                // Two notations in one file: nobody knows which numbers are which.
+                // Two notations in one file: which numbers use which is unknown.
                 Err(fault @ Fault::DecimalPoint(_)) => {
                     return Err(RowFault::Field { column, fault });
                 }
@@ -181,7 +181,7 @@ impl Dialect {
         Ok(())
     }
 
-    /// Whether a column that is needed may lack a value: it may have a clock of its own.
+    /// Whether a column that is needed may lack a value: it may have a separate clock.
     fn may_be_blank(&self, fault: &Fault, column: usize) -> bool {
         matches!(fault, Fault::Empty | Fault::NotFinite(_)) && Some(column) != self.time
     }
@@ -234,7 +234,7 @@ pub(crate) fn uncommented(line: &[u8]) -> &[u8] {
     &line[line.iter().take_while(|b| is_mark(b)).count()..]
 }
 
-/// The cells of a line; none where its quotation marks do not pair up.
+/// The cells of a line; `None` if its quotation marks do not pair up.
 pub(crate) fn cells(line: &[u8], delimiter: u8) -> Option<Vec<Cow<'_, [u8]>>> {
     let (mut cells, mut at) = (Vec::new(), 0);
     let blank = |b: &&u8| matches!(b, b' ' | b'\t');

@@ -5,7 +5,7 @@ use stretch_data::shown;
 /// What tables write where there is no number.
 const MISSING: [&str; 5] = ["na", "n/a", "#n/a", "null", "none"];
 
-/// What is wrong with one field or one row, before it is known where it stands.
+/// What is wrong with one field or one row, before its place is known.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Fault {
     NotANumber(String),
@@ -36,7 +36,7 @@ pub(crate) enum Role {
     Skipped,
 }
 
-/// The field that starts at `at`: its content, and where its delimiter stands.
+/// The field that starts at `at`: its content, and the place of its delimiter.
 pub(crate) enum Field<'a> {
     Plain(&'a [u8], usize),
     Quoted(Vec<u8>, usize),

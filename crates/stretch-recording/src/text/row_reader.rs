@@ -19,13 +19,13 @@ use crate::{
 ///
 /// The header is found as in a file, by the first row of numbers below it; then each line is
 /// answered as soon as it is complete, however slowly the stream comes. Only the time and the required columns are
-/// looked at: whatever else stands in a row cannot spoil it. Memory is bounded: a line that
+/// looked at: whatever else is in a row cannot spoil it. Memory is bounded: a line that
 /// is too long is an error for that line and is skipped.
 ///
 /// The samples of a stream without a time are counted where the options say how many come a second; malformed rows count.
 ///
 /// A row whose time does not advance or goes back is an error, too, but the clock goes on from
-/// there: a logger that was restarted is lost for one row, not for good. Whoever keeps a
+/// there: a logger that was restarted is lost for one row, not for good. A caller that keeps a
 /// memory over the rows should reset it when [`RecordingError::is_time`] holds.
 ///
 /// ```

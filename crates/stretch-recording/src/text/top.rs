@@ -475,7 +475,7 @@ fn is_number(cell: &[u8]) -> bool {
 }
 
 /// The cells of a line of names for a block: one for each cell of its rows, or up to their last one that is filled; and more of
-/// them where rows may end early. None where the line has others.
+/// them where rows may end early. `None` if the line has others.
 fn name_cells(line: &[u8], block: &Block) -> Option<Vec<String>> {
     let split = cells(line, block.delimiter)?;
     let mut names: Vec<String> = Vec::new();

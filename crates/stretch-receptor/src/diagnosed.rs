@@ -317,7 +317,7 @@ impl<T: Real> Diagnosed<T> {
     }
 
     /// Estimates the position of the muscle in its sleeve: the muscle is ahead of the sleeve in the direction of the
-    /// sleeve's last movement. While the sleeve stands, the muscle may be anywhere inside.
+    /// sleeve's last movement. While the sleeve does not move, the muscle may be anywhere inside.
     #[inline(always)]
     fn turn(&self, memory: &mut DiagnosedMemory<T>) {
         let toward = if memory.slipped < T::zero() { -T::one() } else { T::one() };

@@ -193,7 +193,7 @@ impl<T: Real> Observer<T> {
         }
     }
 
-    /// The drive of a target that stands at `y` now.
+    /// The drive of a target that is at `y` now.
     #[inline(always)]
     fn drive_at(&self, memory: &ObserverMemory<T>, y: T) -> T {
         let mut drive = y;

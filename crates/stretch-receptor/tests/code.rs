@@ -193,7 +193,7 @@ fn adc() -> impl Strategy<Value = Adc> {
     })
 }
 
-/// Codes that wander, jump, stick at the ends, and sometimes are none.
+/// Codes that drift, jump, stick at the ends, and sometimes are none.
 fn codes(bits: u8, lost: bool) -> impl Strategy<Value = Vec<i32>> {
     let full = 1i32 << bits;
     let wander = move |start: i32, steps: Vec<i32>| -> Vec<i32> {

@@ -134,7 +134,7 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
 }
 
 /// A bare gauge with this noise errs by 0.002 of the stroke. What no defect hides comes back about as well; a play or a delay costs what
-/// it hides: a slip of 0.02 stands wrong until the sleeve is seen to turn, a skew is predicted over. What a filter says of itself
+/// it hides: a slip of 0.02 is wrong until the sleeve is seen to turn, a skew is predicted over. What a filter says of itself
 /// leaves out what its defects remember wrongly: a fit measures by how much ([`DiagnosedMap::spread`]), here it is 1.
 #[test]
 fn every_defect_is_inverted() {
@@ -219,7 +219,7 @@ fn lost_samples_are_predicted_over_and_wrong_models_refused() {
     for _ in 0..10 {
         let _ = receptor.step(&mut other, Volts(f64::NAN));
     }
-    // a long gap forgets the motion: the next sample stands for itself
+    // a long gap forgets the motion: the next sample counts alone
     assert!(receptor.step(&mut other, Volts(1.4)).unwrap().rate.abs() < 1e3);
     let refused = DiagnosedReceptor::<f32>::new(&example_observer()).unwrap_err();
     assert!(refused.to_string().contains("diagnosed"), "{refused}");

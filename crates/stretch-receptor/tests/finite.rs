@@ -65,7 +65,7 @@ fn spoilt() -> impl Strategy<Value = Option<Calibration>> {
     )
 }
 
-/// What a stream may bring; a share of the calibrated range stands for the usual.
+/// What a stream may bring; a usual sample is a share of the calibrated range.
 fn sample() -> impl Strategy<Value = (bool, f64)> {
     prop_oneof![
         6 => (-0.2..1.2).prop_map(|share| (true, share)),

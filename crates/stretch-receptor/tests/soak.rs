@@ -94,7 +94,7 @@ fn clean_samples(calibration: &Calibration) -> Option<u32> {
     (back < 1e8).then(|| FORGOTTEN + back as u32)
 }
 
-/// Steps a receptor through `samples` faulty ones, then, beside a fresh one, through clean ones; by how much the two
+/// Steps a receptor through `samples` faulty ones, then together with a fresh one through clean ones; by how much the two
 /// differ then.
 fn soak<D, S, O>(
     design: D,

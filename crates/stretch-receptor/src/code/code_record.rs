@@ -11,7 +11,7 @@ use super::{
 
 #[derive(Serialize, Deserialize)]
 struct CodeRecord<L, P> {
-    /// Schema of the record. The field stands first, so that a newer record is refused before the rest is read.
+    /// Schema of the record. The field is first, so that a newer record is refused before the rest is read.
     schema: u32,
     /// Window, degree and delay of the rate.
     shape: (u16, u8, u16),

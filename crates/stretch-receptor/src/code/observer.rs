@@ -148,7 +148,7 @@ impl IntegerObserver {
         (self.numbers.curve[below] + risen as i32, below, place)
     }
 
-    /// The drive of a target that stands at `y` and moves by `rate` a sample.
+    /// The drive of a target that is at `y` and moves by `rate` a sample.
     #[inline(always)]
     fn drive(&self, memory: &IntegerMemory, y: i32, rate: i32) -> i32 {
         let mut sum = i64::from(self.numbers.lead) * i64::from(rate);

@@ -35,7 +35,7 @@ const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ObserverNumbers {
-    /// Schema of the record. The field stands first, so that a newer record is refused before the rest is read.
+    /// Schema of the record. The field is first, so that a newer record is refused before the rest is read.
     pub schema: u32,
     /// Bits of the converter.
     pub adc_bits: u8,

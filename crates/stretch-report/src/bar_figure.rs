@@ -139,7 +139,7 @@ pub(crate) fn picking_figure(
         .live(bars_json(GAP, &bar_rows(rows, picks, unit)))
 }
 
-/// Draws rows of bars in the narrow shape alone, for figures that stand side by side.
+/// Draws rows of bars in the narrow shape alone, for figures that are side by side.
 pub fn narrow_bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
     let mut figure = bar_figure(description, rows, scale, x_label);
     figure.keep_narrowest();

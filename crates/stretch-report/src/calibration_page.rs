@@ -26,7 +26,7 @@ use super::{
 /// Most trials whose curves are drawn; the tables hold all trials.
 const DRAWN: usize = 4;
 
-/// The words of a report beside the numbers.
+/// The words of a report, in addition to the numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
     /// Heading of the page.
@@ -51,7 +51,7 @@ pub struct Judged<'a> {
     pub calibrated: &'a [(&'a str, &'a Calibrated)],
     /// Errors of the calibrations.
     pub evaluation: &'a Evaluation,
-    /// The words beside the numbers.
+    /// The words, in addition to the numbers.
     pub context: &'a Context,
 }
 
@@ -111,7 +111,7 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         }
         (method, None) => method.to_owned(),
     };
-    // beside the best one the signal itself says enough; the table has the others
+    // next to the best one, the signal itself is enough; the table has the others
     let others: Vec<String> = (0..methods.len())
         .filter(|i| *i != best && methods[*i].method == RAW)
         .map(|i| format!("the {} by {}", called(i), short(&methods[i])))

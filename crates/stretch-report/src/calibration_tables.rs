@@ -116,7 +116,7 @@ pub fn signal_table(candidates: &[Candidate]) -> Table {
         .highlight((!candidates.is_empty()).then_some(0))
 }
 
-/// The fitted order beside its neighbours.
+/// The fitted order with its neighbours.
 pub fn order_table(fit: &FitReport) -> Table {
     let row = |o: &stretch_calibrate::Order| {
         let mut remarks = Vec::new();

@@ -67,7 +67,7 @@ const TURNED: &str = "What is left on the test trials as each number of the effe
     the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
     once the changes are added.";
 
-/// The picture that stands first: what the headline speaks of is seen in it.
+/// The first picture, which shows what the headline says.
 fn left_over(page: &mut Page, subject: &Subject<'_>) {
     let stage = subject.diagnosis.location.worst().unwrap_or(0);
     let Some(shown) = shown(subject, stage) else { return };

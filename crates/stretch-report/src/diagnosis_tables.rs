@@ -63,7 +63,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
     .highlight((!candidates.is_empty()).then_some(0))
 }
 
-/// A table of the numbers that were fitted, a row for each effect of each candidate, and of how firmly the effect stands. Sets are counted as in
+/// A table of the numbers that were fitted, a row for each effect of each candidate, and of the stability of the effect. Sets are counted as in
 /// [`candidate_table`].
 pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectStability]) -> Table {
     let value = |p: &EffectValue| {

@@ -12,7 +12,7 @@ use super::{
     thin::{binned, sample},
 };
 
-/// Number of parts of the axis, each with dots and a median of its own.
+/// Number of parts of the axis, each with its own dots and median.
 const SLOTS: usize = 24;
 /// Height of a panel, pixels; the last panel also holds the label of the axis.
 const PANEL: u32 = 165;

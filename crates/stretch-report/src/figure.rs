@@ -87,7 +87,7 @@ impl Figure {
         self
     }
 
-    /// Keeps only the shape for phones, for figures that stand side by side.
+    /// Keeps only the shape for phones, for figures that are side by side.
     pub fn keep_narrowest(&mut self) {
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         self.drawings.retain(|(frame, _)| Some(frame.width) == narrowest);
@@ -127,7 +127,7 @@ impl Figure {
         self.drawings.iter().map(drawing).collect()
     }
 
-    /// The widest drawing as a file of its own, in light colours with its legend inside.
+    /// The widest drawing as a separate file, in light colours with its legend inside.
     pub fn standalone(&self) -> String {
         let Some((frame, body)) = self.drawings.iter().max_by_key(|(frame, _)| frame.width) else {
             return String::new();
@@ -158,7 +158,7 @@ impl Figure {
     }
 }
 
-/// Height of the legend of a figure that stands alone.
+/// Height of the legend of a figure in a separate file.
 const LEGEND_PX: u32 = 28;
 
 /// Labels and spans of two axes.

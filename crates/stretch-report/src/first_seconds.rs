@@ -10,7 +10,7 @@ use super::{
     subject::Subject,
 };
 
-/// The first words of a page: what is missing, where the answer is a name; what it closes and how sure it is stands right below.
+/// The first words of a page: what is missing, if the answer is a name; what it closes and how sure it is follows right below.
 pub(crate) fn headline(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     match &d.answer {
@@ -25,7 +25,7 @@ pub(crate) fn headline(subject: &Subject<'_>) -> String {
 /// The condition of every probability.
 pub(crate) const GIVEN: &str = "given this catalogue";
 
-/// Named effects, and effects that may stand in their place.
+/// Named effects, and effects that may replace them.
 fn to_add(named: &[String], tied: &[String]) -> String {
     match (named, tied) {
         (_, []) => listed(named),
@@ -177,7 +177,7 @@ fn moved(d: &Diagnosis) -> Vec<String> {
     far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
 }
 
-/// Every named effect in words; its numbers stand where it is implemented.
+/// Every named effect in words; its numbers are where it is implemented.
 pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
     let d = subject.diagnosis;
     let one = |name: &String| {

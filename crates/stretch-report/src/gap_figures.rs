@@ -27,7 +27,7 @@ pub(crate) const BEFORE: Ink = Ink::Second;
 /// Colour of the simulator with the effect.
 pub(crate) const AFTER: Ink = Ink::Third;
 
-/// Whether there is an effect to draw beside the re-tuned simulator.
+/// Whether there is an effect to draw in addition to the re-tuned simulator.
 pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
     !subject.evidence.best.effects.is_empty()
 }

@@ -1,4 +1,4 @@
-//! Text and numbers as they stand on a page.
+//! Text and numbers as they are written on a page.
 
 use stretch_core::is_hidden;
 

@@ -26,7 +26,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table none of whose rows stands out.
+    /// A table none of whose rows is highlighted.
     pub fn new(
         caption: impl Into<String>,
         head: &[&str],
@@ -158,7 +158,7 @@ impl Page {
     pub fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
         let cards = if table.head.len() >= CARDS { " class=\"cards\"" } else { "" };
-        // the caption stands outside of the frame, so that it does not scroll away
+        // the caption is outside of the frame, so that it does not scroll away
         self.put(&format!(
             "<p class=\"caption\">{caption}</p>\n\
              <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\

@@ -16,7 +16,7 @@ pub struct Subject<'a> {
     pub evidence: &'a Evidence,
     /// The named effects as code.
     pub implementations: &'a [Implementation],
-    /// The simulator beside its measurements.
+    /// The simulator with its measurements.
     pub simulator: &'a dyn Simulator,
     /// Every run fitted by itself, where that was asked for.
     pub by_trial: Option<&'a ByTrial>,

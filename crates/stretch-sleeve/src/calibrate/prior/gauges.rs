@@ -1,4 +1,4 @@
-//! Whether gauges stand in the places, and rise where they rose, in the sessions of a prior: by their signals alone.
+//! Whether gauges are in the same places, and rise in the same direction, as in the sessions of a prior: by their signals alone.
 
 use nalgebra::{DMatrix, DVector};
 use stretch_calibrate::toolkit::extent;
@@ -100,7 +100,7 @@ impl Prior {
         // the zero of a gauge that was reversed is unknown
         let reversed = (0..count).map(|k| {
             let without = own.reversed(k);
-            // of two gauges it cannot be told which
+            // of two gauges it cannot be known which
             let which =
                 if count == 2 { self.signals.join(" or ") } else { self.signals[k].clone() };
             let says =

@@ -1,4 +1,4 @@
-//! What the program says, how wide its lines are, and whether they have colours, where whoever reads it may have gone: no work hangs on it.
+//! What the program says, how wide its lines are, and whether they have colours, even if its reader may be gone: no work depends on it.
 //!
 //! Standard error is a courtesy: what cannot be written there is let go. Standard output may be
 //! what was asked for: the first failure is kept, the work goes on, its files are written, and
@@ -24,7 +24,7 @@ use stretch_data::files::is_standard_output;
 use terminal_size::{Width, terminal_size};
 use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};
 
-/// How much is said beside results and errors.
+/// How much is said in addition to results and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Volume {
     /// `-q`: nothing, and of a diagnosis the verdict alone.
@@ -57,14 +57,14 @@ pub(crate) fn is_verbose() -> bool {
     volume() == Volume::Verbose
 }
 
-/// Whether progress is drawn: what `-v` says stands in lines of its own.
+/// Whether progress is drawn: what `-v` says is written in separate lines.
 pub(crate) fn shows_progress() -> bool {
     volume() == Volume::Usual
 }
 
 static LOST: OnceLock<ErrorKind> = OnceLock::new();
 
-/// Whether a file goes to standard output, where nothing else may then stand.
+/// Whether a file goes to standard output, where nothing else may be written then.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
 /// Gives standard output to the one of some files that is called `-`, or so.
@@ -98,7 +98,7 @@ pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// A result that other programs read, in lines of its own: code, JSON, TOML.
+/// A result that other programs read, in separate lines: code, JSON, TOML.
 ///
 /// # Errors
 /// None, as [`say`].
@@ -117,7 +117,7 @@ fn write_out(text: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What was done beside the result, such as a file that was written; not with `-q`.
+/// What was done in addition to the result, such as a file that was written; not with `-q`.
 ///
 /// # Errors
 /// None, as [`say`].
@@ -133,7 +133,7 @@ pub(crate) fn detail(text: impl Display) {
     }
 }
 
-/// What to look at: a text and a line end to standard error, or to nobody; not with `-q`.
+/// What to look at: a text and a line end to standard error if it can be written; not with `-q`.
 pub(crate) fn warn(text: impl Display) {
     if volume() != Volume::Quiet {
         write_err(&wrapped(&plain(&text.to_string())));

@@ -1,7 +1,7 @@
 //! The program `stretch`: parses its arguments and runs a command. It is no library for other programs; what they need is in the
 //! crates that it is made of.
 
-// these panic where nobody reads: `display` has what is said
+// these panic without a reader: `display` has what is said
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod commands;
@@ -128,7 +128,7 @@ pub fn run() -> ExitCode {
         Command::Page(args) => page::run(args),
     });
     display::detail("the end");
-    // whoever read our output has gone: nothing is wrong
+    // the reader of our output is gone: nothing is wrong
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
     match (result, display::lost()) {
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
@@ -180,7 +180,7 @@ fn message(error: &anyhow::Error) -> String {
     stretch_data::files::without_temporary_names(&text)
 }
 
-/// A text without Rust's `(os error 28)`, which says what stands before it again.
+/// A text without Rust's `(os error 28)`, which repeats the text before it.
 fn without_numbers(text: &str) -> String {
     let mut parts = text.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_owned();

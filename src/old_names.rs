@@ -56,7 +56,7 @@ const OPTIONS: [(&str, &str); 19] = [
 ];
 
 /// An option that has the same meaning under another name, and that name: scripts that use the old spelling go on working. The value
-/// stands where the braces are; without them there is none.
+/// takes the place of the braces; without them there is none.
 const RENAMED: [(&str, &str); 7] = [
     ("--baselines", "--verbose"),
     ("--json-out", "--json={}"),

@@ -27,7 +27,7 @@ struct Output {
     path: PathBuf,
     /// How such a file is called in the help: `cal.json`.
     example: String,
-    /// Whether a recording may be replaced: one that the command made before, but none that somebody recorded.
+    /// Whether a recording may be replaced: one that the command made before, but none that was recorded.
     replaces_recordings: bool,
 }
 

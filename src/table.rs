@@ -9,12 +9,12 @@ use crate::display::width;
 /// A cell of so many characters is not broken, where that is not more than a third of the line: it is a number, an interval
 /// or a name.
 const WHOLE: usize = 24;
-/// What stands around a cell.
+/// Characters around a cell.
 const AROUND: usize = 3;
 
-/// A table with a header line; the first column reads from the left, the others are numbers and stand at the right.
+/// A table with a header line; the first column reads from the left, the others are numbers and aligned at the right.
 ///
-/// It is as wide as the terminal at most: long texts break between words, and columns for which there is no room stand in a
+/// It is as wide as the terminal at most: long texts break between words, and columns for which there is no room are put into a
 /// further table below, behind the first column again. Nothing is left out.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().collect();

@@ -34,9 +34,10 @@ use super::{
 /// Fit a calibration to logged trials
 ///
 /// Each trial is a recording (CSV in any dialect, NPY, NPZ) with the
-/// time, the signal and the reference, - is standard input; a folder with a dataset.toml stands for its fit trials. The
-/// record that is written holds all that `apply` or a board needs: surfaces,
-/// ranges, rate estimator, dead band, domain, and where it comes from.
+/// time, the signal and the reference, - is standard input; a folder with a
+/// dataset.toml means its fit trials. The record that is written holds all
+/// that `apply` or a board needs: surfaces, ranges, rate estimator, dead band,
+/// domain, and where it comes from.
 ///
 /// Examples:
 ///
@@ -74,7 +75,7 @@ pub(crate) struct Args {
     model: Option<Model>,
     /// Column of the reference, whose last part is the unit
     ///
-    /// `Pos (mm)` is pos_mm. Of several gauges several with commas, such as the angles of a wrist: each gets a record of its own.
+    /// `Pos (mm)` is pos_mm. Of several gauges several with commas, such as the angles of a wrist: each gets a separate record.
     #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = columns)]
     pub(super) reference: String,
     /// Column of the signal, or of several gauges with commas [default: bridge_v]

@@ -87,7 +87,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options = options.require(&column.old);
     }
     let mut log = read_recording(&args.log, &options)?;
-    // a second copy of a long log may not fit beside the first
+    // a second copy of a long log may not fit in addition to the first
     let channels = if args.columns.is_empty() {
         std::mem::take(&mut log.channels)
     } else {

@@ -34,7 +34,7 @@ use sessions::Sessions;
 ///
 /// Simulates the paper's experiment on a rig with effects that the simulator at
 /// hand lacks, and writes it as a data set. Then, as a lab would: the paper's
-/// calibrations on the ramps, a model chosen by cross-validation beside them, all
+/// calibrations on the ramps, and a model chosen by cross-validation, all
 /// judged on arbitrary and pulse trials that no fit has seen; and the diagnosis.
 ///
 /// On measured sessions, the same:
@@ -74,7 +74,7 @@ pub(crate) struct Args {
     /// Replace a demo that exists, in one step; files of your own in its folder are kept
     #[arg(long)]
     force: bool,
-    /// The paper's tables instead: every figure of its experiment, simulated, beside the published
+    /// The paper's tables instead: every figure of its experiment, simulated, next to the published
     #[arg(long)]
     paper: bool,
     #[command(flatten)]

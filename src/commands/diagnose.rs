@@ -27,7 +27,7 @@ const NOT_FORETOLD: &str =
     " that the simulator could predict: it takes no altered inputs, or its runs are spent";
 /// Status of a diagnosis whose verdict is one that `--fail-on` names.
 const FAILED_ON: u8 = 3;
-/// Status of a diagnosis that stands on less than it asked for, because the budget of runs was spent.
+/// Status of a diagnosis that is based on fewer runs than it asked for, because the budget of runs was spent.
 const SPENT: u8 = 4;
 
 /// Say where a simulator and a measurement differ, which effect causes it, and how far the gap closes
@@ -244,7 +244,7 @@ pub(super) fn announce(program: &str) {
     warn(program);
 }
 
-/// Tells what goes on: beside a bar, or with `-v` in lines.
+/// Reports what goes on: next to a bar, or with `-v` in lines.
 pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
     move |what| {
         detail(what);

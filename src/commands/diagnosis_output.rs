@@ -107,7 +107,7 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    // of those that agree one in twenty stands out by chance
+    // of those that agree one in twenty differs by chance
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     if agrees && !diagnosis.is_faint() {
         return;

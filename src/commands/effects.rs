@@ -1,4 +1,4 @@
-//! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
+//! `stretch effects`: the catalogue of what a rig may do in addition to its nominal physics.
 
 use std::path::{Path, PathBuf};
 

@@ -25,7 +25,7 @@ pub(crate) struct Json {
 }
 
 impl Json {
-    /// Whether it stands on standard output, in place of text.
+    /// Whether it is written to standard output, in place of text.
     pub(crate) fn is_printed(&self) -> bool {
         self.json.as_deref().is_some_and(is_standard_output)
     }

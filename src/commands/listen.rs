@@ -131,7 +131,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     result.and(finished).with_context(|| cannot_record(file))
 }
 
-/// The path of a port and its speed, which may stand behind a colon; a path may have colons itself.
+/// The path of a port and its speed, which may follow a colon; a path may have colons itself.
 fn path_and_speed(port: &str) -> (&str, u32) {
     let parts = port.rsplit_once(':').filter(|_| !Path::new(port).exists());
     let speed = parts.and_then(|(path, speed)| Some((path, speed.parse().ok()?)));
@@ -210,7 +210,7 @@ impl Samples {
         }
         self.compare(&sample);
         self.status.newest = sample.estimate.or(self.status.newest);
-        // a sample whose time nobody knows is no row of a trial
+        // a sample whose time is unknown is no row of a trial
         self.status.standing += u64::from(time_s.is_none());
         time_s.map(|_| sample)
     }

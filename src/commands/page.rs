@@ -25,12 +25,12 @@ const CARRIED: Option<&[u8]> = None;
 /// Write the page that needs no installation: calibrate, diagnose and listen in a browser
 ///
 /// One HTML file with the same crates in it, compiled to WASM. It opens from a disk, works offline,
-/// and sends nothing anywhere: give it to whoever has recordings and a browser.
+/// and sends nothing anywhere: give it to anyone who has recordings and a browser.
 ///
 ///   stretch page --out stretch.html
 ///
 /// A program of a release carries the page. One that was built without the feature page takes it
-/// from where STRETCH_PAGE says, or builds it in the source tree that it stands in (rustup target
+/// from where STRETCH_PAGE says, or builds it in the source tree that it is in (rustup target
 /// add wasm32-unknown-unknown).
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -68,7 +68,7 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
     Ok(page.into())
 }
 
-/// Builds the page in the source tree that this program stands in.
+/// Builds the page in the source tree that this program is in.
 fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
     let Some((target, script)) = program.as_deref().and_then(sources) else {

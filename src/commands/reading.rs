@@ -150,7 +150,7 @@ pub(crate) fn with_columns_to_name(error: anyhow::Error, what_to_do: &str) -> an
     anyhow::anyhow!("{missing}; {what_to_do}")
 }
 
-/// Reads trials from files; a folder with a `dataset.toml` stands for its
+/// Reads trials from files; a folder with a `dataset.toml` means its
 /// trials of that split.
 pub(crate) fn read_trials(
     paths: &[PathBuf],

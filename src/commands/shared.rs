@@ -37,7 +37,7 @@ pub(crate) fn spinner() -> ProgressBar {
     ticking(bar)
 }
 
-/// A bar that moves, or one that nobody sees.
+/// A bar that moves, or a hidden one.
 fn ticking(bar: ProgressBar) -> ProgressBar {
     if shows_progress() {
         bar.enable_steady_tick(Duration::from_millis(150));

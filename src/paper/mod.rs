@@ -1,4 +1,4 @@
-//! `stretch demo --paper`: the paper's experiment end to end on the simulated rig, beside the figures that the paper prints.
+//! `stretch demo --paper`: the paper's experiment end to end on the simulated rig, next to the figures that the paper prints.
 //!
 //! The paper's recordings are not public; the preset of effects is one of several that come about as close, and never *the* explanation.
 //! Errors of trials depend on commands that the paper does not print: only their order of magnitude can be compared.
@@ -43,7 +43,7 @@ pub(crate) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Re
     tell(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
 }
 
-/// The paper's tables beside ours.
+/// The paper's tables next to ours.
 fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
     say(format!("The paper's experiment on the simulated rig, preset `paper`, seed {seed}"))?;
     say(format!("\n{}", table_text(&fit_table(experiment))))?;

@@ -9,7 +9,7 @@ use super::{
     tables::{error_tables, fit_table, verdicts},
 };
 
-/// Tables beside the published ones, and the two figures that the paper asks for.
+/// Tables next to the published ones, and the two figures that the paper asks for.
 pub(super) fn paper_page(experiment: &Experiment) -> String {
     let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
     let verdict = format!(
@@ -92,7 +92,7 @@ fn gap_figure(experiment: &Experiment) -> Figure {
     .legend(names.into_iter().enumerate().map(|(i, name)| (Ink::of(i), name.to_owned())))
 }
 
-/// Frequencies stand on a logarithmic axis.
+/// Frequencies are on a logarithmic axis.
 fn frequency_axes(y: std::ops::Range<f64>, y_label: &str) -> Axes {
     Axes { is_log: true, ..Axes::new(-1.75..1.15, y, ["frequency, Hz", y_label]) }
 }

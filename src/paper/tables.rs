@@ -1,4 +1,4 @@
-//! The paper's experiment beside the figures that it prints: tables and sentences, for a terminal and a page.
+//! The paper's experiment next to the figures that it prints: tables and sentences, for a terminal and a page.
 
 use stretch_calibrate::{Evaluation, FitReport};
 use stretch_report::{Table, number};

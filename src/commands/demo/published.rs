@@ -13,7 +13,7 @@ pub(super) const REPOSITORY: &str = "github.com/e-Body-Lab/graphene-based-knitte
 /// The version of them that was read.
 pub(super) const COMMIT: &str = "47369abac95fd43a10ada4156dd22cae91ee7f70";
 
-/// The columns that are read; accelerometer and gyroscope stand behind them.
+/// The columns that are read; accelerometer and gyroscope follow.
 const COLUMNS: [&str; 6] = ["angle_deg", "s1", "s2", "s3", "s4", "s5"];
 /// No line of such a file is as long, bytes.
 const LONGEST: u64 = 64 << 10;
@@ -24,7 +24,7 @@ const RATE_HZ: f64 = 100.0;
 ///
 /// The file has no header and no time: knee angle in degrees, five changes of resistance
 /// over the resistance at rest, six columns of an inertial sensor; 100 rows a second.
-/// Sessions stand end to end. The resistances at rest are those of a session's first row,
+/// Sessions follow each other. The resistances at rest are those of a session's first row,
 /// so that all five changes are exactly zero there: that is where the file is cut.
 ///
 /// # Errors

@@ -98,7 +98,7 @@ impl Sessions {
         kept.map(|(_, trial)| trial.clone()).collect()
     }
 
-    /// The rig, or the gauge alone, beside its simulator.
+    /// The rig, or the gauge alone, with its simulator.
     ///
     /// # Errors
     /// Trials that cannot be diagnosed.
@@ -111,7 +111,7 @@ impl Sessions {
             let reading = Reading { columns, ..Reading::default() };
             return Ok(Problem::read(folder, &reading)?.named(&self.name));
         }
-        // A session has its own zero, and nobody knows the pause before the next.
+        // A session has its own zero, and the pause before the next is unknown.
         let first = self.fit.iter().take(1);
         let trials: Vec<SessionTrial> =
             first.map(|(_, trial)| SessionTrial::new(trial.clone())).collect();

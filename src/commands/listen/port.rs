@@ -13,7 +13,7 @@ use std::{
 pub(crate) enum Heard {
     Bytes(Vec<u8>),
     Connected,
-    /// With the reason; it is opened again until somebody stops listening.
+    /// With the reason; it is opened again until the user stops listening.
     Disconnected(String),
     /// The end of a stream that does not come back: a pipe or a file.
     Ended,
@@ -47,7 +47,7 @@ pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
         ));
     }
     let path = path.to_owned();
-    // Reading blocks; the thread ends with the program, or when nobody listens.
+    // Reading blocks; the thread ends with the program, or when the receiver is gone.
     thread::spawn(move || keep_reading(first, path, baud, &sender));
     Ok(heard)
 }

@@ -142,7 +142,7 @@ fn without_a_row(path: &Path) -> io::Result<Option<File>> {
 }
 
 impl Drop for TrialFile {
-    /// A header alone would stand in the way of the next try.
+    /// A header alone would block the next try.
     fn drop(&mut self) {
         if self.rows == 0 {
             let _ = fs::remove_file(&self.path);

@@ -1,6 +1,6 @@
 //! What is seen while `listen` runs: CSV rows on standard output, a status line on a terminal.
 //!
-//! A thread of its own writes both, so that a slow reader or a stopped terminal cannot hold up a recording.
+//! A separate thread writes both, so that a slow reader or a stopped terminal cannot hold up a recording.
 
 use std::{
     io::{self, BufWriter, IsTerminal, Write},
@@ -153,12 +153,12 @@ pub(crate) struct Status {
     pub(super) largest: i32,
     pub(super) adc_bits: u8,
     /// How many estimates of the board's were held against those here, and the largest
-    /// difference; none where the calibration cannot answer.
+    /// difference; `None` if the calibration cannot answer.
     pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,
     /// The last estimate of the board's.
     pub(super) newest: Option<f64>,
-    /// Frames beside which the board's clock had not gone on although the calibration's period is a tick of it or more.
+    /// Frames at which the board's clock had not advanced although the calibration's period is a tick of it or more.
     pub(super) standing: u64,
     /// Rows that were recorded, at the end of a recording.
     pub(super) rows: Option<u64>,

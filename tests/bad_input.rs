@@ -114,7 +114,7 @@ fn a_full_disk_leaves_nothing_half_written() {
     let calibration = scratch.calibration("cal.json");
     let trial = scratch.loops("long.csv", 60.0, 1.2);
     let before = scratch.names();
-    // a file size limit stands for the full disk; the signal is ignored, so that the write fails
+    // a file size limit acts as a full disk; the signal is ignored, so that the write fails
     let script =
         "trap '' XFSZ; ulimit -f 8; exec \"$0\" apply --calibration \"$1\" \"$2\" --out \"$3\"";
     let output = std::process::Command::new("bash")

@@ -138,7 +138,7 @@ fn a_simulated_effect_is_named_and_reported() {
             && !page.contains("NaN")
             && !page.contains("class=\"missing\"")
     );
-    // With its entry struck out nobody else takes the blame with the same right.
+    // With its entry removed from the catalogue no other effect is named as confidently.
     let without = scratch.path("without.json");
     runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg(json_to(&without)));
     let w = read(&without);
@@ -230,7 +230,7 @@ fn odd_data_get_an_honest_verdict() {
         text.contains("missing after") && !text.lines().next().unwrap().contains("lacks"),
         "{text}"
     );
-    // The rig of somebody else: the gap is everything, and no effect takes the blame.
+    // Another user's rig: the gap is everything, and no effect takes the blame.
     let rig = prints(stretch().args(["simulate", "--print-rig"]));
     let other = rig
         .replace("value = 180.0", "value = 300.0")
@@ -239,7 +239,7 @@ fn odd_data_get_an_honest_verdict() {
     let other = scratch.write("other.toml", other);
     let text = runs(diagnose(&folder).arg("--rig").arg(&other));
     assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
-    // Asked for in general, or told by the value that is most wrong: 300 mm for 180.
+    // Named in general, or by the value that is most wrong: 300 mm for 180.
     assert!(text.contains("Is it the right rig") || text.contains("L0 in the rig file"), "{text}");
 }
 
@@ -261,7 +261,7 @@ fn a_simulator_that_has_the_effect_agrees() {
         let folder = bench(&scratch, name, &[effect]);
         let rig = scratch.write(&format!("{name}.toml"), format!("{stock}\n[[effect]]\n{table}"));
         agrees(diagnose(&folder).arg("--rig").arg(&rig), name);
-        // What `simulate` wrote beside its trials is the rig that they come from.
+        // The rig file that `simulate` wrote next to its trials is the rig that they come from.
         let written = scratch.path(&format!("{name}-one")).join("rig.toml");
         agrees(diagnose(&folder).arg("--rig").arg(&written), name);
     }
@@ -293,7 +293,7 @@ fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
         let other = scratch.write(&format!("{name}.toml"), stock.replace(from, to));
         let text = runs(diagnose(&folder).arg("--rig").arg(&other));
         let first = text.lines().next().unwrap();
-        // It is asked for in general, or told which of its values is wrong.
+        // The message names the rig in general, or the value that is wrong.
         let told = first.contains("right rig") || first.contains("rig file");
         assert!(told && !first.contains("lacks"), "{name}: {text}");
     }

@@ -142,7 +142,7 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let clipped = spoiled(2, &|i| Some(format!("{:.5}", all[i]?.min(1.5))));
     let text = runs(&mut run(&clipped, "angle_deg", "s2"));
     assert!(text.contains("s2 stands at its greatest value, 1.5"), "{text}");
-    // Reference and signal exchanged: told, and no effect takes the blame for certain.
+    // Reference and signal exchanged: reported, and no effect is named with certainty.
     let text = runs(&mut run(&good, "s2", "angle_deg"));
     assert!(text.contains("swapped?"), "{text}");
     let metres = scratch.path("metres.csv");

@@ -88,7 +88,7 @@ fn an_archive_that_unpacks_to_gigabytes_is_refused() {
         "convert bomb.npz --out out.csv",
         &["bomb.npz", "time_s", "more than 19", "MB of memory"],
     );
-    // numbers take eight times the bytes that they stand in
+    // numbers take eight times the bytes that they take in the file
     let small = [npy(60_000_000), vec![1; 60_000_000]].concat();
     scratch.write("small.npy", small);
     refused(

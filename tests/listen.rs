@@ -71,7 +71,7 @@ fn line(frame: &Frame) -> Vec<u8> {
     frame.encode(&mut [0; Frame::LONGEST]).to_vec()
 }
 
-/// The other end of the port, which stands under a name that stays.
+/// The other end of the port, which has a name that stays.
 fn plug(name: &Path) -> File {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&master).unwrap();

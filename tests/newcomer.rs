@@ -1,10 +1,10 @@
-//! What somebody sees who has never used the program: own names, own units, own folders.
+//! What a user sees who has never used the program: own names, own units, own folders.
 
 use std::fmt::Write;
 
 use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
 
-/// A trial with columns and a scale of its own: a reference of 151 to 179 and a gauge of 1.27 to 2.2 times `times`.
+/// A trial with its own columns and scale: a reference of 151 to 179 and a gauge of 1.27 to 2.2 times `times`.
 fn trial(scratch: &Scratch, name: &str, header: &str, times: f64) -> std::path::PathBuf {
     let mut text = format!("{header}\n");
     for n in 0..3000 {
@@ -151,7 +151,7 @@ fn a_diagnosis_says_what_its_page_says() {
     for cell in cells {
         assert!(html.contains(cell), "{cell} is not on the page");
     }
-    // no rivals, no experiment: whoever asked for the file is told, -q or not
+    // no rivals, no experiment: users who asked for the file get a message, with -q or without
     let file = scratch.path("next.csv");
     let mut command = stretch();
     command.arg("-q").arg("diagnose").arg(&bench).arg("--experiment").arg(&file);

@@ -56,7 +56,7 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
     let dead = changed(&scratch, "dead.csv", |n, cells| {
         cells[2] = format!("{:.5}", 1.65 + 0.002 * unit(n));
     });
-    // a recorder that made up more than can be told from a motion: half of the lengths, in between
+    // a recorder that made up more than can be distinguished from a motion: half of the lengths, in between
     let made_up = changed(&scratch, "made_up.csv", |n, cells| {
         cells[1] = format!("{:.4}", 150.0 + 30.0 * unit(n));
     });

@@ -18,7 +18,7 @@ use rustix::{
 
 use crate::support::{Scratch, program};
 
-/// A worker that never answers. Every process that it starts holds the pipe `alive` open: a child, a grandchild that is nobody's any
+/// A worker that never answers. Every process that it starts holds the pipe `alive` open: a child, a grandchild that has no parent any
 /// more, and the shell itself, which goes on once its standard input has ended.
 const WORKER: &str = "exec 3>alive; sleep 600 & (sleep 600 &); trap '' HUP INT TERM; echo up >&3; cat >/dev/null; sleep 600; true";
 
@@ -33,7 +33,7 @@ enum Death {
 const DEATHS: [Death; 4] =
     [Death::By(Signal::TERM), Death::By(Signal::INT), Death::By(Signal::KILL), Death::Deadline];
 
-/// What has been written into the pipe, and whether somebody still holds it open for writing.
+/// What has been written into the pipe, and whether a process still holds it open for writing.
 fn heard(pipe: &mut File, text: &mut String) -> bool {
     let mut bytes = [0; 64];
     match pipe.read(&mut bytes) {

@@ -159,7 +159,7 @@ fn two_outputs_of_one_name_are_refused_before_anything_is_there() {
 fn what_is_no_loss_is_done() {
     let scratch = inputs();
     for line in [
-        // neither has data of its own
+        // neither holds data itself
         "convert a.csv --out /dev/null",
         "calibrate a.csv --out /dev/null --report /dev/null --json=/dev/null",
         "evaluate --calibration cal.json a.csv --json=/dev/stdout",

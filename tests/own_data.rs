@@ -10,7 +10,7 @@ use std::{
 
 /// Values in a row that no two recordings share by chance.
 const RUN: usize = 8;
-/// Least different values among them: a run of zeros is nobody's.
+/// Least different values among them: a run of zeros belongs to no file.
 const DIFFERENT: usize = 5;
 /// Least fields of a row, without the time, that are looked for as a whole.
 const FIELDS: usize = 3;

@@ -1,4 +1,4 @@
-//! `stretch init` and `stretch diagnose problem.toml`: any simulator beside any recording.
+//! `stretch init` and `stretch diagnose problem.toml`: any simulator with any recording.
 
 use std::{fmt::Write, fs, path::Path};
 
@@ -186,7 +186,7 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         fs::write(folder.path().join("problem.toml"), good.replacen(from, to, 1)).unwrap();
         let (is_good, text) = said(folder.path(), &[]);
         assert!(!is_good && text.contains(told), "{to}: {text}");
-        // Where the program that runs FMUs stands beside this one it says that there is no such file.
+        // Where the program that runs FMUs is next to this one it says that there is no such file.
         let is_fmu = text.contains("STRETCH_FMU") || text.contains("x.fmu: No such file");
         assert!(is_fmu || !to.contains("fmu ="), "{to}: {text}");
     }
@@ -216,7 +216,7 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     );
 }
 
-/// A folder as it comes from somebody else: recordings, and a problem whose simulator leaves a trace.
+/// A folder as it comes from another user: recordings, and a problem whose simulator leaves a trace.
 fn downloaded(folder: &Path) -> std::path::PathBuf {
     recording(&folder.join("a.csv"));
     let text = "simulator = [\"sh\", \"-c\", \"touch ran; exec cat\"]\n[[stage]]\noutput = \"angle_deg\"\ninputs = [\"command_V\"]\n[[trial]]\nfile = \"a.csv\"\n";
@@ -278,7 +278,7 @@ fn what_a_data_set_or_a_rig_file_says_runs_nothing() {
         "name = 'a'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'\n";
     let command = "simulator = ['sh', '-c', 'touch ran']\n";
     let gauge = ["--reference", "angle_deg", "--signal", "command_V"];
-    // beside a data set a problem's file is not read; a simulator in the data set or in a rig file is a key that nothing reads
+    // next to a data set a problem's file is not read; a simulator in the data set or in a rig file is a key that nothing reads
     for text in [set.to_owned(), format!("{command}{set}")] {
         fs::write(folder.path().join("dataset.toml"), text).unwrap();
         stretch().arg("diagnose").arg(folder.path()).args(gauge).output().unwrap();

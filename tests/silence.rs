@@ -1,4 +1,4 @@
-//! What is wrong in what the program is given, and would give numbers all the same, is told or refused.
+//! Wrong inputs of the program that would give numbers all the same are reported or refused.
 
 use std::{fmt::Write, fs};
 

@@ -291,7 +291,7 @@ fn priors_refuse_what_they_have_not_seen() {
     fails(&mut with(&["radian.csv"]), &["angle_deg", "--reference"]);
     let other = &mut with(&["--reference", "angle_rad", "radian.csv"]);
     fails(other, &["angle_rad", "stretch convert"]);
-    // a model that is not asked is no option beside it
+    // an unrelated model is no option next to it
     assert_eq!(with(&["--model", "linear", "plain.csv"]).output().unwrap().status.code(), Some(2));
     let renew = |name: &str, says: &[&str]| {
         let arguments = ["sleeve", "renew", "--prior", "prior.json", "--out", "no.json", name];

@@ -21,10 +21,10 @@ use stretch_receptor::{
     example_calibration,
 };
 
-/// What stands behind a stream.
+/// What is behind a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum End {
-    /// Somebody who reads.
+    /// A process that reads.
     Read,
     /// A disk without space.
     Full,
@@ -51,7 +51,7 @@ fn inputs() -> Scratch {
     scratch.loops("a_1.csv", 20.0, 1.1);
     scratch.loops("a_2.csv", 15.0, 0.9);
     scratch.calibration("cal.json");
-    // a row that is malformed is told on standard error
+    // a row that is malformed is reported on standard error
     let rows = fs::read_to_string(scratch.path("a_1.csv")).unwrap();
     let (head, rest) = rows.split_at(rows.find("\n1.00,").unwrap());
     scratch.write("live.csv", format!("{head}\nthis is no row{rest}"));
@@ -130,7 +130,7 @@ fn contents(folder: &Path) -> BTreeMap<String, (usize, u64)> {
     files
 }
 
-/// Runs a command with all that can stand behind its streams, and compares the files.
+/// Runs a command with all that can be behind its streams, and compares the files.
 #[track_caller]
 fn files_do_not_depend_on_streams(command: (&str, Option<&str>)) {
     let expected = inputs();
@@ -154,7 +154,7 @@ fn files_do_not_depend_on_streams(command: (&str, Option<&str>)) {
 
 #[test]
 fn every_command_writes_the_same_files_whatever_stands_behind_its_streams() {
-    // a command a thread of its own: each waits for the disk most of the time
+    // one thread for each command: each waits for the disk most of the time
     thread::scope(|scope| {
         for command in COMMANDS {
             scope.spawn(move || files_do_not_depend_on_streams(command));
@@ -190,7 +190,7 @@ fn what_comes_through_a_pipe_is_read_once() {
         let mut bash = Command::new("bash");
         bash.args(["-c", &format!("\"$0\" {line} > /dev/null")]).arg(program());
         let bash = bash.current_dir(scratch.path("")).stdin(Stdio::null());
-        // where there is no bash there is nobody who writes <(...)
+        // without bash no user writes <(...)
         let Ok(output) = bash.output() else { return };
         assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     }

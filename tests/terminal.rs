@@ -32,7 +32,7 @@ fn verdicts_that_are_named_have_a_status_of_their_own() {
         let mut command = stretch();
         command.arg("diagnose").arg(scratch.path(folder)).args(["--no-next", "--fail-on", on]);
         let output = command.output().unwrap();
-        // the answer stands there whatever the status
+        // the answer is there whatever the status
         assert!(stdout(&output).lines().count() > 5, "{folder} {on}");
         output.status.code()
     };
@@ -168,7 +168,7 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     assert_eq!(both.status.code(), Some(2));
 }
 
-/// What a command says beside what `COLUMNS` says.
+/// What a command prints at the width that `COLUMNS` gives.
 fn at_width(scratch: &Scratch, line: &str, columns: Option<usize>) -> String {
     let mut command = stretch();
     command.current_dir(scratch.path("")).args(line.split(' ')).env_remove("COLUMNS");

@@ -1,4 +1,4 @@
-//! What a command writes is all there or not at all, whatever stands in its way.
+//! What a command writes is all there or not at all, whatever prevents it.
 #![cfg(unix)]
 
 use std::{
@@ -28,7 +28,7 @@ fn a_recording_that_was_killed_before_its_first_row_does_not_block_the_next() {
     }
     let header = fs::read_to_string(scratch.path("trial.csv")).unwrap();
     assert_eq!(header.lines().count(), 1);
-    // somebody else still records there
+    // another process still records there
     let mut second = stretch();
     second.current_dir(scratch.path("")).args(listen.split(' '));
     fails(&mut second, &["trial.csv", "another recording goes there"]);
@@ -41,7 +41,7 @@ fn a_recording_that_was_killed_before_its_first_row_does_not_block_the_next() {
     runs(&mut third);
     let recorded = fs::read_to_string(scratch.path("trial.csv")).unwrap();
     assert_eq!(recorded.lines().count(), 2, "{recorded}");
-    // what has a row is nobody else's
+    // a file with a row is not taken over by another process
     let mut fourth = stretch();
     fourth.current_dir(scratch.path("")).args(listen.split(' ')).write_stdin(frame);
     fails(&mut fourth, &["trial.csv", "it exists"]);
@@ -193,7 +193,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
     );
 }
 
-/// A file system of its own, of so many bytes, for as long as this lives.
+/// A separate file system of so many bytes, for as long as this lives.
 struct Mount(PathBuf);
 
 impl Mount {
@@ -277,7 +277,7 @@ fn with_mount_a_disk_that_is_full_or_read_only_holds_what_it_held() {
 fn a_quota_that_is_reached_is_like_a_full_disk() {
     let scratch = prepared();
     let before = tree(&scratch.path(""));
-    // a limit of the size of a file stands for it; its signal is ignored, so that the write fails
+    // a limit of the size of a file acts as one; its signal is ignored, so that the write fails
     for line in ["simulate --protocol paper --out bench --force", "demo --paper --out new"] {
         let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" {line}");
         let output = Command::new("bash")

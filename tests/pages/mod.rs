@@ -1,4 +1,4 @@
-//! The README and the book: what a reader types works in the order in which it stands there, links lead somewhere, and
+//! The README and the book: what a reader types works in the order of the page, links lead somewhere, and
 //! figures are those of the files that the gate writes.
 
 mod figures;
@@ -25,7 +25,7 @@ fn links_of_readme_and_book_lead_somewhere() {
 
 #[test]
 fn the_book_links_to_nothing_outside_of_it() {
-    // a book that was built stands alone: what leads to a file of the repository leads nowhere there
+    // a book that was built is separate: what leads to a file of the repository leads nowhere there
     let book = root().join("book/src").canonicalize().expect("the book");
     for page in pages().iter().filter(|page| page.starts_with("book")) {
         let folder = root().join(page).parent().expect("a folder").to_owned();
@@ -36,7 +36,7 @@ fn the_book_links_to_nothing_outside_of_it() {
     }
 }
 
-/// What an answer says in numbers: "24 of 27" as it stands, else each number with its own word.
+/// What an answer says in numbers: "24 of 27" as it is, else each number with its own word.
 fn figures(answer: &str) -> Vec<String> {
     let words: Vec<&str> =
         answer.split(' ').map(|word| word.trim_matches([',', ';', '(', ')'])).collect();

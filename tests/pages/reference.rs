@@ -17,12 +17,12 @@ fn block(arguments: &[&str]) -> String {
     format!("```text\n{}\n```\n", lines.join("\n"))
 }
 
-/// Names of the commands, as the help lists them; `fleet` is a program of its own, with a help of its own.
+/// Names of the commands, as the help lists them; `fleet` is a separate program with its own help.
 fn commands() -> Vec<String> {
     let help = prints(stretch().arg("--help"));
     let (_, list) = help.split_once("\nCommands:\n").expect("a list of commands");
     let names = list.lines().take_while(|line| !line.is_empty()).filter_map(|line| {
-        // a line of its own has two blanks in front, the rest of a long one more
+        // a separate line has two blanks in front, the rest of a long one more
         let name = line.strip_prefix("  ")?.split(' ').next()?;
         (!["", "help", "fleet"].contains(&name)).then(|| name.to_owned())
     });

@@ -8,7 +8,7 @@ pub(crate) fn deflated(head: &[u8], byte: u8, millions: usize) -> Vec<u8> {
     out.extend((!length).to_le_bytes());
     out.extend(head);
     let mut bits = Bits { out, held: 0, count: 0 };
-    // The last block, with codes of its own: two lengths of codes, then 1 bit for a match of 258 bytes, 1 bit for its distance.
+    // The last block, with its own codes: two lengths of codes, then 1 bit for a match of 258 bytes, 1 bit for its distance.
     bits.put(0b101, 3);
     // 286 codes of literals and lengths, 1 of distances, 18 lengths of code lengths
     bits.put(286 - 257, 5);
@@ -65,7 +65,7 @@ impl Bits {
     }
 }
 
-/// A file of gzip; its checksum is wrong, which nobody sees who refuses it in time.
+/// A file of gzip; its checksum is wrong, which a reader that refuses it in time never sees.
 pub(crate) fn gzip(deflated: &[u8]) -> Vec<u8> {
     let head = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
     [&head[..], deflated, &[0; 8]].concat()

@@ -32,7 +32,7 @@ pub(crate) fn is_agreed(diagnosis: &Value) -> bool {
 
 /// By column, how far a replay with a rig file lies off what was measured, root mean square in noises of the stock rig.
 ///
-/// `commands` is a trial, or a whole folder, in which the trials stand under the same names.
+/// `commands` is a trial, or a whole folder, in which the trials have the same names.
 pub(crate) fn replayed(
     scratch: &Scratch,
     rig: &Path,

@@ -57,7 +57,7 @@ pub(crate) fn command(scratch: &Scratch, line: &str) -> Command {
     command
 }
 
-/// Whether somebody has begun to write beside a target.
+/// Whether a process has begun to write next to a target.
 pub(crate) fn writes(folder: &Path) -> bool {
     let is_temporary =
         |entry: fs::DirEntry| entry.file_name().to_string_lossy().starts_with(".stretch-");

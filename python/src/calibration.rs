@@ -109,7 +109,7 @@ struct Made<'a> {
     notes: &'a [String],
 }
 
-/// Fits a calibration; beside the record stand fits, models and notes as JSON.
+/// Fits a calibration; the answer is the record, and fits, models and notes as JSON.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,
@@ -141,7 +141,7 @@ pub(crate) fn calibrate(
     Ok((CalibrationRecord { gauge }, made.map_err(said)?))
 }
 
-/// Evaluates calibrations beside the raw signal; the answer is JSON, and the codes and sentences of doubts.
+/// Evaluates calibrations and the raw signal; the answer is JSON, and the codes and sentences of doubts.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
@@ -226,7 +226,7 @@ impl CalibrationRecord {
         }
     }
 
-    /// Whether the calibration needs the pressure beside the signal.
+    /// Whether the calibration needs the pressure in addition to the signal.
     #[getter]
     fn needs_pressure(&self) -> bool {
         pressure_column(self.calibration()).is_some()

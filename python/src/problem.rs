@@ -1,4 +1,4 @@
-//! A simulator beside recordings: its problem is checked and diagnosed.
+//! A simulator with recordings: its problem is checked and diagnosed.
 
 use std::{
     num::NonZeroUsize,
@@ -245,7 +245,7 @@ impl Entries {
         Ok(Self { checked: Checked::new(spec).map_err(said)?, trials, file })
     }
 
-    /// Does a job on a thread of its own, while this one answers for the simulator.
+    /// Does a job on a separate thread, while this one answers for the simulator.
     fn worked<T: Send + 'static>(
         &self,
         py: Python<'_>,

@@ -11,7 +11,7 @@ use pyo3::{exceptions::PyRuntimeError, prelude::*};
 /// How often Python is asked whether it was interrupted.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Does `work` on a thread of its own, without the interpreter's lock, and asks Python meanwhile for interrupts: signal handlers run on
+/// Does `work` on a separate thread, without the interpreter's lock, and asks Python meanwhile for interrupts: signal handlers run on
 /// Python's main thread alone, so the work must run on another thread.
 ///
 /// An interrupted caller returns at once; the work runs to its end, and its result is dropped.

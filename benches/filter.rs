@@ -1,5 +1,5 @@
 //! One step of a Savitzky-Golay rate (11 taps) and of a biquad, per sample,
-//! beside `sci-rs`, `biquad` and `idsp` in the same run.
+//! and one step of `sci-rs`, `biquad` and `idsp` in the same run.
 //!
 //! Before anything is timed, all are asked to agree. The ratios that are
 //! printed first come from rounds that take turns, so that a busy machine

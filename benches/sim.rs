@@ -1,4 +1,4 @@
-//! How fast the rig is simulated: every figure beside a plain loop that computes the nominal bridge of one sample.
+//! How fast the rig is simulated: every figure next to that of a plain loop that computes the nominal bridge of one sample.
 
 use std::hint::black_box;
 

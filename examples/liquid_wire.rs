@@ -21,7 +21,7 @@ use stretch_receptor::StretchReceptor;
 const REST_LENGTH_MM: f64 = 180.0;
 const SEED: u64 = 20;
 
-/// A trial that stands for a log: a muscle that shortens by up to 29 mm, and a
+/// A trial in place of a log: a muscle that shortens by up to 29 mm, and a
 /// gauge that answers 40 ms late, bends, and has 2 mV of noise.
 fn record(seed: u64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);

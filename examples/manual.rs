@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example manual -- FOLDER
 //!
-//! A release has both beside the program (release/build.sh).
+//! A release has both next to the program (release/build.sh).
 
 use std::{env, fs, io, path::Path};
 

@@ -5,11 +5,11 @@
 //! cargo run --release --example accuracy -- --write   # and renews reference/accuracy/*.csv
 //! ```
 //!
-//! Seeds are those of nobody's choosing until `--development` asks for the ones that
+//! Seeds are arbitrary until `--development` asks for the ones that
 //! the models were designed on; then nothing is written.
 //!
 //! Measured sessions are not part of the project: `--data DIR` or `STRETCH_DATA` names the folder that holds
-//! `knit_sleeve` (default `../shared/data` beside the workspace); without it their tables are left out.
+//! `knit_sleeve` (default `../shared/data` next to the workspace); without it their tables are left out.
 //!
 //! Names of parts (why, candidates, effects, robust, measured, coverage) or of effects select some.
 //!

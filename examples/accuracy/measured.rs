@@ -26,7 +26,7 @@ pub(crate) struct Pair {
     pub(crate) options: Options,
 }
 
-/// All pairs of sessions of a sleeve; none where they are not there.
+/// All pairs of sessions of a sleeve; empty if they are not there.
 pub(crate) fn pairs(data: &Path) -> anyhow::Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     let Some(sleeve) = testkit::measured::folder_in(data, "knit_sleeve") else { return Ok(pairs) };

@@ -8,7 +8,7 @@ use stretch_data::Trial;
 
 /// Samples in a block: half a second.
 const BLOCK: usize = 50;
-/// Samples of warm-up that nobody is judged on.
+/// Samples of warm-up that are not judged.
 const SETTLE: usize = 20;
 const DRAWS: usize = 2000;
 
@@ -43,7 +43,7 @@ impl Blocks {
             let errors = truth.iter().zip(estimate).map(|(t, e)| (t - e).powi(2));
             let (sum, n) =
                 errors.filter(|e| e.is_finite()).fold((0.0, 0.0), |(sum, n), e| (sum + e, n + 1.0));
-            // a block without any answer stands in for itself: pairs must stay pairs
+            // a block without any answer keeps its place: pairs must stay pairs
             self.0.push(if n > 0.0 { sum / n } else { f64::NAN });
         }
     }

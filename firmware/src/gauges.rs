@@ -1,4 +1,4 @@
-//! Four gauges that follow the trial, each with a gain of its own.
+//! Four gauges that follow the trial, each with its own gain.
 
 use stretch_core::Branch;
 use stretch_receptor::{Domain, Withheld, code::CodeReading};
@@ -17,7 +17,7 @@ pub fn samples(volts: f32) -> [f32; GAUGES] {
     core::array::from_fn(|gauge| gain(gauge) * volts)
 }
 
-/// What goes into the checksum: a lost channel stands in the place of the branch.
+/// What goes into the checksum: a lost channel takes the place of the branch.
 pub fn answer(
     reading: Result<ArrayReading<f32>, ArrayWithheld>,
 ) -> Result<CodeReading<f32>, Withheld> {

@@ -1,4 +1,4 @@
-//! What the programs in `src/bin` share. See the README beside this package.
+//! What the programs in `src/bin` share. See the README next to this package.
 #![no_std]
 
 pub mod board;

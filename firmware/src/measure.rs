@@ -33,7 +33,7 @@ impl Length for f32 {
     }
 }
 
-/// Length, branch and domain of a reading, and not its rate: what nobody reads
+/// Length, branch and domain of a reading, and not its rate: what is not read
 /// is not computed.
 #[inline(always)]
 pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {

@@ -5,7 +5,7 @@ const PAINT: u32 = 0xa5c3_5a3c;
 
 /// Paints [`DEPTH`] bytes below the caller's frame.
 ///
-/// Inlined, so that nothing of its own lies there.
+/// Inlined, so that none of its data lies there.
 #[inline(always)]
 pub fn paint() -> usize {
     let sp: usize;

@@ -63,7 +63,7 @@ fn records() -> Result<Vec<(&'static str, Calibration)>, Box<dyn Error>> {
     Ok(all)
 }
 
-/// Up and down, held, odd values, samples as they stand.
+/// Up and down, held, odd values, samples as they are.
 fn stream() -> Vec<u8> {
     let mut bytes: Vec<u8> = (18..198).step_by(3).chain((18..198).rev().step_by(5)).collect();
     bytes.extend([225; 12]);

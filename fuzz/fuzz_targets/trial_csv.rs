@@ -10,7 +10,7 @@ fuzz_target!(|bytes: &[u8]| {
         assert!(trial.time_s.iter().all(|t| t.is_finite()));
         let mut text = Vec::new();
         if trial.write_to(&mut text).is_ok() {
-            // seconds, whatever the first reader was told that it counted
+            // seconds, whatever the options of the first reader say that it counted
             let own = ReadOptions::new().time_unit(TimeUnit::Seconds);
             let again = Recording::from_reader(text.as_slice(), "fuzz", &own).expect("own output");
             assert_eq!(trial, again.trial);

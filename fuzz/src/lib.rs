@@ -47,7 +47,7 @@ impl Sample {
     }
 }
 
-/// Bytes as samples: mostly one byte each, a share of the range; some repeat, some are odd, some are eight bytes as they stand.
+/// Bytes as samples: mostly one byte each, a share of the range; some repeat, some are odd, some are eight bytes as they are.
 pub fn samples(bytes: &[u8]) -> impl Iterator<Item = Sample> {
     let (mut at, mut last) = (0, Sample::Share(0.5));
     std::iter::from_fn(move || {

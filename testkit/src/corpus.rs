@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-/// Compares what `told` makes of every file of a folder with its line in `sentences.txt` there. `SNAPSHOTS=overwrite` writes that
+/// Compares the answer of `told` for every file of a folder with its line in `sentences.txt` there. `SNAPSHOTS=overwrite` writes that
 /// file anew: then look at what git says has changed.
 ///
 /// # Panics

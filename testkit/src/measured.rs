@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder that holds measured data sets: `STRETCH_DATA`, else `../shared/data` beside the workspace.
+/// The folder that holds measured data sets: `STRETCH_DATA`, else `../shared/data` next to the workspace.
 pub fn root() -> PathBuf {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     env::var_os("STRETCH_DATA").map_or_else(beside, PathBuf::from)

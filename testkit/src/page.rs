@@ -1,6 +1,6 @@
 //! Pages of reports, as tests read them.
 
-/// A page without the text of its own script, which is a section of characters to XML: what is left was written of the data.
+/// A page without the text of its script, which is a section of characters to XML: what is left was written of the data.
 ///
 /// # Panics
 ///

@@ -45,6 +45,6 @@ pub fn unit(i: usize) -> f64 {
 
 /// Mean 0, standard deviation 1, nearly normal, the `i`-th.
 pub fn noise(i: usize) -> f64 {
-    // seeds that stand near each other would share their sums
+    // seeds that are near each other would share their sums
     Random::new(Random::new(i as u64).bits()).noise()
 }

@@ -121,7 +121,7 @@ pub const NOISE_LEVEL: f64 = 0.1;
 /// its diagonal, whose condition of 1e13 magnifies roundings of 1e-16.
 pub const TWINS: f64 = 1e-2;
 
-/// Of a gain of -0.9 over the range, found by a diagnosis that was told -0.82: noise of 2e-3 at 12 000
+/// Of a gain of -0.9 over the range, found by a diagnosis that was given -0.82: noise of 2e-3 at 12 000
 /// samples of spread 0.35 leaves 5e-5; the rest is for the reference, which is smoothed, and the prior.
 pub const GAIN_FOUND: f64 = 2e-3;
 
@@ -139,7 +139,7 @@ pub const FLOW_FOUND: f64 = 0.03;
 pub const LAG_FOUND: f64 = 0.1;
 
 /// Seconds: where a record resumes after a gap, on a grid of 10 ms whose stamps come up to 4 ms late,
-/// beside a sample lost: five samples.
+/// and with a sample lost: five samples.
 pub const RESUMED_S: f64 = 0.05;
 
 /// Excess of a sound model on 1800 test samples: three standard errors, 3 sqrt(2/1800).
@@ -263,7 +263,7 @@ pub const BEHIND_MM: f64 = 1e-6;
 pub const WHOLE_CODE: f64 = 1e-3;
 
 /// Micrometres: half a step of 3.3 V/65536 at up to three taps of 0.12 a sample, at 100 Hz and
-/// about 1.1 mm for 1 V/s, beside the stated error: 0.9 + 0.6.
+/// about 1.1 mm for 1 V/s, in addition to the stated error: 0.9 + 0.6.
 pub const CODE_STEP_UM: f64 = 1.5;
 
 /// Millimetres of a 30 mm stroke: a baseline that drifted by 0.1 V and rested for 15 s, found again.
@@ -273,7 +273,7 @@ pub const REST_FOUND_MM: f64 = 0.5;
 /// 20 000 of them independent: 0.5 %, twice that for the tails, five times.
 pub const BLIND_NOISE: f64 = 0.05;
 
-/// Relative: the standard deviation of a wander of 5 s over 40 000 s, 4000 of them independent: 1.1 %,
+/// Relative: the standard deviation of a slow drift of 5 s over 40 000 s, 4000 of them independent: 1.1 %,
 /// up to twice that where several lags follow each other, four to five times.
 pub const BLIND_SUPPLY: f64 = 0.1;
 
@@ -301,7 +301,7 @@ pub const BOUNDED_SQUARES: f64 = 1e-6;
 /// Seconds: a delay of 0.05 s by a sum over steps of 0.1 ms, two of them.
 pub const BLIND_DELAY_S: f64 = 2e-4;
 
-/// Seconds: the same where rising has a time constant of its own.
+/// Seconds: the same where rising has a separate time constant.
 pub const BLIND_UNEVEN_S: f64 = 0.02;
 
 /// Relative: what a filter of 1 ns holds back of a step after 1 ms, 1e-6 at each of up to ten poles.
@@ -343,7 +343,7 @@ pub const BLIND_BAND: f64 = 1e-9;
 /// Of an opening: what a dead band of 1e-9 may take, up to ten times itself.
 pub const BLIND_BAND_OFF: f64 = 1e-8;
 
-/// A term that was planted, beside the one proposed for it: shapes are refined in steps of 5 %, and a width that is that much
+/// A term that was planted, compared with the one proposed for it: shapes are refined in steps of 5 %, and a width that is that much
 /// off takes as much of the coefficient with it.
 pub const PLANTED_TERM: f64 = 0.08;
 /// A coefficient fitted in other units: factors that are no powers of two round every sample, and a search of its parameters by

@@ -101,7 +101,7 @@ macro_rules! model {
         // SAFETY: a constant of the C program.
         let bytes = unsafe { linked::BYTES } as usize;
         assert!(bytes <= 4 * WORDS, "{}: a state of {bytes} bytes", $name);
-        // SAFETY: it uses a state of its own.
+        // SAFETY: it uses its own state.
         let wrong = unsafe { linked::self_test() };
         assert!(wrong == 0, "{}: the self-test fails at sample {wrong}", $name);
         // SAFETY: a constant of the C program.

@@ -37,7 +37,7 @@ pub(crate) struct Compared {
 /// `Q` over their sum is compared with F with `(tr K)^2 / tr K^2` degrees of freedom, and that
 /// times the days minus two (Rao and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas
 /// and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of both branches are tested as one model, each
-/// in units of its own residual.
+/// in units of its residual.
 pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String> {
     for (which, days) in [("first", first), ("second", second)] {
         if days.len() < LEAST_DAYS {

@@ -122,7 +122,7 @@ pub struct Turns {
 }
 
 impl Turns {
-    /// Levels whose median is held against the limit.
+    /// Levels whose median is compared with the limit.
     pub const MEDIAN_OF: usize = 5;
     /// Weight of the newest level in the running mean: twenty movements are a minute or two.
     pub const MEAN_SHARE: f64 = 0.05;

@@ -104,7 +104,7 @@ impl Prior {
             let which =
                 if count == 2 { self.signals.join(" or ") } else { self.signals[k].clone() };
             let says =
-                format!("{which} rises where it fell in its sessions, beside the other gauges");
+                format!("{which} rises where it fell in the sessions of the prior, compared with the other gauges");
             (distance(&without, &without.mean), distance(&own, &own.mean), says)
         });
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (b, a)));
@@ -112,7 +112,7 @@ impl Prior {
             let without = own.exchanged(a, b);
             let [first, second] = [&self.signals[a], &self.signals[b]];
             let says = format!(
-                "{first} is what {second} was in its sessions, and {second} what {first} was"
+                "{first} behaves as {second} did in the sessions of the prior, and {second} as {first} did"
             );
             (distance(&without, &prior.mean), distance(&own, &prior.mean), says)
         });

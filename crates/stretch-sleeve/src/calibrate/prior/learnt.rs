@@ -300,7 +300,7 @@ fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
 fn copy(session: &Session, before: &[Session]) -> Option<String> {
     let is_same = |one: &&Session| one.parts == session.parts && one.domains == session.domains;
     before.iter().find(is_same).map(|one| {
-        format!("it holds the samples of {}: sessions that are one do not tell how sessions vary; give it once", one.name)
+        format!("it has the same samples as {}: equal sessions do not show how sessions vary; give it once", one.name)
     })
 }
 
@@ -318,7 +318,7 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     }
     if let Some(name) = elsewhere(&session.signals, &first.signals) {
         return Some(format!(
-            "{name} is in another place among its signals ({}) than in {} ({}), and signals are taken by their places: write it again with \
+            "{name} does not have the same position in its signals ({}) as in those of {} ({}), and signals are matched by position: write it again with \
              stretch calibrate --session and that order",
             session.signals.join(","),
             first.name,
@@ -343,8 +343,8 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     let steeper = (0..own.len()).map(|k| (own[k], steepness(session, k) / steepness(first, k)));
     if is_other_unit(steeper) {
         return Some(format!(
-            "{} runs over {:.4} and in {} over {:.4}, beside the same signals: is one in radians and the other in degrees, or one in centimetres and \
-             the other in millimetres? Convert it (stretch convert), and write the session again",
+            "{} has a range of {:.4}, and in {} one of {:.4}, which does not fit the ranges of the signals: is one in radians and the other in degrees, \
+             or one in centimetres and the other in millimetres? Convert it (stretch convert), and write the session again",
             session.reference,
             span(&session.reference_range),
             first.name,

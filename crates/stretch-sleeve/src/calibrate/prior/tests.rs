@@ -294,13 +294,21 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
         trial
     };
     let order = RenewOptions { signals: vec!["s2".into(), "s1".into()], ..RenewOptions::default() };
-    refused(today.clone(), order, "s2 is in another place among its signals (s1,s2) than in s2,s1");
+    refused(
+        today.clone(),
+        order,
+        "s2 does not have the same position in the signals of the prior (s1,s2) as in s2,s1",
+    );
     for wearer in [2, 9] {
         let of = RenewOptions::of(&format!("w{wearer}"));
         let today = session(wearer, 3, 60.0);
-        refused(exchanged(today.clone()), of.clone(), "s1 is what s2 was in its sessions");
+        refused(
+            exchanged(today.clone()),
+            of.clone(),
+            "s1 behaves as s2 did in the sessions of the prior",
+        );
         for k in 0..2 {
-            let says = "s1 or s2 rises where it fell in its sessions";
+            let says = "s1 or s2 rises where it fell in the sessions of the prior";
             refused(reversed(today.clone(), k), of.clone(), says);
         }
     }

@@ -230,7 +230,8 @@ impl Prior {
         }
         if let Some(name) = elsewhere(signals, &self.signals) {
             return problem(format!(
-                "{name} is in another place among its signals ({}) than in {}, and signals are taken by their places: name them in its order",
+                "{name} does not have the same position in the signals of the prior ({}) as in {}, and signals are matched by position: name them in \
+                 the order of the prior",
                 self.signals.join(","),
                 signals.join(",")
             ));
@@ -268,8 +269,8 @@ impl Prior {
         });
         if is_other_unit(steeper) {
             return problem(format!(
-                "the reference of these data goes up by another unit than in its sessions, beside the same signals: is {} in radians and not in \
-                 degrees, or in centimetres and not in millimetres? Convert it (stretch convert)",
+                "for the same change of the signals, the reference of these data changes by another amount than in the sessions of the prior: is {} in \
+                 another unit, in radians and not in degrees, or in centimetres and not in millimetres? Convert it (stretch convert)",
                 self.reference
             ));
         }

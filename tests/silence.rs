@@ -14,7 +14,7 @@ fn a_trial_that_is_fitted_is_not_tested_on_under_another_name() {
         let _ = writeln!(set, "[[trial]]\nfile = '{name}.csv'\nkind = 'other'\nsplit = '{split}'");
     }
     scratch.write("dataset.toml", set);
-    let told = ["b.csv is a test trial, and it holds the samples of a.csv, which is fitted"];
+    let told = ["b.csv is a test trial, and it has the same samples as a.csv, which is fitted"];
     fails(stretch().arg("diagnose").arg(scratch.path("")), &told);
     let trials = "[[trial]]\nfile = \"a.csv\"\n[[trial]]\nfile = \"b.csv\"\nsplit = \"test\"\n";
     let stage = "[[stage]]\noutput = \"bridge_v\"\ninputs = [\"length_mm\"]\n";
@@ -26,7 +26,7 @@ fn a_trial_that_is_fitted_is_not_tested_on_under_another_name() {
         .output();
     let out = out.unwrap();
     let said = one_line(&String::from_utf8_lossy(&[out.stdout, out.stderr].concat()));
-    assert!(said.contains("b.csv holds the samples of a.csv: they weigh double"), "{said}");
+    assert!(said.contains("b.csv has the same samples as a.csv: they count twice"), "{said}");
 }
 
 const PROBLEM: &str = r#"

@@ -43,14 +43,14 @@ type Spoil = fn(&mut Trial);
 #[test]
 fn one_trial_that_is_not_like_the_others_is_told_once() {
     let members: [(&str, Spoil); 9] = [
-        ("t1.csv has bridge_v and length_mm exchanged, held against t0.csv", |t| {
+        ("t1.csv has bridge_v and length_mm exchanged, compared with t0.csv", |t| {
             let (length, signal) = t.channels.split_at_mut(SIGNAL);
             std::mem::swap(&mut length[0].values, &mut signal[0].values);
         }),
-        ("t1.csv has bridge_v or length_mm reversed, held against t0.csv", |t| {
+        ("t1.csv has bridge_v or length_mm reversed, compared with t0.csv", |t| {
             change(t, SIGNAL, |v| 2.48 - v);
         }),
-        ("t1.csv has bridge_v or length_mm reversed, held against t0.csv", |t| {
+        ("t1.csv has bridge_v or length_mm reversed, compared with t0.csv", |t| {
             change(t, LENGTH, |x| 330.0 - x);
         }),
         ("bridge_v of t1.csv is about 1000 times that of t0.csv", |t| {
@@ -65,10 +65,10 @@ fn one_trial_that_is_not_like_the_others_is_told_once() {
         ("bridge_v is 1.5 throughout t1.csv while length_mm moves", |t| {
             change(t, SIGNAL, |_| 1.5);
         }),
-        ("bridge_v stands at 2 in t1.csv while length_mm moves on", |t| {
+        ("bridge_v stays at 2 in t1.csv while length_mm moves on", |t| {
             change(t, SIGNAL, |v| v.min(2.0));
         }),
-        ("bridge_v stands at 1.5 in t1.csv while length_mm moves on", |t| {
+        ("bridge_v stays at 1.5 in t1.csv while length_mm moves on", |t| {
             change(t, SIGNAL, |v| v.max(1.5));
         }),
     ];
@@ -91,7 +91,7 @@ fn a_trial_saved_again_with_other_digits_is_told() {
         let scale = 10_f64.powi(digits);
         change(&mut trials[3], SIGNAL, |v| (v * scale).round() / scale);
         let notes = notes(&trials);
-        let says = "again.csv holds the samples of t1.csv: they weigh double";
+        let says = "again.csv has the same samples as t1.csv: they count twice";
         assert!(notes.len() == 1 && notes[0].starts_with(says), "{digits}: {notes:?}");
     }
 }

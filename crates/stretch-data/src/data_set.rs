@@ -227,8 +227,7 @@ impl DataSet {
             return fail("trial", "there is no [[trial]]; write a table for each file".into());
         }
         if let Some((key, path)) = set.files().find(|(_, path)| !stands_in_folder(path)) {
-            let problem =
-                format!("{path:?} does not stand in the data set's folder; put the file there");
+            let problem = format!("{path:?} is not in the data set's folder; put the file there");
             return fail(&key, problem);
         }
         for (i, TrialEntry { file, opening, digest, .. }) in set.trials.iter().enumerate() {

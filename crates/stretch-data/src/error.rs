@@ -62,7 +62,7 @@ pub enum DataError {
         value: String,
     },
     /// Time that stays the same or goes back.
-    #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: leave that row out, or split the recording there", if .time_s == .previous_s { "stands still" } else { "goes back" })]
+    #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: leave that row out, or split the recording there", if .time_s == .previous_s { "stays the same" } else { "goes back" })]
     TimeNotRising {
         /// Where.
         at: Place,
@@ -97,7 +97,7 @@ pub enum DataError {
     },
     /// A test trial whose samples are those of a trial that may be fitted.
     #[error(
-        "{test} is a test trial, and it holds the samples of {fit}, which is fitted; a fitted trial cannot be a test: record another trial, or leave one of them out"
+        "{test} is a test trial, and it has the same samples as {fit}, which is fitted; a fitted trial cannot be a test: record another trial, or leave one of them out"
     )]
     FittedAndTested {
         /// The trial that may be fitted.

@@ -29,7 +29,7 @@ fn data_sets() {
         (
             "a.csv",
             "../a.csv",
-            "d, row 4, key trial[0].file: \"../a.csv\" does not stand in the data set's folder; put \
+            "d, row 4, key trial[0].file: \"../a.csv\" is not in the data set's folder; put \
              the file there",
         ),
         (

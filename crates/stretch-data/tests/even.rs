@@ -133,7 +133,7 @@ fn a_test_trial_with_the_samples_of_one_that_is_fitted_is_refused() {
     let of = |trials: &[SessionTrial]| EvenSession::new(trials, &["length_mm"], 10);
     let (fit, copy) = (named("a", Split::Fit), named("b", Split::Test));
     let told = of(&[copy.clone(), fit.clone()]).expect_err("a copy").to_string();
-    assert!(told.starts_with("b is a test trial, and it holds the samples of a"), "{told}");
+    assert!(told.starts_with("b is a test trial, and it has the same samples as a"), "{told}");
     // one sample makes it another
     let mut other = copy;
     other.trial.channels[0].values[7] += 1e-9;

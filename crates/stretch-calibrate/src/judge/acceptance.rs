@@ -94,7 +94,7 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
 pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     (!errors.r_squared.is_finite()).then(|| {
         format!(
-            "the reference stands still, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
+            "the reference is constant, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
             errors.mae
         )
     })

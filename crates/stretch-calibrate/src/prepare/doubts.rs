@@ -1,4 +1,4 @@
-//! What makes one doubt a trial, alone and held against the others.
+//! What makes one doubt a trial, alone and compared with the others.
 
 use std::ops::RangeInclusive;
 
@@ -6,7 +6,7 @@ use crate::Options;
 
 use super::{series::extent, trials::Piece};
 
-/// Correlation squared from which a trial has a line that can be held against another's: it explains more than it leaves.
+/// Correlation squared from which a trial has a line that can be compared with another's: it explains more than it leaves.
 const HAS_LINE: f64 = 0.5;
 /// Slopes over that of another trial which hysteresis, another rate or another range bring about.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
@@ -21,7 +21,7 @@ const SLOW_HZ: f64 = 0.5;
 /// Fewest samples that distinguish a slow recording from a wrong unit of time.
 const TELLING: usize = 50;
 
-/// Most trials that each is held against: of more, some from all over.
+/// Most trials that each is compared with; if there are more, evenly chosen ones.
 const OTHERS: usize = 32;
 /// Trials next in the mean of the reference that each is compared with, to find copies.
 const NEXT: usize = 8;
@@ -33,7 +33,7 @@ type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 const MISTAKES: [Mistake; 4] = [
     (
         |own, _| [own, Line { means: swap(own.means), spreads: swap(own.spreads), ..own }],
-        "{trial} has {signal} and {reference} exchanged, held against {other}: give its columns their names with stretch convert, or leave it out",
+        "{trial} has {signal} and {reference} exchanged, compared with {other}: give its columns their names with stretch convert, or leave it out",
     ),
     (
         // the zero of what was reversed is unknown
@@ -41,7 +41,7 @@ const MISTAKES: [Mistake; 4] = [
             let own = Line { means: other.means, ..own };
             [own, Line { correlation: -own.correlation, ..own }]
         },
-        "{trial} has {signal} or {reference} reversed, held against {other}: one falls with the other where it should rise, or rises where it \
+        "{trial} has {signal} or {reference} reversed, compared with {other}: one falls with the other where it should rise, or rises where it \
          should fall; turn its sign with stretch convert, or leave it out",
     ),
     (
@@ -261,8 +261,8 @@ pub(super) fn doubts(
             ));
         } else if let Some(end) = trial.stands_at() {
             said.push(format!(
-                "{signal} stands at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? What lies beyond \
-                 cannot be told from it; lower the gain, or leave that part out"
+                "{signal} stays at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? Values beyond it are \
+                 lost; lower the gain, or leave that part out"
             ));
         }
     }
@@ -277,7 +277,7 @@ pub(super) fn doubts(
     for (i, own) in held.iter().enumerate() {
         if let Some(first) = copies[i].map(|first| &held[first]) {
             said.push(format!(
-                "{} holds the samples of {}: they weigh double, and cross-validation judges a fit by what it was fitted on; name one of the two",
+                "{} has the same samples as {}: they count twice, and cross-validation judges a fit by samples that it was fitted on; leave one of the two out",
                 own.name, first.name
             ));
         }

@@ -97,7 +97,7 @@ fn open_device(path: &Path, meta: &Metadata) -> io::Result<File> {
             }
         }
     }
-    Err(io::Error::other("it is a pipe that nobody reads; begin to read it first"))
+    Err(io::Error::other("it is a pipe without a reader; begin to read it first"))
 }
 
 #[cfg(not(unix))]

@@ -92,7 +92,7 @@ fn what_nothing_excites_is_told() {
         (&["line.zero".into()][..], &["line.gain".into()][..])
     );
     let sentence = line[0].sentence().expect("something to say");
-    assert!(sentence.starts_with("line.gain is not told apart from line.zero"), "{sentence}");
+    assert!(sentence.starts_with("line.gain cannot be distinguished from line.zero"), "{sentence}");
     let lag = constant(Law::Lag);
     assert_eq!(lag[1].knowledge, Knowledge::Dead);
     assert_eq!(lag[0].knowledge, Knowledge::Determined);
@@ -132,7 +132,7 @@ fn a_parameter_at_the_end_of_its_tolerances_is_told() {
     assert!(gain.at_bound && !zero.at_bound);
     assert_eq!(
         gain.sentence().as_deref(),
-        Some("line.gain stands at the end of what its tolerance allows")
+        Some("line.gain is at the end of what its tolerance allows")
     );
 }
 

@@ -72,7 +72,7 @@ pub enum NoFix {
     },
     /// The catalogue does not explain the gap.
     #[error(
-        "the gap is not explained, so that no file closes it; what is known of it stands in the diagnosis"
+        "the gap is not explained, so that no file closes it; what is known of it is in the diagnosis"
     )]
     Unknown,
     /// No rig file may hold what was found.
@@ -208,7 +208,7 @@ impl<'a> Chosen<'a> {
         let share = d.shares.iter().find(|s| s.effect == effect.name);
         let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
         let faint = match d.faint.iter().any(|name| name == effect.name) {
-            true => ", faint, and kept because the parameters were fitted beside it",
+            true => ", faint, and kept because the parameters were fitted together with it",
             false => "",
         };
         let set = self.found.map_or(String::new(), |c| {

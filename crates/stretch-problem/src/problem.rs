@@ -125,7 +125,7 @@ impl Problem {
         let recorded = reading.recorded.cloned().unwrap_or_default().strict(reading.strict);
         if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
             if rig.is_some() {
-                let hint = "diagnose one signal at a time beside it";
+                let hint = "diagnose one signal at a time with it";
                 return Err(no_option("--rig", "it is of one signal", hint));
             }
             let source = Box::new(read_sensors(path, several, reading.without, recorded)?);
@@ -155,7 +155,7 @@ impl Problem {
         reading: &Reading<'_>,
     ) -> Result<Self, ProblemError> {
         if reading.rig.is_some() {
-            let hint = "its parameters stand in the problem's file";
+            let hint = "its parameters are in the problem's file";
             return Err(no_option("--rig", "it is for the built-in simulators", hint));
         }
         if let Some((reference, signal)) = reading.columns {

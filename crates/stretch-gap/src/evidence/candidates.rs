@@ -27,7 +27,7 @@ use crate::{
     },
 };
 
-/// A set of effects that was held against the data.
+/// A set of effects that was compared with the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
     /// Effects of the set, the strongest first; `unknown` is any cause that the catalogue lacks, and is always the last candidate.

@@ -96,7 +96,10 @@ impl Identified {
                 ));
             }
             _ if !self.like.is_empty() => {
-                format!("{name} is not told apart from {}: they do the same", self.like.join(", "))
+                format!(
+                    "{name} cannot be distinguished from {}: they do the same",
+                    self.like.join(", ")
+                )
             }
             Knowledge::Not => {
                 format!("{name} is not determined: {sd:.0} % of its tolerance is left")
@@ -110,8 +113,8 @@ impl Identified {
         if self.at_bound {
             let at = "at the end of what its tolerance allows";
             said = match said.is_empty() {
-                true => format!("{name} stands {at}"),
-                false => format!("{said}; it stands {at}"),
+                true => format!("{name} is {at}"),
+                false => format!("{said}; it is {at}"),
             };
         }
         Some(said)

@@ -49,7 +49,7 @@ pub(crate) struct Promising {
     pub(crate) share: f64,
 }
 
-/// What every error is held against.
+/// What every error is compared with.
 pub(crate) struct Bench<'a, 'p, 's> {
     problem: &'a PreparedProblem<'p>,
     suspect: &'a Suspect<'s>,

@@ -68,7 +68,7 @@ impl Gross {
         };
         Self {
             sentence: format!(
-                "{} stands still while the others move ({trial}, {from_s:.2} to {to_s:.2} s{more})",
+                "{} is constant while the others move ({trial}, {from_s:.2} to {to_s:.2} s{more})",
                 column.name
             ),
             trial: Some(trial.clone()),

@@ -30,7 +30,7 @@ pub(crate) const RIVALS: (usize, usize) = (6, 3);
 const PROMISE: f64 = 0.1;
 /// Share of the best gain below which an effect is not fitted.
 const FAINT: f64 = 0.03;
-/// Share of an effect's own gain that a rival in its place must promise; twins are held against it whatever they promise.
+/// Share of an effect's own gain that a rival in its place must promise; twins are compared with it whatever they promise.
 pub(crate) const RIVALRY: f64 = 0.5;
 /// How often an effect of the best set gives its place to another.
 const EXCHANGES: usize = 2;

@@ -135,7 +135,7 @@ pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     let note = |(metric, spec): (&Metric, &StageSpec)| {
         let (times, time_s) = metric.recorder_drift()?;
         Some(format!(
-            "{} has slow noise of {times:.2} times its other noise, which lasts some {time_s} s: the diagnosis counts it as noise of the \
+            "{} has slow noise of {times:.2} times its other noise, with a correlation time of {time_s} s: the diagnosis counts it as noise of the \
              recorder, and a gap as small and as slow would not be seen",
             spec.channel
         ))

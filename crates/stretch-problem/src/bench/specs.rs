@@ -55,7 +55,7 @@ pub(crate) fn shown(
                 return Some((effect, place));
             };
             notes.push(format!(
-                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told from motion and drift; from {needed} on it can",
+                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be distinguished from motion and drift; from {needed} on it can",
                 effect.name
             ));
             None

@@ -248,7 +248,7 @@ impl TryFrom<WrittenEffect> for OwnEffect {
         let has_own = range.is_some() || off.is_some() || value.is_some() || is_log;
         let arguments = match (argument.is_empty(), range) {
             (false, _) if has_own => {
-                return Err("range, off, log and value stand in its [[effect.argument]]".into());
+                return Err("range, off, log and value belong into its [[effect.argument]]".into());
             }
             (false, _) => argument,
             (true, Some(range)) => {

@@ -76,7 +76,7 @@ impl Apart {
             true => "; the other runs agree without it: it is another set-up",
             false => "",
         };
-        format!("{} stands apart in {}{other}", self.run, each.join(", "))
+        format!("{} differs from the others in {}{other}", self.run, each.join(", "))
     }
 }
 

@@ -117,7 +117,7 @@ impl GaugeSession {
         let mut notes = Vec::new();
         if shares[0] > 3.0 * shares[1] {
             notes.push(format!(
-                "{reference} is noisier than {signal}, each held against its own range: are reference and signal swapped?"
+                "{reference} is noisier than {signal}, each compared with its own range: are reference and signal swapped?"
             ));
         }
         for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {

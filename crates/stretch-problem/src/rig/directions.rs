@@ -61,7 +61,7 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
         Some(Wrong::Shifted(late_s)) => {
             let word = if late_s > 0.0 { "late" } else { "early" };
             let hint = format!(
-                "they look {:.1} s {word} beside the other columns: check how the recordings were brought together",
+                "they look {:.1} s {word} compared with the other columns: check how the recordings were brought together",
                 late_s.abs()
             );
             ("inlet, outlet", hint)

@@ -31,7 +31,7 @@ impl WorkersSpec {
     ) -> Result<Self, ProblemError> {
         let missing = || {
             ProblemError::Simulator(format!(
-                "{file}: FMUs are run by the program {PROGRAM}, which is neither beside this program nor on the path; build it, cargo build --release -p stretch-fmu, and set {VARIABLE} to it, target/release/{PROGRAM}"
+                "{file}: FMUs are run by the program {PROGRAM}, which is neither next to this program nor on the path; build it, cargo build --release -p stretch-fmu, and set {VARIABLE} to it, target/release/{PROGRAM}"
             ))
         };
         let program = program().ok_or_else(missing)?;

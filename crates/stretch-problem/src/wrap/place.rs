@@ -122,7 +122,7 @@ pub(crate) fn placed(
         let needed = p.shown_at(rate_hz);
         notes.extend(needed.map(|needed| {
             format!(
-                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told; from {needed} on it can",
+                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be distinguished from other causes; from {needed} on it can",
                 p.name
             )
         }));

@@ -27,7 +27,7 @@ class Cart:
 
 def stepped(make, action, observed=0):
     """The simulator of an environment: `make(**parameters)` gives it, `action` is the column that drives it, and one number
-    of what it observes is held against the measurement."""
+    of what it observes is compared with the measurement."""
 
     def simulate(params, effects, inputs, trials):
         out = []

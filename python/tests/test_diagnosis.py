@@ -310,7 +310,7 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
     ("more", "words"),
     [
         ({"output": "width_mm"}, "there is no column width_mm; the columns are force_N, length_mm"),
-        ({"output": None}, "say what is held against the measurement"),
+        ({"output": None}, "say what is compared with the measurement"),
         ({"wrap": ["output.backlsh"]}, "did you mean output.backlash"),
         ({"wrap": ["input.delay"]}, "must take the argument inputs"),
         ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),

@@ -293,7 +293,7 @@ def diagnose(
     `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
     Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
 
-    `output` is the column that the simulation is held against, `inputs` those that drive it; `stages` says the same of
+    `output` is the column that the simulation is compared with, `inputs` those that drive it; `stages` says the same of
     several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
     `(value, tolerance)` or an exact number. `effects` that the simulator has itself: an `Effect`, an `Argument`, `(least,
     greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
@@ -309,7 +309,7 @@ def diagnose(
     if isinstance(data, (str, os.PathLike)):
         if output is not None or stages is not None or parameters or effects:
             raise StretchError(
-                f"{os.fspath(data)} says what is diagnosed; give a simulator beside it, or None for the file's own"
+                f"{os.fspath(data)} says what is diagnosed; give a simulator in addition to it, or None for the file's own"
             )
         checked = _stretch.Problem.read(data, asked is None or asked.takes_inputs)
         name = checked.name if name == "data" else name
@@ -317,7 +317,7 @@ def diagnose(
         if asked is None:
             raise StretchError("there is no simulator; give one, or the path of a problem.toml that names it")
         if (output is None) == (stages is None):
-            raise StretchError("say what is held against the measurement: output, a column's name, or stages")
+            raise StretchError("say what is compared with the measurement: output, a column's name, or stages")
         listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
         units, noise = units or {}, noise or {}
         driven = list(dict.fromkeys(c for one in listed for c in one.inputs))

@@ -9,8 +9,11 @@ from ._stretch import StretchError
 
 
 def replaceable(path: str | os.PathLike[str], *endings: str) -> str:
-    """A path to write to, as text: what is there is nothing, or a file with one of these endings, which an earlier run wrote. A
-    `StretchError` otherwise: a recording, a simulator or a notebook is not replaced by a result."""
+    """Checks that a result may be written to a path, and returns the path as text.
+
+    A file that exists is replaced only if its name has one of these endings. So a result replaces an earlier result, but never a
+    recording, a simulator or a notebook. Any other file is refused with a `StretchError`.
+    """
     if Path(path).is_file() and Path(path).suffix not in endings:
         wanted = " or ".join(endings)
         raise StretchError(f"{os.fspath(path)}: it is a file of another kind; name one to write that ends in {wanted}")

@@ -1,4 +1,4 @@
-"""What a simulator is made of and what was recorded beside it, as a user writes it down."""
+"""The description of a simulator and of its recordings, as a user writes it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Effect:
     stages: Sequence[str] = ()
     """Stages that it acts in; all where none is named."""
     twins: Sequence[str] = ()
-    """Effects that are hard to tell from it: they are fitted beside it."""
+    """Effects that are hard to distinguish from it: they are fitted together with it."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Stage:
     """Measured inputs in, one measured output out."""
 
     output: str
-    """Column that the simulation is held against."""
+    """Column that the simulation is compared with."""
     inputs: Sequence[str] = ()
     """Columns that drive it."""
     name: str = ""

@@ -90,7 +90,7 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let names = method_names(calibrated, evaluation);
     let methods = &evaluation.pooled;
     let Some(best) = best(methods) else {
-        return "No estimate could be held against a reference.".to_owned();
+        return "No estimate could be compared with a reference.".to_owned();
     };
     let off = |m: &MethodErrors| {
         let rmse = with_unit(&number(m.rmse, 3), &evaluation.unit);
@@ -131,7 +131,7 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
 fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &Context) {
     page.section("How good it is", "");
     page.text(&format!(
-        "Fitted on {}; held against {}.",
+        "Fitted on {}; compared with {}.",
         recordings(&context.calibrated_on),
         if context.tested_on.is_empty() {
             "the same data, which flatters every method".to_owned()

@@ -87,7 +87,7 @@ fn agreeing(page: &mut Page, subject: &Subject<'_>) {
     let Some(by_trial) = subject.by_trial else { return };
     page.section(
         "Do the runs agree?",
-        "Every run fitted by itself, with the named effects in place. What differs by more than the intervals is another rig, another load, or an effect that nobody named.",
+        "Every run fitted by itself, with the named effects in place. What differs by more than the intervals is another rig, another load, or an effect that was not named.",
     );
     page.list(&by_trial.sentences());
     page.table(&difference_table(by_trial));
@@ -112,7 +112,9 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
         );
         page.figure(&top, &caption);
         if let Some(turned) = turn_figure(subject, stage, &shown) {
-            page.text("The numbers of an effect can be moved here. They stand in its equation:");
+            page.text(
+                "The numbers of an effect can be moved here. They are the numbers of its equation:",
+            );
             page.list(&equations(subject, &spec.name));
             if let Some(words) = notation(formulas(subject)) {
                 page.text(words);
@@ -368,7 +370,7 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     if let Some(transfer) = &d.transfer {
         page.table(&transfer_table(transfer));
         page.text(
-            "What the gap costs a user: a calibration trained in the simulator and applied to measured trials, beside \
+            "What the gap costs a user: a calibration trained in the simulator and applied to measured trials, next to \
              one trained on measured trials.",
         );
         if let Some(words) = transfer_in_words(transfer) {

@@ -123,7 +123,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             format!("Probability {} {GIVEN}: {rest}.", percent(c.probability))
         }
         (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
-            format!("Probability {} beside every set of effects, {GIVEN}.", percent(c.probability))
+            format!("Probability {} compared with every set of effects, {GIVEN}.", percent(c.probability))
         }
         (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
         (VerdictKind::Unknown, _) => {

@@ -274,7 +274,7 @@ fn data_without_a_number_give_notes_and_no_panic() {
         let page = calibration_page(&judged);
         elements(&page);
         assert_numbers(&page);
-        assert!(page.contains("No estimate could be held against a reference."));
+        assert!(page.contains("No estimate could be compared with a reference."));
         assert_eq!(page.contains("There is no error to draw"), notes);
         let picture = readme_picture(&[], &evaluation);
         assert!(picture.is_empty() || !elements(&picture).is_empty());

@@ -339,7 +339,7 @@ fn counted(
     let (Some(rate_hz), Some(samples)) = (options.sample_rate_hz.or(own), samples) else {
         let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
         let hint = format!(
-            "save it as an array {} beside the others ({}), or give its rate with --time 100hz",
+            "save it as an array {} together with the others ({}), or give its rate with --time 100hz",
             &options.time,
             listed(&names)
         );

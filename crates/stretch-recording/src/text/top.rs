@@ -360,7 +360,7 @@ impl Finder<'_> {
         };
         notes.extend(passed_over(lines[..block.start].iter().filter(|l| !is_part(l)).count()));
         if let Some(line) = header_line.filter(|line| line.is_comment) {
-            notes.push(format!("the names of the columns stand in a comment, row {}", line.row));
+            notes.push(format!("the names of the columns are in a comment, row {}", line.row));
         }
         if [header_line, units].iter().flatten().any(|line| line.is_decoded) {
             notes.push("the names are no UTF-8 and are read as Windows-1252".to_owned());

@@ -66,7 +66,7 @@ ls -l "${reports[@]}" | awk '{ n = split($9, part, "/"); print $5 " bytes: " par
 node "$fresh/report.mjs" ${SHOTS:+--shots "$SHOTS"} "${reports[@]}"
 
 has_wasm || exit 0
-# what the page saves is held against what the program writes
+# what the page saves is compared with what the program writes
 stretch calibrate "$bench" --model poly13 --out "$fresh/poly13.json" >/dev/null
 stretch calibrate "$bench" --model observer --out "$fresh/observer.json" >/dev/null
 stretch export --calibration "$fresh/observer.json" --c "$fresh/header" >/dev/null

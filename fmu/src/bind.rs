@@ -158,7 +158,7 @@ impl Asked<'_> {
         if !self.roles.contains(&variable.role) {
             let hint = match self.what {
                 "input" => "a column drives an input",
-                "output" => "an output or a local variable is held against a column",
+                "output" => "an output or a local variable is compared with a column",
                 _ => "only a parameter that is fixed or tunable can be fitted",
             };
             return Err(fail(variable.role.shown(), hint));

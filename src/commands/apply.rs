@@ -326,7 +326,7 @@ impl ZeroWatch {
                 return;
             }
             return warn(
-                "the calibration does not hold where movements turn: whether the gauge was put on again is not told",
+                "the calibration does not hold where movements turn: whether the gauge was put on again is not reported",
             );
         };
         if let Some(zero) = self.last.filter(|zero| zero.followed != 0.0) {

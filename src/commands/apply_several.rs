@@ -46,7 +46,7 @@ fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applie
             let k = shifts.most.unwrap_or(first);
             let name = calibration.spec().channels[k].signal.as_str();
             let others = match calibration.spec().channels.len() {
-                2 => "the other gauge says (which of the two has moved cannot be told)",
+                2 => "the other gauge says (which of the two has moved is unknown)",
                 _ => "the other gauges say",
             };
             warn(format!(

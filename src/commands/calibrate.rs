@@ -414,7 +414,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let record = gauge.map_err(named)?.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
     if let Some(path) = &args.report {
-        // the line is the yardstick that every surface is held against
+        // the line is the yardstick that every surface is compared with
         let linear = Options { model: ModelKind::Linear, ..options.clone() };
         let linear = calibrate(&trials, &linear).map_err(named)?;
         let fitted = [&linear, &calibrated];

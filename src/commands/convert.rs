@@ -99,7 +99,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         args.columns.iter().map(convert).collect::<anyhow::Result<_>>()?
     };
     if channels.is_empty() {
-        bail!("{}: nothing was written: it has no channel of numbers beside the time", log.name);
+        bail!(
+            "{}: nothing was written: it has no channel of numbers in addition to the time",
+            log.name
+        );
     }
     let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
     let largest_s = log.time_s.iter().fold(0.0, |most: f64, t| most.max(t.abs()));

@@ -206,7 +206,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let problem = open(&args.data_set, &reading)?;
     // what a simulation makes of numbers is the rig file's matter as much as the data's
     let beside = || match &args.rig {
-        Some(rig) => format!("{} beside {}", shown(), rig.display()),
+        Some(rig) => format!("{} with {}", shown(), rig.display()),
         None => shown(),
     };
     detail(format!("read {}", beside()));

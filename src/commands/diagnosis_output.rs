@@ -45,7 +45,7 @@ pub(crate) fn text(
     let rows = diagnosis.rows_used;
     if rows.used < rows.read {
         let share = percent(rows.share());
-        out.push(format!("It stands on {} of {} rows ({share}).", rows.used, rows.read));
+        out.push(format!("It is based on {} of {} rows ({share}).", rows.used, rows.read));
     }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
@@ -310,7 +310,7 @@ pub(super) fn write_snippets(
     }
     if files.is_empty() {
         let why =
-            if all.is_empty() { "no effect is named" } else { "nobody has its code written down" };
+            if all.is_empty() { "no effect is named" } else { "its code is not written down" };
         return Ok(format!("{shown} is not written: {why}"));
     }
     outputs.folder(folder, false, |folder| {

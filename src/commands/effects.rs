@@ -107,7 +107,7 @@ impl Entry {
                 kind.sketch.map(|sketch| sketch(values, &CHANNEL, &signals))
             }
         };
-        sketch.context("nobody has written its code down")
+        sketch.context("its code is not written down")
     }
 }
 

@@ -73,7 +73,7 @@ fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
     let Some((target, script)) = program.as_deref().and_then(sources) else {
         bail!(
-            "this program carries no page, and it does not stand in its source tree: take the program of a release, \
+            "this program carries no page, and it is not in its source tree: take the program of a release, \
              or set STRETCH_PAGE to the folder that web/build.sh made (target/page)"
         );
     };

@@ -21,7 +21,7 @@ use crate::table::table_text;
 ///   stretch diagnose bench/problem.toml
 ///
 /// It holds the columns with units and ranges, rates, the trials with a proposed split, and says in
-/// comments what was guessed: what drives the simulator, and what is held against it.
+/// comments what was guessed: what drives the simulator, and what is compared with it.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct InitArgs {

@@ -1,6 +1,6 @@
 /*
  * The page end to end, in a browser: dropped, calibrated, saved, diagnosed, cancelled, refused; on a phone; live. What it saves is
- * held against what the program writes of the same files.
+ * compared with what the program writes of the same files.
  * node page.mjs [--shots DIR] PAGE.html BENCH WANTED GOLDEN
  *   BENCH a data set, WANTED a folder with what the program made of it: poly13.json, observer.json, header/stretch.h, diagnosis.json;
  *   and of linked.txt, which a board sent: linked.csv, linked.told; of trials and a stream that make one doubt, what it said of them:

@@ -45,8 +45,8 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
     }
     ensure!(
         is_insecure,
-        "a {who} on {listens_on} obeys everybody who reaches it: nothing is encrypted, nobody is asked who they are, and queries \
-         read and write files as this user. Listen on 127.0.0.1, or give the cluster a network of its own and say --insecure"
+        "a {who} on {listens_on} obeys everybody who reaches it: nothing is encrypted, no caller is authenticated, and queries \
+         read and write files as this user. Listen on 127.0.0.1, or give the cluster a separate network and say --insecure"
     );
     // if even this cannot be written, the error cannot be reported
     let _ = writeln!(

@@ -122,7 +122,7 @@ fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
             Ok(power as u8)
         }
         _ => Err(plan_datafusion_err!(
-            "polyij_fit: {name} is {expr}, but must be a number from 0 to {MAX_DEGREE} that stands in the query"
+            "polyij_fit: {name} is {expr}, but must be a number from 0 to {MAX_DEGREE} that is written in the query"
         )),
     }
 }

@@ -105,7 +105,7 @@ pub(crate) fn write_records(
         keys.into_iter().map(|(key, own)| Ok((key, texts(own)?))).collect::<anyhow::Result<_>>()?;
     ensure!(
         !keys.is_empty() || records.len() == 1,
-        "nothing names the {} records: select site, rig or sensor beside the fit",
+        "nothing names the {} records: select site, rig or sensor in addition to the fit",
         records.len()
     );
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;

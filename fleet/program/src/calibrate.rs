@@ -82,7 +82,7 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     );
     let answer = flat(&batches)?;
     std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-    ensure!(args.out.canonicalize()? != lake.folder, "--out is the lake: name a folder of its own");
+    ensure!(args.out.canonicalize()? != lake.folder, "--out is the lake: name a separate folder");
     let _out = Lock::of(&args.out, RECORDS_DEPTH)?;
     let (records, refused) = write_records(&lake, &answer, &args.out)?;
     write_parquet(&args.out.join("calibrations.parquet"), &answer, Vec::new(), None)?;

@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// First month: 2026-01
     #[arg(long, value_name = "MONTH", value_parser = month)]
     from: NaiveDate,
-    /// Month that is held against it
+    /// Month that is compared with it
     #[arg(long, value_name = "MONTH", value_parser = month)]
     to: NaiveDate,
     /// Most false ones among the sensors that are said to have moved
@@ -77,7 +77,7 @@ struct Row {
 }
 
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
-    ensure!(args.from != args.to, "a month cannot be held against itself");
+    ensure!(args.from != args.to, "a month cannot be compared with itself");
     let level = args.false_discoveries;
     ensure!(level > 0.0 && level < 1.0, "--false-discoveries {level} is no share between 0 and 1");
     let (_lock, lake, session) = args.on.open_to_write().await?;
@@ -206,7 +206,7 @@ fn tell(args: &Args, rows: &[Row], batch: &RecordBatch) -> anyhow::Result<()> {
         say(table(&shown)?)?;
     }
     say(format!(
-        "{count} of {} sensors moved (at most {} of them falsely, as expected), {refused} could not be told",
+        "{count} of {} sensors moved (at most {} of them falsely, as expected), {refused} could not be judged",
         rows.len(),
         args.false_discoveries
     ))

@@ -116,7 +116,7 @@ impl Branch {
         let deviation = (squares / freedom.max(1) as f64).sqrt();
         if !(deviation.is_finite() && deviation > 0.0) {
             return Err(format!(
-                "{name} signal: the fit leaves nothing, so that nothing can be told from it"
+                "{name} signal: the fit leaves nothing, so that nothing can be concluded from it"
             ));
         }
         let share = fit.information(&months[0]).map_err(|e| e.to_string())?;

@@ -26,7 +26,7 @@ impl FromStr for Pattern {
         while let Some(next) = rest.find(['{', '*']) {
             if next == 0 && is_open {
                 return Err(format!(
-                    "nothing stands between two of the names in {text:?}: where would one end?"
+                    "there is nothing between two of the names in {text:?}: where would one end?"
                 ));
             }
             pattern += &regex::escape(&rest[..next]);
@@ -46,7 +46,7 @@ impl FromStr for Pattern {
             }
             let group = format!("(?<{name}>[^/]*?)");
             if pattern.contains(&group) {
-                return Err(format!("{{{name}}} stands in it twice"));
+                return Err(format!("{{{name}}} is in it twice"));
             }
             pattern += &group;
             rest = behind;
@@ -97,12 +97,10 @@ impl Where {
         };
         let [site, rig, sensor, date] = found;
         let Some(sensor) = sensor.as_ref().or(self.sensor.as_ref()) else {
-            bail!(
-                "nobody says which sensor it is of: --sensor NAME, or --from-path with {{sensor}}"
-            )
+            bail!("its sensor is unknown: give --sensor NAME, or --from-path with {{sensor}}")
         };
         let Some(date) = date.as_ref().or(self.date.as_ref()) else {
-            bail!("nobody says of which day it is: --date 2026-11-21, or --from-path with {{date}}")
+            bail!("its day is unknown: give --date 2026-11-21, or --from-path with {{date}}")
         };
         let site = site.as_ref().unwrap_or(&self.site);
         Place::new([site, rig.as_ref().unwrap_or(&self.rig), sensor, date])

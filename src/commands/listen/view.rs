@@ -152,7 +152,7 @@ pub(crate) struct Status {
     pub(super) beyond: u64,
     pub(super) largest: i32,
     pub(super) adc_bits: u8,
-    /// How many estimates of the board's were held against those here, and the largest
+    /// How many estimates of the board's were compared with those here, and the largest
     /// difference; `None` if the calibration cannot answer.
     pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,

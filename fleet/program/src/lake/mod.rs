@@ -113,7 +113,7 @@ impl LakeFile {
             if !fits {
                 let (name, found) = (field.name(), field.data_type());
                 bail!(
-                    "its column {name} is of type {found}, and no query could read it beside the others; ingest the trial again"
+                    "its column {name} is of type {found}, and no query could read it together with the others; ingest the trial again"
                 );
             }
         }

@@ -82,7 +82,7 @@ impl Place {
     /// The place that a path below `trials` names.
     pub(crate) fn of(path: &Path) -> anyhow::Result<Self> {
         let named = folder_values(path).filter(|_| path.components().count() == COLUMNS.len() + 1);
-        let named = named.context("it stands in no folder site=../rig=../sensor=../date=..")?;
+        let named = named.context("it is in no folder site=../rig=../sensor=../date=..")?;
         Self::new(named.each_ref().map(String::as_str))
     }
 

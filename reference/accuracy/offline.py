@@ -1,4 +1,4 @@
-"""Offline regressors that see a long window of the signal: the bar that a live calibration is held against.
+"""Offline regressors that see a long window of the signal: the bar that a live calibration is compared with.
 
     python3 reference/accuracy/offline.py SIMULATED_7 SIMULATED_8 ...
 

@@ -69,7 +69,7 @@ impl fmt::Display for FilterError {
                  not live; choose a Savitzky-Golay, a differentiator or a tracker"
             ),
             Self::LengthsDiffer { log, other } => {
-                write!(f, "the log has {log} samples, but the slice beside it has {other}")
+                write!(f, "the log has {log} samples, but the other slice has {other}")
             }
             Self::TooShort { needed, got } => {
                 write!(f, "the log has {got} samples, but {needed} are needed")

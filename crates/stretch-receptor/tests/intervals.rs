@@ -1,7 +1,7 @@
 //! Proofs by interval arithmetic that the steps in integers cannot overflow: one a record, over every code and every state.
 //!
 //! The step is written once more, over intervals of integers that are wide enough for any of its numbers (128 bits). Each
-//! intermediate result is bounded and held against the type that the step keeps it in. For an observer the state is
+//! intermediate result is bounded and compared with the type that the step keeps it in. For an observer the state is
 //! bounded first, the step shown to lead from any such state and any code to such a state again, and a receptor begins in
 //! one: induction does the rest. What a run of the step really gives is then looked for inside of what was proved.
 

@@ -50,7 +50,7 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
     }
 }
 
-/// What each channel's samples are held against, and how they become terms.
+/// What each channel's samples are compared with, and how they become terms.
 fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let of = &numbers.of[..numbers.channels];
     let states = 1 + numbers.relaxations;

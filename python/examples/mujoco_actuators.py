@@ -5,7 +5,7 @@
 
 The simulator is a two-link arm under position control. Each of seven effects of an actuator catalogue is put into a copy of it,
 in another form than the catalogue knows (a friction with a Stribeck rise, a gear with a rotor behind it ...), together with other
-masses and gains and with noise. Asked is which effect is missing; beside the diagnosis stand plain fitting by least RMSE, one
+masses and gains and with noise. Asked is which effect is missing; next to the diagnosis are plain fitting by least RMSE, one
 candidate after the other, and `mujoco.sysid`, which fits all at once. In two more cases nothing is missing, and something is
 that the catalogue does not have.
 """
@@ -200,7 +200,7 @@ def built(case, seed):
         return case.kp * gain * (COMMAND[joint, i] - q) + case.kv * rate * (COMMAND_SPEED[joint, i] - v)
 
     def geared(i, joint, q, v, size):
-        """A rotor of its own and what the gear carries to the link."""
+        """A separate rotor and what the gear carries to the link."""
         inner, dt = 4, DT_S / 4
         angle, speed = rotor[joint]
         inertia, k = case.rotor * size, case.stiffness * size

@@ -1,4 +1,4 @@
-"""An environment with `reset` and `step`, as Gymnasium has them, beside a recording: a simulator in ten lines.
+"""An environment with `reset` and `step`, as Gymnasium has them, with a recording: a simulator in ten lines.
 
     python examples/step_function.py
 

@@ -42,7 +42,7 @@ def test_a_record_survives_as_text_as_file_and_as_pickle(tmp_path, tested, poly1
         assert copy == poly13
         np.testing.assert_array_equal(copy.apply(tested[0]).value, value)
     poly13.save(tmp_path / "c.postcard")
-    # bytes for a board: checksums of the trials stand in JSON alone
+    # bytes for a board: only JSON holds the checksums of the trials
     short = stretch_gap.Calibration.load(tmp_path / "c.postcard")
     np.testing.assert_array_equal(short.apply(tested[0]).value, value)
     short.save(tmp_path / "again.postcard")

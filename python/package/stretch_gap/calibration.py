@@ -151,7 +151,7 @@ class Calibration:
         *,
         time_s: Any = None,
     ) -> Evaluation:
-        """Errors on recordings, beside those of the raw signal; `stretch_gap.evaluate` takes several calibrations."""
+        """Errors on recordings, next to those of the raw signal; `stretch_gap.evaluate` takes several calibrations."""
         from .evaluation import evaluate
 
         return evaluate({self.model or "calibration": self}, signal, reference, rate_hz, time_s=time_s)

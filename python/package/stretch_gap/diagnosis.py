@@ -76,8 +76,8 @@ class Diagnosis:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Probability of every candidate that was weighed, the most probable set first; behind the
-        sets that nothing is missing, and `unknown`, whatever nobody listed."""
+        """Probability of every candidate that was weighed, the most probable set first. After the
+        sets come `nothing` (nothing is missing) and `unknown` (a cause that was not listed)."""
         weighed = self._answer["candidates"]
         return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
 
@@ -135,7 +135,7 @@ class Diagnosis:
 
     @property
     def rivals(self) -> list[str]:
-        """Effects beside the named ones that these data cannot rule out."""
+        """Further effects that these data cannot rule out."""
         return [effect for effect in self._answer["ambiguous"] if effect not in self.named]
 
     @property
@@ -287,7 +287,7 @@ def diagnose(
     that it is to be driven by (without it nothing is looked for on the input's side), and `first`, the measured first value
     of each column; with one of these it is called once a recording. With `trials`, the slices of the recordings, it is
     called once for all of them, end to end; with `stage` it answers for one stage at a time. A method
-    `begin(session)` is called once with everything that stays the same. The same object can stand in a problem.toml. An
+    `begin(session)` is called once with everything that stays the same. The same object can be named in a problem.toml. An
     exception of the simulator comes out as it is; `stretch_gap.Refused` says that values cannot be simulated.
 
     `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
@@ -361,7 +361,7 @@ def run(
     progress: Callable[[str], Any] | None,
     notes: list[str],
 ) -> Diagnosis:
-    """Diagnoses a checked problem; `notes` stand before its own."""
+    """Diagnoses a checked problem; `notes` are put before its own."""
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
@@ -373,7 +373,7 @@ def run(
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:
-    """Wrappers that stand behind the simulator: it cannot be driven by other inputs than it has."""
+    """Wrappers that act behind the simulator: it cannot be driven by other inputs than it has."""
     sides = ("input", *driven)
     for one in wrappers:
         if one.split(".", 1)[0] in sides:

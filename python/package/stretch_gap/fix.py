@@ -60,7 +60,7 @@ class Fix:
         rate_hz: float | None = None,
         progress: Callable[[str], Any] | None = None,
     ) -> Any:
-        """Diagnoses the fixed simulator: beside the same recordings, or beside others."""
+        """Diagnoses the fixed simulator with the same recordings, or with others."""
         from .diagnosis import run
 
         again = self._runnable()

@@ -14,7 +14,7 @@ from . import problem as entries
 from ._stretch import StretchError
 
 COMMANDS = ("cmd", "command", "commanded", "target", "goal", "desired", "setpoint", "ref", "reference", "action", "ctrl")
-"""Words that the column of a command has beside the joint's name."""
+"""Words that the column of a command has in addition to the joint's name."""
 OTHERS = ("vel", "velocity", "speed", "torque", "effort", "current", "load", "acc", "acceleration", "temp", "force")
 """Words of columns that are neither a command nor a position."""
 
@@ -32,7 +32,7 @@ class Joint:
 
 
 def trials(recording: entries.Data, rate_hz: float | None) -> list[entries.Trial]:
-    """Recordings with their times beside the columns."""
+    """Recordings with their times and columns."""
     made = []
     for trial in entries.trials(recording, rate_hz):
         columns = dict(trial.columns)
@@ -52,7 +52,7 @@ def words(column: str) -> list[str]:
 
 
 def of_joint(name: str, columns: Sequence[str], names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Columns of a joint's command and of its position: all words of its name stand in theirs, and no longer name of a joint
+    """Columns of a joint's command and of its position: all words of its name are in theirs, and no longer name of a joint
     does."""
     own = words(name)
 

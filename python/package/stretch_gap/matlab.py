@@ -26,7 +26,7 @@ def read_mat(path: Path, found: Arrays) -> None:
     io = library("scipy.io", "matlab")
     try:
         variables = io.loadmat(path, simplify_cells=True)
-    # scipy has no error of its own for damaged files
+    # scipy has no specific error for damaged files
     except Exception as error:
         raise found.cannot("MAT file", error, "save it again with -v7") from error
     walk({name: value for name, value in variables.items() if not name.startswith("__")}, found, "", ".")
@@ -95,7 +95,7 @@ class Tree:
         """A group, or the array of structures that MATLAB keeps as a group of references."""
         about = self.h5py.h5o.get_info(group.id)
         if (about.fileno, about.addr) in self.seen:
-            return Unread("it stands in another group, too")
+            return Unread("it is in another group, too")
         self.seen.add((about.fileno, about.addr))
         # what begins so MATLAB keeps for itself
         parts = {name: group.get(name) for name in group if not name.startswith("#")}

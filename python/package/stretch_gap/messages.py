@@ -129,7 +129,7 @@ def take(rows: Iterator[tuple[str, int, Decode]], found: Arrays, what: str, todo
             topic, logged_ns, decode = next(rows)
         except StopIteration:
             break
-        # each library has errors of its own, and of those that it stands on
+        # each library has its own errors, and those of the libraries that it uses
         except Exception as error:
             if not count:
                 raise found.cannot(what, error or type(error).__name__, todo) from error

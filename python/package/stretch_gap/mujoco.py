@@ -6,7 +6,7 @@
 >>> left = found.apply(spec := problem.spec)                         # doctest: +SKIP
 
 Joints are found by their names among the columns. Gains, damping and armature that the model has are parameters with
-tolerances; friction loss, damping and armature that it lacks are candidates, beside whatever may be around a simulator
+tolerances; friction loss, damping and armature that it lacks are candidates, in addition to whatever may be around a simulator
 (delay, backlash, a flexible joint ...).
 """
 
@@ -90,7 +90,7 @@ class Simulator:
                 rest = states[:, self.steps - 1 :: self.steps, at][:, : part.samples.stop - part.samples.start - 1]
                 out[joint.measured][:, part.samples.start + 1 : part.samples.stop] = rest / joint.scale
         broken = [i for i in range(count) if not all(np.isfinite(x[i]).all() for x in out.values())]
-        for i in broken:  # told as no number, which takes that model out
+        for i in broken:  # reported as no number, which takes that model out
             for x in out.values():
                 x[i] = np.nan
         return out
@@ -115,7 +115,7 @@ class Simulator:
 
 @dataclass
 class Problem:
-    """A model beside recordings: what `stretch_gap.diagnose` takes, ready to be changed before it is asked."""
+    """A model with recordings: what `stretch_gap.diagnose` takes, ready to be changed before it is asked."""
 
     spec: Any
     """The model's specification, as `MjSpec`."""
@@ -149,7 +149,7 @@ def problem(
 
     `model` is the path of an XML file, its text, or an `MjSpec`. `recording` is whatever `stretch_gap.diagnose` takes as
     data. `joints` says which joints of the model are looked at, by name, or also by which columns: `{"elbow":
-    ("elbow_cmd_rad", "elbow_rad")}`; without it, all whose name stands in the columns. Angles are in radians; columns that
+    ("elbow_cmd_rad", "elbow_rad")}`; without it, all whose name is in the columns. Angles are in radians; columns that
     end with `_deg` are in degrees, and all with `degrees=True`.
 
     Refused, with what to do: joints that no column is called like, joints that never moved, a command that is the

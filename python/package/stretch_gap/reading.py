@@ -35,7 +35,7 @@ READERS: tuple[tuple[int, bytes, Callable[[Path, Arrays], None]], ...] = (
     (0, b"\x93NUMPY", tables.read_numpy),
     (0, b"PK\x03\x04", tables.read_numpy),
 )
-"""What stands where in a file of a format, and what reads it."""
+"""The layout of a file of a format, and its reader."""
 
 
 class Recording(Mapping[str, Array]):
@@ -89,7 +89,7 @@ def read(
 ) -> Recording:
     """Reads a recording: text in any dialect, NPY, NPZ, MCAP, ROS bags, MAT, HDF5, Parquet, any of which its first bytes tell.
 
-    Each topic, group or structure with a time of its own is a clock. Channels on several clocks are brought to that of the
+    Each topic, group or structure with its own time is a clock. Channels on several clocks are brought to that of the
     fastest, or to a grid of `grid_hz`, by straight lines and within the time that all of them cover. With `columns` only the
     clocks of these count; a column is found by the last part of its path where only one ends so. `time` is the column or
     array of the time where it has an unusual name. `rate_hz` is for recordings without any time.
@@ -145,7 +145,7 @@ def convert(path: str | os.PathLike[str], out: str | os.PathLike[str], *, force:
         found.notes += recording.notes
     if not found.numbers:
         raise StretchError(f"{os.fspath(path)}: there are no numbers in it ({'; '.join(found.notes) or 'it is empty'})")
-    # a name that nobody has
+    # a name that no other file has
     part = Path(f"{os.fspath(out)}.{uuid.uuid4().hex}.part")
     try:
         # numpy.savez takes no array that is called "file"

@@ -24,7 +24,7 @@ def write(
 ) -> None:
     """Writes a recording of Rerun: by trial and output the measured curve, the simulated ones, and what is left of each.
 
-    `spans` are name, samples and session time, s, of the trials that stand end to end in the curves.
+    `spans` are name, samples and session time, s, of the trials that follow each other in the curves.
     """
     try:
         import rerun  # type: ignore[import-untyped,import-not-found,unused-ignore]

@@ -9,7 +9,7 @@ attribute `batch`); a function takes two dicts for one model and returns `[sampl
 - `stage`: the number of the stage that is asked for.
 
 A simulator that takes `inputs` or `first` is called once a trial. One that takes `trials` as well is called once for all of
-them, which stand end to end; so is one that takes none of these. `**kw` takes all. With several outputs a simulator that does
+them, which follow each other; so is one that takes none of these. `**kw` takes all. With several outputs a simulator that does
 not take `stage` returns a dict of arrays by output. A method `begin(session)` is called once with everything that stays the
 same.
 """
@@ -74,7 +74,7 @@ class TrialSpan:
     start_s: float
     """Session time of its first sample, s."""
     first: Mapping[str, float]
-    """Every column's measured value in its first sample: where the machine stands when the trial begins."""
+    """Every column's measured value in its first sample: the position of the machine when the trial begins."""
 
 
 class Asked:
@@ -117,7 +117,7 @@ class Asked:
 
     @property
     def is_called_once_a_trial(self) -> bool:
-        """Whether each trial is a call of its own."""
+        """Whether each trial is a separate call."""
         return "trials" not in self.optional and not self.optional.isdisjoint({"inputs", "first"})
 
     def bind(self, session: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Numba where it is installed; without it every simulator and operator runs as it stands, only slower."""
+"""Numba where it is installed; without it every simulator and operator runs as it is, only slower."""
 try:
     from numba import njit
 except ImportError:

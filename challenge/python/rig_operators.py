@@ -44,7 +44,7 @@ def oscillated(x, m_s, damping):
 
 @njit(cache=True)
 def played(x, width, wound):
-    """Backlash of a half width; `wound` is where x stands in it at first: 1 it went up before, -1 down, 0 in the middle."""
+    """Backlash of a half width; `wound` is the position of x in it at first: 1 it went up before, -1 down, 0 in the middle."""
     out, y = np.empty_like(x), x[0] - wound * width
     for i in range(len(x)):
         y = min(max(y, x[i] - width), x[i] + width)

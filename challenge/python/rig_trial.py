@@ -1,4 +1,4 @@
-"""A trial of the rig as recorded: on a grid of 100 Hz, with what a simulation needs beside it."""
+"""A trial of the rig as recorded: on a grid of 100 Hz, with what a simulation needs in addition."""
 import numpy as np
 from scipy.signal import medfilt, savgol_filter
 
@@ -7,7 +7,7 @@ from rig_operators import played
 
 STRIDE = 7  # rows that are compared: 50 and 60 Hz stay visible in them
 GAP_S, AFTER_GAP_S = 0.035, 1.5  # commands of a gap are not known: rows in it and behind it are left out
-OUTLIER = 10.0  # times the noise beside the median of five: left out
+OUTLIER = 10.0  # times the noise from the median of five: left out
 MAD = 1.4826  # standard deviation of a normal variable over its median absolute deviation
 
 

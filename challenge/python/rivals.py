@@ -8,7 +8,7 @@ from case import solve
 
 
 def named(case, believed):
-    """The answer that the greatest probability stands for."""
+    """The answer with the greatest probability."""
     names, _ = max(believed, key=lambda b: b[1])
     if names == ["unknown"]:
         return believed, "unknown", None, 0.0

@@ -26,7 +26,7 @@ SYSTEMS = (
 
 
 def module(folder: Path, name: str) -> ModuleType:
-    """A module of a system's folder, under a name of its own."""
+    """A module of a system's folder, under a separate name."""
     spec = importlib.util.spec_from_file_location(f"{folder.name}_{name}", folder / f"{name}.py")
     assert spec is not None and spec.loader is not None
     made = importlib.util.module_from_spec(spec)

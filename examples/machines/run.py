@@ -1,8 +1,8 @@
-"""A machine that others measured beside the simulator that anybody would write: what is missing?
+"""A machine that others measured, and the simulator that anyone would write: what is missing?
 
     python run.py SYSTEM DATA [--problem viscous.toml] [--every 2] [--set joint=wpitch] [--out FOLDER] [--compare]
 
-SYSTEM is a folder beside this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program that runs is the
+SYSTEM is a folder next to this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program that runs is the
 `stretch` of the search path, or --program.
 """
 

@@ -1,6 +1,6 @@
 """What DuckDB and NumPy take on the files of `speed rows FOLDER ...`: python others.py FOLDER
 
-Needs duckdb, numpy and pyarrow (in an environment of its own). Shortest of three, like the example.
+Needs duckdb, numpy and pyarrow (in a separate environment). Shortest of three, like the example.
 """
 
 import glob

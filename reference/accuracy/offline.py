@@ -3,7 +3,7 @@
     python3 reference/accuracy/offline.py SIMULATED_7 SIMULATED_8 ...
 
 Each argument is a folder made by `stretch simulate --rig paper --seed N --out SIMULATED_N`; the measured
-sessions are those of the folder knit_sleeve below STRETCH_DATA (default ../shared/data beside the project; the
+sessions are those of the folder knit_sleeve below STRETCH_DATA (default ../shared/data next to the project; the
 project carries none), in the pairs and with the signals of reference/accuracy/measured.csv (written by the accuracy example). Writes reference/accuracy/offline.csv.
 """
 

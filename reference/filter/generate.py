@@ -1,6 +1,6 @@
 """Reference values for stretch-filter. Run: python3 reference/filter/generate.py
 
-Writes the CSV files beside this script; each names the tools it came from.
+Writes the CSV files next to this script; each names the tools it came from.
 """
 
 import platform

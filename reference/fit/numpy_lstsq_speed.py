@@ -1,6 +1,6 @@
 """Speed and error of NumPy's least squares on the data of benches/fit.rs.
 
-Run beside `cargo bench --bench fit` on the same machine and compare
+Run next to `cargo bench --bench fit` on the same machine and compare
 nanoseconds a sample: `python3 numpy_lstsq_speed.py`. One thread, process CPU
 time, the design matrix built inside the clock as in the bench; the lowest of
 seven rounds.

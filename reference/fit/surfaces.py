@@ -2,7 +2,7 @@
 
 Least squares in 60-digit arithmetic (mpmath) on the samples as stored in
 binary64, so the ill-conditioned coefficients are exact to every digit shown;
-t and F quantiles and the robust fits from SciPy; statsmodels beside them.
+t and F quantiles and the robust fits from SciPy; those of statsmodels next to them.
 """
 import mpmath as mp
 import numpy as np

@@ -2,7 +2,7 @@
 
     python3 reference/gauge/by_hand.py [DATA]
 
-DATA holds knit_sleeve and cylinder_friction (default: STRETCH_DATA, else ../shared/data beside the project, which
+DATA holds knit_sleeve and cylinder_friction (default: STRETCH_DATA, else ../shared/data next to the project, which
 carries no recordings of others; book/src/results/gauge_alone.md says whose they are).
 
 Straight lines, splines, exponentials and stops by least squares (numpy, scipy), on the

@@ -1,6 +1,6 @@
 """Writes the recordings in this folder with the tools that people write them with.
 
-One motion, made here: 60 samples at 100 Hz of length_mm and bridge_v, and a pressure_kpa at 25 Hz on a clock of its own. `lerobot/` is a
+One motion, made here: 60 samples at 100 Hz of length_mm and bridge_v, and a pressure_kpa at 25 Hz on a separate clock. `lerobot/` is a
 data set of LeRobot (a Parquet file of two episodes, names in meta/info.json).
 Run in an environment with the packages of versions.txt: python make.py
 """

@@ -1,4 +1,4 @@
-"""Sixteen sessions of knitted sensors, as they are and with all sensors 80 ms late: is that told?
+"""Sixteen sessions of knitted sensors, as they are and with all sensors 80 ms late: is that reported?
 
     python shifted.py FOLDER [--program stretch] [--only 4]
 

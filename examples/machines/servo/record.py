@@ -45,7 +45,7 @@ SETTLED_S = 0.8
 
 
 def recordings(data: Path, every: int = 1, stand: str = "single") -> dict[str, dict[str, np.ndarray]]:
-    """The holds of a log at its 10 Hz, end to end: what stands between two commands is left out, since how it moves is
+    """The holds of a log at its 10 Hz, end to end: what is between two commands is left out, since how it moves is
     another question."""
     rows = read(data, stand)
     time_s = np.arange(0.0, rows["time_s"][-1], 0.1 * every)

@@ -1,5 +1,5 @@
 //! Where the feature `page` is on, finds the page that was built beforehand, so that the program carries it: what `STRETCH_PAGE` names, else what
-//! web/build.sh made. A page that is named and missing is an error, for a release would lack it; where none is named, the program is built without.
+//! web/build.sh made. A page that is named and missing is an error, because a release would lack it; where none is named, the program is built without.
 
 use std::{
     env, fs,

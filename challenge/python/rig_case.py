@@ -136,7 +136,7 @@ class RigCase(Case):
         return self.body(p, effects, trials, [self.trials[i][1].pressure for i in trials])
 
     def pressures(self, p, effects, trials):
-        """Pressure of each trial, kPa; the last ones are kept, for most fits move something else."""
+        """Pressure of each trial, kPa; the last ones are kept, because most fits move something else."""
         inside = np.array([effects[n][0] if n in effects else 0.0 for n in PNEUMATIC])
         key = (tuple(p), tuple(inside), tuple(trials))
         if key != self.last_pressure[0]:

@@ -105,7 +105,7 @@ impl<T: Send> Source for Asked<T> {
 /// array `[n, samples]` each, or None, and those of other stages, each with stage and input; it returns `[n, samples]`.
 ///
 /// # Errors
-/// Exceptions of the simulator, and KeyboardInterrupt; the work then ends by itself, for its questions stay without an answer.
+/// Exceptions of the simulator, and KeyboardInterrupt; the work then ends by itself, because its questions stay without an answer.
 pub(crate) fn serve<T: Send>(
     py: Python<'_>,
     mut messages: Receiver<Message<T>>,

@@ -215,7 +215,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             ("DRAG", v[2], "s"),
             ("DRY", v[3], &*signals.x.unit),
             ("W", libm::sqrt(1.0 - v[1] * v[1]) / v[0].max(1e-9), "1/s"),
-            // Not 0 where nothing is dry, for it divides.
+            // Not 0 where nothing is dry, because it divides.
             ("SLOW", (SLOW * v[3] / v[0].max(1e-9)).max(1e-150), &*speed),
             ("DT", signals.dt_s, "s"),
         ];

@@ -238,9 +238,13 @@ impl EffectParameter {
         }
     }
 
-    /// Values to screen at: a strength at a fiftieth and a fifth of its range, of both signs where it has both; a threshold, which is off
-    /// elsewhere than at 0, at a twentieth, a fifth, three fifths and nine tenths of the way from there, for it may reach the signal only near the other end; a shape, and a strength that is searched in equal
-    /// ratios, at a sixth, a half and five sixths of its range; a form at its usual value.
+    /// Values to screen at:
+    ///
+    /// - a strength: a fiftieth and a fifth of its range, of both signs if it has both;
+    /// - a threshold, which is off elsewhere than at 0: a twentieth, a fifth, three fifths and nine tenths of the way from there, because it
+    ///   may reach the signal only near the other end;
+    /// - a shape, and a strength that is searched in equal ratios: a sixth, a half and five sixths of its range;
+    /// - a form: its usual value.
     ///
     /// ```
     /// use stretch_effects::EffectParameter;

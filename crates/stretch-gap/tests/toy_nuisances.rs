@@ -14,7 +14,7 @@ fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
 
 const DESCRIBED: SlowDrift = SlowDrift { sd: 0.03, correlation_s: 3.0 };
 
-/// As described, half as large, twice as large, quicker: of 20 records none has a name, for a name takes 12 nats.
+/// As described, half as large, twice as large, quicker: of 20 records none has a name, because a name takes 12 nats.
 #[test]
 fn a_drift_that_is_described_is_no_effect() {
     for (i, course) in [(0.03, 3.0), (0.015, 3.0), (0.06, 3.0), (0.03, 1.0)].into_iter().enumerate()

@@ -11,7 +11,7 @@ fn told(record: &Measured) -> Diagnosis {
     record.diagnosed().0
 }
 
-/// In white noise a parameter errs by its posterior deviation over sqrt(50), for a block counts as one observation, and is drawn to its nominal
+/// In white noise a parameter errs by its posterior deviation over sqrt(50), because a block counts as one observation, and is drawn to its nominal
 /// value by sd^2/tolerance^2 of the distance. Of 80 numbers none errs by 4.5 deviations (7 in 10^6 each); half a deviation is left to the
 /// midpoint rule, which lies (2 pi rate h)^2/6 = 1.6e-4 off in the rate.
 #[test]

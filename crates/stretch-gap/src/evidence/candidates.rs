@@ -140,7 +140,7 @@ pub(crate) fn candidates(
 }
 
 /// Share of the gap that a set of effects closes at least to be a cause of it, as a `partial` answer promises: of the gap of the fitted and of the
-/// test trials, whichever is the greater, for what acts in long trials alone leaves little gap in short ones.
+/// test trials, whichever is the greater, because what acts in long trials alone leaves little gap in short ones.
 pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than

@@ -49,7 +49,7 @@ pub struct Noise {
     known_to: f64,
 }
 
-/// Relative standard deviation of a variance from second differences: a tenth of the noise itself, for they hold whatever else is quick.
+/// Relative standard deviation of a variance from second differences: a tenth of the noise itself, because they contain whatever else is quick.
 const DIFFERENCES_KNOWN_TO: f64 = 0.2;
 
 impl Noise {

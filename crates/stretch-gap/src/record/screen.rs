@@ -8,7 +8,7 @@
 //!
 //! for the measured m and the simulated y. A parameter's size is one step of Gauss and Newton with its own tolerance taken away. Then
 //! one or two simulations a stage say what is left, from either end: from the rig as shipped, after one step of all parameters within
-//! their tolerances, for a large error bends what was re-tuned; and from the re-tuned rig, for a small one does not.
+//! their tolerances, because a large error bends what was re-tuned; and from the re-tuned rig, because a small one does not.
 
 use rayon::prelude::*;
 

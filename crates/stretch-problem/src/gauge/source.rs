@@ -49,7 +49,7 @@ impl GaugeSimulator {
         let (reference, signal) = (reference.to_owned(), signal.to_owned());
         let (reference, signal) = (reference.as_str(), signal.as_str());
         let trials = match &set {
-            // The recording is read once, for it may be standard input.
+            // The recording is read once, because it may be standard input.
             None => vec![SessionTrial::from(first)],
             Some(set) => {
                 let options = recorded.clone().require(reference).require(signal);

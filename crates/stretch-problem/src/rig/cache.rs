@@ -66,7 +66,7 @@ pub(super) fn causes(
     (acting().map(ActiveEffect::name).collect(), numbers.collect())
 }
 
-/// The last few results of a function, by its arguments. A clone begins empty, for the owner of a clone will change what the function depends on.
+/// The last few results of a function, by its arguments. A clone begins empty, because the owner of a clone will change what the function depends on.
 #[derive(Debug)]
 pub(super) struct LastResults<K: Hash + Eq, V> {
     last: Mutex<LruCache<K, Arc<V>>>,

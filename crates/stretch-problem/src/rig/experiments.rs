@@ -12,7 +12,7 @@ use crate::{bench::acting::unrecorded, error::ProblemError};
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
-/// Step of integration, s: four times the usual one, for differences between rivals need few digits.
+/// Step of integration, s: four times the usual one, because differences between alternatives need few digits.
 const STEP_S: f64 = 4.0 * DEFAULT_STEP_S;
 /// Share by which the shunt changes the bridge's trim.
 const SHUNT: f64 = 0.02;

@@ -68,7 +68,7 @@ pub(super) fn parameters(
 const INITIAL_STATE: f64 = 0.4;
 
 /// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the stroke, 1 as if it had settled where
-/// the session begins. The chamber has no such parameter, for its pressure is measured.
+/// the session begins. The chamber has no such parameter, because its pressure is measured.
 fn initial_state(kind: &RigStage) -> Option<(ParameterSpec, TunedParameter)> {
     let name = match kind {
         RigStage::Pneumatics | RigStage::Reference => return None,

@@ -10,7 +10,7 @@ use super::cache::LastResults;
 const WIDEST: usize = 15;
 /// Narrowest half-width, in samples.
 const NARROWEST: usize = 2;
-/// Longest time that the widest and the narrowest half-width may take, s: fewer samples where the rate is low, for what a valve does is as
+/// Longest time that the widest and the narrowest half-width may take, s: fewer samples where the rate is low, because what a valve does is as
 /// quick there. A window of less than [`NARROWEST`] samples on either side is none.
 const LONGEST_S: [f64; 2] = [0.15, 0.02];
 /// Greatest half-width of a window, a share of the time since the last command without [`WAKE_S`].

@@ -152,7 +152,7 @@ fn write_err(text: &str) {
 }
 
 /// A text without what a terminal acts on, or what turns the text around it or hides: names come from
-/// files of anybody. What is written in its place is an escape of JSON, too.
+/// files of any origin. What is written in its place is an escape of JSON, too.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {

@@ -48,7 +48,7 @@ impl Recordings {
     fn add(&mut self, text: &str) {
         self.rows.extend(text.lines().skip(1).filter_map(row));
         let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|l| l.split(',').collect()).collect();
-        // the time is everybody's
+        // all recordings share the time
         for column in 1..rows.first().map_or(0, Vec::len) {
             let values: Vec<&str> = rows.iter().filter_map(|r| r.get(column).copied()).collect();
             self.runs.extend(runs(&values));

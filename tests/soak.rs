@@ -89,7 +89,7 @@ fn send(frames: u32, out: impl Write) -> std::io::Result<()> {
         let code = (n * 7 % 4096) as i32;
         let frame = Frame { counter, time_ms: 10 * counter, code, answer };
         let line = frame.encode(&mut [0; Frame::LONGEST]).to_vec();
-        // what comes last before a board starts again, or first behind it, cannot be missed by anybody
+        // what comes last before a board starts again, or first behind it, cannot be missed
         let starts_again = n % 500_000 == 499_999;
         must |= starts_again || n + 1 == frames;
         way.send(&line, must, &mut out)?;

@@ -45,7 +45,7 @@ impl Language {
         }
     }
 
-    /// A text as a line of comment. Names of anybody's columns, and their units, are in it: none ends the comment or its line, or is a
+    /// A text as a line of comment. Names of columns of any origin, and their units, are in it: none ends the comment or its line, or is a
     /// coding that Python would read the file in.
     ///
     /// ```

@@ -1,4 +1,4 @@
-//! Names and units come from files of anybody: none of them becomes code.
+//! Names and units come from files of any origin: none of them becomes code.
 
 use stretch_effects::{EffectParameter, Extent, KINDS, Language, Quantity, Signals};
 

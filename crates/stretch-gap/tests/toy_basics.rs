@@ -3,7 +3,7 @@
 use crate::toys::{Effect, Law, Toy, binomial_bound, slow};
 use stretch_gap::VerdictKind;
 
-/// One of each kind, alone and one behind the other.
+/// One of each kind, alone and one after the other.
 fn kinds() -> Vec<Toy> {
     let alone = [Law::Line, Law::Lag, Law::Oscillator, Law::Delay].map(|law| Toy::of(&[law]));
     alone.into_iter().chain([Toy::of(&[Law::Lag, Law::Line])]).collect()

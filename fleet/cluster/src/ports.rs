@@ -45,13 +45,13 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
     }
     ensure!(
         is_insecure,
-        "a {who} on {listens_on} obeys everybody who reaches it: nothing is encrypted, no caller is authenticated, and queries \
+        "a {who} on {listens_on} obeys everyone who reaches it: nothing is encrypted, no caller is authenticated, and queries \
          read and write files as this user. Listen on 127.0.0.1, or give the cluster a separate network and say --insecure"
     );
     // if even this cannot be written, the error cannot be reported
     let _ = writeln!(
         io::stderr().lock(),
-        "WARNING: INSECURE: this {who} on {listens_on} obeys everybody who reaches it; keep that network closed"
+        "WARNING: INSECURE: this {who} on {listens_on} obeys everyone who reaches it; keep that network closed"
     );
     Ok(())
 }

@@ -172,7 +172,7 @@ pub(crate) async fn ask_in_shares<T: Copy>(
     in_order(session, shares.map(|own| question(&condition(own))).collect()).await
 }
 
-/// Answers of several questions, one behind the other.
+/// Answers of several questions, one after the other.
 ///
 /// Each query is answered by one thread, which takes files and rows in their order, and all queries
 /// run at once. Therefore sums have the same bits in every run, however many queries there are.

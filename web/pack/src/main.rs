@@ -98,7 +98,7 @@ impl Glue {
     }
 }
 
-/// Files one behind the other.
+/// Files one after the other.
 fn joined(sources: &Path, files: &[&str]) -> Outcome<String> {
     let mut text = String::new();
     for file in files {

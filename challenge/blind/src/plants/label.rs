@@ -44,7 +44,7 @@ pub struct FormFamily {
 }
 
 impl FormFamily {
-    /// The three families that anybody may read.
+    /// The three families that are public.
     #[must_use]
     pub fn published() -> Vec<Self> {
         let family = |name: &str, softness, asymmetry, spread, colour| Self {

@@ -140,7 +140,7 @@ fn is_killed_before_every_call(job: Job, exchanges: bool) -> usize {
             assert_eq!(tree(scratch.path()), expected[1], "{case}");
             return at;
         }
-        // the next run is not in anybody's way, and what is the user's is still there
+        // the next run is not blocked, and what is the user's is still there
         if job == Job::Folder && exchanges {
             job.run(scratch.path()).expect(&case);
             assert_eq!(kept(scratch.path()), expected[1], "{case}");

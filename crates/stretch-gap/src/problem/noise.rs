@@ -347,7 +347,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 /// are none.
 ///
 /// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; if one remains in
-/// what is left, the waves are fitted to that again. It makes differences of either sign one behind the other, where a kink of the
+/// what is left, the waves are fitted to that again. It makes differences of either sign one after the other, where a kink of the
 /// motion makes one alone.
 pub(crate) fn take_waves_out(
     values: &mut [f64],

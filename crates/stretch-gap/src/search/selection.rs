@@ -1,4 +1,4 @@
-//! The search: forward selection, backward pruning, and rivals in every slot.
+//! The search: forward selection, backward elimination, and alternatives for every effect.
 //!
 //! Greedy selection is dangerously sure of a strong effect that replaces several small ones, so the search looks back three times:
 //! sets are pruned with the rest fitted anew from the larger set; every effect of the best set is compared with alternatives
@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
         Ok(set)
     }
 
-    /// Forward selection from a set, backward pruning; the sets that were fitted are remembered.
+    /// Forward selection from a set, and backward elimination; the sets that were fitted are remembered.
     fn grow(&mut self, from: Hypothesis, progress: &dyn Fn(&str)) -> Result<Hypothesis, GapError> {
         let mut best = from;
         for round in best.effects.len()..self.depth {
@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
             best = next;
         }
         if best.effects.len() > 1 {
-            progress("pruning");
+            progress("removing weak effects");
             best = self.prune(best)?;
         }
         Ok(best)

@@ -186,7 +186,7 @@ pub trait Source: Send + Sync {
     /// The output of the stage over the trials of each ask, in the order of the asks.
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>>;
 
-    /// Whether an answer holds the outputs of all stages, one behind the other, whatever stage is asked for: a simulator that runs as a
+    /// Whether an answer holds the outputs of all stages, one after the other, whatever stage is asked for: a simulator that runs as a
     /// whole is then run once for all stages. The inputs of an ask are those of the stage asked for.
     ///
     /// Where the inputs of one stage are altered, such a source is asked for that stage, whichever output is looked at.

@@ -150,7 +150,7 @@ class Asked:
         altered: Sequence[Sequence[Array]] | None,
         others: Sequence[tuple[int, int, Sequence[Array]]] = (),
     ) -> Array:
-        """Outputs of some models, `[n, samples]`; with several stages those of all, one behind the other.
+        """Outputs of some models, `[n, samples]`; with several stages those of all, one after the other.
 
         `altered` holds a row a model for each column that drives the stage, `others` the same with stage and input for columns of
         other stages.

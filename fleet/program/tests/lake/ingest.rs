@@ -133,7 +133,7 @@ fn a_damaged_trial_is_named_and_the_rest_goes_on() {
     assert!(told.contains("2_20260101.csv") && told.contains("nonsense"), "{told}");
     assert!(told.contains("does not fit the pattern"), "{told}");
     assert_eq!(bytes(&lake.join("refused")).len(), 2);
-    // put right, it is in the lake, and no longer named
+    // corrected, it is in the lake, and no longer named
     fs::write(logs.join("2_20260101.csv"), text).unwrap();
     assert!(
         warned(line, &[&logs, &lake])

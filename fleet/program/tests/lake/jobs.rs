@@ -28,7 +28,7 @@ pub(crate) const INGEST: Job = Job {
         {
             file(&folder.join("logs"), &trial(name, k as f64));
         }
-        // a trial that is refused, and one that was refused and is put right
+        // a trial that is refused, and one that was refused and is corrected
         fs::create_dir(folder.join("logs/3")).unwrap();
         fs::write(folder.join("logs/3/20260101_a.csv"), "no trial").unwrap();
         file(&folder.join("logs"), &trial("4/20260101_a.csv", 9.0));

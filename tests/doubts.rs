@@ -91,7 +91,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
             "still.csv",
             still,
             evaluate,
-            &["the reference stands still, so that there is no R^2"],
+            &["the reference is constant, so that there is no R^2"],
             &[],
         ),
         (

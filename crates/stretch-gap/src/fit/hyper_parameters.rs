@@ -48,27 +48,25 @@ impl Metric {
             let levels = levels.chain([own]);
             let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let levels: Vec<Level> = levels.collect();
-            let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
-            let noise = tried.par_iter().map(|m| m.spectral_level(roles, residual));
+            // a metric holds several columns: each is made twice, so that those of all levels need not be kept
+            let noise = levels.par_iter().map(|level| one(*level).spectral_level(roles, residual));
             let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
             let fit = |m: &Self| m.beside(roles, residual, noise);
-            let fits: Vec<f64> = tried.par_iter().map(fit).collect();
+            let fits: Vec<f64> = levels.par_iter().map(|level| fit(&one(*level))).collect();
             let before = fits.last().copied().unwrap_or(0.0);
-            let all = fits.iter().copied().zip(&tried);
-            let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            let found = &metric.loose()[which];
-            let drifts = found.parameter.is_none() && found.level != Level::NONE;
-            let without = metric.with(|i, own| if i == which { Level::NONE } else { own }, roles);
+            let all = fits.iter().copied().zip(&levels);
+            let Some((most, level)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+            let drifts = best.loose()[which].parameter.is_none() && *level != Level::NONE;
             let is_of_motion = || {
                 let mut left = residual.to_vec();
-                without.clean(roles, &mut left);
+                one(Level::NONE).clean(roles, &mut left);
                 depends_on_motion(&left)
             };
-            if BEYOND.contains(&found.level.size) || (drifts && is_of_motion()) {
-                best = without;
+            if BEYOND.contains(&level.size) || (drifts && is_of_motion()) {
+                best = one(Level::NONE);
             } else {
                 gained += most - before;
-                best = metric.clone();
+                best = one(*level);
             }
         }
         (best, gained)

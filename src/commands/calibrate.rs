@@ -369,7 +369,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     // signals that are only candidates may be anything, and the rows of a table may be far apart
     let named = [args.reference.as_str(), options.signal.as_str()];
     let named = if is_table { &[][..] } else { &named[..] };
-    let (trials, gross_errors) = without_gross_errors(&trials, named);
+    let (trials, gross_errors) = without_gross_errors(trials, named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
     let ranking = match signal {
         Signal::Best(names) => {

@@ -192,17 +192,6 @@ pub enum CalibrateError {
         /// The fault of the file, and its place.
         problem: String,
     },
-    /// The trials have too many rows to be fitted in memory.
-    #[error(
-        "the trials have {rows} rows together, and at most {most} are fitted at once; thin them to fewer samples a second \
-         (stretch convert --grid HZ), or give a part of the log"
-    )]
-    TooLong {
-        /// Rows of all trials.
-        rows: usize,
-        /// The most rows.
-        most: usize,
-    },
     /// A trial is inconsistent, or lacks a column.
     #[error(transparent)]
     Data(#[from] stretch_data::DataError),

@@ -31,8 +31,9 @@ pub use record::{
 pub mod toolkit {
     pub use crate::{
         fit::{
-            LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, TermRows, leave_one_out,
+            LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, States, TermRows,
+            leave_one_out,
         },
-        prepare::{check_rows, even, even_signals, extent, noise, pooled_range, sample_rate_hz},
+        prepare::{even, even_signals, extent, noise, pooled_range, sample_rate_hz},
     };
 }

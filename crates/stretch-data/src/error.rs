@@ -105,6 +105,17 @@ pub enum DataError {
         /// The test trial.
         test: String,
     },
+    /// More rows than a command takes in memory.
+    #[error(
+        "the trials have {rows} rows together, and at most {most} are taken at once; thin them to fewer samples a second \
+         (stretch convert --grid HZ), or give a part of the log"
+    )]
+    TooLong {
+        /// Rows of all trials.
+        rows: usize,
+        /// The most rows.
+        most: usize,
+    },
     /// A session in which no trial has two samples.
     #[error("no recording has two or more rows; give a recording that has")]
     NoSamples,

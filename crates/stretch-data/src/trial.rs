@@ -27,6 +27,25 @@ pub struct Channel {
     pub values: Vec<f64>,
 }
 
+/// Refuses trials that are too long to be held in memory by what follows.
+///
+/// # Errors
+/// [`DataError::TooLong`] for more than `most` rows of all trials together.
+///
+/// ```
+/// use stretch_data::{Trial, check_rows};
+/// let trial = Trial { time_s: vec![0.0; 3], ..Trial::default() };
+/// assert!(check_rows([&trial, &trial], 6).is_ok());
+/// assert!(check_rows([&trial, &trial], 5).is_err());
+/// ```
+pub fn check_rows<'a>(
+    trials: impl IntoIterator<Item = &'a Trial>,
+    most: usize,
+) -> Result<(), DataError> {
+    let rows = trials.into_iter().map(Trial::len).sum();
+    if rows <= most { Ok(()) } else { Err(DataError::TooLong { rows, most }) }
+}
+
 impl Trial {
     /// How many samples it has.
     pub fn len(&self) -> usize {

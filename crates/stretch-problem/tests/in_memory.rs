@@ -99,7 +99,7 @@ fn trials_that_are_none_are_refused_by_calibrations() {
     for (what, trial) in spoilt() {
         let trials = [trial];
         survives(&format!("gross errors, {what}"), || {
-            without_gross_errors(&trials, &["length_mm", "bridge_v"])
+            without_gross_errors(trials.to_vec(), &["length_mm", "bridge_v"])
         });
         survives(&format!("calibrate, {what}"), || calibrate(&trials, &Options::default()).is_ok());
         survives(&format!("apply, {what}"), || apply(&calibration, &trials[0]).is_ok());

@@ -53,7 +53,7 @@ impl Choices {
         if trials.is_empty() {
             return Err(Said("there is no recording to fit: drop one, or fit one of those that are only tested on".to_owned()));
         }
-        Ok(without_gross_errors(&trials, &[&self.reference, &self.signal]))
+        Ok(without_gross_errors(trials, &[&self.reference, &self.signal]))
     }
 }
 

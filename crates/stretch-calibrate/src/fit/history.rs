@@ -54,10 +54,29 @@ const fn design(relaxations_s: &'static [f64], radii: &'static [f64], degree: u8
     StateDesign { relaxations_s, radii, degree, memory_degree: degree }
 }
 
+/// The states of every sample, end to end: a list of its own for each sample takes three times the memory.
+#[derive(Debug, Clone)]
+pub struct States {
+    width: usize,
+    values: Vec<f64>,
+}
+
+impl States {
+    /// The states of each sample.
+    pub fn iter(&self) -> impl Iterator<Item = &[f64]> + Clone {
+        self.values.chunks_exact(self.width)
+    }
+
+    /// The states of one sample.
+    pub fn at(&self, sample: usize) -> &[f64] {
+        &self.values[sample * self.width..][..self.width]
+    }
+}
+
 /// The states of a whole piece, and its target.
 struct Piece {
     fold: Vec<usize>,
-    states: Vec<Vec<f64>>,
+    states: States,
     target: Vec<f64>,
 }
 
@@ -72,14 +91,16 @@ impl StateDesign {
     }
 
     /// The states of every sample, computed as in the receptor.
-    pub fn states(&self, x: &[f64], period_s: f64) -> Vec<Vec<f64>> {
+    pub fn states(&self, x: &[f64], period_s: f64) -> States {
         let first = x.first().copied().unwrap_or(0.0);
         let mut slow = vec![first; self.relaxations_s.len()];
         let mut played = vec![first; self.radii.len()];
         let shares: Vec<f64> =
             self.relaxations_s.iter().map(|&tau| lag_share(period_s, tau)).collect();
-        let step = |&x: &f64| {
-            let mut states = vec![x];
+        let width = self.shape().states;
+        let mut states = Vec::with_capacity(width * x.len());
+        for &x in x {
+            states.push(x);
             let mut before = x;
             for (l, &share) in slow.iter_mut().zip(&shares) {
                 *l = lag(*l, x, share);
@@ -90,17 +111,14 @@ impl StateDesign {
                 *p = play(*p, x, radius);
                 states.push(x - *p);
             }
-            states
-        };
-        x.iter().map(step).collect()
+        }
+        States { width, values: states }
     }
 
     /// The least and the greatest value of each state in some pieces.
-    pub fn domain<'a>(
-        &self,
-        pieces: impl Iterator<Item = &'a Vec<Vec<f64>>> + Clone,
-    ) -> Vec<Interval> {
-        let one = |k: usize| extent(pieces.clone().flatten().map(move |states| states[k]));
+    pub fn domain<'a>(&self, pieces: impl Iterator<Item = &'a States> + Clone) -> Vec<Interval> {
+        let one =
+            |k: usize| extent(pieces.clone().flat_map(States::iter).map(move |states| states[k]));
         (0..self.shape().states).map(one).collect()
     }
 
@@ -171,7 +189,6 @@ struct Trained {
     choice: HistoryChoice,
     domain: Vec<Interval>,
     estimate: Interval,
-    pieces: Vec<Piece>,
     rows: TermRows,
     samples: usize,
     whole: LinearFactor,
@@ -193,7 +210,8 @@ pub(crate) fn history(
     let choice = best.choice;
     let solution = solve(&best.whole, choice.ridge).ok_or_else(undetermined)?;
     let weights = &solution.weights;
-    let (fit, errors) = judge(&best, &solution, prepared.sample_rate.hz());
+    let pieces = pieces(prepared, choice.design, choice.rest);
+    let (fit, errors) = judge(&best, &pieces, &solution, prepared.sample_rate.hz());
     let list = |f: fn(&Interval) -> f64| best.domain.iter().map(f).collect::<Vec<_>>();
     let map = HistoryMap {
         rest: choice.rest,
@@ -264,12 +282,8 @@ fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
     }
 }
 
-fn train(
-    prepared: &Prepared,
-    design: StateDesign,
-    rest: Option<RestTracker>,
-    ridges: &[f64],
-) -> Result<Trained, CalibrateError> {
+/// The pieces of all series. A fit that is kept is kept without them, because they are by far the largest part of it.
+fn pieces(prepared: &Prepared, design: StateDesign, rest: Option<RestTracker>) -> Vec<Piece> {
     let period_s = prepared.sample_rate.period_s();
     let mut pieces = Vec::new();
     for (series, fold) in prepared.folds() {
@@ -284,6 +298,16 @@ fn train(
         let target = series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
         pieces.push(Piece { fold, states: design.states(&x, period_s), target });
     }
+    pieces
+}
+
+fn train(
+    prepared: &Prepared,
+    design: StateDesign,
+    rest: Option<RestTracker>,
+    ridges: &[f64],
+) -> Result<Trained, CalibrateError> {
+    let pieces = pieces(prepared, design, rest);
     let shape = design.shape();
     let domain = design.domain(pieces.iter().map(|piece| &piece.states));
     let estimate = extent(pieces.iter().flat_map(|piece| piece.target.iter().copied()));
@@ -309,7 +333,7 @@ fn train(
         return Err(undetermined());
     }
     let choice = HistoryChoice { design, ridge, rest };
-    Ok(Trained { choice, domain, estimate, pieces, rows, samples, whole, cross_validated })
+    Ok(Trained { choice, domain, estimate, rows, samples, whole, cross_validated })
 }
 
 /// The triangular factor of each fold.
@@ -367,13 +391,13 @@ fn predict(weights: &[f64], row: &[f64], estimate: Interval) -> f64 {
 }
 
 /// Statistics of the final fit, and standard errors of its coefficients.
-fn judge(best: &Trained, solution: &Solution, hz: f64) -> (FitSummary, Vec<f64>) {
+fn judge(best: &Trained, pieces: &[Piece], solution: &Solution, hz: f64) -> (FitSummary, Vec<f64>) {
     let weights = &solution.weights;
     let length = ((BLOCK_S * hz) as usize).max(1);
     let (mut scaled, mut row) = (Vec::new(), Vec::new());
     let mut blocks: Vec<Vec<f64>> = Vec::new();
     let mut squares = 0.0;
-    for piece in &best.pieces {
+    for piece in pieces {
         let samples = piece.states.iter().zip(&piece.target).skip(SETTLE);
         for (i, (states, &target)) in samples.enumerate() {
             best.rows.fill(states, &mut scaled, &mut row);

@@ -12,7 +12,7 @@ mod report;
 mod surfaces;
 
 pub use calibrate::{Calibrated, calibrate};
-pub use history::{SETTLE, StateDesign, TermRows};
+pub use history::{SETTLE, StateDesign, States, TermRows};
 pub use least_squares::{LinearFactor, RowAccumulator, Solution, leave_one_out};
 pub use report::{Coefficient, FitReport, Order};
 

@@ -166,13 +166,15 @@ fn surface(
         volts: prepared.signal_range.normalise(raw.signal),
         value: prepared.target_range.normalise(raw.target),
     };
+    let [signal_domain, rate_domain] = [all(|raw| raw.signal), all(|raw| raw.signal_rate)];
     let samples: Vec<Folded> = raw.iter().map(|raw| (raw.fold, sample(raw))).collect();
+    drop(raw);
     let report = fit(name, Some(branch), &samples, degree, options.robust)?;
     let fitted = BranchSurface {
         rate_range,
         surface: report.surface,
-        signal_domain: all(|raw| raw.signal),
-        rate_domain: all(|raw| raw.signal_rate),
+        signal_domain,
+        rate_domain,
         fit: report.summary(),
     };
     Ok((fitted, report))

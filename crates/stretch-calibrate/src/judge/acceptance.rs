@@ -113,8 +113,7 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
     };
     // a fit leaves out what holds a gross error, and its checksums are of what it kept
     let cleaned = |trial: &Trial| {
-        let (kept, _) =
-            without_gross_errors(std::slice::from_ref(trial), &[columns[1], columns[0]]);
+        let (kept, _) = without_gross_errors(vec![trial.clone()], &[columns[1], columns[0]]);
         kept.iter().any(is_known)
     };
     let has_checksums = !provenance.checksums().is_empty();

@@ -8,7 +8,7 @@ use stretch_receptor::Domain;
 
 use crate::{
     CalibrateError,
-    prepare::{extent, polarity, sample_rate_hz},
+    prepare::{check_rows, extent, polarity, sample_rate_hz},
 };
 
 use super::apply::apply;
@@ -122,13 +122,14 @@ struct Estimates {
 /// reference.
 ///
 /// # Errors
-/// [`CalibrateError::Data`] when a trial lacks signal or reference,
+/// [`CalibrateError::Data`] when a trial lacks signal or reference, or the trials have more than [`MOST_ROWS`](crate::MOST_ROWS) rows,
 /// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up, or with fewer samples a second than the calibration expects.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
 ) -> Result<Evaluation, CalibrateError> {
     let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
+    check_rows(trials)?;
     let names: Vec<&str> =
         std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect();
     let mut pooled = vec![Tally::default(); names.len()];

@@ -25,13 +25,13 @@ const MOST_SHARE: f64 = 0.1;
 /// let length = Channel { name: "length_mm".into(), values: values.collect() };
 /// let time_s = (0..100).map(|n| 0.01 * f64::from(n)).collect();
 /// let trial = Trial { name: "ramp.csv".into(), time_s, channels: vec![length] };
-/// let (kept, sentences) = without_gross_errors(&[trial], &["length_mm"]);
+/// let (kept, sentences) = without_gross_errors(vec![trial], &["length_mm"]);
 /// assert_eq!(kept[0].len(), 99);
 /// assert!(sentences[0].contains("1 of 100 values of length_mm are gross errors (-999"), "{}", sentences[0]);
 /// ```
-pub fn without_gross_errors(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
+pub fn without_gross_errors(trials: Vec<Trial>, columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
     let mut sentences = Vec::new();
-    let mut kept: Vec<Trial> = trials.to_vec();
+    let mut kept = trials;
     for column in columns {
         let values: Vec<f64> =
             kept.iter().filter_map(|trial| trial.channel(column)).flatten().copied().collect();

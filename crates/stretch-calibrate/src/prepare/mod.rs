@@ -7,8 +7,8 @@ mod trials;
 
 pub use gross_errors::without_gross_errors;
 pub use series::{Rated, RatedPart, extent, noise, rated, sample_rate_hz};
-pub use trials::{MOST_ROWS, check_rows, even, even_signals, pooled_range};
+pub use trials::{MOST_ROWS, even, even_signals, pooled_range};
 
 pub(crate) use gross_errors::rows;
 pub(crate) use series::{branches, polarity, rates_at_use};
-pub(crate) use trials::{LEAST_TRIALS, Prepared, Tally, fold_of};
+pub(crate) use trials::{LEAST_TRIALS, Prepared, Tally, check_rows, fold_of};

@@ -23,9 +23,6 @@ pub(crate) struct Bank {
     rows: Vec<TermRows>,
 }
 
-/// The states of every sample of a channel: `states[sample][state]`.
-pub(crate) type States = Vec<Vec<f64>>;
-
 impl Bank {
     pub(crate) fn new(domains: Vec<Vec<Interval>>) -> Self {
         let rows = domains.iter().map(|domain| TermRows::new(BANK.shape(), domain)).collect();

@@ -2,16 +2,16 @@
 //! are fitted to these.
 
 use stretch_calibrate::{
-    CalibrateError,
-    toolkit::{SETTLE, check_rows, even, extent, sample_rate_hz},
+    CalibrateError, MOST_ROWS,
+    toolkit::{SETTLE, States, even, extent, sample_rate_hz},
 };
 use stretch_core::{Provenance, SampleRate};
-use stretch_data::Trial;
+use stretch_data::{Trial, check_rows};
 use stretch_metrics::Agreement;
 
 use crate::{MAX_CHANNELS, SleeveError};
 
-use super::bank::{BANK, Bank, States};
+use super::bank::{BANK, Bank};
 
 /// Channels whose correlation differs from one by less than this are copies.
 const COPY: f64 = 1e-9;
@@ -31,7 +31,7 @@ impl Stretch {
 
     /// The states of each channel at a sample.
     pub(crate) fn at(&self, sample: usize) -> impl Iterator<Item = &[f64]> {
-        self.states.iter().map(move |states| states[sample].as_slice())
+        self.states.iter().map(move |states| states.at(sample))
     }
 
     /// The samples after the warm-up, in which the low-passes forget their initial values.
@@ -57,7 +57,8 @@ impl Channels {
             return Err(SleeveError::Channels { asked: signals.len(), most: MAX_CHANNELS });
         }
         let first = trials.first().ok_or(CalibrateError::NoTrials)?;
-        check_rows(trials)?;
+        // each signal adds its states to a row
+        check_rows(trials, MOST_ROWS / signals.len()).map_err(CalibrateError::from)?;
         let sample_rate = SampleRate::new(sample_rate_hz(first)?)?;
         let mut all = Self { sample_rate, stretches: Vec::new(), notes: Vec::new() };
         for (index, trial) in trials.iter().enumerate() {

@@ -151,8 +151,9 @@ fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
     const LATE: f64 = 1.4;
     let calibration = stretch_receptor::example_calibration();
     let regular = |n: usize| n as f64;
-    // name, number of periods at a row, rate in Hz
-    let members: [(&str, &dyn Fn(usize) -> f64, f64); 6] = [
+    /// Name, number of periods at a row, rate in Hz.
+    type Member<'a> = (&'a str, &'a dyn Fn(usize) -> f64, f64);
+    let members: [Member<'_>; 6] = [
         ("every third is late", &|n| regular(n) + LATE * f64::from(n % 3 == 1), 266.7),
         ("every third is early", &|n| regular(n) - LATE * f64::from(n % 3 == 1), 266.7),
         ("pairs are exchanged", &|n| regular(n ^ 1), 200.0),
@@ -170,6 +171,6 @@ fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
         let text = doubt.expect(name).text;
         let (found, _) = text.split_once(' ').expect(name);
         let found_hz: f64 = found.parse().expect(name);
-        assert!((found_hz / rate_hz - 1.0).abs() < 0.03, "{name}: {text}");
+        assert!((found_hz / rate_hz - 1.0).abs() < 0.05, "{name}: {text}");
     }
 }

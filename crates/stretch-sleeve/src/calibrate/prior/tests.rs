@@ -337,18 +337,19 @@ fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_tol
     const RESTS: Simulated = resting;
     let note = "cannot be told whether all gauges are reversed";
     let refusal = "they would not be if all gauges were reversed: turn the wires";
-    // the movement, the signals, what is subtracted from, and what is said
-    let members: [(Simulated, &[&str], Option<f64>, Result<Option<&str>, &str>); 10] = [
+    /// The movement, the signals, what they are subtracted from, and the note or the refusal.
+    type Member<'a> = (Simulated, &'a [&'a str], Option<f64>, Result<Option<&'a str>, &'a str>);
+    let members: [Member<'_>; 10] = [
         (ALIKE, &["s1"], None, Ok(Some(note))),
         (ALIKE, &["s1"], Some(1.0), Ok(Some(note))),
         (ALIKE, &["s1", "s2"], None, Ok(Some(note))),
         (ALIKE, &["s1", "s2"], Some(1.2), Ok(Some(note))),
-        (ALIKE, &["s1", "s2"], Some(0.0), Err(refusal)),
+        (ALIKE, &["s1", "s2"], Some(0.0), Err("of reference")),
         (RESTS, &["s1"], None, Ok(None)),
         (RESTS, &["s1"], Some(1.0), Err(refusal)),
         (RESTS, &["s1", "s2"], None, Ok(None)),
         (RESTS, &["s1", "s2"], Some(1.2), Err(refusal)),
-        (RESTS, &["s1", "s2"], Some(0.0), Err(refusal)),
+        (RESTS, &["s1", "s2"], Some(0.0), Err("of reference")),
     ];
     for (simulated, signals, subtracted_from, says) in members {
         let prior = prior_of(simulated, signals);

@@ -5,7 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use stretch_calibrate::{Options, apply, calibrate, evaluate, without_gross_errors};
 use stretch_data::{Channel, EvenSession, SessionTrial, Split, Trial};
 use stretch_gap::{Description, DescriptionSpec};
-use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
+use stretch_problem::{
+    Checked, GaugeSetup, GaugeSimulator, ProblemSpec, RigSession, RigSetup, RigSimulator,
+    StageEntry,
+};
 use stretch_sim::{Catalogue, Rig, RigParams, RunSettings, TrialPlan};
 
 const COLUMNS: [&str; 5] = ["inlet", "outlet", "length_mm", "bridge_v", "pressure_kpa"];
@@ -115,6 +118,54 @@ fn trials_that_are_none_are_refused_by_calibrations() {
     }
     refuses("no calibration", || evaluate(&[], &[trial()]));
     refuses("no trial", || calibrate(&[], &Options::default()));
+}
+
+/// What refuses long trials, from how many rows on.
+fn refusing() -> Vec<(&'static str, usize, Box<dyn Fn(Trial) -> String>)> {
+    fn told<T, E: std::fmt::Display>(answer: Result<T, E>) -> String {
+        answer.map_or_else(|error| error.to_string(), |_| String::new())
+    }
+    let gauge = |trial| {
+        let trials = &[SessionTrial::new(trial)];
+        let catalogue = &Catalogue::default();
+        let (reference, signal) = ("length_mm", "bridge_v");
+        told(GaugeSimulator::new(&GaugeSetup { trials, reference, signal, rig: None, catalogue }))
+    };
+    let black_box = |outputs: usize| {
+        move |trial| {
+            let stage = |k| StageEntry {
+                name: format!("stage {k}"),
+                output: format!("output_{k}"),
+                inputs: vec!["inlet".into()],
+                ..StageEntry::default()
+            };
+            let stages = (0..outputs).map(stage).collect();
+            let trials = vec![SessionTrial::new(trial)];
+            told(Checked::new(ProblemSpec { stages, trials, ..ProblemSpec::default() }))
+        }
+    };
+    let calibration = stretch_receptor::example_calibration();
+    vec![
+        ("gauge", 2_500_000, Box::new(gauge)),
+        ("rig", 833_333, Box::new(|trial| told(RigSession::new(&[SessionTrial::new(trial)])))),
+        ("one output", 2_500_000, Box::new(black_box(1))),
+        ("six outputs", 416_666, Box::new(black_box(6))),
+        ("calibrate", 10_000_000, Box::new(|t| told(calibrate(&[t], &Options::default())))),
+        ("evaluate", 10_000_000, Box::new(move |t| told(evaluate(&[("a", &calibration)], &[t])))),
+    ]
+}
+
+#[test]
+fn trials_that_are_too_long_are_refused_by_every_command() {
+    // the check comes first: a trial without a channel is refused for its length
+    let of = |rows| Trial { name: "long.csv".into(), time_s: vec![0.0; rows], ..Trial::default() };
+    for (what, most, call) in refusing() {
+        let said = call(of(most + 1));
+        let expected = format!("{} rows together, and at most {most} are taken at once", most + 1);
+        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{what}: {said}");
+        let said = call(of(most));
+        assert!(!said.is_empty() && !said.contains("rows together"), "{what}: {said}");
+    }
 }
 
 #[test]

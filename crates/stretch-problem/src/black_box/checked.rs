@@ -18,7 +18,7 @@ use super::{
     velocity::{integral_of, of_position},
 };
 use crate::{
-    error::ProblemError,
+    error::{ProblemError, check_length},
     wrap::{Among, Placed, Site},
 };
 
@@ -62,6 +62,7 @@ impl Checked {
         let ProblemSpec { inputs, parameters, effects, .. } = &spec;
         let stages = &spec.stages.iter().map(|s| rubbing(s, &spec)).collect::<Vec<_>>();
         check_known(stages, parameters, effects)?;
+        check_length(&trials, stages.len())?;
         let names = used(stages, &spec);
         let apart = spec.by.clone().filter(|by| !names.contains(by));
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;

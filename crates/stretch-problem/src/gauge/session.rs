@@ -7,7 +7,7 @@ use stretch_gap::{Noise, SampleRoles, TrialSpec};
 
 use crate::{
     bench::undetermined::undetermined,
-    error::{ProblemError, check_rate},
+    error::{ProblemError, check_length, check_rate},
 };
 
 /// Least samples that may be fitted.
@@ -41,6 +41,7 @@ impl GaugeSession {
         reference: &str,
         signal: &str,
     ) -> Result<Self, ProblemError> {
+        check_length(trials, 1)?;
         let mut columns = vec![reference, signal];
         if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
             columns.push(PRESSURE);

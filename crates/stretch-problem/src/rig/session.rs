@@ -14,12 +14,14 @@ use crate::{
         isolated_outliers::without_isolated_outliers,
         undetermined::{undetermined, undetermined_behind_gap},
     },
-    error::{ProblemError, check_rate},
+    error::{ProblemError, check_length, check_rate},
 };
 
 /// Columns that a rig needs; the pressure is optional.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
 const PRESSURE: &str = "pressure_kpa";
+/// Simulated outputs: pressure, length and voltage.
+const OUTPUTS: usize = 3;
 /// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 where it is missing.
 const EXCITATION: &str = "excitation_share";
 /// Parts of a trial with fewer samples are left out.
@@ -115,6 +117,7 @@ impl RigSession {
     /// # Errors
     /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
     pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
+        check_length(trials, OUTPUTS)?;
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
         let mut columns = NEEDED.to_vec();
         if with == trials.len() {

@@ -1,4 +1,4 @@
-//! Units at the door: newtypes that keep arguments from being swapped.
+//! Newtypes of units for the public functions, so that arguments cannot be swapped.
 //!
 //! They carry a number across a public boundary and no arithmetic; inside,
 //! the bare number (field `0`) is used.

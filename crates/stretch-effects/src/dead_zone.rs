@@ -184,7 +184,7 @@ const BARELY: f64 = 1e-12;
 pub struct DeadBand {
     /// Command that opens nothing yet.
     pub u_db: f64,
-    /// How gradually the band is left, in units of it; 0 for at once.
+    /// Width of the transition at the edge of the band, as a share of the band; 0 is an abrupt edge.
     pub softness: f64,
     /// How gradually the conductance rises above the band, in units of it; 0 for at once.
     pub gate: f64,

@@ -48,7 +48,7 @@ pub enum Acts {
     },
     /// A separate term, which belongs to no kind.
     Own {
-        /// Where and how, with values that are not off.
+        /// Where the effect acts and how, for values other than those that turn it off.
         action: fn(&[f64], &Surroundings<'_>) -> Action,
         /// How a user would type it.
         sketch: Option<fn(&[f64], &Surroundings<'_>) -> Sketch>,

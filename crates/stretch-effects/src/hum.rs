@@ -53,7 +53,7 @@ impl Operator for Hum {
     }
 }
 
-/// The mains, picked up with a phase that only a record tells.
+/// Mains hum; its phase is estimated from the recording.
 pub static HUM: Kind = Kind {
     name: "hum",
     title: "mains hum",

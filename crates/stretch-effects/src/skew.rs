@@ -312,7 +312,7 @@ pub static CLOCK_DRIFT: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// How late the end of a session may be, in longest delays.
+/// Greatest delay at the end of a session, as a multiple of the longest constant delay.
 const REACH: f64 = 5.0;
 /// Least and greatest error of a clock that is looked for, s/s.
 const LEAST: f64 = 1e-4;

@@ -18,7 +18,7 @@ pub enum ExportError {
         /// The model.
         model: String,
     },
-    /// Integers were asked of a model that has none.
+    /// An integer form was requested, but this model has none.
     #[error("{0}; or export in --form float, which needs no converter")]
     NoFixedForm(#[source] CalibrateError),
     /// Integers were asked of several gauges.

@@ -277,7 +277,7 @@ fn rounded(x: f64) -> f64 {
     (x / unit).round() * unit
 }
 
-/// Number of recordings, from the last, that are tested on.
+/// Number of recordings, counted from the end, that are kept for testing.
 fn tested(trials: &[(String, Trial)]) -> usize {
     match trials.len() {
         1 => 0,

@@ -120,8 +120,10 @@ fn trials_that_are_none_are_refused_by_calibrations() {
     refuses("no trial", || calibrate(&[], &Options::default()));
 }
 
-/// What refuses long trials, from how many rows on.
-fn refusing() -> Vec<(&'static str, usize, Box<dyn Fn(Trial) -> String>)> {
+/// What refuses long trials, the most rows that it takes, and what it says.
+type Refusing = (&'static str, usize, Box<dyn Fn(Trial) -> String>);
+
+fn refusing() -> Vec<Refusing> {
     fn told<T, E: std::fmt::Display>(answer: Result<T, E>) -> String {
         answer.map_or_else(|error| error.to_string(), |_| String::new())
     }

@@ -231,7 +231,7 @@ pub enum RecordingError {
         /// What the column should be called if they are milliseconds.
         column_ms: String,
     },
-    /// No column that is the time.
+    /// There is no column of the time.
     #[error(
         "{missing}; say which column is the time with --time COLUMN, or --time 100hz if there is none"
     )]

@@ -43,7 +43,7 @@ pub(crate) struct Fitted {
     pub(crate) model: Model,
     /// J of the module's head.
     pub(crate) cost: f64,
-    /// What the model leaves of each stage that was fitted.
+    /// The misfit of each stage that was fitted.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,

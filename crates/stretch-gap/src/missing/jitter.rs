@@ -20,8 +20,8 @@
 //! e is Student's t of 3, 10 or so many degrees of freedom that it is Gaussian, in all three, so
 //! that a few jumps do not count as scale (Lange, Little and Taylor 1989, doi
 //! 10.1080/01621459.1989.10478852). The second parameter costs half of ln n. Jitter is accepted if
-//! it is the most likely and if its noise explains the share of what exceeds the noise that makes a
-//! [course](super::course). Errors of samples that are late, or wrong whenever the signal moves,
+//! it is the most likely cause and if it explains as large a share of the residual beyond the noise as a
+//! [course in time](super::course) has to explain. Errors of samples that are late, or wrong whenever the signal moves,
 //! are predicted by the previous sample and leave little in e.
 
 use crate::missing::{

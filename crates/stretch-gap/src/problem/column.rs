@@ -76,7 +76,7 @@ pub struct Column<'a> {
     /// Stages that it drives: [`Simulator::corrected`](crate::Simulator::corrected) can correct it for
     /// them.
     pub read_by: Vec<usize>,
-    /// Whether it is a command. The only possible error of a command is a scale.
+    /// Whether it is a command. A command can only be wrong by a constant factor.
     pub is_command: bool,
     /// Delays that an effect of the catalogue describes, s. None of these is an error of the
     /// record.

@@ -131,7 +131,7 @@ pub struct EffectSpec {
     pub parameters: Vec<EffectParameter>,
     /// Values for screening, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
-    /// Whether its course is found in the record. Its size then only says how much is searched.
+    /// Whether its course in time can be found in the record. Its size then only says how much is searched.
     pub is_found: bool,
     /// Whether it is a law of session time, so that trials outside the fitted time are
     /// extrapolated.

@@ -1,4 +1,4 @@
-//! A gauge alone with what a diagnosis found.
+//! A gauge without a rig, together with the effects that a diagnosis found.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};

@@ -134,7 +134,7 @@ impl IntegerObserver {
         (((below as i32) << PLACE_BITS) + share, held)
     }
 
-    /// The signal at a drive, its segment, and its place held to the curve.
+    /// The signal at a drive, the index of its segment, and its place clamped to the ends of the curve.
     #[inline(always)]
     fn forward(&self, drive: i32) -> (i32, usize, i32) {
         let last = i32::from(self.numbers.knots) - 1;

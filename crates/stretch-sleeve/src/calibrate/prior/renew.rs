@@ -51,7 +51,7 @@ pub struct RenewOptions {
 }
 
 impl RenewOptions {
-    /// Options for a session of a path such as `left/anna`.
+    /// Options for a session that is named by a path such as `left/anna`.
     pub fn of(path: &str) -> Self {
         Self { path: parse_path(path), ..Self::default() }
     }

@@ -157,7 +157,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
         let begun = Instant::now();
         let mut command = stretch();
         command.current_dir(scratch.path("")).args(line.split(' '));
-        fails(&mut command, &["pipe", "nobody reads"]);
+        fails(&mut command, &["pipe", "without a reader"]);
         assert!(begun.elapsed() < Duration::from_secs(60), "{line}");
         let reader = thread::spawn({
             let pipe = pipe.clone();

@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_ripple_and_a_difference_of_directions_depend_on_motion() {
-        let detent = |x: f64, _: bool| 0.4 * (TAU * 3.0 * x).sin();
+        let detent = |x: f64, _: bool| 0.5 * (TAU * 2.0 * x).sin();
         let asymmetry = |x: f64, rises: bool| if rises { 0.3 * x } else { 0.0 };
         let bump = |x: f64, _: bool| if (0.4..0.6).contains(&x) { 0.8 } else { 0.0 };
         for seed in 0..10 {

@@ -203,7 +203,7 @@ fn data_of_another_kind_are_refused_with_what_to_do() {
     refused(
         &scaled(2, std::f64::consts::PI / 180.0),
         usual(),
-        "angle_deg in radians and not in degrees",
+        "is angle_deg in another unit, in radians and not in degrees",
     );
     let turned = |t: &mut Trial| t.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
     refused(&turned, usual(), "swap the wires");
@@ -392,7 +392,7 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
     refused(&turned, "swap the wires");
     refused(
         &|s| *s = Session { name: "w1_2".into(), ..summed(1, 0, &["s1"]) },
-        "the samples of w1_0",
+        "the same samples as w1_0",
     );
     for (factor, says) in [(std::f64::consts::PI / 180.0, "radians"), (10.0, "centimetres")] {
         let converted = |s: &mut Session| {

@@ -406,5 +406,8 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
     let mut sessions: Vec<Session> = (0..3).map(|n| summed(1, n, &["s1", "s2"])).collect();
     sessions[2] = summed(1, 2, &["s2", "s1"]);
     let error = Prior::learn(&sessions).unwrap_err().to_string();
-    assert!(error.contains("w1_2") && error.contains("s2 is in another place"), "{error}");
+    assert!(
+        error.contains("w1_2") && error.contains("s2 does not have the same position"),
+        "{error}"
+    );
 }

@@ -150,8 +150,8 @@ mod tests {
     #[test]
     fn a_ripple_and_a_difference_of_directions_depend_on_motion() {
         let detent = |x: f64, _: bool| 0.5 * (TAU * 2.0 * x).sin();
-        let asymmetry = |x: f64, rises: bool| if rises { 0.5 * x } else { 0.0 };
-        let bump = |x: f64, _: bool| if (0.4..0.6).contains(&x) { 1.5 } else { 0.0 };
+        let asymmetry = |x: f64, rises: bool| if rises { x } else { 0.0 };
+        let bump = |x: f64, _: bool| if (0.4..0.6).contains(&x) { 2.0 } else { 0.0 };
         for seed in 0..10 {
             for (drift, time_s) in [(0.0, 1.0), (0.3, 0.3), (0.3, 3.0)] {
                 assert!(depends(seed, drift, time_s, detent), "detent {seed} {drift} {time_s}");

@@ -109,10 +109,11 @@ impl Live {
 
     /// What makes one doubt the estimates so far, as `stretch apply` says it of a stream: a sentence a line.
     pub fn doubts(&self) -> String {
-        let Source::Numbers(Numbers { applied: Some(applied), .. }) = &self.source else {
-            return String::new();
+        let applied = match &self.source {
+            Source::Numbers(numbers) => numbers.applied.as_ref(),
+            _ => None,
         };
-        let doubts = applied.pace.iter().cloned().chain(applied.seen.doubt());
+        let doubts = applied.into_iter().flat_map(|a| a.pace.iter().cloned().chain(a.seen.doubt()));
         doubts.map(|doubt| format!("{doubt}\n")).collect()
     }
 }

@@ -75,7 +75,7 @@ fn queries_that_mean_nothing_are_refused_by_name() {
         ("select polyij_fit(1, 9, rate, bridge_v, contraction) from trials", "0 to 5"),
         (
             "select polyij_fit(sensor, 3, rate, bridge_v, contraction) from trials",
-            "stands in the query",
+            "is written in the query",
         ),
         (
             "select poly13_fit(rate, bridge_v, contraction) over (order by bridge_v rows between 3 preceding and \

@@ -34,7 +34,8 @@ fn drift_names_the_sensors_that_moved() {
     let told = said("drift --lake {} --from 2026-01 --to 2026-03", &[&lake]);
     assert!(told.contains("3 days in the second month are too few"), "{told}");
     assert!(
-        refused("drift --lake {} --from 2026-01 --to 2026-01", &[&lake]).contains("against itself")
+        refused("drift --lake {} --from 2026-01 --to 2026-01", &[&lake])
+            .contains("compared with itself")
     );
     assert!(refused("drift --lake {} --from 1.26 --to 2026-01", &[&lake]).contains("is no month"));
 }

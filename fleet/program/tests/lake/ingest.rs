@@ -148,9 +148,9 @@ fn what_nobody_says_is_asked_for() {
     let path = file(folder.path(), &trial("a.csv", 0.0));
     let lake = folder.path().join("lake");
     let told = warned("ingest {} --lake {} --date 2026-01-01", &[&path, &lake]);
-    assert!(told.contains("which sensor it is of: --sensor NAME"), "{told}");
+    assert!(told.contains("its sensor is unknown: give --sensor NAME"), "{told}");
     let told = warned("ingest {} --lake {} --sensor 1", &[&path, &lake]);
-    assert!(told.contains("of which day it is: --date"), "{told}");
+    assert!(told.contains("its day is unknown: give --date"), "{told}");
     let told = warned("ingest {} --lake {} --sensor a/b --date 2026-01-01", &[&path, &lake]);
     assert!(told.contains("cannot be a sensor"), "{told}");
     let told = warned("ingest {} --lake {} --sensor 1 --date 3.1.2026", &[&path, &lake]);

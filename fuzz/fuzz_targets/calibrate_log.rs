@@ -39,7 +39,7 @@ fuzz_target!(|bytes: &[u8]| {
     if !second.is_empty() {
         trials.push(trial(second, &columns, most));
     }
-    let (kept, _) = without_gross_errors(&trials, &["length_mm", "bridge_v"]);
+    let (kept, _) = without_gross_errors(trials, &["length_mm", "bridge_v"]);
     let Ok(calibrated) = calibrate(&kept, &options) else { return };
     if let Ok(evaluation) = evaluate(&[("fuzz", &calibrated.calibration)], &kept) {
         assert!(evaluation.pooled.iter().all(|errors| errors.rmse.is_finite()));

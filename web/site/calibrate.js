@@ -2,7 +2,7 @@
  * A calibration: a model, or the one that does best on trials left out, which workers judge side by side.
  */
 
-/** @typedef {{method: string, average_error_percent: number, rmse: number, r_squared: number, lag_s: number|null}} MethodErrors */
+/** @typedef {{method: string, average_error_percent: number, rmse: number, r_squared: number|null, lag_s: number|null}} MethodErrors */
 /** @typedef {{model: string, rmse: number|null, rmse_arbitrary: number|null, rmse_pulses: number|null, rmse_ramps: number|null, parameters: number, problem: string|null}} ModelRow */
 
 /** Workers beyond it wait for memory more than they work. */
@@ -81,7 +81,7 @@ const calibration = {
   /** @param {{evaluation: {unit: string, trials: {trial: string}[], pooled: MethodErrors[]}, doubts: {text: string}[], held_out: boolean}} judgement */
   judgement({ evaluation: { unit, trials, pooled }, doubts, held_out }) {
     const row = (/** @type {MethodErrors} */ e) =>
-      [e.method, shown(e.average_error_percent, 3), shown(e.rmse), e.r_squared.toFixed(4).replace("-", "−"), shown(e.lag_s, 3)];
+      [e.method, shown(e.average_error_percent, 3), shown(e.rmse), e.r_squared?.toFixed(4).replace("-", "−") ?? "–", shown(e.lag_s, 3)];
     tell.table("errors", pooled.map(row), pooled.length - 1);
     tell.list("doubts", doubts.map((doubt) => doubt.text));
     const names = trials.map((t) => t.trial);

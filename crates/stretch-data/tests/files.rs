@@ -207,6 +207,30 @@ fn of_two_writers_at_once_one_has_written_all() {
     assert_eq!(names(parent.path()).len(), 2, "nothing stays beside them");
 }
 
+#[test]
+fn writers_at_once_lose_nothing_of_the_users() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let out = parent.path().join("set");
+    fs::create_dir_all(out.join("own")).expect("made");
+    for i in 0..100 {
+        fs::write(out.join(format!("own/{i}")), "mine").expect("written");
+    }
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                for _ in 0..10 {
+                    write_folder(&out, true, two_files).expect("another writer is waited for");
+                }
+            });
+        }
+    });
+    assert_eq!(names(parent.path()), ["set"], "nothing stays beside it");
+    assert_eq!(names(&out), ["a", "own", "sub"]);
+    for i in 0..100 {
+        assert_eq!(fs::read(out.join(format!("own/{i}"))).expect("there"), b"mine");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_written_to_and_one_without_a_reader_is_refused() {

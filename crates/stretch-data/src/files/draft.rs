@@ -11,7 +11,10 @@ use std::{
 
 use tempfile::Builder;
 
-use super::{FileError, folder::replace};
+use super::{
+    FileError,
+    folder::{lock, replace},
+};
 
 /// Temporary names of this process with the paths that they will replace. Those of folders stay here because messages may name them.
 ///
@@ -80,6 +83,8 @@ pub(super) struct Draft {
     pub(super) file: Option<File>,
     /// Whether a folder replaces one that holds something.
     force: bool,
+    /// The folder that is replaced, locked.
+    replaced: Option<File>,
     /// Removed after the draft, if it is still empty.
     _parents: Option<Parents>,
 }
@@ -118,7 +123,12 @@ impl Draft {
         };
         let path = path.to_owned();
         names.push((temporary.clone(), path.clone()));
-        Ok(Self { path, real, temporary, file, force, _parents: parents })
+        Ok(Self { path, real, temporary, file, force, replaced: None, _parents: parents })
+    }
+
+    /// Waits until no other writer replaces the same folder, and keeps others waiting until this is dropped.
+    pub(super) fn lock(&mut self) {
+        self.replaced = self.replaced.take().or_else(|| lock(&self.real));
     }
 
     /// Gives everything its name; Ctrl-C waits for all of them.

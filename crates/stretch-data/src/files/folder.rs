@@ -44,6 +44,33 @@ fn is_inside(here: &Path, folder: &Path) -> bool {
     fs::canonicalize(folder).is_ok_and(|folder| here.starts_with(folder))
 }
 
+/// Locks a folder that is to be replaced, so that writers which replace the same folder wait for each other.
+///
+/// None if there is no folder, or if the system cannot lock one.
+pub(super) fn lock(folder: &Path) -> Option<File> {
+    loop {
+        let locked = File::open(folder).ok()?;
+        locked.lock().ok()?;
+        // the writer before may have replaced the folder that is locked now
+        if is_still(folder, &locked) {
+            return Some(locked);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_still(folder: &Path, locked: &File) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |meta: fs::Metadata| (meta.dev(), meta.ino());
+    let here = fs::metadata(folder).map(identity);
+    locked.metadata().map(identity).is_ok_and(|own| here.is_ok_and(|here| here == own))
+}
+
+#[cfg(not(unix))]
+fn is_still(_: &Path, _: &File) -> bool {
+    true
+}
+
 /// Links what is the user's in the old folder into the new one, and waits until all is on the disk.
 pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     if let Ok(meta) = fs::metadata(old) {
@@ -71,6 +98,7 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 
 /// Gives a complete folder the name of the one that is there.
 pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
+    draft.lock();
     let (new, real) = (&draft.temporary, &draft.real);
     exchange(new, real)?;
     // what came into the old folder in the meantime
@@ -138,7 +166,11 @@ fn carry(
             Err(_) if replaced.contains(&from) => check(&from, &entry.metadata()?)?,
             Err(_) => {
                 ask("link")?;
-                fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop))?;
+                match fs::hard_link(&from, &to) {
+                    // a copy onto another name of the same file would empty it
+                    Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+                    linked => linked.or_else(|_| fs::copy(&from, &to).map(drop))?,
+                }
             }
         }
         if is_folder {

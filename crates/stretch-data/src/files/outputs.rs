@@ -176,8 +176,9 @@ impl Outputs {
         let path = path.as_ref();
         let fail = |cause| FileError::io(path.display(), "write it", cause);
         check(path, force)?;
-        let draft = Draft::folder(path, force).map_err(fail)?;
+        let mut draft = Draft::folder(path, force).map_err(fail)?;
         fill(&draft.temporary)?;
+        draft.lock();
         complete(&draft.temporary, &draft.real).map_err(fail)?;
         self.0.push(draft);
         Ok(())

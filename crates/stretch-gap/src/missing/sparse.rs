@@ -12,6 +12,8 @@
 //! best of them are refined in their shapes. The one that leaves least of the held-out samples is
 //! added if it closes a share of their gap.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
@@ -196,19 +198,25 @@ impl Pursuit<'_, '_> {
 
     /// What remains after the sensitivities and the most promising families together.
     fn beside_many(&self) -> Vec<f64> {
-        let mut columns: Vec<Vec<f64>> =
-            self.residue.columns().iter().map(|c| c.values.clone()).collect();
-        columns.extend(self.promising(MANY).iter().map(|term| self.residue.values(term)));
-        let mut residual = self.residue.residual.values.clone();
-        let compare = self.residue.compare;
-        compare.metrics[self.residue.stage].clean(&compare.roles, &mut residual);
-        let rows = |role| {
-            let means = |values: &Vec<f64>| means(self.roles, role, values, self.count);
-            Rows { residual: means(&residual), columns: columns.iter().map(means).collect() }
+        let (residue, promising) = (self.residue, self.promising(MANY));
+        // computed twice, because all at once they would be larger than all else in memory
+        let columns = || {
+            let known = residue.columns().iter().map(|c| Cow::Borrowed(&c.values));
+            known.chain(promising.iter().map(|term| Cow::Owned(residue.values(term))))
         };
-        let weights = ridge(&rows(Role::Fit), &rows(Role::Held));
-        for (column, weight) in columns.iter().zip(weights) {
-            residual.iter_mut().zip(column).for_each(|(r, d)| *r -= weight * d);
+        let mut residual = residue.residual.values.clone();
+        let compare = residue.compare;
+        compare.metrics[residue.stage].clean(&compare.roles, &mut residual);
+        let [mut fit, mut held] = [Role::Fit, Role::Held].map(|role| Rows {
+            residual: means(self.roles, role, &residual, self.count),
+            columns: Vec::new(),
+        });
+        for column in columns() {
+            fit.columns.push(means(self.roles, Role::Fit, &column, self.count));
+            held.columns.push(means(self.roles, Role::Held, &column, self.count));
+        }
+        for (column, weight) in columns().zip(ridge(&fit, &held)) {
+            residual.iter_mut().zip(column.iter()).for_each(|(r, d)| *r -= weight * d);
         }
         residual
     }

@@ -54,6 +54,22 @@ pub(crate) struct Piece {
     rate: Vec<f64>,
 }
 
+/// Contribution to the drive of a unit of each dynamic parameter, a row for each sample of a piece.
+pub(crate) struct Features {
+    values: Vec<f64>,
+    width: usize,
+}
+
+impl Features {
+    fn rows(&self) -> impl Iterator<Item = &[f64]> + Clone {
+        self.values.chunks_exact(self.width)
+    }
+
+    pub(crate) fn row(&self, sample: usize) -> &[f64] {
+        &self.values[sample * self.width..][..self.width]
+    }
+}
+
 /// A sample: the signal, and the inputs of the model.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample<'a> {
@@ -104,33 +120,33 @@ pub(crate) fn pieces(
 }
 
 impl Piece {
-    /// Contribution to the drive of a unit of each dynamic parameter, for each sample.
-    pub(crate) fn features(&self, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn features(&self, choice: ObserverChoice, period_s: f64) -> Features {
         let first = self.smooth[0];
         let mut slow: Vec<(f64, f64)> =
             choice.taus().map(|tau| (first, lag_share(period_s, tau))).collect();
         let mut played = vec![first; choice.radii().len()];
-        let step = |(&y, &rate): (&f64, &f64)| {
-            let mut row = vec![rate];
+        let width = choice.dynamics();
+        let mut values = Vec::with_capacity(width * self.smooth.len());
+        for (&y, &rate) in self.smooth.iter().zip(&self.rate) {
+            values.push(rate);
             for (l, share) in &mut slow {
                 *l = lag(*l, y, *share);
-                row.push(y - *l);
+                values.push(y - *l);
             }
             for (p, &w) in played.iter_mut().zip(choice.radii()) {
                 *p = play(*p, y, w);
-                row.push(y - *p);
+                values.push(y - *p);
             }
-            row
-        };
-        self.smooth.iter().zip(&self.rate).map(step).collect()
+        }
+        Features { values, width }
     }
 
     /// The samples after the low-passes have settled, with their `features`.
     pub(crate) fn samples<'a>(
         &'a self,
-        features: &'a [Vec<f64>],
-    ) -> impl Iterator<Item = Sample<'a>> {
-        let all = self.smooth.iter().zip(features).zip(&self.signal).skip(SETTLE);
+        features: &'a Features,
+    ) -> impl Iterator<Item = Sample<'a>> + Clone {
+        let all = self.smooth.iter().zip(features.rows()).zip(&self.signal).skip(SETTLE);
         all.map(|((&target, features), &signal)| Sample { target, features, signal })
     }
 }

@@ -1,6 +1,6 @@
 //! Why a problem was refused.
 
-use stretch_data::{DataError, SessionTrial, check_rows};
+use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
 use stretch_recording::RecordingError;
 use stretch_sim::{GridError, SimError};
@@ -83,15 +83,6 @@ pub enum ProblemError {
         /// The stage.
         stage: String,
     },
-}
-
-/// The most rows times outputs that a diagnosis takes: 7 hours of one output at 100 Hz, in about 2 GB. Measured peaks: 376 MB for a gauge with
-/// 500,000 rows, and 263 MB for a rig, which has three outputs, with 100,000.
-const MOST_SAMPLES: usize = 2_500_000;
-
-/// Refuses recordings that are too long to be compared with so many simulated outputs in memory.
-pub(crate) fn check_length(trials: &[SessionTrial], outputs: usize) -> Result<(), ProblemError> {
-    Ok(check_rows(trials.iter().map(|own| &own.trial), MOST_SAMPLES / outputs.max(1))?)
 }
 
 /// Refuses a sample rate outside 1e-3 .. 1e7 Hz, before anything is counted in samples: such time stamps are in another unit.

@@ -4,25 +4,29 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use stretch_calibrate::{Options, apply, calibrate, evaluate, without_gross_errors};
 use stretch_data::{Channel, EvenSession, SessionTrial, Split, Trial};
-use stretch_gap::{Description, DescriptionSpec};
+use stretch_gap::{Description, DescriptionSpec, Simulator};
 use stretch_problem::{
-    Checked, GaugeSetup, GaugeSimulator, ProblemSpec, RigSession, RigSetup, RigSimulator,
-    StageEntry,
+    Checked, GaugeSetup, GaugeSimulator, ProblemError, ProblemSpec, RigSession, RigSetup,
+    RigSimulator, StageEntry,
 };
 use stretch_sim::{Catalogue, Rig, RigParams, RunSettings, TrialPlan};
 
 const COLUMNS: [&str; 5] = ["inlet", "outlet", "length_mm", "bridge_v", "pressure_kpa"];
 
 fn trial() -> Trial {
+    trial_of(1500)
+}
+
+fn trial_of(rows: u32) -> Trial {
     let channel = |(k, name): (usize, &&str)| Channel {
         name: (*name).to_owned(),
-        values: (0..1500)
+        values: (0..rows)
             .map(|i| 0.5 + 0.4 * (0.01 * f64::from(i) * (k + 1) as f64).sin())
             .collect(),
     };
     Trial {
         name: "a.csv".into(),
-        time_s: (0..1500).map(|i| 0.01 * f64::from(i)).collect(),
+        time_s: (0..rows).map(|i| 0.01 * f64::from(i)).collect(),
         channels: COLUMNS.iter().enumerate().map(channel).collect(),
     }
 }
@@ -120,53 +124,93 @@ fn trials_that_are_none_are_refused_by_calibrations() {
     refuses("no trial", || calibrate(&[], &Options::default()));
 }
 
-/// What refuses long trials, the most rows that it takes, and what it says.
-type Refusing = (&'static str, usize, Box<dyn Fn(Trial) -> String>);
+/// Samples of each trial that is used, and notes.
+type Shortened = (Vec<usize>, Vec<String>);
 
-fn refusing() -> Vec<Refusing> {
-    fn told<T, E: std::fmt::Display>(answer: Result<T, E>) -> String {
-        answer.map_or_else(|error| error.to_string(), |_| String::new())
-    }
-    let gauge = |trial| {
-        let trials = &[SessionTrial::new(trial)];
+/// What shortens long trials, and the most rows that it takes.
+type Shortening =
+    (&'static str, usize, Box<dyn Fn(&[SessionTrial]) -> Result<Shortened, ProblemError>>);
+
+fn shortening() -> Vec<Shortening> {
+    let samples = |about: &Description| about.trials.iter().map(|t| t.samples).collect();
+    let gauge = move |trials: &[SessionTrial]| {
         let catalogue = &Catalogue::default();
         let (reference, signal) = ("length_mm", "bridge_v");
-        told(GaugeSimulator::new(&GaugeSetup { trials, reference, signal, rig: None, catalogue }))
+        let gauge =
+            GaugeSimulator::new(&GaugeSetup { trials, reference, signal, rig: None, catalogue })?;
+        Ok((samples(gauge.description()), gauge.notes().to_vec()))
+    };
+    let rig = |trials: &[SessionTrial]| {
+        let session = RigSession::new(trials)?;
+        let samples = session.trials().iter().map(|t| t.length_mm().len()).collect();
+        Ok((samples, session.notes().to_vec()))
     };
     let black_box = |outputs: usize| {
-        move |trial| {
-            let stage = |k| StageEntry {
+        move |trials: &[SessionTrial]| {
+            let stage = |k: usize| StageEntry {
                 name: format!("stage {k}"),
-                output: format!("output_{k}"),
+                output: COLUMNS[k % COLUMNS.len()].to_owned(),
                 inputs: vec!["inlet".into()],
                 ..StageEntry::default()
             };
-            let stages = (0..outputs).map(stage).collect();
-            let trials = vec![SessionTrial::new(trial)];
-            told(Checked::new(ProblemSpec { stages, trials, ..ProblemSpec::default() }))
+            let stages = (2..2 + outputs).map(stage).collect();
+            let spec = ProblemSpec { stages, trials: trials.to_vec(), ..ProblemSpec::default() };
+            let checked = Checked::new(spec)?;
+            Ok((samples(checked.description()), checked.notes().to_vec()))
         }
     };
-    let calibration = stretch_receptor::example_calibration();
     vec![
-        ("gauge", 2_500_000, Box::new(gauge)),
-        ("rig", 833_333, Box::new(|trial| told(RigSession::new(&[SessionTrial::new(trial)])))),
-        ("one output", 2_500_000, Box::new(black_box(1))),
-        ("six outputs", 416_666, Box::new(black_box(6))),
-        ("calibrate", 10_000_000, Box::new(|t| told(calibrate(&[t], &Options::default())))),
-        ("evaluate", 10_000_000, Box::new(move |t| told(evaluate(&[("a", &calibration)], &[t])))),
+        ("gauge", 270_000, Box::new(gauge)),
+        ("rig", 90_000, Box::new(rig)),
+        ("one output", 270_000, Box::new(black_box(1))),
+        ("three outputs", 90_000, Box::new(black_box(3))),
     ]
 }
 
 #[test]
-fn trials_that_are_too_long_are_refused_by_every_command() {
-    // the check comes first: a trial without a channel is refused for its length
+fn long_recordings_are_shortened_and_a_note_says_so() {
+    let of = |rows: usize, start_s: f64| {
+        let mut trial = trial_of(rows as u32);
+        // millimetres and kilopascals
+        for column in [2, 4] {
+            trial.channels[column].values.iter_mut().for_each(|x| *x = 100.0 + 50.0 * *x);
+        }
+        SessionTrial { start_s, ..SessionTrial::new(trial) }
+    };
+    for (what, most, call) in shortening() {
+        let long = most / 2 + 7;
+        for (rows, expected) in [
+            (vec![most], vec![most]),
+            (vec![most + 1], vec![most]),
+            (vec![2000, long, long], vec![2000, most / 2 - 1000, most / 2 - 1000]),
+        ] {
+            let trials: Vec<_> =
+                rows.iter().enumerate().map(|(i, rows)| of(*rows, 1e4 * i as f64)).collect();
+            let (samples, notes) = call(&trials).unwrap_or_else(|e| panic!("{what}: {e}"));
+            assert_eq!(samples, expected, "{what}");
+            let said = notes.iter().filter(|note| note.starts_with("only the first")).count();
+            assert_eq!(said, usize::from(rows != expected), "{what}: {notes:?}");
+        }
+        // beginnings that are too short to diagnose are refused
+        let many = vec![of(1000, 0.0); most / 1000 + 1];
+        let error = call(&many).map(drop).unwrap_err().to_string();
+        assert!(error.contains("rows together") && error.contains("--grid HZ"), "{what}: {error}");
+    }
+}
+
+#[test]
+fn trials_that_are_too_long_for_a_calibration_are_refused() {
+    // the check comes first: a trial without a channel is refused because of its length
     let of = |rows| Trial { name: "long.csv".into(), time_s: vec![0.0; rows], ..Trial::default() };
-    for (what, most, call) in refusing() {
-        let said = call(of(most + 1));
+    let calibration = stretch_receptor::example_calibration();
+    let most = 10_000_000;
+    let calibrated = |trial| calibrate(&[trial], &Options::default()).map(drop);
+    let evaluated = |trial| evaluate(&[("a", &calibration)], &[trial]).map(drop);
+    for call in [&calibrated as &dyn Fn(Trial) -> Result<(), _>, &evaluated] {
+        let said = call(of(most + 1)).unwrap_err().to_string();
         let expected = format!("{} rows together, and at most {most} are taken at once", most + 1);
-        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{what}: {said}");
-        let said = call(of(most));
-        assert!(!said.is_empty() && !said.contains("rows together"), "{what}: {said}");
+        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{said}");
+        assert!(!call(of(most)).unwrap_err().to_string().contains("rows together"));
     }
 }
 

@@ -23,9 +23,8 @@ const MEASURED: [&str; 3] = ["pressure_kpa", "length_mm", "bridge_v"];
 
 /// Trials with the isolated outliers of their measured columns replaced, and a sentence for each column that had some.
 pub(crate) fn without_isolated_outliers(
-    trials: &[SessionTrial],
+    mut trials: Vec<SessionTrial>,
 ) -> (Vec<SessionTrial>, Vec<String>) {
-    let mut trials = trials.to_vec();
     let mut notes = Vec::new();
     for name in MEASURED {
         let channels = trials.iter_mut().flat_map(|t| &mut t.trial.channels);

@@ -4,5 +4,6 @@ pub(crate) mod acting;
 pub(crate) mod courses;
 pub(crate) mod isolated_outliers;
 pub(crate) mod rig_file;
+pub(crate) mod shortened;
 pub(crate) mod specs;
 pub(crate) mod undetermined;

@@ -18,7 +18,8 @@ use super::{
     velocity::{integral_of, of_position},
 };
 use crate::{
-    error::{ProblemError, check_length},
+    bench::shortened::shortened,
+    error::ProblemError,
     wrap::{Among, Placed, Site},
 };
 
@@ -62,7 +63,7 @@ impl Checked {
         let ProblemSpec { inputs, parameters, effects, .. } = &spec;
         let stages = &spec.stages.iter().map(|s| rubbing(s, &spec)).collect::<Vec<_>>();
         check_known(stages, parameters, effects)?;
-        check_length(&trials, stages.len())?;
+        let (trials, cut) = shortened(&trials, stages.len())?;
         let names = used(stages, &spec);
         let apart = spec.by.clone().filter(|by| !names.contains(by));
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
@@ -71,7 +72,7 @@ impl Checked {
         check_stated(stages, inputs, &columns)?;
         let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());
         let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;
-        let mut notes = columns.notes.clone();
+        let mut notes: Vec<String> = cut.into_iter().chain(columns.notes.iter().cloned()).collect();
         let grid = Grid::samples(columns.dt_s)
             .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time"))?;
         let stated = |column: &str| stated_unit(stages, inputs, column);

@@ -6,8 +6,8 @@ use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, ends, unit};
 use stretch_gap::{Noise, SampleRoles, TrialSpec};
 
 use crate::{
-    bench::undetermined::undetermined,
-    error::{ProblemError, check_length, check_rate},
+    bench::{shortened::shortened, undetermined::undetermined},
+    error::{ProblemError, check_rate},
 };
 
 /// Least samples that may be fitted.
@@ -41,12 +41,12 @@ impl GaugeSession {
         reference: &str,
         signal: &str,
     ) -> Result<Self, ProblemError> {
-        check_length(trials, 1)?;
+        let (trials, cut) = shortened(trials, 1)?;
         let mut columns = vec![reference, signal];
         if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
             columns.push(PRESSURE);
         }
-        let session = EvenSession::new(trials, &columns, SHORTEST)?;
+        let session = EvenSession::new(&trials, &columns, SHORTEST)?;
         check_rate(session.dt_s())?;
         let all = |column: usize| -> Vec<f64> {
             session
@@ -71,7 +71,7 @@ impl GaugeSession {
             is_lost: session.trials().iter().flat_map(|t| undetermined(t.is_lost())).collect(),
             dt_s: session.dt_s(),
             rows: session.rows(),
-            notes: session.notes().to_vec(),
+            notes: cut.into_iter().chain(session.notes().iter().cloned()).collect(),
         };
         own.check(reference, signal)?;
         Ok(own)

@@ -12,9 +12,10 @@ use super::timing::{is_slow, switched};
 use crate::{
     bench::{
         isolated_outliers::without_isolated_outliers,
+        shortened::shortened,
         undetermined::{undetermined, undetermined_behind_gap},
     },
-    error::{ProblemError, check_length, check_rate},
+    error::{ProblemError, check_rate},
 };
 
 /// Columns that a rig needs; the pressure is optional.
@@ -117,7 +118,7 @@ impl RigSession {
     /// # Errors
     /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
     pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
-        check_length(trials, OUTPUTS)?;
+        let (trials, cut) = shortened(trials, OUTPUTS)?;
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
         let mut columns = NEEDED.to_vec();
         if with == trials.len() {
@@ -129,7 +130,7 @@ impl RigSession {
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
         // Outliers are replaced before anything is resampled: an outlier between two rows would spread.
-        let (trials, outlier_notes) = without_isolated_outliers(trials);
+        let (trials, outlier_notes) = without_isolated_outliers(trials.into_owned());
         let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
         check_rate(even.dt_s())?;
@@ -140,7 +141,11 @@ impl RigSession {
             trials: even.trials().iter().zip(before).map(of).collect(),
             dt_s: even.dt_s(),
             rows: even.rows(),
-            notes: even.notes().iter().cloned().chain(outlier_notes).collect(),
+            notes: cut
+                .into_iter()
+                .chain(even.notes().iter().cloned())
+                .chain(outlier_notes)
+                .collect(),
         };
         if with > 0 && with < trials.len() {
             session.notes.push(format!(

@@ -203,14 +203,25 @@ fn trials_that_are_too_long_for_a_calibration_are_refused() {
     // the check comes first: a trial without a channel is refused because of its length
     let of = |rows| Trial { name: "long.csv".into(), time_s: vec![0.0; rows], ..Trial::default() };
     let calibration = stretch_receptor::example_calibration();
-    let most = 10_000_000;
-    let calibrated = |trial| calibrate(&[trial], &Options::default()).map(drop);
-    let evaluated = |trial| evaluate(&[("a", &calibration)], &[trial]).map(drop);
-    for call in [&calibrated as &dyn Fn(Trial) -> Result<(), _>, &evaluated] {
-        let said = call(of(most + 1)).unwrap_err().to_string();
+    for (what, most) in [
+        ("evaluate", 10_000_000),
+        ("linear", 10_000_000),
+        ("poly13", 10_000_000),
+        ("history", 3_000_000),
+        ("observer", 3_000_000),
+    ] {
+        let told = |rows: usize| {
+            let trials = [of(rows)];
+            let answer = match what.parse() {
+                Ok(model) => calibrate(&trials, &Options { model, ..Options::default() }).map(drop),
+                Err(_) => evaluate(&[("a", &calibration)], &trials).map(drop),
+            };
+            answer.unwrap_err().to_string()
+        };
+        let said = told(most + 1);
         let expected = format!("{} rows together, and at most {most} are taken at once", most + 1);
-        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{said}");
-        assert!(!call(of(most)).unwrap_err().to_string().contains("rows together"));
+        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{what}: {said}");
+        assert!(!told(most).contains("rows together"), "{what}");
     }
 }
 

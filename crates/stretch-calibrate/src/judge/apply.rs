@@ -147,27 +147,37 @@ pub struct Applied {
 /// [`CalibrateError::Data`] when the trial lacks the signal,
 /// [`CalibrateError::Filter`] when the estimator cannot be designed.
 pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
+    let mut readings = Vec::with_capacity(trial.len());
+    let faults = each_reading(calibration, trial, |reading| readings.push(reading))?;
+    Ok(Applied { readings, faults })
+}
+
+/// Gives the readings of [`apply`] one after the other, because all of them together are several times as large as the trial.
+pub(crate) fn each_reading(
+    calibration: &Calibration,
+    trial: &Trial,
+    mut take: impl FnMut(Result<Reading, Withheld>),
+) -> Result<Faults, CalibrateError> {
     trial.check_lengths()?;
     let signal = trial.require(calibration.spec().signal.as_str())?;
     if calibration.spec().rate_estimator == RateEstimator::CentralDifference {
         let rate = calibration.spec().sample_rate_hz;
         let rates = Logged(rates_at_use(calibration.spec().rate_estimator, rate, signal)?);
         let mut receptor = Runner::new(Receptor::with_rate(calibration, rates)?);
-        let readings = signal.iter().map(|&v| receptor.step(Volts(v))).collect();
-        return Ok(Applied { readings, faults: Faults::default() });
+        signal.iter().for_each(|&v| take(receptor.step(Volts(v))));
+        return Ok(Faults::default());
     }
     let own_hz = calibration.spec().sample_rate_hz.hz();
     let mut live =
         LiveReceptor::new(&at_rate(calibration, sample_rate_hz(trial).unwrap_or(own_hz))?)?;
     let pressure = pressure_column(calibration).map(|column| trial.require(column)).transpose()?;
-    let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
+    for (i, (&time_s, &v)) in trial.time_s.iter().zip(signal).enumerate() {
         if let Some(pressure) = pressure {
             live.set_pressure(pressure[i]);
         }
-        live.step(t, v)
-    };
-    let readings = trial.time_s.iter().zip(signal).enumerate().map(one).collect();
-    Ok(Applied { readings, faults: live.faults() })
+        take(live.step(time_s, v));
+    }
+    Ok(live.faults())
 }
 
 /// A calibration that [needs the signal only](Model::needs_signal_only), at another sample rate. Any other calibration

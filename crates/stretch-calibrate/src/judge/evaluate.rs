@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
-use stretch_data::{Trial, unit_of};
+use stretch_data::{Trial, check_rows, unit_of};
 use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
 use stretch_receptor::Domain;
 
 use crate::{
     CalibrateError,
-    prepare::{check_rows, extent, polarity, sample_rate_hz},
+    prepare::{MOST_ROWS, extent, polarity, sample_rate_hz},
 };
 
 use super::apply::apply;
@@ -129,7 +129,7 @@ pub fn evaluate(
     trials: &[Trial],
 ) -> Result<Evaluation, CalibrateError> {
     let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
-    check_rows(trials)?;
+    check_rows(trials, MOST_ROWS)?;
     let names: Vec<&str> =
         std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect();
     let mut pooled = vec![Tally::default(); names.len()];

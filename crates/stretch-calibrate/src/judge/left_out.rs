@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use stretch_core::{Calibration, Model};
 use stretch_data::Trial;
 use stretch_metrics::lag;
+use stretch_receptor::Reading;
 
 use crate::{
     CalibrateError, ModelKind, Options,
@@ -13,7 +14,7 @@ use crate::{
     prepare::{LEAST_TRIALS, extent, fold_of, rows, sample_rate_hz},
 };
 
-use super::apply::apply;
+use super::apply::each_reading;
 
 /// Seconds on either side of a part left out that are not fitted either, because neighbouring samples are correlated.
 const GAP_S: f64 = 2.0;
@@ -209,15 +210,17 @@ impl Errors {
         options: &Options,
     ) -> Result<(), CalibrateError> {
         let reference = trial.require(&options.reference)?;
-        let applied = match options.is_table {
+        let mut estimates = Vec::with_capacity(trial.len());
+        let take = |reading: Result<Reading, _>| {
+            estimates.push(reading.map_or(f64::NAN, |reading| reading.estimate));
+        };
+        match options.is_table {
             true => {
                 let signals = trial.require(&options.signal)?;
-                apply(&beyond_its_ends(calibration.clone(), signals)?, trial)?
+                each_reading(&beyond_its_ends(calibration.clone(), signals)?, trial, take)?
             }
-            false => apply(calibration, trial)?,
+            false => each_reading(calibration, trial, take)?,
         };
-        let estimates: Vec<f64> =
-            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
         let period_s = 1.0 / sample_rate_hz(trial)?;
         let which = match (trial.name.contains("pulse"), turns) {
             (true, true) => 1,

@@ -11,4 +11,4 @@ pub use trials::{MOST_ROWS, even, even_signals, pooled_range};
 
 pub(crate) use gross_errors::rows;
 pub(crate) use series::{branches, polarity, rates_at_use};
-pub(crate) use trials::{LEAST_TRIALS, Prepared, Tally, check_rows, fold_of};
+pub(crate) use trials::{LEAST_TRIALS, Prepared, Tally, fold_of};

@@ -160,10 +160,10 @@ fn shortening() -> Vec<Shortening> {
         }
     };
     vec![
-        ("gauge", 270_000, Box::new(gauge)),
-        ("rig", 90_000, Box::new(rig)),
-        ("one output", 270_000, Box::new(black_box(1))),
-        ("three outputs", 90_000, Box::new(black_box(3))),
+        ("gauge", 240_000, Box::new(gauge)),
+        ("rig", 80_000, Box::new(rig)),
+        ("one output", 240_000, Box::new(black_box(1))),
+        ("three outputs", 80_000, Box::new(black_box(3))),
     ]
 }
 

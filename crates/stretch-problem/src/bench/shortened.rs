@@ -6,10 +6,10 @@ use stretch_data::{Channel, SessionTrial, Trial, check_rows};
 
 use crate::error::ProblemError;
 
-/// The most rows times simulated outputs: 45 minutes of a gauge at 100 Hz, or 15 minutes of a rig, which has three outputs.
+/// The most rows times simulated outputs: 40 minutes of a gauge at 100 Hz, or 13 minutes of a rig, which has three outputs.
 ///
 /// A diagnosis needs 550 to 950 bytes a row and output, so that it needs less than 256 MB and four times the size of the recordings.
-const MOST_SAMPLES: usize = 270_000;
+const MOST_SAMPLES: usize = 240_000;
 /// A trial that is cut keeps at least this many rows.
 const LEAST: usize = 1000;
 

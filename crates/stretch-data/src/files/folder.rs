@@ -60,10 +60,9 @@ pub(super) fn lock(folder: &Path) -> Option<File> {
 
 #[cfg(unix)]
 fn is_still(folder: &Path, locked: &File) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let identity = |meta: fs::Metadata| (meta.dev(), meta.ino());
-    let here = fs::metadata(folder).map(identity);
-    locked.metadata().map(identity).is_ok_and(|own| here.is_ok_and(|here| here == own))
+    use super::inputs::numbers;
+    let (here, own) = (fs::metadata(folder), locked.metadata());
+    here.is_ok_and(|here| own.is_ok_and(|own| numbers(&here) == numbers(&own)))
 }
 
 #[cfg(not(unix))]

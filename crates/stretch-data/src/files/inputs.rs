@@ -32,8 +32,14 @@ struct Identity(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] PathBuf);
 /// `None` for what holds no data itself: pipes, devices, folders, missing files.
 #[cfg(unix)]
 fn identity_of(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
+    meta.is_file().then(|| Identity(numbers(meta)))
+}
+
+/// Device and number of a file or folder.
+#[cfg(unix)]
+pub(super) fn numbers(meta: &fs::Metadata) -> [u64; 2] {
     use std::os::unix::fs::MetadataExt;
-    meta.is_file().then(|| Identity([meta.dev(), meta.ino()]))
+    [meta.dev(), meta.ino()]
 }
 
 #[cfg(not(unix))]

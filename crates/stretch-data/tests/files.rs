@@ -224,7 +224,7 @@ fn writers_at_once_lose_nothing_of_the_users() {
             });
         }
     });
-    assert_eq!(names(parent.path()), ["set"], "nothing stays beside it");
+    assert_eq!(names(parent.path()), ["set"], "nothing else is left");
     assert_eq!(names(&out), ["a", "own", "sub"]);
     for i in 0..100 {
         assert_eq!(fs::read(out.join(format!("own/{i}"))).expect("there"), b"mine");

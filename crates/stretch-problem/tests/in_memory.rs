@@ -210,7 +210,7 @@ fn trials_that_are_too_long_for_a_calibration_are_refused() {
         ("history", 3_000_000),
         ("observer", 3_000_000),
     ] {
-        let told = |rows: usize| {
+        let message = |rows: usize| {
             let trials = [of(rows)];
             let answer = match what.parse() {
                 Ok(model) => calibrate(&trials, &Options { model, ..Options::default() }).map(drop),
@@ -218,10 +218,10 @@ fn trials_that_are_too_long_for_a_calibration_are_refused() {
             };
             answer.unwrap_err().to_string()
         };
-        let said = told(most + 1);
+        let refused = message(most + 1);
         let expected = format!("{} rows together, and at most {most} are taken at once", most + 1);
-        assert!(said.contains(&expected) && said.contains("--grid HZ"), "{what}: {said}");
-        assert!(!told(most).contains("rows together"), "{what}");
+        assert!(refused.contains(&expected) && refused.contains("--grid HZ"), "{what}: {refused}");
+        assert!(!message(most).contains("rows together"), "{what}");
     }
 }
 

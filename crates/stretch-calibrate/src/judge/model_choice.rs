@@ -21,6 +21,8 @@ const AS_GOOD: f64 = 1.05;
 /// Greatest cost of following the baseline, as a ratio of root mean square errors on trials left out. A followed
 /// baseline lowers the cost of a drift of 5 % in a minute by a quarter.
 const PREMIUM: f64 = 1.05;
+/// Rows that candidates judged at the same time hold together, because each candidate needs some 200 bytes a row.
+const JUDGED_TOGETHER: usize = 1_000_000;
 /// The result of cross-validation for one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelRow {
@@ -81,10 +83,13 @@ pub struct ModelChoice {
 /// # Errors
 /// [`CalibrateError`] of the simplest model when none can be fitted.
 pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
-    let judged: Vec<_> = candidate_models(options)
-        .into_par_iter()
-        .map(|kind| (kind, judge_model(trials, options, kind)))
-        .collect();
+    let rows: usize = trials.iter().map(Trial::len).sum();
+    let candidates = candidate_models(options);
+    let mut judged = Vec::new();
+    for together in candidates.chunks((JUDGED_TOGETHER / rows.max(1)).max(1)) {
+        let judge = |&kind: &ModelKind| (kind, judge_model(trials, options, kind));
+        judged.par_extend(together.par_iter().map(judge));
+    }
     let mut first = None;
     let mut in_words = |problem: CalibrateError| {
         let text = problem.to_string();

@@ -144,20 +144,23 @@ impl Job {
         0
     }
 
-    /// Kills the command at moments that are spread over its run time; returns how many kills came
-    /// before its end.
-    pub(crate) fn is_killed_at_moments(&self, kills: u32) -> u32 {
+    /// Kills the command at moments that are spread over its run time until `hits` kills came before
+    /// its end; returns how many kills that took.
+    pub(crate) fn is_killed_at_moments(&self, hits: u32) -> u32 {
         let (expected, takes) = self.expected();
-        let mut hit = 0;
-        for kill in 0..kills {
+        let (mut hit, mut moments) = (0, 0);
+        while hit < hits {
+            // multiples of the golden ratio fill the time evenly, however many it takes
+            let share = (f64::from(moments) * 0.618_033_988_75).fract();
+            moments += 1;
             let folder = scratch();
             (self.prepare)(folder.path());
             let mut child = self.command(folder.path()).spawn().unwrap();
-            sleep(takes * kill / kills);
+            sleep(takes.mul_f64(share));
             child.kill().unwrap();
             hit += u32::from(child.wait().unwrap().signal() == Some(9));
-            self.assert_mended(folder.path(), &expected, &format!("{}: kill {kill}", self.line));
+            self.assert_mended(folder.path(), &expected, &format!("{}: {share}", self.line));
         }
-        hit
+        moments
     }
 }

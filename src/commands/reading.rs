@@ -5,6 +5,7 @@ use std::{
     str::FromStr,
 };
 
+use rayon::prelude::*;
 use stretch_data::{DataError, DataSet, Split, Trial};
 use stretch_recording::{DateOrder, ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
@@ -157,31 +158,39 @@ pub(crate) fn read_trials(
     split: Split,
     options: &ReadOptions,
 ) -> anyhow::Result<Vec<Trial>> {
-    let bar = progress("reading", paths.len() as u64);
     let mut trials = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let set = DataSet::read(path)?;
-            let before = trials.len();
-            for entry in set.entries(split) {
-                trials.push(with_notes_printed(Recording::of_entry(entry, path, options)?));
-            }
-            // once: what is wrong is one line of dataset.toml
-            let wrong = trials[before..].iter().find_map(|trial| set.rate_mismatch(trial));
-            wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
-            if trials.len() == before {
-                anyhow::bail!(
-                    "{}: no trial of the data set has split = \"{split}\"; name files instead",
-                    path.display()
-                );
-            }
-        } else {
-            trials.push(read_recording(path, options)?);
+    for group in paths.chunk_by(|a, b| !a.is_dir() && !b.is_dir()) {
+        let folder = &group[0];
+        if !folder.is_dir() {
+            trials.extend(read_all(group, |path| Recording::read(path, options))?);
+            continue;
         }
-        bar.inc(1);
+        let set = DataSet::read(folder)?;
+        let entries: Vec<_> = set.entries(split).collect();
+        if entries.is_empty() {
+            anyhow::bail!(
+                "{}: no trial of the data set has split = \"{split}\"; name files instead",
+                folder.display()
+            );
+        }
+        let own = read_all(&entries, |entry| Recording::of_entry(entry, folder, options))?;
+        // once: what is wrong is one line of dataset.toml
+        let wrong = own.iter().find_map(|trial| set.rate_mismatch(trial));
+        wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
+        trials.extend(own);
     }
-    bar.finish_and_clear();
     Ok(trials)
+}
+
+/// Reads recordings on all cores; notes and the first error are those of reading them in order.
+fn read_all<T: Sync>(
+    items: &[T],
+    read: impl Fn(&T) -> Result<Recording, RecordingError> + Send + Sync,
+) -> Result<Vec<Trial>, RecordingError> {
+    let bar = progress("reading", items.len() as u64);
+    let read: Vec<_> = items.par_iter().map(read).inspect(|_| bar.inc(1)).collect();
+    bar.finish_and_clear();
+    read.into_iter().map(|recording| Ok(with_notes_printed(recording?))).collect()
 }
 
 #[cfg(test)]

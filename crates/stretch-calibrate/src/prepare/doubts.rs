@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use rayon::prelude::*;
+
 use crate::Options;
 
 use super::{series::extent, trials::Piece};
@@ -268,7 +270,7 @@ pub(super) fn doubts(
     }
     let others = || (0..held.len()).step_by(held.len().div_ceil(OTHERS).max(1));
     let mistakes: Vec<Vec<_>> = held
-        .iter()
+        .par_iter()
         .map(|own| others().map(|j| (j, own.line.mistake(held[j].line))).collect())
         .collect();
     // the trial in doubt is that which more of the others contradict; of two it is the second

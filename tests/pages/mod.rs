@@ -88,5 +88,5 @@ fn the_summary_lists_every_page_of_the_book() {
 #[test]
 fn the_readme_stays_short() {
     let words = read(Path::new("README.md")).split_whitespace().count();
-    assert!(words <= 1300, "{words} words: what more there is to say belongs into the book");
+    assert!(words <= 1000, "{words} words: what more there is to say belongs into the book");
 }

@@ -20,9 +20,9 @@ use super::shared::{give_stdout, say, tell};
 /// a sample, stretch_lost() for one that did not come, and stretch_self_test(), which runs 200 samples
 /// and compares the answers with the computer's. No allocation, no library; the same bits as on the computer.
 ///
-///   stretch export --calibration cal.json --c StretchReceptor --arduino
+///   stretch export --calibration cal.json --c Elbow --arduino
 ///
-/// makes a folder for the libraries of the Arduino IDE, with an example that reads A0. Of several gauges
+/// makes a library Elbow for the Arduino IDE, with an example that reads A0. Of several gauges
 /// (`stretch calibrate --signal s1,s2`) a step takes a sample of each, and the example reads A0, A1 and so on.
 ///
 /// For a board with firmware in Rust and without floating point, as a record in postcard:
@@ -43,7 +43,7 @@ pub(crate) struct Args {
     /// Folder for the header; it must not hold anything; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
     c: Option<PathBuf>,
-    /// Make the folder a library that the Arduino IDE takes
+    /// Make the folder an Arduino library of its own name
     #[arg(long, requires = "c")]
     arduino: bool,
     /// Write C in this form, fixed or float [default: fixed where the model has such a form]
@@ -103,9 +103,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ))?;
     }
     match &c {
-        Some((out, made, files)) if !is_standard_output(out) => {
-            explain(out, made, files, args.arduino)
-        }
+        Some((out, made, files)) if !is_standard_output(out) => explain(out, made, files),
         _ => Ok(()),
     }
 }
@@ -137,7 +135,8 @@ fn stage(
         return Ok(Vec::new());
     }
     let files = if is_library {
-        arduino_library(made)
+        let folder = std::path::absolute(out)?;
+        arduino_library(made, &folder.file_name().unwrap_or_default().to_string_lossy())
     } else {
         vec![File { path: HEADER.into(), text: made.text.clone() }]
     };
@@ -161,7 +160,7 @@ fn stage(
     Ok(files)
 }
 
-fn explain(out: &Path, made: &Header, files: &[File], is_library: bool) -> anyhow::Result<()> {
+fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
     let (out, Header { form, model, pressure, step, .. }) = (out.display(), made);
     let step = step.as_ref().map_or_else(String::new, |step| format!(", in steps of {step}"));
     tell(format!(
@@ -173,9 +172,11 @@ fn explain(out: &Path, made: &Header, files: &[File], is_library: bool) -> anyho
     if *pressure {
         tell("tell it the pressure with stretch_set_pressure() before each sample")?;
     }
-    tell(if is_library {
-        "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"
-    } else {
-        "include it in one file of the program; stretch_self_test() is 0 where the board computes as the computer does"
+    let header = files.iter().find_map(|file| file.path.strip_prefix("src/")?.strip_suffix(".h"));
+    tell(match header {
+        Some(name) => format!(
+            "put the folder into the sketchbook's libraries; the IDE then has File > Examples > {name} > Live"
+        ),
+        None => "include it in one file of the program; stretch_self_test() is 0 where the board computes as the computer does".to_owned(),
     })
 }

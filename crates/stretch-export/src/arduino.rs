@@ -1,6 +1,6 @@
 //! A header as a library that the Arduino IDE takes.
 
-use crate::{Form, HEADER, Header, part::kept};
+use crate::{Form, Header, part::kept};
 
 /// A file of a library folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,10 +11,11 @@ pub struct File {
     pub text: String,
 }
 
-/// The library: its properties, the header in `src`, an example that reads A0 (of several gauges, A0 and the pins
-/// after it) at the calibration's sample rate, and the words that the IDE colours.
+/// A library of that name: its properties, the header in `src`, an example that reads A0 (of several gauges, A0 and the
+/// pins after it) at the calibration's sample rate, and the words that the IDE colours.
 ///
-/// The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
+/// The header has the library's name, so that libraries of several calibrations can be installed side by side; a sketch
+/// includes one of them. Characters that a name may not have become `_`. The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
 /// revision 2.2 (format 1.5).
 ///
 /// ```
@@ -22,26 +23,38 @@ pub struct File {
 /// use stretch_export::{Options, arduino_library, header};
 /// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
 /// let header = header(&stretch_receptor::example_calibration(), &options)?;
-/// let paths: Vec<_> = arduino_library(&header).into_iter().map(|file| file.path).collect();
-/// assert_eq!(paths, ["library.properties", "keywords.txt", "src/stretch.h", "examples/Live/Live.ino"]);
+/// let paths: Vec<_> = arduino_library(&header, "Elbow").into_iter().map(|file| file.path).collect();
+/// assert_eq!(paths, ["library.properties", "keywords.txt", "src/Elbow.h", "examples/Live/Live.ino"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn arduino_library(header: &Header) -> Vec<File> {
+pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
+    let name = allowed(name);
     let file = |path: &str, text: String| File { path: path.into(), text };
     vec![
-        file("library.properties", properties(header)),
+        file("library.properties", properties(header, &name)),
         file("keywords.txt", keywords(header)),
-        file(&format!("src/{HEADER}"), header.text.clone()),
-        file("examples/Live/Live.ino", live(header)),
+        file(&format!("src/{name}.h"), header.text.clone()),
+        file("examples/Live/Live.ino", live(header, &name)),
     ]
 }
 
-fn properties(header: &Header) -> String {
+/// A name as the specification allows it: at most 63 letters, digits and `_.-`, a letter or digit first.
+fn allowed(name: &str) -> String {
+    let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
+    let name: String = name.chars().map(|c| if is_allowed(c) { c } else { '_' }).take(56).collect();
+    if name.starts_with(|c: char| c.is_ascii_alphanumeric()) {
+        name
+    } else {
+        format!("stretch{name}")
+    }
+}
+
+fn properties(header: &Header, name: &str) -> String {
     include_str!("arduino/library.properties")
         .replace("@VERSION@", env!("CARGO_PKG_VERSION"))
         .replace("@MODEL@", &header.model)
         .replace("@FORM@", &header.form.to_string())
-        .replace("@HEADER@", HEADER)
+        .replace("@NAME@", name)
 }
 
 /// The words that the IDE colours, a tab between a word and its kind: those that the header has.
@@ -51,7 +64,7 @@ fn keywords(header: &Header) -> String {
     lines.filter(is_there).collect()
 }
 
-fn live(header: &Header) -> String {
+fn live(header: &Header, name: &str) -> String {
     let form = match (header.array, header.form) {
         (Some(_), _) => "array",
         (None, Form::Fixed) => "fixed",
@@ -63,6 +76,7 @@ fn live(header: &Header) -> String {
     let pins: Vec<String> = (0..header.array.unwrap_or(0)).map(|k| format!("A{k}")).collect();
     let [rising, falling] = header.branches;
     kept(include_str!("arduino/Live.ino"), &has)
+        .replace("@NAME@", name)
         .replace("@PINS@", &pins.join(", "))
         .replace("@RISING@", rising)
         .replace("@FALLING@", falling)

@@ -309,11 +309,39 @@ fn with_avr_gcc_two_gauges_on_an_uno_give_the_same_bits() {
 #[test]
 fn the_arduino_example_reads_a_pin_a_gauge() {
     let made = array_header(&example_array(), &options(None)).unwrap();
-    let library = arduino_library(&made);
+    let library = arduino_library(&made, "Elbow");
     let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
     assert!(live.text.contains("pins[STRETCH_CHANNELS] = {A0, A1};"), "{}", live.text);
     let words = &library.iter().find(|file| file.path == "keywords.txt").unwrap().text;
     assert!(words.contains("stretch_readmit\t") && !words.contains("STRETCH_INFLATION"), "{words}");
+}
+
+#[test]
+fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
+    let made = array_header(&example_array(), &options(None)).unwrap();
+    for (folder, name) in [
+        ("Elbow", "Elbow"),
+        ("left knee", "left_knee"),
+        ("2nd-rig.b", "2nd-rig.b"),
+        ("a\nurl=x", "a_url_x"),
+        ("x>\"*/", "x____"),
+        ("_hidden", "stretch_hidden"),
+        ("", "stretch"),
+        ("Ellbögen", "Ellb_gen"),
+    ] {
+        let library = arduino_library(&made, folder);
+        let text = |end: &str| {
+            let file = library.iter().find(|file| file.path.ends_with(end));
+            &file.unwrap_or_else(|| panic!("{folder}: no {end}")).text
+        };
+        let properties: Vec<&str> = text("library.properties").lines().collect();
+        assert_eq!(properties[0], format!("name={name}"));
+        assert!(properties.contains(&&*format!("includes={name}.h")), "{properties:?}");
+        assert_eq!(*text(&format!("src/{name}.h")), made.text);
+        assert!(text("Live.ino").contains(&format!("#include <{name}.h>\n")), "{name}");
+    }
+    let long = arduino_library(&made, &"x".repeat(300));
+    assert!(long[0].text.lines().next().is_some_and(|line| line.len() <= "name=".len() + 63));
 }
 
 #[test]

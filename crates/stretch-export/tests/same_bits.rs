@@ -510,7 +510,7 @@ fn a_header_has_the_defects_that_its_map_has() {
         let made = header(&calibration, &options).unwrap();
         assert_eq!(made.form, Form::Float, "{name}");
         assert!(!made.text.contains('@'), "{name}: a mark was left");
-        let library = arduino_library(&made);
+        let library = arduino_library(&made, "Elbow");
         let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
         assert_eq!(live.text.contains("stretch_set_pressure("), made.pressure, "{name}");
         (made.pressure, made.text)

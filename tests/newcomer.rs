@@ -51,8 +51,8 @@ fn a_gauge_in_another_unit_is_told_by_its_power_of_ten() {
     );
     let record = scratch.path("cal.json");
     runs(&mut calibrate(&volts, &record));
-    let says = "3,000 of 3,000 samples lie outside the range of the calibration, 1.273 to 2.196 V, and were held at its ends: \
-                are they in mV? divided by 1000, 2,999 would lie inside";
+    let says = "3,000 of 3,000 samples lie outside the range of the calibration, 1.273 to 2.196 V, and were limited to it: \
+                are they in mV? 2,999 lie inside when divided by 1000";
     let told = |command: &str, log: &std::path::Path| {
         let output =
             stretch().args([command, "--calibration"]).arg(&record).arg(log).output().unwrap();

@@ -104,7 +104,7 @@ def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
         stretch_gap.calibrate(*fitted)
     with pytest.raises(stretch_gap.StretchError, match="does not come after"):
         stretch_gap.calibrate(*fitted, time_s=np.zeros(fitted[0].size))
-    with pytest.raises(stretch_gap.StretchError, match="this is no calibration that can be used"):
+    with pytest.raises(stretch_gap.StretchError, match="this calibration cannot be used"):
         stretch_gap.Calibration.from_json('{"schema": 1}')
     with pytest.raises(stretch_gap.StretchError, match="cannot read it"):
         stretch_gap.Calibration.load("/nowhere/c.json")

@@ -1,5 +1,4 @@
-//! Input that is wrong: each time a sentence that names the place, exit code 1,
-//! and nothing written. Files that are wrong in themselves are those of `corpus/`.
+//! Wrong input gives a message with the place, exit code 1 and no output. Invalid files are in `corpus/`.
 
 use std::fs::File;
 

@@ -1,4 +1,4 @@
-//! What many rows change: nothing but the time that they take.
+//! More rows change only the run time.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! Commands that write, killed at any moment: what is there is old or new.
+//! Commands killed while they write leave the old file or the new one.
 #![cfg(unix)]
 
 use std::{

@@ -1,4 +1,4 @@
-//! What a small file may take of memory and time: under a limit of the system, a refusal with a sentence, and no abort.
+//! A small file that needs too much memory or time is refused with a message, without an abort.
 #![cfg(target_os = "linux")]
 
 use std::{

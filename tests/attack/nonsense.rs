@@ -1,4 +1,4 @@
-//! Logs and records that do not belong to what is asked of them: it is said, and nothing is written.
+//! Logs and records that do not fit the command are refused, and nothing is written.
 
 use std::{fmt::Write, fs};
 

@@ -1,4 +1,4 @@
-//! Wrong inputs of the program that would give numbers all the same are reported or refused.
+//! Wrong inputs that would still give numbers are reported or refused.
 
 use std::{fmt::Write, fs};
 

@@ -1,4 +1,4 @@
-//! A day on the line, as fast as the pipe: every frame that was sent is a row or is said to be lost.
+//! An hour of frames through a pipe, without pauses: every frame is recorded or reported as lost.
 
 use std::{
     fs,

@@ -1,4 +1,4 @@
-//! What a command writes is all there or not at all, whatever prevents it.
+//! A command that cannot finish writing leaves nothing, and does not change what was there.
 #![cfg(unix)]
 
 use std::{
@@ -57,7 +57,7 @@ fn a_report_that_fails_leaves_no_record_behind() {
         ("calibrate a.csv --out cal.json --report none/r.html", "none/r.html"),
         ("export --calibration board.json --fixed cal.postcard --c bench", "bench"),
         ("calibrate a.csv --out cal.json --report logs", "logs"),
-        ("calibrate a.csv --out new.json --report new.json", "is written there, too"),
+        ("calibrate a.csv --out new.json --report new.json", "has the same path or contains it"),
         (
             "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=new.json --report logs",
             "logs",

@@ -1,4 +1,4 @@
-//! What is said of a record that is wrong is what is wrong with it, and where.
+//! The message about a wrong record names the actual fault and its place.
 
 use std::{fmt::Write, fs, path::PathBuf};
 

@@ -218,7 +218,7 @@ pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
     if (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         format!(
-            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: bring it onto that rate (stretch convert --grid {expected_hz})"
+            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: resample it (stretch convert --grid {expected_hz})"
         )
     } else {
         "it is shorter than the warm-up of the rate estimator".to_owned()

@@ -51,8 +51,8 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
 pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
-            "{} % of the samples lie outside of what was calibrated and were held at its ends: is this a log of that \
-             sensor, in that unit? If it is, calibrate on trials that reach as far",
+            "{} % of the samples lie outside the range of the calibration and were limited to it: is it the calibrated sensor, in \
+             the same unit? If so, calibrate on trials with this range",
             share(clamped, samples)
         )
     })

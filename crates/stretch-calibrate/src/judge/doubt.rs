@@ -202,15 +202,15 @@ impl Pace {
             return None;
         }
         let what = if self.needs_signal_only {
-            "its estimates are right, the rates are not"
+            "the estimates are right, but their rates of change are wrong"
         } else if found_hz > rate_hz {
-            "its rates, and estimates that rest on them, are wrong"
+            "rates of change, and estimates that use them, are wrong"
         } else {
-            "the samples in between count as missing"
+            "the samples that the log lacks count as missing"
         };
         let text = format!(
-            "{found_hz:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
-             the log there with stretch convert --grid {rate_hz}"
+            "the log has {found_hz:.4} samples a second, the calibration {rate_hz:.4}: {what}; log at that rate, or resample \
+             the log with stretch convert --grid {rate_hz}"
         );
         Some(Doubt::new("other_rate", text))
     }

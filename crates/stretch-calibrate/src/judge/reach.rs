@@ -80,25 +80,25 @@ impl Reach {
         let (count, all) = (thousands(outside), thousands(self.samples));
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         let sentence = format!(
-            "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were held at its ends"
+            "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were limited to it"
         );
         let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
         let (code, text) = match best.filter(|(_, inside)| 2 * inside > self.samples) {
             Some((power, inside)) => {
                 let asked = in_other_unit(&self.unit, power)
-                    .map_or("is the unit another".to_owned(), |unit| format!("are they in {unit}"));
+                    .map_or("is the unit wrong".to_owned(), |unit| format!("are they in {unit}"));
                 let by = ten_to(power.abs());
                 let how = if power > 0 { "multiplied" } else { "divided" };
                 let inside = thousands(inside);
                 (
                     "other_unit",
-                    format!("{sentence}: {asked}? {how} by {by}, {inside} would lie inside"),
+                    format!("{sentence}: {asked}? {inside} lie inside when {how} by {by}"),
                 )
             }
             None => (
                 "outside_range",
                 format!(
-                    "{sentence}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
+                    "{sentence}: is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range"
                 ),
             ),
         };
@@ -185,9 +185,9 @@ mod tests {
         assert_eq!(doubt([f64::NAN; 3]), None);
         // values that no single power of ten brings inside
         let other = doubt([-1.0, -2.0, -3.0]).expect("all are outside");
-        assert!(other.contains("a log of that sensor"), "{other}");
+        assert!(other.contains("the calibrated sensor"), "{other}");
         let other = doubt([1e2 * middle; 3]).expect("all are outside");
-        assert!(other.contains("is the unit another? divided by 100, 3 would"), "{other}");
+        assert!(other.contains("is the unit wrong? 3 lie inside when divided by 100"), "{other}");
     }
 
     #[test]

@@ -35,7 +35,7 @@ type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 const MISTAKES: [Mistake; 4] = [
     (
         |own, _| [own, Line { means: swap(own.means), spreads: swap(own.spreads), ..own }],
-        "{trial} has {signal} and {reference} exchanged, compared with {other}: give its columns their names with stretch convert, or leave it out",
+        "{trial} has {signal} and {reference} exchanged, compared with {other}: swap the two column names with stretch convert, or leave the trial out",
     ),
     (
         // the zero of what was reversed is unknown
@@ -43,17 +43,17 @@ const MISTAKES: [Mistake; 4] = [
             let own = Line { means: other.means, ..own };
             [own, Line { correlation: -own.correlation, ..own }]
         },
-        "{trial} has {signal} or {reference} reversed, compared with {other}: one falls with the other where it should rise, or rises where it \
-         should fall; turn its sign with stretch convert, or leave it out",
+        "{trial} has {signal} or {reference} reversed, compared with {other}: change the sign of one with stretch convert, \
+         or leave the trial out",
     ),
     (
         |own, _| [own, own.times(1e-3)],
-        "{signal} of {trial} is about 1000 times that of {other}: is one in millivolts and the other in volts? Bring both into one unit with \
+        "{signal} of {trial} is about 1000 times that of {other}: is one in millivolts and the other in volts? Convert one with \
          stretch convert --column '{signal}={signal}/1000'",
     ),
     (
         |own, _| [own, own.times(1e3)],
-        "{signal} of {trial} is about a thousandth of that of {other}: is one in volts and the other in millivolts? Bring both into one unit with \
+        "{signal} of {trial} is about a thousandth of that of {other}: is one in volts and the other in millivolts? Convert one with \
          stretch convert --column '{signal}={signal}*1000'",
     ),
 ];
@@ -245,8 +245,8 @@ pub(super) fn doubts(
     let samples = pieces.iter().map(|(_, [signal, ..])| signal.len()).sum::<usize>();
     if rate_hz < SLOW_HZ && samples >= TELLING && !options.is_table {
         said.push(format!(
-            "the trials have {rate_hz:.4} samples a second: are their times milliseconds? Then give them in seconds (--time time_s:ms): the rates are 1000 \
-             times as high"
+            "the trials have {rate_hz:.4} samples a second: are their times in milliseconds? If so, add --time time_s:ms, which makes the rates \
+             1000 times as high"
         ));
     }
     let all = Line::of(pieces.iter()).spreads[1];
@@ -254,7 +254,7 @@ pub(super) fn doubts(
         let name = trial.name;
         if trial.parts.iter().all(|(_, [v, x, _])| is_same(v, x)) && trial.line.spreads[0] > 0.0 {
             said.push(format!(
-                "{signal} equals {reference} in {name}: was one recorded in place of the other? A fit to it is right for that column only"
+                "{signal} equals {reference} in {name}: was one recorded in place of the other? If so, leave that trial out"
             ));
         } else if trial.line.spreads[0] == 0.0 && trial.line.spreads[1] > MOVES_ON * all {
             let value = trial.line.means[0];

@@ -92,7 +92,7 @@ pub fn join(object: &str) -> Option<String> {
 pub fn seal(record: &impl Serialize) -> Result<String, CalibrateError> {
     let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
     let object = serde_json::to_string_pretty(record).map_err(|e| problem(e.to_string()))?;
-    join(&object).ok_or_else(|| problem("it is no object".to_owned()))
+    join(&object).ok_or_else(|| problem("it is not a JSON object".to_owned()))
 }
 
 fn trimmed(text: &str) -> &str {

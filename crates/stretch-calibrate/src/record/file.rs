@@ -129,7 +129,7 @@ pub fn calibration_bytes(
     Ok(calibration_to_json(calibration)?.into_bytes())
 }
 
-const UNUSABLE: &str = "this is no calibration that can be used";
+const UNUSABLE: &str = "this calibration cannot be used";
 
 /// An object without where its movements turn, which are a record of `stretch-sleeve`; `None` where it has none.
 fn without_turns(object: &str) -> Option<serde_json::Value> {

@@ -85,12 +85,12 @@ pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Res
             let is_same = own.is_some() && own == *identity;
             if is_same || real.starts_with(other_real) || other_real.starts_with(&real) {
                 return fail(format!(
-                    "{other} is written there, too; choose another file for one of them"
+                    "{other} has the same path or contains it; choose another for one of them"
                 ));
             }
         }
         if own.is_some() && own == stdin {
-            return fail("standard input comes from it; name another file".to_owned());
+            return fail("it is also standard input; choose another file".to_owned());
         }
         guarded.outputs.push((shown.clone(), own));
         before.push((shown, real));
@@ -161,7 +161,7 @@ pub(super) fn check_output(path: &Path, meta: &fs::Metadata) -> io::Result<()> {
     let input = || guard.as_ref()?.inputs.get(&identity_of(path, meta)?);
     match input() {
         Some(input) => Err(io::Error::other(format!(
-            "it is a file that this command reads, {}; name another file",
+            "this command reads it as {}; choose another output file",
             input.display()
         ))),
         None => Ok(()),

@@ -38,10 +38,10 @@ pub(crate) fn shortened(
         .collect();
     let others = match cut.len() - 1 {
         0 => String::new(),
-        more => format!(" and of {more} more"),
+        more => format!(" and of each of {more} more"),
     };
     let note = format!(
-        "only the first {rows} rows of {}{others} are used, because a diagnosis takes {most} rows at most; give shorter recordings to choose another part",
+        "only the first {rows} rows of {}{others} are used, because a diagnosis takes {most} rows in all; cut the recordings to choose another part",
         cut[0],
     );
     Ok((trials.iter().map(|own| beginning(own, rows)).collect(), Some(note)))

@@ -218,7 +218,7 @@ fn is_of_several(text: &str) -> bool {
 }
 
 fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
-    let problem = format!("this is no calibration that can be used: {cause}");
+    let problem = format!("this calibration cannot be used: {cause}");
     CalibrateError::Record { file: file.to_owned(), problem }
 }
 

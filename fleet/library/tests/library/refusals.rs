@@ -86,7 +86,7 @@ fn queries_that_mean_nothing_are_refused_by_name() {
         ("select poly13_fit(bridge_v, contraction) from trials", "poly13_fit"),
         (
             "select strain_estimate('{}', rate, bridge_v) from trials",
-            "no calibration that can be used",
+            "this calibration cannot be used",
         ),
     ];
     for (sql, said) in cases {

@@ -51,10 +51,7 @@ fn no_answer_is_written_over_what_it_was_made_from() {
     {
         for over in [trial, "lake.json"] {
             let told = refused(line, &[&lake, &lake.join(over)]);
-            assert!(
-                told.contains("it is a file that this command reads"),
-                "{line}, {over}: {told}"
-            );
+            assert!(told.contains("this command reads it as"), "{line}, {over}: {told}");
             // sums that help the next command may be added
             let after = tree(&lake);
             assert!(

@@ -104,7 +104,7 @@ impl Prior {
             let which =
                 if count == 2 { self.signals.join(" or ") } else { self.signals[k].clone() };
             let says =
-                format!("{which} rises where it fell in the sessions of the prior, compared with the other gauges");
+                format!("relative to the other gauges, {which} rises where it fell in the sessions of the prior");
             (distance(&without, &without.mean), distance(&own, &own.mean), says)
         });
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (b, a)));
@@ -119,7 +119,7 @@ impl Prior {
         let found = reversed.chain(exchanged).filter(|(without, is, _)| *without < NEARER * is);
         let (_, _, says) = found.min_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
         Some(format!(
-            "{says}: is a gauge exchanged or reversed? Turn the wires, or give the columns the names and signs of the sessions (stretch convert)"
+            "{says}: are gauges exchanged or reversed? Swap the wires, or give the columns the names and signs that they had (stretch convert)"
         ))
     }
 }

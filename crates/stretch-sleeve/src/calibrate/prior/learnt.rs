@@ -281,7 +281,7 @@ fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
     let few = || SleeveError::Prior {
         file: "prior".into(),
         problem: format!(
-            "{} sessions do not tell how sessions vary; give at least {LEAST_SESSIONS}, each written by stretch \
+            "{} are too few sessions to show how they vary; give at least {LEAST_SESSIONS}, each written by stretch \
              calibrate --session",
             sessions.len()
         ),
@@ -318,8 +318,8 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     }
     if let Some(name) = elsewhere(&session.signals, &first.signals) {
         return Some(format!(
-            "{name} does not have the same position in its signals ({}) as in those of {} ({}), and signals are matched by position: write it again with \
-             stretch calibrate --session and that order",
+            "{name} does not have the same position in this session ({}) as in {} ({}), and signals are matched by position: write this session again \
+             (stretch calibrate --session) in that order",
             session.signals.join(","),
             first.name,
             first.signals.join(",")
@@ -327,13 +327,13 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     }
     if unit_of(&session.reference) != unit_of(&first.reference) {
         return Some(format!(
-            "its reference is {} and that of {} is {}: convert one of them (stretch convert), so that both are in one unit",
+            "its reference is {} and that of {} is {}: convert the recording of one (stretch convert), and write its session again",
             session.reference, first.name, first.reference
         ));
     }
     if (session.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 0.05 {
         return Some(format!(
-            "it was sampled at {:.4} Hz and {} at {:.4} Hz: bring it onto that rate (stretch convert --grid {})",
+            "it was sampled at {:.4} Hz and {} at {:.4} Hz: resample its recording (stretch convert --grid {}) and write it again",
             session.sample_rate_hz, first.name, first.sample_rate_hz, first.sample_rate_hz
         ));
     }
@@ -343,7 +343,7 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     let steeper = (0..own.len()).map(|k| (own[k], steepness(session, k) / steepness(first, k)));
     if is_other_unit(steeper) {
         return Some(format!(
-            "{} has a range of {:.4}, and in {} one of {:.4}, which does not fit the ranges of the signals: is one in radians and the other in degrees, \
+            "{} has a range of {:.4} here but in {} one of {:.4}, and the signals do not explain that: is one in radians and the other in degrees, \
              or one in centimetres and the other in millimetres? Convert it (stretch convert), and write the session again",
             session.reference,
             span(&session.reference_range),
@@ -353,7 +353,7 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     }
     turned(own.into_iter().zip(other)).map(|opposite| {
         format!(
-            "{opposite} of {} channels fall where those of {} rise: swap the wires of the bridge, or turn the signal's sign (leave one of the sessions out)",
+            "{opposite} of {} channels fall where those of {} rise: swap the wires and record again, change the sign of the signal, or leave one session out",
             session.signals.len(),
             first.name
         )

@@ -21,7 +21,7 @@ const PRIOR: [&str; 2] = ["prior", "learn it again with stretch sleeve learn"];
 const SESSION: [&str; 2] = ["session", "write it again with stretch calibrate --session"];
 
 fn problem([what, again]: [&str; 2], file: &str, problem: impl std::fmt::Display) -> SleeveError {
-    let problem = format!("this is no {what} that can be used: {problem}; {again}");
+    let problem = format!("this {what} cannot be used: {problem}; {again}");
     SleeveError::Prior { file: file.to_owned(), problem }
 }
 
@@ -48,7 +48,9 @@ impl Prior {
             && prior.levels.iter().chain([&prior.gram]).all(is_whole);
         match is_good {
             true => Ok(prior),
-            false => Err(problem(PRIOR, &file, "its numbers are not as many as its channels need")),
+            false => {
+                Err(problem(PRIOR, &file, "it has too many or too few numbers for its channels"))
+            }
         }
     }
 
@@ -64,7 +66,7 @@ impl Prior {
 /// An object in JSON with its digest as the last field.
 fn sealed(what: [&str; 2], record: &impl Serialize, name: &str) -> Result<String, SleeveError> {
     let object = serde_json::to_string(record).map_err(|error| problem(what, name, error))?;
-    digest::join(&object).ok_or_else(|| problem(what, name, "it is no object"))
+    digest::join(&object).ok_or_else(|| problem(what, name, "it is not a JSON object"))
 }
 
 /// The object of a file whose digest is that of its text.
@@ -76,7 +78,7 @@ fn opened<T: for<'d> Deserialize<'d>>(
     let unusable = |error: &dyn std::fmt::Display| problem(what, &file, error);
     let bytes = read_whole(path).map_err(|error| unusable(&error))?;
     let text = String::from_utf8(bytes).map_err(|error| unusable(&error))?;
-    let object = digest::verified(&text, "take an unchanged copy if there is one");
+    let object = digest::verified(&text, "an unchanged copy, if any, works as well");
     let value = digest::parse(&object.map_err(|error| unusable(&error))?);
     Ok((value.map_err(|error| unusable(&error))?, file))
 }

@@ -112,9 +112,9 @@ struct OnLandmarks {
 }
 
 /// The note on a movement whose ends and rest are the same from either side.
-const REVERSED: &str = "without a reference it cannot be told whether all gauges are reversed, because the signals fit the earlier sessions \
-                        then, too: look whether the estimate rises where the reference does, or give ten seconds of reference (stretch \
-                        calibrate --prior)";
+const REVERSED: &str = "it cannot be told whether all gauges are reversed, because reversed signals would fit the earlier sessions as well: \
+                        check that the estimate rises when the measured quantity does, or record ten seconds with a reference \
+                        (stretch calibrate --prior)";
 
 impl Prior {
     /// Renews a calibration by the ends and the rests of a movement, without any reference.
@@ -171,8 +171,8 @@ impl Prior {
         let linear = self.linear(&normal.mean, self.gram.clone(), self.noise);
         let weights = linear.weights_of(calibration).ok_or_else(|| SleeveError::Prior {
             file: "the calibration".into(),
-            problem: "it was not made of this prior: make it with stretch calibrate --prior, or name the wearer with \
-                      --of in its place"
+            problem: "it was not made from this prior: make one with stretch calibrate --prior, or give --of WEARER \
+                      instead"
                 .into(),
         })?;
         // both sessions differ from their wearer, as sessions do
@@ -230,8 +230,8 @@ impl Prior {
         Err(SleeveError::Prior {
             file: "these data".into(),
             problem: format!(
-                "they hold no whole movement: {:.3} {} from end to end, where earlier sessions had {:.3}, and {passes} ways between the ends; \
-                 move over the whole range, at least once up and down, or give some seconds of reference (stretch calibrate --prior)",
+                "they hold no whole movement: {:.3} {} from end to end (earlier sessions: {:.3}), and {passes} passes between the ends; \
+                 move over the whole range, at least once up and down, or record some seconds with a reference (stretch calibrate --prior)",
                 span * unit,
                 unit_of(&self.reference),
                 usual * unit
@@ -254,15 +254,15 @@ impl Prior {
         };
         let why = match may_be_reversed {
             true => {
-                "they would not be if all gauges were reversed: turn the wires or the signs of the columns (stretch convert), or"
+                "they would fit if all gauges were reversed: swap the wires or change the signs of the columns (stretch convert), or"
             }
-            false => "another movement, sensor or polarity;",
+            false => "check the movement, the sensor and the polarity, or",
         };
         Err(SleeveError::Prior {
             file: "these data".into(),
             problem: format!(
-                "the ends and rests of their signals are further from those of the sessions{of} than one session in a thousand is (squared \
-                 distance {distance:.1}, at most {UNSEEN}): {why} give ten seconds of reference or more (stretch calibrate --prior)"
+                "at the ends and at rest, their signals are further from the sessions{of} than in all but one session in a thousand \
+                 (squared distance {distance:.1}, limit {UNSEEN}): {why} record ten seconds or more with a reference (stretch calibrate --prior)"
             ),
         })
     }

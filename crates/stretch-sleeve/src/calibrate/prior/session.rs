@@ -228,7 +228,7 @@ impl Session {
             && self.still_samples.len() == self.signals.len()
             && self.domains.iter().all(has_domain)
             && self.parts.iter().all(is_whole);
-        if is_good { Ok(()) } else { Err(problem("its numbers are not those of a session")) }
+        if is_good { Ok(()) } else { Err(problem("its numbers contradict each other")) }
     }
 }
 

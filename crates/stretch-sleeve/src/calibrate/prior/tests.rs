@@ -180,7 +180,7 @@ fn sorted_fields_of_a_prior_and_of_a_session_are_told_with_what_to_do() {
         std::fs::write(&path, value.to_string()).unwrap();
         let error = error();
         let says =
-            format!("or its fields were sorted; take an unchanged copy if there is one; {again}");
+            format!("or its fields were sorted; an unchanged copy, if any, works as well; {again}");
         assert!(error.contains(&says) && error.contains("file.json"), "{error}");
     }
 }
@@ -203,7 +203,7 @@ fn data_of_another_kind_are_refused_with_what_to_do() {
     refused(
         &scaled(2, std::f64::consts::PI / 180.0),
         usual(),
-        "is angle_deg in another unit, in radians and not in degrees",
+        "is angle_deg in another unit, such as radians instead of degrees",
     );
     let turned = |t: &mut Trial| t.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
     refused(&turned, usual(), "swap the wires");
@@ -328,7 +328,7 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
     );
     let foreign =
         RenewOptions { calibration: Some(fit.unwrap().calibration), ..RenewOptions::of("w2") };
-    refused(today, foreign, "not made of this prior");
+    refused(today, foreign, "not made from this prior");
 }
 
 #[test]
@@ -336,7 +336,7 @@ fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_tol
     const ALIKE: Simulated = session;
     const RESTS: Simulated = resting;
     let note = "cannot be told whether all gauges are reversed";
-    let refusal = "they would not be if all gauges were reversed: turn the wires";
+    let refusal = "they would fit if all gauges were reversed: swap the wires";
     /// The movement, the signals, what they are subtracted from, and the note or the refusal.
     type Member<'a> = (Simulated, &'a [&'a str], Option<f64>, Result<Option<&'a str>, &'a str>);
     let members: [Member<'_>; 10] = [
@@ -344,12 +344,12 @@ fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_tol
         (ALIKE, &["s1"], Some(1.0), Ok(Some(note))),
         (ALIKE, &["s1", "s2"], None, Ok(Some(note))),
         (ALIKE, &["s1", "s2"], Some(1.2), Ok(Some(note))),
-        (ALIKE, &["s1", "s2"], Some(0.0), Err("of reference")),
+        (ALIKE, &["s1", "s2"], Some(0.0), Err("with a reference")),
         (RESTS, &["s1"], None, Ok(None)),
         (RESTS, &["s1"], Some(1.0), Err(refusal)),
         (RESTS, &["s1", "s2"], None, Ok(None)),
         (RESTS, &["s1", "s2"], Some(1.2), Err(refusal)),
-        (RESTS, &["s1", "s2"], Some(0.0), Err("of reference")),
+        (RESTS, &["s1", "s2"], Some(0.0), Err("with a reference")),
     ];
     for (simulated, signals, subtracted_from, says) in members {
         let prior = prior_of(simulated, signals);

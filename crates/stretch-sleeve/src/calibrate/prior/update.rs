@@ -222,7 +222,7 @@ impl Prior {
             |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if signals.len() != self.signals.len() {
             return problem(format!(
-                "it is of {} channels ({}), and {} were named: name as many with --signal, in its order, or learn a prior of these",
+                "it has {} channels ({}), and {} were named: name as many with --signal, in that order, or learn a prior from these",
                 self.signals.len(),
                 self.signals.join(","),
                 signals.len()
@@ -257,7 +257,7 @@ impl Prior {
             |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
             return problem(format!(
-                "the reference of these data lies far outside of what its sessions had: is {} in another unit?",
+                "the reference of these data lies far outside its range in the sessions: is {} in another unit?",
                 self.reference
             ));
         }
@@ -269,8 +269,8 @@ impl Prior {
         });
         if is_other_unit(steeper) {
             return problem(format!(
-                "for the same change of the signals, the reference of these data changes by another amount than in the sessions of the prior: is {} in \
-                 another unit, in radians and not in degrees, or in centimetres and not in millimetres? Convert it (stretch convert)",
+                "for the same change of the signals, the reference of these data changes by a different amount than in the sessions of the prior: is {} in \
+                 another unit, such as radians instead of degrees? Convert it (stretch convert)",
                 self.reference
             ));
         }
@@ -284,7 +284,7 @@ impl Prior {
         let hz = channels.sample_rate.hz();
         if (hz / self.sample_rate_hz - 1.0).abs() > 0.05 {
             return problem(format!(
-                "it is of {:.4} samples a second and the data have {hz:.4}: bring them onto its rate (stretch convert --grid {})",
+                "it has {:.4} samples a second and the data {hz:.4}: resample the data (stretch convert --grid {})",
                 self.sample_rate_hz, self.sample_rate_hz
             ));
         }
@@ -298,7 +298,7 @@ impl Prior {
             if 2 * outside > all {
                 return problem(format!(
                     "{name} ran from {:.4} to {:.4} in its sessions, and most of these samples lie far outside: is the signal in another \
-                     unit, or reversed, or another gauge?",
+                     unit, reversed, or from another gauge?",
                     domain.min, domain.max
                 ));
             }
@@ -319,7 +319,7 @@ impl Prior {
             return Err(SleeveError::Prior {
                 file: "the prior".into(),
                 problem: format!(
-                    "{opposite} of {} channels fall where they rose in its sessions: swap the wires of the bridge, or turn the signal's sign",
+                    "{opposite} of {} channels fall where they rose in its sessions: swap the wires of the bridge, or change the sign of the signal",
                     self.signals.len()
                 ),
             });
@@ -334,7 +334,7 @@ impl Prior {
         let share = (moved.max - moved.min) / all;
         (share < MOVEMENT).then(|| {
             format!(
-                "the reference moved over {:.3} of the {all:.3} that the prior has seen: what follows is mostly the prior; move over the whole range, at least once up and down",
+                "the reference moved over {:.3} of the {all:.3} that the prior has seen: the result depends mostly on the prior; move over the whole range, at least once up and down",
                 moved.max - moved.min
             )
         })
@@ -348,11 +348,15 @@ impl Prior {
         let seen = paths_in_words(self.paths().filter(|p| p.len() == 1).map(<[String]>::to_vec));
         Some(match known {
             0 => format!(
-                "the prior has not seen {}: its spread over all is used (seen: {seen})",
+                "the prior has no session of {}: the spread of all sessions is used (known: {seen})",
                 path.join("/")
             ),
             known => {
-                format!("the prior has seen {}, not {}", path[..known].join("/"), path.join("/"))
+                format!(
+                    "the prior has sessions of {}, none of {}",
+                    path[..known].join("/"),
+                    path.join("/")
+                )
             }
         })
     }

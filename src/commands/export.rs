@@ -16,21 +16,23 @@ use super::shared::{give_stdout, say, tell};
 
 /// Write a calibration for a board, in C or as a record of integers; check or renew a record's seal
 ///
-/// In C it is one C99 header that C++ takes as well: the record as constants, stretch_init(), stretch_step() for
-/// a sample, stretch_lost() for one that did not come, and stretch_self_test(), which runs 200 samples
-/// and compares the answers with the computer's. No allocation, no library; the same bits as on the computer.
+/// In C it is one C99 header that C++ takes as well: the record as constants, stretch_init(),
+/// stretch_step() for a sample, stretch_lost() for one that did not come, and stretch_self_test(),
+/// which runs 200 samples and compares the answers with the computer's. No allocation, no library;
+/// the same bits as on the computer.
 ///
 ///   stretch export --calibration cal.json --c Elbow --arduino
 ///
 /// makes a library Elbow for the Arduino IDE, with an example that reads A0. Of several gauges
-/// (`stretch calibrate --signal s1,s2`) a step takes a sample of each, and the example reads A0, A1 and so on.
+/// (`stretch calibrate --signal s1,s2`) a step takes a sample of each, and the example reads A0, A1
+/// and so on.
 ///
 /// For a board with firmware in Rust and without floating point, as a record in postcard:
 ///
 ///   stretch export --calibration cal.json --fixed cal.postcard --adc 12,0,3.3
 ///
-/// Every record carries a checksum, its seal. Without any other option the command says what a record is and
-/// whether its seal holds. After you edit a record in JSON by hand, renew the seal:
+/// Every record carries a checksum, its seal. Without any other option the command says what a record
+/// is and whether its seal holds. After you edit a record in JSON by hand, renew the seal:
 ///
 ///   stretch export --calibration cal.json
 ///   stretch export --calibration cal.json --seal
@@ -43,7 +45,7 @@ pub(crate) struct Args {
     /// Folder for the header; it must not hold anything; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
     c: Option<PathBuf>,
-    /// Make the folder an Arduino library of its own name
+    /// Make the folder an Arduino library with the folder's name
     #[arg(long, requires = "c")]
     arduino: bool,
     /// Write C in this form, fixed or float [default: fixed where the model has such a form]
@@ -172,7 +174,8 @@ fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
     if *pressure {
         tell("tell it the pressure with stretch_set_pressure() before each sample")?;
     }
-    let header = files.iter().find_map(|file| file.path.strip_prefix("src/")?.strip_suffix(".h"));
+    let header =
+        files.iter().find_map(|file| file.path.strip_prefix("src/stretch_")?.strip_suffix(".h"));
     tell(match header {
         Some(name) => format!(
             "put the folder into the sketchbook's libraries; the IDE then has File > Examples > {name} > Live"

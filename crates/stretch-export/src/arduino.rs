@@ -14,8 +14,8 @@ pub struct File {
 /// A library of that name: its properties, the header in `src`, an example that reads A0 (of several gauges, A0 and the
 /// pins after it) at the calibration's sample rate, and the words that the IDE colours.
 ///
-/// The header has the library's name, so that libraries of several calibrations can be installed side by side; a sketch
-/// includes one of them. Characters that a name may not have become `_`. The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
+/// The header has the library's name after `stretch_`, so that it hides no header of another library, and so that libraries
+/// of several calibrations can be installed side by side; a sketch includes one of them. Characters that a name may not have become `_`. The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
 /// revision 2.2 (format 1.5).
 ///
 /// ```
@@ -24,7 +24,7 @@ pub struct File {
 /// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
 /// let header = header(&stretch_receptor::example_calibration(), &options)?;
 /// let paths: Vec<_> = arduino_library(&header, "Elbow").into_iter().map(|file| file.path).collect();
-/// assert_eq!(paths, ["library.properties", "keywords.txt", "src/Elbow.h", "examples/Live/Live.ino"]);
+/// assert_eq!(paths, ["library.properties", "keywords.txt", "src/stretch_Elbow.h", "examples/Live/Live.ino"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
@@ -33,7 +33,7 @@ pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
     vec![
         file("library.properties", properties(header, &name)),
         file("keywords.txt", keywords(header)),
-        file(&format!("src/{name}.h"), header.text.clone()),
+        file(&format!("src/stretch_{name}.h"), header.text.clone()),
         file("examples/Live/Live.ino", live(header, &name)),
     ]
 }

@@ -336,9 +336,9 @@ fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
         };
         let properties: Vec<&str> = text("library.properties").lines().collect();
         assert_eq!(properties[0], format!("name={name}"));
-        assert!(properties.contains(&&*format!("includes={name}.h")), "{properties:?}");
-        assert_eq!(*text(&format!("src/{name}.h")), made.text);
-        assert!(text("Live.ino").contains(&format!("#include <{name}.h>\n")), "{name}");
+        assert!(properties.contains(&&*format!("includes=stretch_{name}.h")), "{properties:?}");
+        assert_eq!(*text(&format!("src/stretch_{name}.h")), made.text);
+        assert!(text("Live.ino").contains(&format!("#include <stretch_{name}.h>\n")), "{name}");
     }
     let long = arduino_library(&made, &"x".repeat(300));
     assert!(long[0].text.lines().next().is_some_and(|line| line.len() <= "name=".len() + 63));

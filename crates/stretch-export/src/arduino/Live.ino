@@ -4,7 +4,7 @@
 @if array
 // Several gauges, one amplifier each on A0 and the pins after it, a line a sample, at 115200 baud.
 @end
-#include <@NAME@.h>
+#include <stretch_@NAME@.h>
 
 // analogRead of these boards gives 10 bits, whatever is asked of it
 #if defined(__AVR__) && STRETCH_ADC_BITS != 10

@@ -40,8 +40,8 @@ const SPENT: u8 = 4;
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
-/// The named effects can be written into a rig file, with which nothing is missing any more, and
-/// as code for a simulator of your own:
+/// The named effects can be written into a rig file, with which nothing is missing any more, and as
+/// code for a simulator of your own:
 ///
 ///   stretch diagnose bench --fix fixed.toml --snippets code
 ///   stretch diagnose bench --rig fixed.toml
@@ -53,16 +53,18 @@ const SPENT: u8 = 4;
 ///   stretch diagnose fixed.toml
 ///
 /// A problem file is a program: its simulator runs with your rights. It runs where the file itself is
-/// named, not where its folder is; what runs is said before it runs. The keys jobs and budget of the file say how many
-/// workers run at once, and how many runs there are at most (exit status 4 where they are spent).
+/// named, not where its folder is; what runs is said before it runs. The keys jobs and budget of the
+/// file say how many workers run at once, and how many runs there are at most (exit status 4 where
+/// they are spent).
 ///
-/// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it does not):
+/// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it
+/// does not):
 ///
 ///   stretch diagnose bench --rig fixed.toml --quiet --fail-on gap
 ///
-/// Test trials are read once, at the end. Without --rig the rig file that the data set names is
-/// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
-/// effects are part of it.
+/// Test trials are read once, at the end. Without --rig the rig file that the data set names is the
+/// simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its effects
+/// are part of it.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

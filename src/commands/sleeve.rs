@@ -18,10 +18,11 @@ use crate::{
     table::{maybe, number, table},
 };
 
-/// Sensors that are put on again: learn from earlier sessions, renew a calibration without a reference
+/// Sensors that are put on again: learn from earlier sessions, renew a calibration
 ///
-/// `stretch calibrate --signal s1,s2` calibrates several gauges, and writes with --session what `learn` takes.
-/// `stretch calibrate --prior` needs ten seconds to a minute of reference more, or none.
+/// `stretch calibrate --signal s1,s2` calibrates several gauges, and writes with --session what
+/// `learn` takes. `stretch calibrate --prior` needs ten seconds to a minute of reference more, or
+/// none.
 ///
 ///   stretch calibrate monday.csv --reference angle_deg --signal s1,s2 --of left/anna --session s/monday.json --out a.json
 ///   stretch sleeve learn s/*.json --out prior.json
@@ -49,8 +50,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 
 /// Learn what earlier sessions say of the next one
 ///
-/// Each session is a file that `stretch calibrate --session` wrote. The prior holds mean and covariance of the
-/// coefficients of one model over sessions, sensors and wearers.
+/// Each session is a file that `stretch calibrate --session` wrote. The prior holds mean and
+/// covariance of the coefficients of one model over sessions, sensors and wearers.
 ///
 ///   stretch sleeve learn s/*.json --out prior.json
 #[derive(clap::Args)]
@@ -89,9 +90,9 @@ fn print_prior(prior: &Prior) -> anyhow::Result<()> {
 
 /// Renew a calibration for a sensor that was put on again, without a reference
 ///
-/// It assumes that the movement has the ends and the rest of earlier sessions, and believes a shift and a scale as far
-/// as earlier sessions differed by: what lies beyond is refused. It prints what it assumes. Ten seconds of reference say
-/// more (`stretch calibrate --prior`).
+/// It assumes that the movement has the ends and the rest of earlier sessions, and believes a shift
+/// and a scale as far as earlier sessions differed by: what lies beyond is refused. It prints what it
+/// assumes. Ten seconds of reference say more (`stretch calibrate --prior`).
 ///
 ///   stretch sleeve renew --prior prior.json --calibration yesterday.json today.csv --out cal.json
 ///   stretch sleeve renew --prior prior.json --of left/anna today.csv --out cal.json

@@ -23,7 +23,7 @@ fn rows(count: u32, (least_mm, most_mm): (f64, f64), phase: f64) -> String {
 /// The short trials hold five sixths of the range: without them the estimates are off by millimetres.
 #[test]
 #[ignore = "reads 1,600,000 rows twice; ./ci.sh runs it"]
-fn short_trials_beside_a_long_one_are_fitted_and_digests_are_checked() {
+fn short_trials_are_fitted_with_a_long_one_and_digests_are_checked() {
     let scratch = Scratch::in_memory();
     scratch.write("long.csv", rows(MANY, (150.0, 155.0), 0.0));
     let short: Vec<String> = (0..6).map(|k| format!("short_{k}.csv")).collect();
@@ -37,8 +37,8 @@ fn short_trials_beside_a_long_one_are_fitted_and_digests_are_checked() {
     prints(calibrate.arg(at("long.csv")).args(short.iter().map(|name| at(name))));
     let mut evaluate = stretch();
     evaluate.args(["evaluate", "--json", "--calibration"]).args([at("cal.json"), at("new.csv")]);
-    let told: serde_json::Value = serde_json::from_str(&prints(&mut evaluate)).unwrap();
-    let rmse_mm = told["pooled"][1]["rmse"].as_f64().unwrap();
+    let judged: serde_json::Value = serde_json::from_str(&prints(&mut evaluate)).unwrap();
+    let rmse_mm = judged["pooled"][1]["rmse"].as_f64().unwrap();
     assert!(rmse_mm < 0.1, "{rmse_mm} mm");
 
     prints(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(at("set")));

@@ -112,7 +112,7 @@ struct OnLandmarks {
 }
 
 /// The note on a movement whose ends and rest are the same from either side.
-const REVERSED: &str = "it cannot be told whether all gauges are reversed, because reversed signals would fit the earlier sessions as well: \
+const REVERSED: &str = "it cannot be determined whether all gauges are reversed, because reversed signals would fit the earlier sessions as well: \
                         check that the estimate rises when the measured quantity does, or record ten seconds with a reference \
                         (stretch calibrate --prior)";
 

@@ -335,7 +335,7 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
 fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_told() {
     const ALIKE: Simulated = session;
     const RESTS: Simulated = resting;
-    let note = "cannot be told whether all gauges are reversed";
+    let note = "cannot be determined whether all gauges are reversed";
     let refusal = "they would fit if all gauges were reversed: swap the wires";
     /// The movement, the signals, what they are subtracted from, and the note or the refusal.
     type Member<'a> = (Simulated, &'a [&'a str], Option<f64>, Result<Option<&'a str>, &'a str>);

@@ -181,10 +181,14 @@ enum Model {
 }
 
 impl FromStr for Model {
-    type Err = SpellingError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, SpellingError> {
-        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(Self::One) }
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let model = text.parse().map(Self::One);
+        model.map_err(|error: SpellingError| format!("{error}; or auto, which chooses one of them"))
     }
 }
 

@@ -304,7 +304,7 @@ fn priors_refuse_what_they_have_not_seen() {
     scratch.worn("far.csv", far, |row| row[2] = f64::NAN);
     let arguments = "sleeve renew --prior prior.json --of w1 --out no.json far.csv";
     let arguments: Vec<&str> = arguments.split(' ').collect();
-    fails(&mut scratch.sleeve(&arguments), &["far.csv", "one session in a thousand", "reference"]);
+    fails(&mut scratch.sleeve(&arguments), &["far.csv", "999 of 1000 sessions", "reference"]);
     assert!(!scratch.path("no.json").exists());
 }
 

@@ -159,10 +159,12 @@ pub(crate) fn read_trials(
     options: &ReadOptions,
 ) -> anyhow::Result<Vec<Trial>> {
     let mut trials = Vec::new();
-    for group in paths.chunk_by(|a, b| !a.is_dir() && !b.is_dir()) {
-        let folder = &group[0];
+    // pipes and standard input are read in their order, because each can be read once
+    let known: Vec<(&PathBuf, bool)> = paths.iter().map(|path| (path, path.is_file())).collect();
+    for group in known.chunk_by(|(_, a), (_, b)| *a && *b) {
+        let folder = group[0].0;
         if !folder.is_dir() {
-            trials.extend(read_all(group, |path| Recording::read(path, options))?);
+            trials.extend(read_all(group, |(path, _)| Recording::read(path, options))?);
             continue;
         }
         let set = DataSet::read(folder)?;
@@ -182,15 +184,24 @@ pub(crate) fn read_trials(
     Ok(trials)
 }
 
+/// Recordings that are read before their notes are printed. The first that cannot be read ends the reading after its batch.
+const BATCH: usize = 256;
+
 /// Reads recordings on all cores; notes and the first error are those of reading them in order.
 fn read_all<T: Sync>(
     items: &[T],
     read: impl Fn(&T) -> Result<Recording, RecordingError> + Send + Sync,
 ) -> Result<Vec<Trial>, RecordingError> {
     let bar = progress("reading", items.len() as u64);
-    let read: Vec<_> = items.par_iter().map(read).inspect(|_| bar.inc(1)).collect();
+    let mut trials = Vec::new();
+    for batch in items.chunks(BATCH) {
+        let read: Vec<_> = batch.par_iter().map(&read).inspect(|_| bar.inc(1)).collect();
+        for recording in read {
+            trials.push(with_notes_printed(recording?));
+        }
+    }
     bar.finish_and_clear();
-    read.into_iter().map(|recording| Ok(with_notes_printed(recording?))).collect()
+    Ok(trials)
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let outside = "samples lie outside the range of the calibration";
     let members: [Member<'_>; 20] = [
         ("own.csv", own.clone(), &[APPLY], &["outside of what was calibrated"], &[]),
-        ("own.csv", own, files, &[], &["is this a log of that"]),
+        ("own.csv", own, files, &[], &["is it the calibrated sensor"]),
         ("other.csv", other.clone(), evaluate, &[], &["cal:"]),
         (
             "for_calibration.csv",

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::support::{Scratch, fails, prints, stretch};
 
-/// Rows of a recording that is longer than any that was read whole at first.
+/// More rows than an earlier release read at once.
 const MANY: u32 = 1_600_000;
 
 /// A gauge between two lengths.
@@ -24,7 +24,7 @@ fn rows(count: u32, (least_mm, most_mm): (f64, f64), phase: f64) -> String {
 #[test]
 #[ignore = "reads 1,600,000 rows twice; ./ci.sh runs it"]
 fn short_trials_are_fitted_with_a_long_one_and_digests_are_checked() {
-    let scratch = Scratch::in_memory();
+    let scratch = Scratch::new();
     scratch.write("long.csv", rows(MANY, (150.0, 155.0), 0.0));
     let short: Vec<String> = (0..6).map(|k| format!("short_{k}.csv")).collect();
     for (k, name) in (0_u8..).zip(&short) {

@@ -114,7 +114,7 @@ fn a_refusal_names_the_option_and_the_input() {
         ),
         (
             "calibrate a.csv --out x.json --report ./x.json",
-            ["--report ./x.json", "--out x.json has the same path or contains it"],
+            ["--report ./x.json", "--out x.json is the same file, or one lies in the other"],
         ),
     ] {
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
@@ -149,7 +149,10 @@ fn two_outputs_of_one_name_are_refused_before_anything_is_there() {
         "sleeve renew --prior prior.json a.csv --out x --json=./x",
         "demo --out x --json=x/d.json",
     ] {
-        let parts = ["x", "has the same path or contains it; choose another for one of them"];
+        let parts = [
+            "x",
+            "is the same file, or one lies in the other; choose another path for one of them",
+        ];
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
         assert!(tree(&scratch.path("")) == before, "{line}");
     }
@@ -188,7 +191,7 @@ fn a_folder_that_is_replaced_does_not_take_an_input_with_it() {
         "simulate --protocol bench/arbitrary_1.csv --rig rig.toml --out bench --force",
         "simulate --protocol pulses --rig bench/rig.toml --out bench --force",
     ] {
-        let parts = ["bench: cannot write it: this command reads it as bench/"];
+        let parts = ["bench: cannot write it: this command reads bench/"];
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
         assert!(tree(&scratch.path("")) == before, "{line}");
     }

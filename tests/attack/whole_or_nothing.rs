@@ -57,7 +57,10 @@ fn a_report_that_fails_leaves_no_record_behind() {
         ("calibrate a.csv --out cal.json --report none/r.html", "none/r.html"),
         ("export --calibration board.json --fixed cal.postcard --c bench", "bench"),
         ("calibrate a.csv --out cal.json --report logs", "logs"),
-        ("calibrate a.csv --out new.json --report new.json", "has the same path or contains it"),
+        (
+            "calibrate a.csv --out new.json --report new.json",
+            "is the same file, or one lies in the other",
+        ),
         (
             "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=new.json --report logs",
             "logs",

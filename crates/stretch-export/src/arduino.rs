@@ -38,15 +38,14 @@ pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
     ]
 }
 
-/// A name as the specification allows it: at most 63 letters, digits and `_.-`, a letter or digit first.
+/// A name as the specification allows it: at most 63 letters, digits and `_.-`, with a letter, and a letter or digit first.
 fn allowed(name: &str) -> String {
     let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
-    let name: String = name.chars().map(|c| if is_allowed(c) { c } else { '_' }).take(56).collect();
-    if name.starts_with(|c: char| c.is_ascii_alphanumeric()) {
-        name
-    } else {
-        format!("stretch{name}")
-    }
+    let name: String = name.chars().map(|c| if is_allowed(c) { c } else { '_' }).collect();
+    let is_name = name.starts_with(|c: char| c.is_ascii_alphanumeric())
+        && name.contains(|c: char| c.is_ascii_alphabetic());
+    let name = if is_name { name } else { format!("stretch{name}") };
+    name.chars().take(63).collect()
 }
 
 fn properties(header: &Header, name: &str) -> String {

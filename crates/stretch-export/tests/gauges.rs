@@ -326,6 +326,7 @@ fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
         ("a\nurl=x", "a_url_x"),
         ("x>\"*/", "x____"),
         ("_hidden", "stretch_hidden"),
+        ("2024", "stretch2024"),
         ("", "stretch"),
         ("Ellbögen", "Ellb_gen"),
     ] {
@@ -340,8 +341,11 @@ fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
         assert_eq!(*text(&format!("src/stretch_{name}.h")), made.text);
         assert!(text("Live.ino").contains(&format!("#include <stretch_{name}.h>\n")), "{name}");
     }
-    let long = arduino_library(&made, &"x".repeat(300));
-    assert!(long[0].text.lines().next().is_some_and(|line| line.len() <= "name=".len() + 63));
+    for (length, kept) in [(60, 60), (63, 63), (300, 63)] {
+        let long = arduino_library(&made, &"x".repeat(length));
+        let name = format!("name={}", "x".repeat(kept));
+        assert_eq!(long[0].text.lines().next(), Some(&*name), "{length}");
+    }
 }
 
 #[test]

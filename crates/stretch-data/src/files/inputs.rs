@@ -85,7 +85,7 @@ pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Res
             let is_same = own.is_some() && own == *identity;
             if is_same || real.starts_with(other_real) || other_real.starts_with(&real) {
                 return fail(format!(
-                    "{other} has the same path or contains it; choose another for one of them"
+                    "{other} is the same file, or one lies in the other; choose another path for one of them"
                 ));
             }
         }
@@ -161,7 +161,7 @@ pub(super) fn check_output(path: &Path, meta: &fs::Metadata) -> io::Result<()> {
     let input = || guard.as_ref()?.inputs.get(&identity_of(path, meta)?);
     match input() {
         Some(input) => Err(io::Error::other(format!(
-            "this command reads it as {}; choose another output file",
+            "this command reads {}; choose another output",
             input.display()
         ))),
         None => Ok(()),

@@ -38,7 +38,7 @@ pub(crate) fn shortened(
         .collect();
     let others = match cut.len() - 1 {
         0 => String::new(),
-        more => format!(" and of each of {more} more"),
+        more => format!(" and of {more} more recordings each"),
     };
     let note = format!(
         "only the first {rows} rows of {}{others} are used, because a diagnosis takes {most} rows in all; cut the recordings to choose another part",

@@ -51,7 +51,7 @@ fn no_answer_is_written_over_what_it_was_made_from() {
     {
         for over in [trial, "lake.json"] {
             let told = refused(line, &[&lake, &lake.join(over)]);
-            assert!(told.contains("this command reads it as"), "{line}, {over}: {told}");
+            assert!(told.contains("this command reads"), "{line}, {over}: {told}");
             // sums that help the next command may be added
             let after = tree(&lake);
             assert!(

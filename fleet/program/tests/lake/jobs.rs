@@ -153,6 +153,7 @@ impl Job {
             // multiples of the golden ratio fill the time evenly, however many it takes
             let share = (f64::from(moments) * 0.618_033_988_75).fract();
             moments += 1;
+            assert!(moments < 50 * hits, "{hit} of {moments} kills came before the end");
             let folder = scratch();
             (self.prepare)(folder.path());
             let mut child = self.command(folder.path()).spawn().unwrap();

@@ -281,7 +281,7 @@ fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
     let few = || SleeveError::Prior {
         file: "prior".into(),
         problem: format!(
-            "{} are too few sessions to show how they vary; give at least {LEAST_SESSIONS}, each written by stretch \
+            "there are too few sessions ({}) to show how sessions vary; give at least {LEAST_SESSIONS}, each written by stretch \
              calibrate --session",
             sessions.len()
         ),

@@ -78,7 +78,7 @@ fn opened<T: for<'d> Deserialize<'d>>(
     let unusable = |error: &dyn std::fmt::Display| problem(what, &file, error);
     let bytes = read_whole(path).map_err(|error| unusable(&error))?;
     let text = String::from_utf8(bytes).map_err(|error| unusable(&error))?;
-    let object = digest::verified(&text, "an unchanged copy, if any, works as well");
+    let object = digest::verified(&text, "an unchanged copy can still be used");
     let value = digest::parse(&object.map_err(|error| unusable(&error))?);
     Ok((value.map_err(|error| unusable(&error))?, file))
 }

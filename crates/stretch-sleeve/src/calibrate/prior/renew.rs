@@ -261,7 +261,7 @@ impl Prior {
         Err(SleeveError::Prior {
             file: "these data".into(),
             problem: format!(
-                "at the ends and at rest, their signals are further from the sessions{of} than in all but one session in a thousand \
+                "at the ends and at rest, their signals are further from the sessions{of} than 999 of 1000 sessions would be \
                  (squared distance {distance:.1}, limit {UNSEEN}): {why} record ten seconds or more with a reference (stretch calibrate --prior)"
             ),
         })

@@ -179,8 +179,7 @@ fn sorted_fields_of_a_prior_and_of_a_session_are_told_with_what_to_do() {
         let value: serde_json::Value = serde_json::from_str(&text.unwrap()).unwrap();
         std::fs::write(&path, value.to_string()).unwrap();
         let error = error();
-        let says =
-            format!("or its fields were sorted; an unchanged copy, if any, works as well; {again}");
+        let says = format!("or its fields were sorted; an unchanged copy can still be used; {again}");
         assert!(error.contains(&says) && error.contains("file.json"), "{error}");
     }
 }
@@ -283,7 +282,7 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
         assert!(error.contains(says), "{error}");
     };
     refused(session(9, 0, 1.0), RenewOptions::default(), "no whole movement");
-    refused(session(2, 9, 60.0), options, "one session in a thousand");
+    refused(session(2, 9, 60.0), options, "999 of 1000 sessions");
     let exchanged = |mut trial: Trial| {
         let (first, second) = trial.channels.split_at_mut(1);
         std::mem::swap(&mut first[0].values, &mut second[0].values);

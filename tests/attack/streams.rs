@@ -174,6 +174,9 @@ fn a_file_that_nobody_reads_on_standard_output_keeps_no_other_back() {
 fn what_comes_through_a_pipe_is_read_once() {
     let scratch = inputs();
     fs::copy(scratch.path("cal.json"), scratch.path("b.json")).unwrap();
+    let trial = fs::read_to_string(scratch.path("a_1.csv")).unwrap();
+    let rows = trial.lines().map(|row| row.split_once(',').unwrap().1);
+    scratch.write("table.csv", rows.collect::<Vec<_>>().join("\n"));
     for line in [
         "apply --calibration <(cat cal.json) a_1.csv",
         "apply --calibration cal.json <(cat a_1.csv)",
@@ -182,6 +185,8 @@ fn what_comes_through_a_pipe_is_read_once() {
         "export --calibration <(cat cal.json)",
         "export --calibration <(cat cal.json) --c -",
         "calibrate <(cat a_1.csv) <(cat a_2.csv) --out -",
+        "calibrate a_1.csv a_2.csv - --out - < a_1.csv",
+        "calibrate table.csv <(cut -d, -f2- a_2.csv) --model curve --out -",
         "convert <(cat a_1.csv) --out -",
         "listen --port frames --calibration <(cat board.json)",
         "simulate --rig <(\"$0\" simulate --print-rig) --protocol pulses --out -",

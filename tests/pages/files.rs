@@ -10,17 +10,15 @@ use crate::support::{Scratch, calibrate, prints, runs, stretch};
 const BEGIN: &str = "\
 # Files
 
-The program reads and writes four kinds of files in addition to recordings. Each example of this page is a file as the program writes
-it. In rig files, problems and records an unknown key is an error that names the key.
+The program reads and writes four kinds of files in addition to recordings. The program wrote the examples on this page. In rig files, problems and records an unknown key is an error that names the key.
 
 ";
 
 const DATA_SET: &str = "
 ## A data set: dataset.toml
 
-A folder with `dataset.toml` and its trials is a data set; most commands take its name in place of files. A trial has a `kind` (`inflation`,
-`deflation`, `arbitrary`, `pulses` or `other`) and a `split`: `fit` trials are fitted, `test` trials are held back. `start_s` is where a trial
-begins in the session, which drifts need. A `digest`, which `stretch simulate` adds, is checked as the file is read. `rig` names the rig file of
+A folder with `dataset.toml` and its trials is a data set; most commands accept the folder in place of files. A trial has a `kind` (`inflation`,
+`deflation`, `arbitrary`, `pulses` or `other`) and a `split`: `fit` trials are fitted, `test` trials are held back. `start_s` is the time in the session at which a trial begins; drift effects need it. A `digest`, which `stretch simulate` adds, is verified when the file is read. `rig` names the rig file of
 the simulator.
 
 ";
@@ -28,37 +26,35 @@ the simulator.
 const RIG: &str = "
 ## A rig file
 
-`stretch simulate --print-rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is on is an
-`[[effect]]` with its name and parameters, as `stretch effects` lists them. `stretch diagnose --fix` writes such a file.
+`stretch simulate --print-rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is switched on is a table `[[effect]]` with its name and parameters, as `stretch effects` lists them. `stretch diagnose --fix` writes such a file.
 
 ";
 
 const PROBLEM: &str = "
 ## Your own simulator: problem.toml
 
-`stretch init FOLDER` writes a first version into a folder with recordings. [The tutorial](../tutorials/worker.md) fills it in, and
-[the worker protocol](worker.md) specifies what the command has to answer. The command runs with your rights.
+`stretch init FOLDER` writes a first version into a folder with recordings. [The tutorial](../tutorials/worker.md) shows how to complete it, and [the worker protocol](worker.md) specifies the answers of the command. The command runs with your rights.
 
 ";
 
 const RECORD: &str = "
 ## A calibration record
 
-`stretch calibrate --out cal.json` writes a record as JSON; a name that ends with `.postcard` gives the same as bytes for a board. `stretch export
+`stretch calibrate --out cal.json` writes a record as JSON; if the name ends with `.postcard`, it writes the same record in binary form for a board. `stretch export
 --calibration cal.json` checks its digest, and `--seal` renews the digest after a change by hand.
 
 | key | what |
 | --- | --- |
-| `schema` | version of the format; a newer one is refused before anything else is read |
+| `schema` | version of the format; a newer version is refused before anything else is read |
 | `signal`, `reference` | columns of the recording; the unit is the last part of the name |
 | `sample_rate_hz` | rate at which the calibration runs |
-| `target` | what the model gives: the reference itself (`direct`), or a contraction with its resting length |
+| `target` | quantity that the model estimates: the reference itself (`direct`), or a contraction, with its resting length |
 | `polarity` | whether the signal rises or falls as the target rises |
-| `signal_range`, `target_range` | least and greatest value of the fitted trials, by which both are divided |
+| `signal_range`, `target_range` | least and greatest value in the fitted trials; signal and target are divided by these ranges |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
-| `rate_source` | what the rate of the fit was taken from |
-| `turns` | the levels at which the fitted trials' movements turned, and how far later ones may be off; absent if there were too few |
-| `dead_band` | rate within which the direction of motion is kept, in units of the signal a second |
+| `rate_source` | source of the rate in the fit |
+| `turns` | levels of the turning points of movements in the fitted trials, and limits for later ones; absent if there were too few |
+| `dead_band` | rate below which the direction of motion is not changed, in units of the signal per second |
 | `model` | the model by its name, with its coefficients, time constants and domains |
 | `provenance` | date, number, names and checksums of the fitted trials |
 | `digest` | checksum of all other keys |

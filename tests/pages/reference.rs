@@ -66,8 +66,8 @@ fn the_effects_are_those_of_the_catalogue() {
 
 #[test]
 fn the_keys_of_problems_and_diagnoses_are_those_of_the_crates() {
-    let mut text = "# problem.toml\n\nEvery key of a problem's file. `problem.schema.json` next to this page says the same to editors.\n\
-                    [The worker protocol](worker.md) says what a worker is sent and what it may answer.\n\n"
+    let mut text = "# problem.toml\n\nAll keys of a problem file. `problem.schema.json` next to this page describes the same keys for editors.\n\
+                    [The worker protocol](worker.md) describes the requests to a worker and its answers.\n\n"
         .to_owned();
     text += &stretch_problem::problem_reference();
     is_written_by_the_program("problem.md", &text);

@@ -62,7 +62,7 @@ where
 /// An effect that acts in every run: its name, and its parameters by name.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct EffectEntry {
-    /// Name in the catalogue; around a simulator of the user's own place and kind, such as `output.backlash`.
+    /// Name in the catalogue; for a simulator of the user, place and kind, such as `output.backlash`.
     pub name: String,
     /// Parameters by name.
     #[serde(flatten)]

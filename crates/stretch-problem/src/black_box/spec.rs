@@ -48,51 +48,51 @@ use crate::file::{SimulatorEntry, simulator, simulator_schema};
 /// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(title = "problem.toml of stretch", description = "The file itself.", extend("required" = ["simulator"]))]
+#[schemars(title = "problem.toml of stretch", description = "Top-level keys of the file.", extend("required" = ["simulator"]))]
 pub struct ProblemSpec {
     /// Name of the problem in reports.
     pub name: Option<String>,
-    /// Folder that its files are relative to, where it is not its own.
+    /// Folder to which file names are relative, if it is not the folder of the problem file.
     #[serde(default, skip_serializing_if = "is_own")]
     pub folder: PathBuf,
     /// The simulator: a command as a list, or the table `[simulator]`.
     #[serde(default, deserialize_with = "simulator")]
     #[schemars(schema_with = "simulator_schema")]
     pub simulator: Option<SimulatorEntry>,
-    /// What is looked for around the stages: `all`, or names such as `input.delay`, `output.all`, `state.all`, `gear.output.backlash`.
+    /// Effects to try around the stages: `all`, or names such as `input.delay`, `output.all`, `state.all`, `gear.output.backlash`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wrap: Vec<String>,
-    /// Effects that are not looked for, by name, kind (`backlash`) or place (`output.all`).
+    /// Effects that are excluded from the search, by name, kind (`backlash`) or place (`output.all`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
-    /// Further columns that a wrapper may look at: channels that may talk across to another channel, loads of a contact.
+    /// Further columns that a wrapper may use: channels with possible crosstalk to another channel, loads of a contact.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub beside: Vec<String>,
-    /// Column that a sensor measures, where the output `signal` is that of a sensor: the diagnosis then reports what a calibration of the
-    /// sensor loses by the gap, and slices go by this column.
+    /// Column that a sensor measures, if the output `signal` is the signal of this sensor. The diagnosis then reports how much the gap degrades
+    /// a calibration of the sensor, and evaluates the gap by levels of this column.
     pub reference: Option<String>,
     /// Output of a stage that is a sensor; with `reference`.
     pub signal: Option<String>,
-    /// Column of the time; `time_s` without it.
+    /// Time column; default `time_s`.
     pub time: Option<String>,
-    /// What the time counts, where the name of its column does not say.
+    /// Unit of the time, if the name of its column does not state it.
     pub time_unit: Option<TimeUnit>,
     /// Greatest number of runs of the simulator.
     pub budget: Option<NonZeroUsize>,
     /// The stages; needed unless the simulator is built in.
     #[serde(rename = "stage", default, skip_serializing_if = "Vec::is_empty")]
     pub stages: Vec<StageEntry>,
-    /// Unit and noise of columns that drive stages, where they are known.
+    /// Unit and noise of input columns of stages, if they are known.
     #[serde(rename = "input", default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<Input>,
     /// Nominal parameters.
     #[serde(rename = "parameter", default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter>,
-    /// Effects that the simulator has itself.
+    /// Effects that the simulator implements.
     #[serde(rename = "effect", default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<OwnEffect>,
-    /// Wrappers that act in every run, by place and kind (`output.backlash`), with their values; a form that is left out has its usual value.
-    /// These wrappers are not looked for. `--fix` writes them.
+    /// Wrappers that act in every run, by place and kind (`output.backlash`), with their values; a form that is omitted has its default value.
+    /// The diagnosis does not search for these wrappers. `--fix` writes them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wrapped: Vec<EffectEntry>,
     /// The recordings; needed unless the simulator is built in.
@@ -129,41 +129,41 @@ impl ProblemSpec {
     }
 }
 
-/// A stage turns measured input columns into one measured output column.
+/// A stage maps measured input columns to one measured output column.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageEntry {
-    /// Name in reports; the output without it.
+    /// Name in reports; default: the output.
     #[serde(default)]
     pub name: String,
     /// Column that the simulated output is compared with.
     pub output: String,
-    /// Unit of the output; the last part of the column's name without it.
+    /// Unit of the output; default: the last part of the column's name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
     /// Columns that drive the stage.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<String>,
-    /// Noise of the output, one standard deviation; estimated from the recordings without it.
+    /// Noise of the output, one standard deviation; default: estimated from the recordings.
     #[serde(default, deserialize_with = "from_zero")]
     pub noise: Option<f64>,
-    /// Column of the velocity of the rubbing parts; friction needs it, or the position.
-    /// Without both it is the output where a force or a torque drives the stage and the output is a speed, a position or an angle.
+    /// Column of the velocity at which the parts with friction move; friction effects need it, or `position`.
+    /// Without both, the output is used if a force or a torque drives the stage and the output is a speed, a position or an angle.
     pub velocity: Option<String>,
-    /// Column of the position whose change is that velocity.
+    /// Column of the position from which that velocity is computed.
     pub position: Option<String>,
 }
 
-/// What is known of a column that drives a stage.
+/// Unit and noise of an input column of a stage.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
     /// The column.
     pub column: String,
-    /// Its unit; the last part of the column's name without it.
+    /// Its unit; default: the last part of the column's name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Its noise, one standard deviation; 0 for a command, and without it.
+    /// Its noise, one standard deviation; 0 for a command; default 0.
     #[serde(default, deserialize_with = "from_zero")]
     pub noise: f64,
 }
@@ -172,30 +172,30 @@ pub struct Input {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
-    /// Name, as the simulator knows it.
+    /// Name in the simulator.
     pub name: String,
-    /// Unit; empty where there is none.
+    /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Value that the simulator is shipped with.
+    /// Nominal value in the simulator.
     pub value: f64,
-    /// One standard deviation, a number in the unit or a share such as `"10 %"`; exact without it.
+    /// One standard deviation, a number in the unit or a share such as `"10 %"`; the value is exact without it.
     #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
     #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
-    /// Least value that makes sense; where none is given, a value whose tolerance is a share of it, or less than it, keeps its sign.
+    /// Least plausible value. Without it, a value whose tolerance is a share of it, or less than it, keeps its sign.
     pub least: Option<f64>,
-    /// Greatest value that makes sense.
+    /// Greatest plausible value.
     pub greatest: Option<f64>,
-    /// Names of the stages in which it acts; all without it.
+    /// Names of the stages in which it acts; default: all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stages: Vec<String>,
-    /// Value re-tuned without the effects of the file, with which `stretch predict` compares; `--fix` writes it.
+    /// Value re-tuned without the effects of the file; `stretch predict` uses it for comparison; `--fix` writes it.
     pub alone: Option<f64>,
 }
 
-/// An effect that the simulator has itself. The keys of its one argument are given here; an effect of several arguments has a table
-/// `[[effect.argument]]` with these keys for each.
+/// An effect that the simulator implements. If it has one argument, the keys of the argument are given here; if it has several, each has a
+/// table `[[effect.argument]]` with these keys.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "WrittenEffect", into = "WrittenEffect")]
 pub struct OwnEffect {
@@ -213,28 +213,28 @@ pub struct OwnEffect {
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct WrittenEffect {
-    /// Name, as the simulator knows it.
+    /// Name in the simulator.
     name: String,
-    /// Names of the stages in which it acts; all without it.
+    /// Names of the stages in which it acts; default: all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     stages: Vec<String>,
-    /// Effects that are hard to tell from it.
+    /// Effects that are hard to distinguish from it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     twins: Vec<String>,
-    /// Unit; empty where there is none.
+    /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     unit: String,
     /// Least and greatest plausible value; needed without `[[effect.argument]]`.
     #[serde(default, deserialize_with = "range")]
     range: Option<[f64; 2]>,
-    /// Value at which it does nothing; none for a shape.
+    /// Value at which it does nothing; omitted for a shape parameter.
     off: Option<f64>,
-    /// Whether it is searched in equal ratios.
+    /// Whether it is searched on a logarithmic scale.
     #[serde(default, skip_serializing_if = "is_false")]
     log: bool,
-    /// Value in every run, where it was found before; `--fix` writes it.
+    /// Fixed value for every run, if it was found before; `--fix` writes it.
     value: Option<f64>,
-    /// Its arguments, where it has several.
+    /// Its arguments, if it has several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     argument: Vec<Argument>,
 }
@@ -292,24 +292,24 @@ impl OwnEffect {
     }
 }
 
-/// An argument of an effect that has several; the simulator knows it as `effect.argument`.
+/// One of several arguments of an effect; its name in the simulator is `effect.argument`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Argument {
     /// Name of the argument.
     pub name: String,
-    /// Unit; empty where there is none.
+    /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
     /// Least and greatest plausible value.
     #[serde(deserialize_with = "range")]
     pub range: [f64; 2],
-    /// Value at which it does nothing; none for a shape, which has the middle of its range where the effect is off.
+    /// Value at which it does nothing; omitted for a shape parameter, which has the middle of its range while the effect is off.
     pub off: Option<f64>,
-    /// Whether it is searched in equal ratios.
+    /// Whether it is searched on a logarithmic scale.
     #[serde(rename = "log", default, skip_serializing_if = "is_false")]
     pub is_log: bool,
-    /// Value in every run, where it was found before; `--fix` writes it.
+    /// Fixed value for every run, if it was found before; `--fix` writes it.
     pub value: Option<f64>,
 }
 
@@ -319,10 +319,10 @@ pub struct Argument {
 pub struct TrialFile {
     /// File, relative to the problem's folder.
     pub file: String,
-    /// Session time of its first sample, s; without it the trial follows the one before.
+    /// Session time of its first sample, s; default: the trial follows the previous one.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub start_s: f64,
-    /// Whether it may be fitted, as without it, or is tested on once.
+    /// `fit`, the default: it may be fitted; `test`: it is used once, for the test at the end.
     #[serde(default, skip_serializing_if = "is_fit")]
     pub split: Split,
 }

@@ -13,7 +13,7 @@ use serde::{
 
 use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
 
-/// One of command, python, fmu and builtin; the others say how it is run.
+/// Exactly one of command, python, fmu and builtin is needed; the other keys set how the simulator is run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatorEntry {
@@ -23,25 +23,25 @@ pub struct SimulatorEntry {
     pub python: Option<String>,
     /// A functional mock-up unit, relative to the problem's folder.
     pub fmu: Option<String>,
-    /// Of an FMU: its names for parameters, effects and columns, where they differ.
+    /// For an FMU: its names of parameters, effects and columns, if they differ.
     pub variables: Option<BTreeMap<String, String>>,
-    /// Number of workers at once, at most 256; one without it.
+    /// Number of parallel workers, at most 256; default 1.
     pub jobs: Option<NonZeroUsize>,
-    /// Longest time that one model may take, s; 60 without it.
+    /// Longest computing time of one model, s; default 60.
     #[serde(default, deserialize_with = "above_zero")]
     pub deadline_s: Option<f64>,
-    /// Longest time that a worker may take to begin, s; 120 without it.
+    /// Longest start-up time of a worker, s; default 120.
     #[serde(default, deserialize_with = "above_zero")]
     pub start_s: Option<f64>,
-    /// The built-in rig, or a gauge alone.
+    /// The built-in rig, or a single gauge.
     pub builtin: Option<BuiltIn>,
-    /// Of a built-in one: folder of its data set, or a trial; the problem's folder without it.
+    /// For a built-in simulator: folder of its data set, or a trial; default: the problem's folder.
     pub data_set: Option<String>,
-    /// Of a built-in one: its rig file; that of the data set without it.
+    /// For a built-in simulator: its rig file; default: that of the data set.
     pub rig: Option<String>,
-    /// Of a gauge: column of its reference, where that is not the usual one; with `signal`.
+    /// For a gauge: column of its reference, if it is not the default one; with `signal`.
     pub reference: Option<String>,
-    /// Of a gauge: column of its signal.
+    /// For a gauge: column of its signal.
     pub signal: Option<String>,
 }
 

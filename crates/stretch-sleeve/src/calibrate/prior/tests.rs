@@ -179,7 +179,8 @@ fn sorted_fields_of_a_prior_and_of_a_session_are_told_with_what_to_do() {
         let value: serde_json::Value = serde_json::from_str(&text.unwrap()).unwrap();
         std::fs::write(&path, value.to_string()).unwrap();
         let error = error();
-        let says = format!("or its fields were sorted; an unchanged copy can still be used; {again}");
+        let says =
+            format!("or its fields were sorted; an unchanged copy can still be used; {again}");
         assert!(error.contains(&says) && error.contains("file.json"), "{error}");
     }
 }

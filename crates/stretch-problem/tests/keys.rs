@@ -65,7 +65,7 @@ fn the_schema_and_the_reference_have_the_keys_of_every_table() {
         "## `[simulator]`",
         "## `[[effect.argument]]`",
         "| `simulator` | texts, or table (needed) |",
-        "| `wrap` | text, or texts | What is looked for",
+        "| `wrap` | text, or texts | Effects to try",
         "| `split` | fit, test |",
         "| `time_unit` | s, ms, us, ns, min, h, d |",
         "| `range` | two numbers (needed) |",

@@ -104,16 +104,10 @@ for file in $(git ls-files 'src/*.rs' 'crates/*/src/*.rs' ':!*_tests.rs' ':!*/te
     fails grep -nF 'env!("CARGO_MANIFEST_DIR")' "$room/shipped" || { echo "in $file"; exit 1; }
 done
 # a file of tests that neither its test program nor its folder's mod.rs names would never be compiled
-for main in $(git ls-files 'tests/*/mod.rs' 'crates/*/tests/*/mod.rs'); do
-    for file in $(git ls-files "${main%/*}/*.rs" | grep -vE "^${main%/*}/.*/|/mod.rs$"); do
-        module=${file##*/} module=${module%.rs}
-        grep -qE "^(pub(\(crate\))? )?mod $module;" "$main" || { echo "$main does not name $file"; exit 1; }
-    done
-done
-for main in tests/main.rs crates/*/tests/main.rs; do
-    for file in $(git ls-files "${main%/*}/*.rs" | grep -vE "^${main%/*}/.*/.*/|/main.rs$"); do
+for main in $(git ls-files 'tests/main.rs' 'tests/*/mod.rs' 'crates/*/tests/main.rs' 'crates/*/tests/*/mod.rs'); do
+    for file in $(git ls-files "${main%/*}/*.rs" | grep -vE "^${main%/*}/.*/.*/|/(main|mod)\.rs$"); do
         module=${file#"${main%/*}/"} module=${module%.rs} module=${module%%/*}
-        grep -qE "^(pub )?mod $module;|^    mod $module;" "$main" || grep -q "tests/$module" "${main%/tests/main.rs}/Cargo.toml" || { echo "$main does not name $file"; exit 1; }
+        grep -qE "^(pub(\(crate\))? )?mod $module;|^    mod $module;" "$main" || grep -q "tests/$module" "${main%/tests/*}/Cargo.toml" || { echo "$main does not name $file"; exit 1; }
     done
 done
 

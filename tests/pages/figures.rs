@@ -47,7 +47,7 @@ fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     text
 }
 
-/// The few models that the README shows.
+/// The few models that the README of stretch-receptor shows.
 fn instructions(budget: &Budget) -> String {
     let of = |program: &str| {
         let mean = budget.get(&("m3".to_owned(), program.to_owned()));

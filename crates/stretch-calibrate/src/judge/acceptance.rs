@@ -45,14 +45,17 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
+/// What is asked about a log whose samples lie outside the range of the calibration.
+pub(super) const IS_IT_THE_SENSOR: &str =
+    "is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range";
+
 /// A sentence for a log most of whose samples lie outside the calibrated domain.
 ///
 /// Most means more than half: the estimates of such a log are those of the domain's ends more often than not.
 pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
-            "{} % of the samples lie outside the range of the calibration and were limited to it: is it the calibrated sensor, in \
-             the same unit? If so, calibrate on trials with this range",
+            "{} % of the samples lie outside the range of the calibration and were limited to it: {IS_IT_THE_SENSOR}",
             share(clamped, samples)
         )
     })

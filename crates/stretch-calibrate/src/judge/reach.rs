@@ -5,7 +5,7 @@ use stretch_data::unit_of;
 
 use crate::prepare::extent;
 
-use super::doubt::Doubt;
+use super::{acceptance::IS_IT_THE_SENSOR, doubt::Doubt};
 
 /// Powers of ten by which a signal is multiplied for a trial: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
@@ -95,12 +95,7 @@ impl Reach {
                     format!("{sentence}: {asked}? {inside} lie inside when {how} by {by}"),
                 )
             }
-            None => (
-                "outside_range",
-                format!(
-                    "{sentence}: is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range"
-                ),
-            ),
+            None => ("outside_range", format!("{sentence}: {IS_IT_THE_SENSOR}")),
         };
         Some(Doubt::new(code, text))
     }

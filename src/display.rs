@@ -193,22 +193,22 @@ impl Write for Output {
     }
 }
 
-/// No line is longer, on whatever terminal or none: beyond it the eye loses its row.
+/// Longest line of text, on any terminal, because longer lines are hard to read. Also the width without a terminal.
 const WIDEST: usize = 100;
-/// Narrower ones break what words there are.
+/// Least width: a narrower terminal breaks the lines itself.
 const NARROWEST: usize = 30;
 
-/// Columns of a line: those of `COLUMNS`, else of the terminal, never more than a hundred.
-pub(crate) fn width() -> usize {
-    let said = env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
+/// Columns of the terminal: those of `COLUMNS`, otherwise those that the terminal reports. A table may use them all.
+pub(crate) fn columns() -> usize {
+    let set = env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
     let found = || terminal_size().map(|(Width(columns), _)| usize::from(columns));
-    said.or_else(found).unwrap_or(WIDEST).clamp(NARROWEST, WIDEST)
+    set.or_else(found).unwrap_or(WIDEST).max(NARROWEST)
 }
 
-/// A text in lines that are not wider than that: broken between words, further in as the line began. Rows of tables are made
-/// as wide as there is room already, and a word is never cut.
+/// Breaks a text between words into lines of at most 100 columns; further lines keep the indent of the first. Rows of tables
+/// already fit, and a word is never cut.
 fn wrapped(text: &str) -> String {
-    wrapped_at(text, width())
+    wrapped_at(text, columns().min(WIDEST))
 }
 
 fn wrapped_at(text: &str, width: usize) -> String {

@@ -4,7 +4,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Wi
 
 pub(crate) use stretch_report::number;
 
-use crate::display::width;
+use crate::display::columns;
 
 /// A cell of so many characters is not broken, where that is not more than a third of the line: it is a number, an interval
 /// or a name.
@@ -18,7 +18,7 @@ const AROUND: usize = 3;
 /// further table below, behind the first column again. Nothing is left out.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().collect();
-    fitted(header, &rows, width())
+    fitted(header, &rows, columns())
 }
 
 fn fitted(header: &[&str], rows: &[Vec<String>], width: usize) -> String {

@@ -117,7 +117,7 @@ fn a_choice_is_explained_with_its_figures() {
     let told = one_line(&runs(command.arg(&logs[1]).args(["--model", "auto"])));
     let why = told.split("Chosen: ").nth(1).expect("a sentence");
     let why = &why[..why.find(". ").unwrap()];
-    assert!(why.contains("on what was left out of the fit") && why.contains(" mm"), "{why}");
+    assert!(why.contains("on data left out of the fit") && why.contains(" mm"), "{why}");
     assert!(!told.contains("[]"), "{told}");
     let history = runs(calibrate(&logs[0], &scratch.path("cal.json")).args(["--model", "history"]));
     assert!(!history.contains("[]") && history.contains("time constants of 0.05"), "{history}");

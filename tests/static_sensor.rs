@@ -50,7 +50,7 @@ fn a_table_without_a_time_gives_a_line_or_a_curve() {
     // a sensor that bends gets a curve from auto as well
     let bent: String = (0..12).map(|k| format!("{},{}\n", 10 * k, 400 + 5 * k + k * k)).collect();
     let said = calibrated(&scratch, &format!("load_g,raw\n{bent}"), "auto");
-    assert!(said.contains("curve errs least"), "{said}");
+    assert!(said.contains("curve has the smallest error"), "{said}");
     let (rows, _) = live(&scratch, &[], "400\n435\n576\n");
     let [start, middle, end] = grams(&rows)[..] else { panic!("three readings") };
     assert!(start.abs() <= 1.0 && (middle - 41.0).abs() < 2.0 && (end - 110.0).abs() <= 1.0);

@@ -289,6 +289,9 @@ fn shells_complete_and_man_has_pages() {
         clap_complete::generate(shell, &mut stretch_cli::command(), "stretch", &mut text);
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains(part) && text.contains("fail-on"), "{shell}");
+        for value in ["observer+rest", "diagnosed", "fixed", "bisquare"] {
+            assert!(text.contains(value), "{shell} does not complete {value}");
+        }
     }
     let scratch = Scratch::new();
     clap_mangen::generate_to(stretch_cli::command(), scratch.path("")).unwrap();

@@ -303,14 +303,13 @@ impl ZeroWatch {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
             let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
             warn(format!(
-                "stretch: {}put on again? The zero is {} {unit} off since {:.2} s; usual is up to {} {unit} over five movements and {} {unit} over \
-                 some twenty, with {} false alarms an hour. Calibrate again",
+                "stretch: {}the zero has shifted by {} {unit} since {:.2} s; the calibration expects at most {} {unit} over five movements and {} {unit} \
+                 over about twenty. If the sensor was put on again, calibrate again",
                 self.trial,
                 number(zero.off_reference.abs()),
                 time_s - f64::from(zero.since_samples) * self.period_s,
                 usual(turns.limit),
                 usual(turns.mean_limit),
-                turns.false_alarms_an_hour,
                 unit = self.unit,
             ));
         }

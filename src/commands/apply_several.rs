@@ -35,7 +35,7 @@ pub(super) fn apply_several(
     Ok(())
 }
 
-/// A line for each time that a gauge begins to be off from what the others say.
+/// Reports each time that a gauge begins to differ from the others.
 fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applied: &AppliedArray) {
     let Some(usual) = &calibration.spec().shifts else { return };
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
@@ -46,14 +46,13 @@ fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applie
             let k = shifts.most.unwrap_or(first);
             let name = calibration.spec().channels[k].signal.as_str();
             let others = match calibration.spec().channels.len() {
-                2 => "the other gauge says (which of the two has moved is unknown)",
-                _ => "the other gauges say",
+                2 => "the other gauge (the data cannot tell which of the two has moved)",
+                _ => "the other gauges",
             };
             warn(format!(
-                "stretch: {trial}: at {time_s:.2} s {name} is at least {} {unit} off from what {others}; usual is up to {} {unit}, with {} false alarms an hour. Put on again? Calibrate again",
+                "stretch: {trial}: at {time_s:.2} s the estimate from {name} differs by at least {} {unit} from {others}; in the calibration it differed by up to {} {unit}. If the gauge was put on again, calibrate again",
                 number(shifts.off[k].abs()),
                 number(usual.limits[k]),
-                usual.false_alarms_an_hour
             ));
         }
         before = shifts.shifted;

@@ -28,7 +28,7 @@ use super::{
     calibration_text::{print, print_models},
     json::Json,
     reading::{Recorded, columns, read_trials, with_columns_to_name},
-    shared::{detail, of_files, spinner, stage_text, tell},
+    shared::{Completed, detail, of_files, spinner, stage_text, tell},
 };
 
 /// Fit a calibration to logged trials
@@ -71,7 +71,12 @@ pub(crate) struct Args {
     /// curve is a polynomial of the signal alone, its degree by cross-validation; curve and linear also take a table of weights and
     /// readings without a time. polyIJ is of degree I in the rate and J in the signal. observer, history and diagnosed remember; +rest behind observer or
     /// history follows a drifting baseline. auto takes the best on trials left out.
-    #[arg(long, conflicts_with_all = SLEEVE)]
+    #[arg(
+        long,
+        conflicts_with_all = SLEEVE,
+        hide_possible_values = true,
+        value_parser = Completed { names: &MODELS, parser: str::parse::<Model> }
+    )]
     model: Option<Model>,
     /// Column of the reference, whose last part is the unit
     ///
@@ -172,6 +177,20 @@ impl FromStr for Rate {
         if text == "paper" { Ok(Self::Paper) } else { parse_rate(text).map(Self::Of) }
     }
 }
+
+/// What a shell completes after `--model`; it takes further degrees of a surface.
+const MODELS: [&str; 10] = [
+    "auto",
+    "linear",
+    "curve",
+    "poly13",
+    "observer",
+    "observer+rest",
+    "history",
+    "history+rest",
+    "diagnosed",
+    "diagnosed+rest",
+];
 
 /// A model, or the choice of one.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,18 +1,24 @@
 //! A calibration as text on a terminal.
 
+use std::ops::RangeInclusive;
+
 use stretch_calibrate::{Calibrated, Candidate, FitReport, MODELS_IN_WORDS, ModelChoice, ModelRow};
 use stretch_data::unit_of;
 use stretch_report::{order_table, signal_table};
 
-use super::shared::{say, tell};
+use super::shared::{say, say_first, tell};
 use crate::display::is_verbose;
 use crate::table::{maybe, number, table, table_text};
 
 /// The heading of how far the mean squared error of a model is above that of the best one.
 const SQUARED_EXCESS: &str = "over the best, squared";
 
+/// Columns of the kinds of trial.
+const KINDS: RangeInclusive<usize> = 2..=4;
+
 /// What `auto` rests on; columns without a value are left out.
 pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
+    say_first(format!("Chosen: {}.", choice.why))?;
     let unit = unit_of(reference);
     let unit = if unit.is_empty() { unit } else { format!(" in {unit}") };
     say(format!("Models, RMSE{unit} on trials left out of the fit:"))?;
@@ -44,14 +50,20 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
         "ramps",
         "delay ms",
         "worst",
-        "numbers",
+        "coefficients",
         "M3 instr.",
         SQUARED_EXCESS,
         "",
     ];
     let rows: Vec<Vec<String>> = choice.rows.iter().map(row).collect();
     let has_values = |i: &usize| rows.iter().any(|row| row.get(*i).is_some_and(|cell| cell != "-"));
-    let is_shown = |i: &usize| has_values(i) && (is_verbose() || header[*i] != SQUARED_EXCESS);
+    // with trials of one kind only, the column of that kind repeats the first one
+    let has_kinds = KINDS.filter(has_values).count() > 1;
+    let is_shown = |i: &usize| {
+        has_values(i)
+            && (is_verbose() || header[*i] != SQUARED_EXCESS)
+            && (has_kinds || !KINDS.contains(i))
+    };
     let columns: Vec<usize> = (0..header.len()).filter(is_shown).collect();
     let picked = |row: &Vec<String>| columns.iter().filter_map(|i| row.get(*i).cloned()).collect();
     let header: Vec<&str> = columns.iter().map(|i| header[*i]).collect();
@@ -59,11 +71,11 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     if is_verbose() {
         say(format!("Models: {}.", MODELS_IN_WORDS))?;
         say(
-            "worst: the largest error. numbers: how many coefficients. M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), \
-             as measured. over the best, squared: mean squared error less that of the best model. \u{b1}: one standard error.",
+            "worst: the largest error. coefficients: how many. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
+             over the best, squared: mean squared error minus that of the best model. \u{b1}: one standard error.",
         )?;
     }
-    say(format!("Chosen: {}.", choice.why))
+    Ok(())
 }
 
 /// From volts in `f32`, and in fixed point where the model has that form.

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use stretch_calibrate::{Evaluation, MethodErrors, evaluate, evaluation_doubts, read_calibration};
 use stretch_data::Split;
-use stretch_report::{comparison_table, method_table};
+use stretch_report::{comparison_table, errors_in_words, method_table};
 
 use super::{
     json::Json,
     reading::{Recorded, read_trials, with_columns_to_name},
-    shared::{say, short_name},
+    shared::{say, say_first, short_name},
 };
 use crate::display::warn;
 use crate::table::table_text;
@@ -76,6 +76,10 @@ pub(super) fn print_errors(
 /// The paper's table, a trial each and pooled.
 pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
     let unit = &evaluation.unit;
+    let name = |i: usize| evaluation.pooled[i].method.clone();
+    if let Some(errors) = errors_in_words(&evaluation.pooled, unit, name) {
+        say_first(errors)?;
+    }
     for trial in &evaluation.trials {
         print_errors(&trial.trial, &trial.methods, unit)?;
     }

@@ -12,7 +12,7 @@ use stretch_export::{
 use stretch_receptor::code::Adc;
 use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_record};
 
-use super::shared::{give_stdout, say, tell};
+use super::shared::{Completed, give_stdout, say, tell};
 
 /// Write a calibration for a board, in C or as a record of integers; check or renew a record's seal
 ///
@@ -52,7 +52,13 @@ pub(crate) struct Args {
     ///
     /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
     /// signal's unit to the reference's.
-    #[arg(long, value_name = "FORM", requires = "c")]
+    #[arg(
+        long,
+        value_name = "FORM",
+        requires = "c",
+        hide_possible_values = true,
+        value_parser = Completed { names: &["fixed", "float"], parser: str::parse::<Form> }
+    )]
     form: Option<Form>,
     /// Where the record of integers goes: converter codes in, thousandths of the reference's unit out
     ///

@@ -3,6 +3,7 @@
 //! At Ctrl-C a live recording ends like a stream that ends; anything else stops at once and leaves nothing half-written.
 
 use std::{
+    ffi::OsStr,
     io::{self, Read},
     path::{Path, PathBuf},
     sync::{
@@ -12,11 +13,39 @@ use std::{
     time::Duration,
 };
 
+use clap::{
+    Arg, Command,
+    builder::{PossibleValue, TypedValueParser},
+};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use stretch_data::files::{FileError, Outputs};
 
 use crate::display::shows_progress;
 pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_first, tell};
+
+/// A parser of values that a shell completes with `names`, although it accepts further values.
+#[derive(Clone)]
+pub(crate) struct Completed<P> {
+    pub(crate) names: &'static [&'static str],
+    pub(crate) parser: P,
+}
+
+impl<P: TypedValueParser> TypedValueParser for Completed<P> {
+    type Value = P::Value;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<P::Value, clap::Error> {
+        self.parser.parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.names.iter().map(PossibleValue::new)))
+    }
+}
 
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {

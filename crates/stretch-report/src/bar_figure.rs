@@ -222,7 +222,11 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
     let axis = vec![(left, px(2.0)), (left, bottom)];
     area.draw(&PathElement::new(axis, stroke(Ink::Axis.color(), 1.0)))?;
     let corner = (right, height as i32 - px(1.0));
-    area.draw(&Text::new(x_label.to_owned(), corner, words(Ink::Text, HPos::Right, VPos::Bottom)))
+    let label = match scale {
+        Scale::Percent => x_label.to_owned(),
+        Scale::NoiseMultiples => format!("{x_label} (logarithmic)"),
+    };
+    area.draw(&Text::new(label, corner, words(Ink::Text, HPos::Right, VPos::Bottom)))
 }
 
 fn ticks_start(scale: Scale) -> f64 {

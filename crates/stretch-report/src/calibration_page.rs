@@ -89,33 +89,22 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let Judged { calibrated, evaluation, context } = *judged;
     let names = method_names(calibrated, evaluation);
     let methods = &evaluation.pooled;
-    let Some(best) = best(methods) else {
-        return "No estimate could be compared with a reference.".to_owned();
-    };
-    let off = |m: &MethodErrors| {
-        let rmse = with_unit(&number(m.rmse, 3), &evaluation.unit);
-        format!("{rmse} (RMSE, {}\u{a0}% of the range)", number(m.rmse_percent, 2))
-    };
-    let short = |m: &MethodErrors| with_unit(&number(m.rmse, 3), &evaluation.unit);
     let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
-        (RAW, _) => "raw signal".to_owned(),
         (method, Some(name)) => {
             let kind = || method.parse::<ModelKind>().ok();
             let remembers = kind().is_some_and(|k| matches!(k, ModelKind::Remembering { .. }));
             match (remembers, name.split_once(" (")) {
-                (true, _) => "calibration with memory".to_owned(),
+                (true, _) => "the calibration with memory".to_owned(),
                 // which of them it is says the table
-                (false, Some((words, _))) => format!("{words} calibration"),
-                (false, None) => format!("{name} calibration"),
+                (false, Some((words, _))) => format!("the {words} calibration"),
+                (false, None) => format!("the {name} calibration"),
             }
         }
         (method, None) => method.to_owned(),
     };
-    // next to the best one, the signal itself is enough; the table has the others
-    let others: Vec<String> = (0..methods.len())
-        .filter(|i| *i != best && methods[*i].method == RAW)
-        .map(|i| format!("the {} by {}", called(i), short(&methods[i])))
-        .collect();
+    let Some(errors) = errors_in_words(methods, &evaluation.unit, called) else {
+        return "No estimate could be compared with a reference.".to_owned();
+    };
     let judged = &evaluation.trials;
     let seen = judged.iter().filter(|t| context.calibrated_on.contains(&t.trial)).count();
     let on = match (seen, judged.len()) {
@@ -124,8 +113,23 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         (seen, all) if seen == all => "On the very data of the fit",
         _ => "On recordings of which some were used for the fit",
     };
-    let rest = if others.is_empty() { String::new() } else { format!("; {}", others.join(", ")) };
-    format!("{on}, the {} is off by {}{rest}.", called(best), off(&methods[best]))
+    format!("{on}, {errors}")
+}
+
+/// States the error of the best method, and that of the raw signal, in one sentence; `None` without a calibration that
+/// could be compared. `name` gives the name of a method by its index.
+pub fn errors_in_words(
+    methods: &[MethodErrors],
+    unit: &str,
+    name: impl Fn(usize) -> String,
+) -> Option<String> {
+    let best = best(methods)?;
+    let off = |m: &MethodErrors| with_unit(&number(m.rmse, 3), unit);
+    let raw = methods.iter().find(|m| m.method == RAW);
+    let raw = raw.map_or_else(String::new, |m| format!("; the raw signal by {}", off(m)));
+    let percent = number(methods[best].rmse_percent, 2);
+    let is_off = format!("{} is off by {}", name(best), off(&methods[best]));
+    Some(format!("{is_off} (RMSE, {percent}\u{a0}% of the range){raw}."))
 }
 
 fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &Context) {

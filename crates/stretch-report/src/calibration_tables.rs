@@ -46,11 +46,11 @@ pub fn method_table(
     names: &[String],
     unit: &str,
 ) -> Table {
-    let largest = with_unit("Largest error,", unit);
+    let [rmse, largest] = ["RMSE,", "Largest error,"].map(|name| with_unit(name, unit));
     let head = [
         "Method",
         "Average error, %",
-        &format!("RMSE, {}", if unit.is_empty() { "1" } else { unit }),
+        rmse.trim_end_matches(','),
         "RMSE, % of range",
         "R\u{b2}",
         "Lag, ms",
@@ -99,9 +99,9 @@ pub fn comparison_table(
             probability(c.p_samples),
         ]
     };
-    let caption = with_unit("Difference of absolute errors, paired t test; unit:", unit);
+    let caption = with_unit("Difference of absolute errors, paired t test,", unit);
     let head = ["Difference", "Mean", "95 % interval", "P, blocks", "Blocks", "P, samples"];
-    Table::new(caption, &head, comparisons.iter().map(row))
+    Table::new(caption.trim_end_matches(','), &head, comparisons.iter().map(row))
 }
 
 /// Candidate signals, best first.

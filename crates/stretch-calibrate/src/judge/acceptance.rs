@@ -86,8 +86,8 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
             "it is {} {side} the reference on average, which is most of its error: is the reference in the unit of the calibration \
-             (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was mounted anew or has drifted: \
-             calibrate again, or with --model observer+rest, which follows a drifting zero",
+             (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was put on again or has drifted: \
+             calibrate again; half a minute of reference is enough with a prior of earlier sessions (calibrate --prior)",
             off.trim_end()
         )
     })
@@ -120,7 +120,7 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
         kept.iter().any(is_known)
     };
     let has_checksums = !provenance.checksums().is_empty();
-    let told = trials.iter().filter_map(|trial| {
+    let fitted = trials.iter().filter_map(|trial| {
         let label = Label::truncated(&trial.name);
         let is_named = provenance.trials().any(|fitted| fitted == label.as_str());
         let how = match has_checksums && (is_known(trial) || cleaned(trial)) {
@@ -132,11 +132,11 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
         };
         Some(format!("{}{how}", trial.name))
     });
-    let told: Vec<String> = told.collect();
-    (!told.is_empty()).then(|| {
+    let fitted: Vec<String> = fitted.collect();
+    (!fitted.is_empty()).then(|| {
         format!(
-            "it was fitted on {}: how good it is on other trials these do not tell; evaluate on trials that were held back",
-            told.join(", ")
+            "it was fitted on {}, so that these numbers do not show how good it is on other trials; evaluate trials that were not used for the fit",
+            fitted.join(", ")
         )
     })
 }

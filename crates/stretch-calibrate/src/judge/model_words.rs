@@ -30,27 +30,28 @@ pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     // the form with a followed baseline is no candidate of this comparison
     let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.kind));
     let mut sentence = if simplest.kind == best.kind {
-        let before = second.map_or(String::new(), |s| format!(", {} {}", s.kind, error(s)));
+        let next = second.map_or(String::new(), |s| format!(" ({}: {})", s.kind, error(s)));
         let (model, least) = (&best.kind, error(best));
-        let among = if *memory_shows { "" } else { " of those without memory" };
+        let among = if *memory_shows { "" } else { " of all models without memory" };
         format!(
-            "{chosen}{model} errs least{among} on what was left out of the fit, {least}{before}"
+            "{chosen}{model} has the smallest error{among} on data left out of the fit: {least}{next}"
         )
     } else {
         let by_chance = excess.filter(|(mean, error)| mean <= error);
         let decided = match by_chance {
             Some((mean, error)) if mean > 0.0 => format!(
-                "the difference of their squares is {:.1} of its standard errors, which is chance",
+                "the difference of their squared errors is {:.1} of its standard error",
                 mean / error
             ),
-            Some(_) => "trial by trial it is no better".to_owned(),
-            None => format!("which is within {:.0} %", 100.0 * (as_good - 1.0)),
+            Some(_) => "trial by trial its squared error is no larger".to_owned(),
+            None => format!("their errors differ by less than {:.0} %", 100.0 * (as_good - 1.0)),
         };
         format!(
-            "{chosen}{} errs {} on what was left out of the fit, the best, {}, {}; {decided}, and {} numbers are fewer than {}",
+            "{chosen}{} is as good as {} and simpler: on data left out of the fit their errors are {} and {}, and {decided}; {} coefficients \
+             instead of {}",
             simplest.kind,
-            error(simplest),
             best.kind,
+            error(simplest),
             error(best),
             simplest.numbers,
             best.numbers
@@ -58,11 +59,10 @@ pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     };
     if let Some(insured) = insured {
         let cost = 100.0 * (insured.rmse / simplest.rmse - 1.0);
+        sentence += "; following a drifting baseline ";
         sentence += &match cost >= 0.05 {
-            true => {
-                format!("; to follow a drifting baseline costs {cost:.1} % of that and is taken")
-            }
-            false => "; to follow a drifting baseline costs nothing and is taken".to_owned(),
+            true => format!("increases the error by {cost:.1} %"),
+            false => "does not increase the error".to_owned(),
         };
     }
     sentence
@@ -94,20 +94,20 @@ mod tests {
         };
         assert_eq!(
             why(&grounds),
-            "observer errs least on what was left out of the fit, 0.5 mm, history 0.52 mm"
+            "observer has the smallest error on data left out of the fit: 0.5 mm (history: 0.52 mm)"
         );
         let chance = Grounds { simplest: &simple, excess: Some((0.1, 0.2)), ..grounds };
         assert_eq!(
             why(&chance),
-            "history errs 0.52 mm on what was left out of the fit, the best, observer, 0.5 mm; the \
-             difference of their squares is 0.5 of its standard errors, which is chance, and 13 numbers are fewer than 31"
+            "history is as good as observer and simpler: on data left out of the fit their errors are 0.52 mm and 0.5 mm, and the difference \
+             of their squared errors is 0.5 of its standard error; 13 coefficients instead of 31"
         );
         let close = Grounds { excess: Some((0.3, 0.2)), insured: Some(&rest), ..chance };
         let sentence = why(&close);
         assert!(
-            sentence.starts_with("history+rest: ") && sentence.contains("within 5 %"),
+            sentence.starts_with("history+rest: ") && sentence.contains("less than 5 %"),
             "{sentence}"
         );
-        assert!(sentence.ends_with("costs 1.9 % of that and is taken"), "{sentence}");
+        assert!(sentence.ends_with("increases the error by 1.9 %"), "{sentence}");
     }
 }

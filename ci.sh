@@ -170,7 +170,7 @@ STRETCH_PROGRAM=$STRETCH ignored "$without" --lib --bins --tests
 
 step "examples"
 # cargo test has built them
-for example in examples/*.rs crates/stretch-{filter,fit,gap}/examples/*.rs; do
+for example in examples/*.rs crates/stretch-{filter,fit,gap,receptor}/examples/*.rs; do
     example=$(basename "$example" .rs)
     # a folder to write to, which one of them needs
     cargo run --quiet --locked --example "$example" -- "$room/example" >/dev/null

@@ -133,6 +133,7 @@ for triple in $TARGETS; do
         cargo check --quiet --locked -p "$crate" --no-default-features --target "$triple"
     done
     cargo check --quiet --locked -p stretch-core --features record --target "$triple"
+    cargo check --quiet --locked -p stretch-receptor --no-default-features --features defmt --target "$triple"
     echo "$triple:" $BOARDS
 done
 

@@ -4,6 +4,7 @@ use core::fmt;
 
 /// Why a design was refused. Small, `Copy`, and carries the evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DesignError {
     /// A number is not finite or outside what its field allows.

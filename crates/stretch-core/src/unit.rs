@@ -9,6 +9,7 @@ macro_rules! unit {
     ($($(#[$doc:meta])* $name:ident, $symbol:literal;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct $name<T = f64>(pub T);
 
         impl<T: core::fmt::Display> core::fmt::Display for $name<T> {
@@ -46,6 +47,7 @@ unit! {
 /// assert!(SampleRate::new(0.0).is_err());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "f64", into = "f64"))]
 pub struct SampleRate(f64);

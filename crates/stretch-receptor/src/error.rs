@@ -7,6 +7,7 @@ use stretch_filter::FilterError;
 
 /// Why a calibration gives no receptor.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReceptorError {
     /// The calibration holds another model, or a number that the receptor cannot hold.

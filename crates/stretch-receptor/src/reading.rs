@@ -6,6 +6,7 @@ use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
 
 /// An answer: the estimate, its rate, and the quality of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading<T = f64> {
     /// The estimated reference, in the unit of the reference (millimetres of a muscle, degrees of a joint).
     pub estimate: T,
@@ -37,6 +38,7 @@ impl<T: Real> Reading<T> {
 /// An input outside the domain is moved to the nearest end before the calibration is evaluated, because a polynomial
 /// is never extrapolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Domain {
     /// Both inputs were inside: the estimate is an interpolation.
     Inside,
@@ -73,6 +75,7 @@ impl fmt::Display for Domain {
 
 /// The reason why there is no [`Reading`] for a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Withheld {
     /// The rate estimator has not seen enough samples yet, and the model needs a rate.

@@ -8,6 +8,7 @@ use crate::ReceptorError;
 ///
 /// A number outside `0 .. 2^bits` is a missing sample; firmware uses [`AdcCode::MISSING`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AdcCode(pub i32);
 
 impl AdcCode {

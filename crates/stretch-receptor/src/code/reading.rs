@@ -6,6 +6,7 @@ use crate::Domain;
 
 /// The answer of a [`CodeReceptor`](super::CodeReceptor) for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CodeReading<E> {
     /// The estimated reference: in thousandths of the reference's unit for [`Fixed`](super::Fixed) (micrometres for a
     /// reference in millimetres), else in the unit.

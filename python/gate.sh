@@ -26,7 +26,7 @@ trap 'rm -rf "$fresh"' EXIT
 "$python" -m venv "$fresh/use"
 pip() { "$fresh/use/bin/pip" install --quiet --disable-pip-version-check "$@"; }
 if [ -n "${MODULE:-}" ]; then
-    pip numpy pytest pandas
+    pip numpy pytest pandas matplotlib
     installed=$("$fresh/use/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/stretch_gap
     # one of its files is a link into the crates
     cp -rL package/stretch_gap "$installed"
@@ -38,7 +38,7 @@ else
         echo "the wheel names the folder in which it was built"
         exit 1
     fi
-    pip "$fresh"/wheels/*.whl pytest pandas
+    pip "$fresh"/wheels/*.whl pytest pandas matplotlib
     ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
 fi
 # without these their tests say SKIPPED

@@ -21,7 +21,7 @@ mod _stretch {
     #[pymodule_export]
     use crate::error::StretchError;
     #[pymodule_export]
-    use crate::problem::{Entries, FixedEntries, comment, identifier};
+    use crate::problem::{Entries, FixedEntries, comment, identifier, wrappers};
     #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
     #[pymodule_export]

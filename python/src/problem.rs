@@ -17,7 +17,7 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Fixed, Language, PAUSE_S, Prediction, Problem, ProblemSpec,
+    BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, Side, PAUSE_S, Prediction, Problem, ProblemSpec,
     RecordedSession, Source, predict_with,
     worker::{Workers, WorkersSpec, session_header},
 };
@@ -341,6 +341,20 @@ pub(crate) fn comment(text: &str) -> String {
 #[pyfunction]
 pub(crate) fn identifier(text: &str) -> String {
     Language::identifier(text)
+}
+
+/// Kinds of effects that can be wrapped around a simulator: name, where `wrap="all"` looks for it, words and equation.
+#[pyfunction]
+pub(crate) fn wrappers() -> Vec<(&'static str, String, &'static str, &'static str)> {
+    let side = |side: &Side| match side {
+        Side::Input => "input",
+        Side::Output => "output",
+    };
+    let row = |kind: &&'static Kind| {
+        let sides: Vec<&str> = kind.usual.iter().map(side).collect();
+        (kind.name, sides.join(", "), kind.words, kind.equation)
+    };
+    KINDS.iter().map(row).collect()
 }
 
 fn answer(problem: &Problem, examined: Examined) -> Answer {

@@ -1,3 +1,4 @@
+import json
 import pickle
 
 import numpy as np
@@ -85,7 +86,7 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
     ("spoil", "words"),
     [
         (lambda s, a: (s[:-1], a), "1999"),
-        (lambda s, a: (np.where(np.arange(s.size) == 7, np.nan, s), a), "sample 7: nan"),
+        (lambda s, a: (np.full_like(s, np.nan), a), "no sample has a number in every column; gauge_mv is nan in sample 0"),
         (lambda s, a: (s.reshape(2, 1000), a), "give as many"),
         (lambda s, a: (np.zeros_like(s), a), "signal is 0 throughout"),
         (lambda s, a: (s[:1], a[:1]), "1 samples are too few"),
@@ -95,6 +96,23 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
 def test_bad_columns_are_refused_in_a_sentence(fitted, spoil, words):
     with pytest.raises(stretch_gap.StretchError, match=words):
         stretch_gap.calibrate(*spoil(*fitted), RATE_HZ, model="linear")
+
+
+@pytest.mark.parametrize("spoilt", [np.nan, np.inf, -np.inf])
+def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, spoilt):
+    signal, angle = fitted
+    time_s = np.arange(signal.size) / RATE_HZ
+    broken = np.where(np.arange(signal.size) == 700, spoilt, signal)
+    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 samples are left out \(700\)") as warned:
+        one = stretch_gap.calibrate(broken, angle, RATE_HZ, model="linear")
+    assert warned[0].message.code == "missing_samples" and warned[0].filename == __file__
+    path = tmp_path / "log.csv"
+    rows = np.column_stack([time_s, broken, angle])
+    np.savetxt(path, rows, delimiter=",", header="time_s,signal,angle", comments="", fmt="%.17g")
+    read = stretch_gap.read(path)
+    assert read["signal"].size == 1999
+    same = stretch_gap.calibrate(read["signal"], read["angle"], time_s=read.time_s, model="linear")
+    assert json.loads(one.to_json())["model"] == json.loads(same.to_json())["model"]
 
 
 def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):

@@ -53,6 +53,47 @@ def bent():
     return diagnose(Spring(), BENT)
 
 
+def test_wrappers_are_listed_with_their_sides():
+    listed = stretch_gap.wrappers()
+    kinds = dict(zip(listed["kind"], listed["wrap"]))
+    assert kinds["backlash"] == "output" and "input" in kinds["delay"]
+    assert all(listed["words"]) and all(listed["equation"])
+
+
+def test_curves_are_plotted(bent):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("agg")
+    top, bottom = bent.plot()
+    assert [line.get_label() for line in top.lines] == ["measured", "as shipped", "retuned", "with effects"]
+    x, y = top.lines[0].get_data()
+    np.testing.assert_allclose(x[[0, 100]], [0.0, 1.0])
+    np.testing.assert_allclose(y, BENT)
+    assert len(bottom.lines) == 3 and top.get_ylabel() == "length_mm"
+    top, bottom = bent.fix().predict({"force_N": FORCE, "length_mm": BENT}, rate_hz=RATE_HZ).plot("length_mm")
+    assert len(top.lines) == 3 and len(bottom.lines) == 2
+    with pytest.raises(stretch_gap.StretchError, match="there is no output"):
+        bent.plot("speed")
+
+
+def test_a_recording_is_named_by_its_path(bent, tmp_path):
+    path = tmp_path / "day1.csv"
+    columns = np.column_stack([np.arange(FORCE.size) / RATE_HZ, FORCE, BENT])
+    np.savetxt(path, columns, delimiter=",", header="time_s,force_N,length_mm", comments="", fmt="%.17g")
+    question = {"output": "length_mm", "effects": {"bend": (-0.05, 0.05)}, "wrap": ["output.backlash", "output.delay"]}
+    parameters = {"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")}
+    for data in [str(path), path, [path]]:
+        found = stretch_gap.diagnose(Spring(), data, inputs=["force_N"], parameters=parameters, **question)
+        assert found.named == bent.named
+        assert found.effects["bend"]["bend"] == pytest.approx(bent.effects["bend"]["bend"], rel=1e-6)
+
+
+def test_a_missing_sample_is_bridged_with_a_warning():
+    broken = np.where(np.arange(BENT.size) == 1000, np.nan, BENT)
+    with pytest.warns(stretch_gap.DoubtWarning, match=r"sample 1000 of length_mm is nan"):
+        found = diagnose(Spring(), broken)
+    assert found.named == ["bend"]
+
+
 def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
     assert bent.verdict == "effect" and bent.named == ["bend"]
     assert bent.answer["kind"] == "missing" and bent.answer["effects"][0]["name"] == "bend"

@@ -12,7 +12,7 @@ True
 
 from ._stretch import Reading, Receptor, Refused, StretchError, __version__
 from .calibration import Calibration, Estimate, calibrate
-from .diagnosis import Diagnosis, diagnose
+from .diagnosis import Diagnosis, diagnose, wrappers
 from .evaluation import Evaluation, evaluate
 from .fix import Fix, Prediction
 from .problem import Argument, Effect, Parameter, Stage, Trial
@@ -43,4 +43,5 @@ __all__ = [
     "diagnose",
     "evaluate",
     "read",
+    "wrappers",
 ]

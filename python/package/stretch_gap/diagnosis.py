@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from . import _stretch, html, timeline
+from . import _stretch, figures, html, timeline
 from . import problem as entries
 from ._stretch import StretchError
 from .fix import Again, Fix, fix
@@ -180,6 +180,13 @@ class Diagnosis:
             raise StretchError(f"there is no output {name}; there are {', '.join(self._curves)}")
         return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
 
+    def plot(self, output: str | None = None) -> Any:
+        """Draws one output with matplotlib: measured, as shipped, re-tuned and with the named effects, and below it measured
+        minus simulated. Returns the two axes."""
+        values = self.curves(output)
+        name = output or next(iter(self._curves))
+        return figures.curves(values, float(self._session.get("dt_s", 1.0)), name, self.sentence)
+
     def fix(self) -> Fix:
         """The changes to the simulator: parameters re-tuned, and the named effects as Python code. The fix can
         `predict` new recordings, and `diagnose` the fixed simulator.
@@ -290,8 +297,9 @@ def diagnose(
     `begin(session)` is called once with everything that stays the same. The same object can be named in a problem.toml. An
     exception of the simulator comes out as it is; `stretch_gap.Refused` says that values cannot be simulated.
 
-    `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
-    Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
+    `data`: a dict of arrays by column, a frame, a `Trial`, the path of a recording (as `stretch_gap.read` takes it), or a
+    list of these; with `rate_hz` or a column `time_s`. Or the path of a problem.toml, which says all of the following; without
+    a simulator (None) the file's own is run.
 
     `output` is the column that the simulation is compared with, `inputs` those that drive it; `stages` says the same of
     several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
@@ -306,7 +314,7 @@ def diagnose(
         raise StretchError(f"depth: {depth} effects cannot be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
-    if isinstance(data, (str, os.PathLike)):
+    if isinstance(data, (str, os.PathLike)) and os.fspath(data).endswith(".toml"):
         if output is not None or stages is not None or parameters or effects:
             raise StretchError(
                 f"{os.fspath(data)} says what is diagnosed; give a simulator in addition to it, or None for the file's own"
@@ -365,11 +373,19 @@ def run(
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
-    text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), progress)
+    with figures.shown(progress) as report:
+        text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
     again = None if fixed is None else Again(fixed, asked, how)
     return Diagnosis(answer, page, curves, functions, trial, session, again)
+
+
+def wrappers() -> Any:
+    """Effects that can be wrapped around a simulator, as a pandas frame (a dict of columns without pandas): `kind`; `wrap`, the
+    sides on which `wrap="all"` looks for it; `words`; and `equation`, in which x becomes y."""
+    keys = ("kind", "wrap", "words", "equation")
+    return frame([dict(zip(keys, one)) for one in _stretch.wrappers()])
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
-from . import html
+from . import figures, html
 from . import problem as entries
 from ._stretch import Fixed, StretchError, comment, identifier
 from .recordings import Array
@@ -49,9 +49,12 @@ class Fix:
         recorded = entries.recorded(data, rate_hz, again.fixed.columns)
         later = [(columns, begins_s + start_s, True) for columns, start_s, _ in recorded]
         checked = again.fixed.problem(later, False)
+        session = json.loads(checked.session)
         if again.asked is not None:
-            again.asked.bind({**json.loads(checked.session), "columns": checked.columns})
-        return Prediction(*checked.predict(fitted, again.asked, json.dumps(again.how), progress))
+            again.asked.bind({**session, "columns": checked.columns})
+        with figures.shown(progress) as report:
+            made = checked.predict(fitted, again.asked, json.dumps(again.how), report)
+        return Prediction(*made, dt_s=float(session["dt_s"]))
 
     def diagnose(
         self,
@@ -81,11 +84,12 @@ class Fix:
 class Prediction:
     """What the fixed simulator predicts of recordings that were not fitted."""
 
-    def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]]) -> None:
+    def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]], dt_s: float) -> None:
         self._answer: dict[str, Any] = json.loads(text)
         self.sentence = sentence
         """The result in a sentence."""
         self._curves = curves
+        self._dt_s = dt_s
 
     @property
     def ratio(self) -> float:
@@ -113,6 +117,11 @@ class Prediction:
         if name not in self._curves:
             raise StretchError(f"there is no output {name}; there are {', '.join(self._curves)}")
         return dict(zip(("measured", "without", "with_effects"), self._curves[name]))
+
+    def plot(self, output: str | None = None) -> Any:
+        """Draws one output with matplotlib: measured, without and with the fix, and below it measured minus simulated. Returns
+        the two axes."""
+        return figures.curves(self.curves(output), self._dt_s, output or next(iter(self._curves)), self.sentence)
 
     def to_json(self) -> str:
         """Everything but the curves, as `stretch predict --json` writes it."""

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._stretch import StretchError
-from .recordings import column, same_length, times
+from .reading import Recording, read
+from .recordings import column, same_length, times, without_missing
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
     """Recordings from whatever holds them: a dict of arrays, a frame, a `Trial`, or a list of these."""
     if isinstance(data, Trial):
         return [data]
+    if isinstance(data, (str, os.PathLike)):
+        data = read(data)
     if isinstance(data, (list, tuple)):
         return [one for part in data for one in trials(part, rate_hz)]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # a frame, of whichever library
@@ -107,11 +110,13 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
         data = {str(name): np.asarray(frame[name]) for name in frame.columns}
     if not isinstance(data, Mapping):
         raise StretchError(
-            f"data are a {type(data).__name__}; give a dict of arrays by column, a frame, a stretch_gap.Trial, or a list of these"
+            f"data are a {type(data).__name__}; give a dict of arrays by column, a frame, a stretch_gap.Trial, the path of a "
+            "recording, or a list of these"
         )
     columns = dict(data)
     time_s = columns.pop("time_s", None)
-    return [Trial(columns, rate_hz=None if time_s is not None else rate_hz, time_s=time_s)]
+    name = data.name if isinstance(data, Recording) else ""
+    return [Trial(columns, rate_hz=None if time_s is not None else rate_hz, time_s=time_s, name=name)]
 
 
 def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[tuple[dict[str, Any], float, bool]]:
@@ -137,7 +142,7 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
         for c, values in channels:
             same_length(values, samples, f"{c} of {name}")
         rate = None if stamps is not None else trial.rate_hz or rate_hz
-        time_s = times(samples, rate, stamps, name)
+        time_s, channels = without_missing(name, times(samples, rate, stamps, name), channels)
         start_s = begins_s if trial.start_s is None else trial.start_s
         begins_s = start_s + float(time_s[-1] - time_s[0] if samples else 0.0) + PAUSE_S
         made.append(({"name": name, "time_s": time_s, "channels": channels}, start_s, trial.test))

@@ -29,21 +29,30 @@ def doubt(doubts: Iterable[tuple[str, str]], stacklevel: int = 3) -> None:
 
 
 def column(values: ArrayLike, what: str) -> Array:
-    """One column of finite numbers, or the sentence that says which is none."""
+    """One column of numbers; a missing value is NaN or infinite."""
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise StretchError(f"{what} does not hold numbers: {error}") from None
     if array.ndim != 1:
         raise StretchError(f"{what} has the shape {array.shape}; give one number a sample, in one dimension")
-    wrong = np.flatnonzero(~np.isfinite(array))
-    if wrong.size:
-        first = int(wrong[0])
-        raise StretchError(
-            f"{what}, sample {first}: {array[first]} is no number to work with ({wrong.size} of {array.size} are none); "
-            "leave those samples out (time_s says where they were) or interpolate them"
-        )
     return array
+
+
+def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Array]]) -> tuple[Array, list[tuple[str, Array]]]:
+    """The samples in which every channel has a number, as when a file is read; a `DoubtWarning` says which were left out."""
+    present = np.logical_and.reduce([np.isfinite(values) for _, values in channels], initial=np.True_)
+    left_out = np.flatnonzero(~present)
+    if not left_out.size:
+        return time_s, list(channels)
+    first = int(left_out[0])
+    name, value = next((name, values[first]) for name, values in channels if not np.isfinite(values[first]))
+    if left_out.size == time_s.size:
+        raise StretchError(f"{what}: no sample has a number in every column; {name} is {value} in sample {first}")
+    some = ", ".join(map(str, left_out[:5])) + (", ..." if left_out.size > 5 else "")
+    words = f"{what}: {left_out.size} of {time_s.size} samples are left out ({some}): sample {first} of {name} is {value}"
+    doubt([("missing_samples", words)], stacklevel=5)
+    return time_s[present], [(name, values[present]) for name, values in channels]
 
 
 def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: str) -> Array:
@@ -62,6 +71,9 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
         time_s = (given - given.flat[0]) / np.timedelta64(1, "s")
     stamps = column(time_s, f"time_s of {what}")
     same_length(stamps, samples, f"time_s of {what}")
+    wrong = np.flatnonzero(~np.isfinite(stamps))
+    if wrong.size:
+        raise StretchError(f"time_s of {what}, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave that sample out")
     back = np.flatnonzero(np.diff(stamps) <= 0.0)
     if back.size:
         i = int(back[0]) + 1
@@ -115,5 +127,6 @@ def recordings(
         samples = channels[0][1].size
         for key, one in channels[1:]:
             same_length(one, samples, f"{key} of {name}")
-        made.append({"name": name, "time_s": times(samples, rate_hz, stamps[i], name), "channels": channels})
+        kept, channels = without_missing(name, times(samples, rate_hz, stamps[i], name), channels)
+        made.append({"name": name, "time_s": kept, "channels": channels})
     return made

@@ -1,0 +1,52 @@
+"""Figures with matplotlib, and the progress bar of a notebook."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._stretch import StretchError
+
+Array = NDArray[np.float64]
+
+
+def curves(values: Mapping[str, Array], dt_s: float, output: str, title: str) -> Any:
+    """Two axes above each other: the measured and the simulated curves, and measured minus simulated."""
+    try:
+        from matplotlib import pyplot  # type: ignore[import-not-found,unused-ignore]
+    except ImportError:
+        raise StretchError("the package matplotlib is not installed; pip install matplotlib") from None
+    figure, axes = pyplot.subplots(2, sharex=True, layout="constrained", height_ratios=(2, 1))
+    measured = np.asarray(values["measured"])
+    time_s = dt_s * np.arange(measured.size)
+    for name, curve in values.items():
+        label = name.replace("_", " ")
+        axes[0].plot(time_s, curve, label=label, linewidth=2.5 if name == "measured" else 1.2)
+        if name != "measured":
+            axes[1].plot(time_s, measured - np.asarray(curve), label=label, color=axes[0].lines[-1].get_color(), linewidth=1.0)
+    axes[0].set_ylabel(output)
+    axes[1].set_ylabel("measured \N{MINUS SIGN} simulated")
+    axes[1].set_xlabel("time, all recordings end to end, s")
+    axes[0].legend()
+    figure.suptitle(title, fontsize="medium", wrap=True)
+    return axes
+
+
+@contextmanager
+def shown(progress: Callable[[str], Any] | None) -> Iterator[Callable[[str], Any] | None]:
+    """The user's function that takes progress; without one, a bar in a notebook if tqdm is installed."""
+    if progress is not None or "ipykernel" not in sys.modules:
+        yield progress
+        return
+    try:
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,import-not-found,unused-ignore]
+    except ImportError:
+        yield None
+        return
+    with tqdm(bar_format="{desc} {elapsed}") as bar:
+        yield bar.set_description_str

@@ -1,5 +1,5 @@
-//! The flow: a problem is prepared and searched, the record is doubted, the evidence is gathered and judged, and the answer is put into
-//! words.
+//! Runs a diagnosis: prepares the problem, searches for effects, tests for errors of the recording,
+//! gathers the evidence, judges it and assembles the report.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -51,14 +51,15 @@ use crate::{
     },
 };
 
-/// Diagnoses a simulator with its measurements.
+/// Compares a simulator with its measurements and finds the effects that it lacks.
 ///
-/// `progress` takes in words what goes on. `stop` is asked between simulations; once it says yes, the
-/// diagnosis ends with [`GapError::Stopped`].
+/// `progress` is called with a short description of each step. `stop` is called between
+/// simulations; once it returns true, the diagnosis ends with [`GapError::Stopped`].
 ///
 /// # Errors
-/// [`GapError::Solver`] when the step of integration is too long, [`GapError::TooLittle`] without data to fit, and
-/// what the simulator says.
+/// [`GapError::Solver`] if the step of integration is too long, [`GapError::TooLittle`] if there
+/// are no data to fit, `GapError::Measured` if a measured channel is incomplete, and errors of the
+/// simulator.
 pub fn diagnose(
     simulator: &dyn Simulator,
     options: &Options,
@@ -70,24 +71,25 @@ pub fn diagnose(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(options.threads)).build();
     match pool {
         Ok(pool) => pool.install(|| run(task)),
-        // No thread could be started: the caller's own will do.
+        // If no thread can be started, use the caller's thread.
         Err(_) => run(task),
     }
 }
 
-/// What is diagnosed, how, where progress is reported, and what says whether to stop.
+/// Inputs of a diagnosis: the simulator, options and callbacks.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     simulator: &'a dyn Simulator,
     options: &'a Options,
-    /// Whether effects are examined: they mean nothing if the columns alone say that the record is wrong.
+    /// Whether effects are examined. They are not if the options exclude it, or if the columns of
+    /// the recording by themselves show an error.
     examines_effects: bool,
     progress: &'a (dyn Fn(&str) + Sync),
     stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Task<'_> {
-    /// Most effects that a set may have.
+    /// Returns the largest number of effects in a set.
     fn depth(&self) -> usize {
         if self.examines_effects { self.options.depth.get() } else { 0 }
     }
@@ -103,7 +105,8 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let (problem, from) = prepare(task, between_rows.as_ref())?;
     let is_limited = simulator.model_runs().is_some_and(|runs| runs.budget.is_some());
     let spare = simulator.model_runs().map(|_| Searched::without(problem.clone()));
-    // What an answer without effects needs is run first: whatever a search spends, there is an answer.
+    // First make the runs that an answer without effects needs, so that there is an answer even if
+    // the search spends the budget.
     if let Some(spare) = spare.as_ref().filter(|_| is_limited) {
         gather(task, spare.cause(&columns), 0.0)?;
     }
@@ -116,7 +119,7 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     }
 }
 
-/// The answer after a search.
+/// Searches for effects, tests for errors of the recording, and concludes.
 fn answered<'a>(
     task: Task<'a>,
     problem: PreparedProblem<'a>,
@@ -138,7 +141,7 @@ fn answered<'a>(
     concluded(task, &searched, cause, begun)
 }
 
-/// What a cause comes to.
+/// Gathers the evidence for a cause, judges it and reports it.
 fn concluded(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -152,7 +155,9 @@ fn concluded(
     report(task, searched, cause, (gathered, judged, proposed), begun)
 }
 
-/// The problem in which the records are likelier, of commands that switch at rows and between them, and the set of effects to go on from.
+/// Prepares the problem and re-tunes it from several starts. If commands may switch between rows,
+/// returns the variant (switching at rows or between rows) that makes the recordings likelier. Also
+/// returns the set of effects from which the search continues.
 fn prepare<'a>(
     task: Task<'a>,
     between_rows: Option<&'a Altered<'a>>,
@@ -164,29 +169,31 @@ fn prepare<'a>(
     command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
 }
 
-/// What the search found, in the problem whose nuisances the record has.
+/// Result of a search, with the problem prepared for the nuisances (drift and offsets) estimated
+/// from the recording.
 struct Searched<'a> {
     problem: PreparedProblem<'a>,
     found: Found,
-    /// The best set by backward elimination.
+    /// Backward elimination of the best set: each removed effect, and the set without it.
     eliminated: Vec<(usize, Hypothesis)>,
     /// Every set that was fitted.
     tried: BTreeMap<Vec<usize>, Hypothesis>,
-    /// The screen around the re-tuned nominal, where it is kept.
+    /// Screening results around the re-tuned nominal simulator, if they were kept.
     looked: Option<Arc<Looked>>,
-    /// Whether the search ended because a run of it could not be simulated.
+    /// Whether the search ended because one of its simulations failed.
     is_lost: bool,
 }
 
 impl<'a> Searched<'a> {
-    /// What is there before a search: the re-tuned nominal.
+    /// Returns the result without a search: the re-tuned nominal simulator only.
     fn without(problem: PreparedProblem<'a>) -> Self {
         let found = Found { best: problem.nominal.clone(), rivals: Vec::new() };
         let (eliminated, tried) = Default::default();
         Self { problem, found, eliminated, tried, looked: None, is_lost: false }
     }
 
-    /// The best set as the cause, or what the columns alone say is wrong with the record.
+    /// Returns the best set of effects as the cause, with the errors that the columns by themselves
+    /// show.
     fn cause<'p>(&'p self, gross: &'p [Gross]) -> Cause<'p>
     where
         'a: 'p,
@@ -195,14 +202,16 @@ impl<'a> Searched<'a> {
         Cause { problem, found, eliminated, gross }
     }
 
-    /// Effects of the catalogue that no fitted set holds.
+    /// Returns the effects of the catalogue that are in no fitted set.
     fn not_looked_at(&self) -> Vec<String> {
         let effects = self.problem.simulator().effects().iter().enumerate();
         let is_new = |e: &usize| self.tried.keys().all(|set| !set.contains(e));
         effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.clone()).collect()
     }
 
-    /// Those of them whose runs could not be simulated, and the effects of sets that were fitted and could not be judged.
+    /// Returns the effects that could not be examined because simulations failed: those in no
+    /// fitted set, and those whose fitted sets could not be judged. If the search itself failed,
+    /// returns all effects in no fitted set.
     fn lost(&self, weighed: &[Candidate]) -> Vec<String> {
         let not_looked_at = self.not_looked_at();
         if self.is_lost {
@@ -219,7 +228,9 @@ impl<'a> Searched<'a> {
     }
 }
 
-/// Searches for the best set of effects, and once more if noise levels or parameters change when they are estimated anew with that set.
+/// Searches for the best set of effects. The search is repeated if re-tuning from the best set's
+/// parameters, without its effects, ends lower, or if the nuisances re-estimated with the best set
+/// differ.
 fn search<'a>(
     task: Task<'a>,
     problem: PreparedProblem<'a>,
@@ -257,8 +268,10 @@ fn search<'a>(
     Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })
 }
 
-/// Errors of the record or of the rig file that explain more than the best set of effects, and what was found with the first of them
-/// in place of the set: an error has one number and leaves noise. `None` if the set of effects explains more.
+/// Tests whether errors of the recording or of the rig file explain more than the best set of
+/// effects. Returns these errors, and the search result with the first of them in place of the set.
+/// Such an error has one parameter and leaves only noise. `None` if the set of effects explains
+/// more, or if no more runs may be made.
 fn doubt(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -275,7 +288,8 @@ fn doubt(
     Ok(weigh_errors(doubted, suspect, doubts.errors, found, thresholds))
 }
 
-/// How strong each effect would have to be to be named; `None` if the record carries no name at all, or no more runs may be made.
+/// Returns the detection limit of each effect; empty if effects are not examined or no more runs
+/// may be made.
 fn limits(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -291,17 +305,18 @@ fn limits(
     Ok(if_possible(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
-/// What the gap is put down to: the best set of effects, or an error.
+/// The cause to which the gap is attributed: the best set of effects, or an error of the recording
+/// or of the rig file.
 #[derive(Clone, Copy)]
 struct Cause<'p> {
     problem: &'p PreparedProblem<'p>,
     found: &'p Found,
     eliminated: &'p [(usize, Hypothesis)],
-    /// What is wrong with the record or the rig file.
+    /// Errors of the recording or of the rig file.
     gross: &'p [Gross],
 }
 
-/// What the test trials say of a cause.
+/// Evidence about a cause, including the test trials.
 struct Gathered {
     evidence: Evidence,
     null_band: f64,
@@ -311,13 +326,13 @@ struct Gathered {
     stabilities: Vec<EffectStability>,
     sanity: Sanity,
     location: Where,
-    /// What the catalogue lacks, where that was asked for already.
+    /// Proposal for what the catalogue lacks, if it was computed already.
     proposed: Option<Proposed>,
-    /// Why the record carries no name, where it does not.
+    /// Why the recording is insufficient to name effects, if it is.
     too_little: Option<TooLittle>,
 }
 
-/// Gathers the evidence: from here on test trials are read.
+/// Gathers the evidence. Test trials are read here for the first time.
 fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, GapError> {
     let Cause { problem, found, eliminated, .. } = cause;
     let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
@@ -362,7 +377,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     })
 }
 
-/// The verdict with its names.
+/// Derives the verdict and the named effects from the evidence.
 fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
     let Gathered { evidence, posterior, candidates, shares, sanity, .. } = gathered;
     let case = Case {
@@ -378,7 +393,8 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
     judge(&case, &task.options.thresholds)
 }
 
-/// Searches for what the catalogue lacks if a gap is left: in addition to the names of a partial answer, in place of names otherwise.
+/// Searches for a sum of terms outside the catalogue: in addition to the named effects if the
+/// verdict is `partial`, in place of effects if it is `unknown`.
 fn propose_rest(
     task: Task<'_>,
     cause: Cause<'_>,
@@ -394,7 +410,7 @@ fn propose_rest(
     Ok(if_possible(found)?.flatten())
 }
 
-/// The verdict in words and numbers.
+/// Assembles the diagnosis: verdict, numbers, notes and summary sentence.
 fn report(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -453,7 +469,8 @@ fn report(
     notes.extend(searched.problem.starts.note().map(Note::from));
     notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
     notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
-    // What another form of an effect leaves may look like a swing.
+    // Note oscillations of parameters only if little gap is left, because the residual of an effect
+    // of another form may look like one.
     if is_quiet || evidence.gap.left <= thresholds.unknown_excess {
         notes.extend(swing_notes(cause.problem, &evidence).into_iter().map(Note::from));
     }
@@ -467,7 +484,7 @@ fn report(
         stages: with_causes(location.stages, &shares, &naming.named, simulator),
         ..location
     };
-    // What a page needs in addition to the answer does not count as cost of the answer.
+    // Runs that only the report page needs do not count as cost of the answer.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
         evidence.responses = if_possible(responses)?.unwrap_or_default();
@@ -515,10 +532,11 @@ fn report(
     Ok((diagnosis, evidence))
 }
 
-/// Slices that are reported of what a partial answer leaves.
+/// Number of slices of the unexplained gap that are reported.
 const REPORTED_SLICES: usize = 3;
 
-/// What the first candidate leaves of the held-out gap, and where it is largest.
+/// Returns the share of the gap on the test trials that the first candidate leaves, and where the
+/// residual is largest.
 fn unexplained(
     simulator: &dyn Simulator,
     evidence: &Evidence,

@@ -13,7 +13,7 @@ mod verdict;
 
 #[cfg(test)]
 extern crate self as stretch_gap;
-/// The simulators that tests from outside are made of, for tests from inside.
+/// Toy simulators of the integration tests, shared with the unit tests.
 #[cfg(test)]
 #[path = "../tests/toys/mod.rs"]
 mod toys;

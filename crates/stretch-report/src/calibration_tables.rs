@@ -46,11 +46,12 @@ pub fn method_table(
     names: &[String],
     unit: &str,
 ) -> Table {
-    let [rmse, largest] = ["RMSE,", "Largest error,"].map(|name| with_unit(name, unit));
+    let rmse = if unit.is_empty() { "RMSE".to_owned() } else { format!("RMSE, {unit}") };
+    let largest = with_unit("Largest error,", unit);
     let head = [
         "Method",
         "Average error, %",
-        rmse.trim_end_matches(','),
+        &rmse,
         "RMSE, % of range",
         "R\u{b2}",
         "Lag, ms",
@@ -99,9 +100,9 @@ pub fn comparison_table(
             probability(c.p_samples),
         ]
     };
-    let caption = with_unit("Difference of absolute errors, paired t test,", unit);
+    let caption = with_unit("Difference of absolute errors, paired t test; unit:", unit);
     let head = ["Difference", "Mean", "95 % interval", "P, blocks", "Blocks", "P, samples"];
-    Table::new(caption.trim_end_matches(','), &head, comparisons.iter().map(row))
+    Table::new(caption.trim_end_matches("; unit:"), &head, comparisons.iter().map(row))
 }
 
 /// Candidate signals, best first.

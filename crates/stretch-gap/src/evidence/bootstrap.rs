@@ -18,12 +18,14 @@ pub(crate) struct Closed {
     pub(crate) after: f64,
     pub(crate) closed: f64,
     pub(crate) interval: [f64; 2],
-    /// Whether the mean square falls significantly, at the same level.
+    /// Whether the mean square falls significantly: the lower end of the 95 % interval of its fall
+    /// is above 0.
     pub(crate) falls: bool,
 }
 
-/// CGF = 1 - sum max(0, excess after)/sum max(0, excess before). The same blocks are drawn for all
-/// channels.
+/// Returns the closed-gap fraction CGF = 1 - sum max(0, excess after)/sum max(0, excess before)
+/// over the channels, and its interval. An excess is a reduced chi-square minus one. The same
+/// blocks are drawn for all channels.
 pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64) -> Closed {
     let whole = |blocks: &[Vec<f64>]| -> f64 { blocks.iter().map(|b| gap(mean_square(b))).sum() };
     let closed = |before: f64, after: f64| {
@@ -64,8 +66,8 @@ mod tests {
     use approx::assert_relative_eq;
     use testkit::tolerance::F64_ROUNDING;
 
-    /// Blocks of a mean square around `mean`, as variable as those of ten independent squares:
-    /// standard deviation 0.45 of it.
+    /// Mean squares of blocks around `mean`, each from ten independent squares: relative standard
+    /// deviation 0.45.
     fn blocks(mean: f64, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         let square = |random: &mut RandomGenerator| random.gauss().powi(2);
         (0..count).map(|_| mean * (0..10).map(|_| square(random)).sum::<f64>() / 10.0).collect()
@@ -141,10 +143,10 @@ mod tests {
         assert!((few / many / 2.0 - 1.0).abs() < 0.1, "{few} {many}");
     }
 
-    /// Of 400 records 95 % should be held. Percentiles of a ratio from sixty blocks hold about 93 %
-    /// (its draws are skewed, and narrower by sqrt(59/60)). The lower limit is three standard
-    /// deviations of the count, 5 each, below that; the upper limit excludes intervals that always
-    /// hold.
+    /// 95 % of 400 intervals should contain the true share. Percentile intervals of a ratio from
+    /// sixty blocks contain it in about 93 % (the draws are skewed, and narrower by sqrt(59/60)).
+    /// The lower limit is three standard deviations of the count, 5 each, below that. The upper
+    /// limit excludes intervals that always contain it.
     #[test]
     fn intervals_hold_the_true_share_as_often_as_they_say() {
         let truth = 1.0 - 1.0 / 5.0;
@@ -158,8 +160,9 @@ mod tests {
         assert!((357..400).contains(&held), "{held} of 400");
     }
 
-    /// If nothing changed, the mean square falls significantly in 2.5 of 100 records: 10 of 400,
-    /// standard deviation 3.1; about 12 for the same reason as above. 22 is three of these above.
+    /// If nothing changed, the mean square falls significantly in 2.5 % of the recordings: 10 of
+    /// 400, standard deviation 3.1. Percentile intervals give about 12 (see the previous test). The
+    /// limit of 22 is three standard deviations above that.
     #[test]
     fn chance_is_seldom_confirmed() {
         let mut random = RandomGenerator::new(7, 0);

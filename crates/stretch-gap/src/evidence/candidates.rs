@@ -30,17 +30,18 @@ use crate::{
 /// A set of effects that was compared with the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
-    /// Effects of the set, the strongest first; `unknown` is any cause that the catalogue lacks, and is always the last candidate.
+    /// Effects of the set, the strongest first. The last candidate is always `unknown`, any cause
+    /// outside the catalogue.
     pub effects: Vec<String>,
     /// Probability among the candidates.
     pub probability: f64,
-    /// Score against the re-tuned nominal, nats.
+    /// Score relative to the re-tuned nominal simulator, nats.
     pub score: f64,
     /// Excess of the re-tuned nominal on the test trials, summed over channels.
     pub gap_before: f64,
     /// Excess with the effects.
     pub gap_after: f64,
-    /// Excess that the set leaves, of the fitted and the test trials the greater.
+    /// Excess that the set leaves: the larger of those on fitted and test trials.
     #[serde(default)]
     pub left: f64,
     /// Whether the strongest effect of the set is at an end of its range.
@@ -61,8 +62,8 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Whether much more than on the test trials is left on those that were fitted: the root mean square of [`left`](Self::left) is above 1.2 times
-    /// that of [`gap_after`](Self::gap_after).
+    /// Whether the set leaves much more on the fitted trials than on the test trials: the root mean
+    /// square of [`left`](Self::left) is above 1.2 times that of [`gap_after`](Self::gap_after).
     pub fn fits_worse(&self) -> bool {
         1.0 + self.left > 1.2 * 1.2 * (1.0 + self.gap_after)
     }
@@ -84,7 +85,7 @@ pub struct EffectValue {
     /// 95 % interval of the value, within the range that was searched.
     #[serde(default)]
     pub interval: [f64; 2],
-    /// Whether it only gives the effect its form.
+    /// Whether the parameter describes only the form of the effect, not its strength.
     #[serde(default)]
     pub is_form: bool,
 }
@@ -100,28 +101,30 @@ pub struct ParameterShift {
     pub nominal: f64,
     /// Value in the final model.
     pub fitted: f64,
-    /// One standard deviation of it, as that of an [`EffectValue`].
+    /// One standard deviation of the fitted value, as for an [`EffectValue`].
     #[serde(default)]
     pub sd: f64,
-    /// Distance in tolerances.
+    /// Distance of the fitted from the nominal value, in tolerances.
     pub sigmas: f64,
-    /// Value that the nominal simulator without the effects was bent to.
+    /// Value after re-tuning without effects.
     pub bent: f64,
-    /// Whether the value is evidence by itself.
+    /// Whether the value is evidence by itself. It is not if other parameters can compensate for
+    /// it.
     pub is_evidence: bool,
 }
 
 /// Standard deviations to either side that hold 95 % of a Gaussian.
 const COVERS: f64 = 1.96;
 
-/// Name of what the catalogue lacks.
+/// Name of the candidate for any cause outside the catalogue.
 const UNKNOWN: &str = "unknown";
 
-/// A candidate, with what it leaves by stage and block.
+/// A candidate, and its reduced chi-squares by stage and block.
 pub(crate) type Held = (Candidate, Vec<Blocks>);
 
-/// Every hypothesis that can be simulated on the test trials, with what it leaves by stage and block; its probability is that of the
-/// others' sum later.
+/// Simulates every hypothesis on the test trials. Returns those that can be simulated, each with
+/// its candidate and its reduced chi-squares by stage and block. `posterior` fills in the
+/// probabilities.
 pub(crate) fn candidates(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
@@ -139,13 +142,15 @@ pub(crate) fn candidates(
     Ok(held?.into_iter().flatten().unzip())
 }
 
-/// Share of the gap that a set of effects closes at least to be a cause of it, as a `partial` answer promises: of the gap of the fitted and of the
-/// test trials, whichever is the greater, because what acts in long trials alone leaves little gap in short ones.
+/// Smallest share of the gap that a set of effects must close to count as a cause; a `partial`
+/// answer promises this share. The gap, before and after, is the larger of those on fitted and test
+/// trials, because an effect that acts only in long trials leaves little gap in short ones.
 pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
-/// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
-/// [`LEAST_CLOSED`] of the gap is dropped. Where every set leaves more than noise and model discrepancy would, `function` is asked for what the
-/// catalogue lacks, in addition to the set with the greatest score.
+/// Computes the posterior. Returns it with candidates and blocks in the order of its sets. A set of
+/// effects that closes less than [`LEAST_CLOSED`] of the gap is dropped. If every remaining set
+/// leaves more than noise and model discrepancy would, `function` is called with the set of the
+/// highest score, to compute one more hypothesis, a cause outside the catalogue.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
@@ -226,7 +231,8 @@ fn candidate(
     Ok((candidate, blocks))
 }
 
-/// The candidates with what the catalogue lacks behind them, which has the score of a function and leaves what that leaves, where there is one.
+/// Appends the candidate `unknown`. It has the score and the remaining excess of the function
+/// outside the catalogue; without such a function, score 0 and the whole gap.
 pub(crate) fn beside_unknown(
     mut candidates: Vec<Candidate>,
     gap: Excess,
@@ -273,13 +279,14 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
     all
 }
 
-/// 95 % interval of a fitted parameter, as far as its range goes: of what is fitted in equal ratios in equal ratios.
+/// Returns the 95 % interval of a fitted parameter, limited to its range. The interval of a
+/// parameter on a logarithmic scale is symmetric in the logarithm.
 fn interval(p: &EffectParameter, value: f64, sd: f64) -> [f64; 2] {
     let ends = match p.is_log() && value > 0.0 {
         true => [-COVERS, COVERS].map(|k| value * libm::exp(k * sd / value)),
         false => [-COVERS, COVERS].map(|k| value + k * sd),
     };
-    // A value outside of its range (a threshold that is off) is its own end.
+    // A value outside of its range (a threshold that is off) extends the range.
     let (low, high) = (p.min.min(value), p.max.max(value));
     ends.map(|end| end.clamp(low, high))
 }
@@ -336,7 +343,8 @@ mod tests {
         Candidate { effects: vec![effect.into()], ..candidate }
     }
 
-    /// 95 % of a Gaussian lie within 1.96 standard deviations; where the range is searched in equal ratios, of the logarithm.
+    /// 95 % of a Gaussian lie within 1.96 standard deviations. If the parameter is on a logarithmic
+    /// scale, these are deviations of the logarithm.
     #[test]
     fn intervals_reach_two_deviations_to_either_side() {
         let strength = EffectParameter::sized("c", "1", -1.0..=1.0);
@@ -371,7 +379,7 @@ mod tests {
         assert_eq!([leaves(3.0, 18.4), leaves(3.0, 3.84), leaves(0.0, 0.69)], [true, false, true]);
     }
 
-    /// A threshold that is off may be outside of its range: it is its own end.
+    /// A threshold that is off may be outside of its range. The interval then ends at the value.
     #[test]
     fn a_value_outside_of_its_range_is_an_end() {
         let spec = EffectParameter::sized("threshold", "V", 1.0..=2.0).off_at(9.0);

@@ -270,8 +270,9 @@ fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 
     }
 }
 
-/// The larger of those on fitted and test trials, because a gap that only one of them shows is a
-/// gap.
+/// Computes the gap as shipped (on the test trials), re-tuned and with the best set. The last two
+/// are the larger of those on fitted and test trials, because a gap that only one of them shows is
+/// a gap.
 fn gap(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

@@ -1,15 +1,19 @@
-//! What noise alone leaves in data like these: below it a gap is chance, above it something is missing, though it may be too faint to name.
+//! Computes the null band: the excess (reduced chi-square minus one) that noise alone leaves in
+//! data like these. An excess below it is chance. Above it something is missing, although it may be
+//! too faint to name.
 //!
-//! Draws of a record in which nothing is missing, of the trials and the noise at hand. In the metric the output's own noise is white
-//! whatever its nuisances are, so that N samples leave a chi-square; noise of the measured input, t, arrives through the stage as the
-//! simulator transmits it, slow as it may be, and has the share u of the noise:
+//! Recordings in which nothing is missing are drawn for the given trials and noise. In the metric,
+//! the output's own noise is white whatever its nuisances are, so N samples leave a chi-square. The
+//! noise t of the measured input reaches the output as the simulator transmits it, however slow it
+//! is, and has the share u of the noise:
 //!
 //! ```text
 //! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)
 //! ```
 //!
-//! where the level of the own noise is an estimate, (1 - u) is known to its relative standard deviation only, the same in all trials of a record.
-//! Re-tuning would take some of it away, which is left out: the band errs to the wide side.
+//! If the level of the own noise is an estimate, (1 - u) is known only to its relative standard
+//! deviation, and has the same error in all trials of a recording. Re-tuning would remove some of
+//! the excess. This is neglected, so the band errs on the wide side.
 
 use rayon::prelude::*;
 
@@ -27,8 +31,9 @@ use crate::{
 const RECORDS: usize = 40;
 const WITHIN: f64 = 0.95;
 
-/// The excess that 19 of 20 records stay below in which nothing is missing; as every gap the greater of fitted and tested, summed over
-/// stages. Where no more runs may be made, all noise is taken for the outputs' own.
+/// Returns the excess below which 19 of 20 recordings with nothing missing stay. Like every gap, it
+/// is the larger of those on fitted and test trials, summed over stages. If no more runs may be
+/// made, all noise is assumed to be the outputs' own.
 pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64, GapError> {
     let stages = 0..problem.compare.metrics.len();
     let arrives: Result<Vec<Vec<f64>>, GapError> =
@@ -44,7 +49,7 @@ pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64,
     Ok(excesses[last])
 }
 
-/// Excess of one record.
+/// Draws the excess of one recording.
 fn excess(
     problem: &PreparedProblem<'_>,
     arrives: Option<&[Vec<f64>]>,
@@ -74,7 +79,7 @@ fn excess(
     f64::max(fitted, tested)
 }
 
-/// t'V^-1 t a sample, by record.
+/// Returns t'V^-1 t per sample, by recording.
 fn arrives(problem: &PreparedProblem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
     if problem.transmits(stage) == 0.0 {
         return Ok(vec![0.0; RECORDS]);

@@ -1,11 +1,12 @@
 //! One posterior over all causes of a gap: nothing, each set of effects, and a cause outside the
 //! catalogue.
 //!
-//! Scores S_h are log-likelihood ratios in nats of hypotheses whose forms are all wrong: the
-//! parameters are re-tuned within their tolerances, the effects are fitted, and each parameter is
-//! penalised. The part of the gap that a hypothesis h leaves, g_h, is noise that is known only to a
-//! share, and model discrepancy, which is at most a share of what it closes; something else leaves
-//! more. With D_h, the probability that noise and discrepancy leave as much,
+//! Scores S_h are log-likelihood ratios, in nats, of hypotheses whose forms are all approximate:
+//! the parameters are re-tuned within their tolerances, the effects are fitted, and each parameter
+//! is penalised. The gap that hypothesis h leaves is g_h. Noise, whose level is known only to
+//! within a share, and model discrepancy, at most a share of what h closes, leave a limited gap;
+//! any other cause leaves more. With D_h, the probability that noise and discrepancy leave as much
+//! as g_h,
 //!
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
@@ -18,15 +19,16 @@
 //! for its parameters and for the choice of its terms; o are the prior odds of a cause that the
 //! catalogue lacks. It is one form of "something else", so the larger of the two weights counts.
 //!
-//! Probabilities are these weights as shares of their sum. The temperature t tempers the
-//! posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set
-//! leaves, the less its form is that of the rig, and the less a difference of scores says. T, rho,
-//! o, u, v and s are calibrated on development cases. If nothing is missing there is no model
-//! discrepancy: noise alone leaves the gap, which is normal with the standard deviation of its
-//! estimate, u, and what its chance leaves in 19 of 20 records, b. Something else leaves any gap
-//! with equal probability. Sets that explain less than 30 % of the gap are discarded; the gap is
-//! the larger of those on fitted and test trials. If the strongest effect of a set is at an end of
-//! its range, the odds o_h are ten times as large, because it may compensate for something else.
+//! Probabilities are these weights as shares of their sum. The temperature t tempers the posterior
+//! (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set leaves,
+//! the less its form is that of the rig, and the less a difference of scores means. T, rho, o, u, v
+//! and s are calibrated on development cases. If nothing is missing there is no model discrepancy,
+//! and noise alone leaves the gap. The gap is then normal with variance u^2 + b^2, from the
+//! uncertainty u of the noise level and the scatter by chance b, below which noise alone stays in
+//! 19 of 20 recordings. Any other cause leaves every gap with equal probability. Sets that explain
+//! less than 30 % of the gap are discarded; the gap is the larger of those on fitted and test
+//! trials. If the strongest effect of a set is at an end of its range, the odds o_h are ten times
+//! as large, because it may compensate for something else.
 
 use crate::{
     fit::hypothesis::Hypothesis,

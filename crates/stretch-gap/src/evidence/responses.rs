@@ -163,7 +163,7 @@ fn products(
         blocks.iter().map(|b| dot(&x[b.clone()], &y[b.clone()])).sum::<f64>() / samples / level
     };
     let row = |(i, (x, _)): (usize, &(&[f64], &[f64]))| -> Vec<f64> {
-        // V^-1 is symmetric up to rounding: store one number per pair
+        // V^-1 is symmetric up to rounding, so use one number per pair.
         let pair = |j: usize, y: &[f64]| match j < i {
             true => product(columns[j].0, columns[i].1),
             false => product(x, y),

@@ -1,15 +1,19 @@
-//! Whether the data can come from the simulator at all, which the judge asks, and whether the noise level is plausible, which a note says.
+//! Checks whether the data can come from the simulator at all, for the judge, and whether the noise
+//! level is plausible, for a note.
 //!
-//! Two signs that data come from something else than the simulator is of:
+//! Two signs show that the data come from something other than the simulated rig:
 //!
-//! * *gross misfit*: more of a channel's variance is left on the test trials than a missing effect leaves
-//!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)): another rig, or a column that is not what its name says. The share is that of
-//!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
-//! * *at bounds*: two parameters of a stage are at the end of their tolerances and more than noise is left all the same. If the
-//!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
+//! * *gross misfit*: on the test trials, more of a channel's variance is left than a missing effect
+//!   leaves ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)). The
+//!   cause is another rig, or a column that is not what its name says. The share is that of 1 - R^2
+//!   without the noise: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
+//! * *at bounds*: two parameters of a stage are at the ends of their tolerances, and more than
+//!   noise is left. If the same two with wider tolerances explain as much without any effect, the
+//!   cause is other parameters, not an effect.
 //!
-//! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise. No noise does that, so it was
-//! estimated or stated too large, and a gap of that size would not be seen.
+//! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise.
+//! Noise cannot do that, so it was estimated or stated too large, and a gap of that size would be
+//! invisible.
 
 use crate::{
     evidence::gathered::Evidence,
@@ -28,12 +32,13 @@ use crate::{
     search::sets::LEFT,
 };
 
-/// What the tolerances of such parameters are multiplied by to see whether they would explain all.
+/// Factor on the tolerances of parameters at their bounds, to test whether they then explain all.
 const LOOSE: f64 = 5.0;
-/// Share of its nominal value that a parameter keeps then.
+/// Share of its nominal value down to which such a parameter may go.
 const KEPT: f64 = 0.02;
 
-/// Share of the noise that noise leaves at least, as a root mean square: a simulator without effects cannot follow noise.
+/// Smallest plausible residual, as a share of the noise, both as root mean squares. A simulator
+/// without effects cannot follow noise.
 const LEAST_NOISE: f64 = 0.5;
 
 /// Whether the data can come from the simulator at all.
@@ -57,8 +62,9 @@ pub(crate) struct AtBounds {
     pub(crate) ended: Vec<usize>,
     /// Excess that is left on the test trials.
     pub(crate) left: f64,
-    /// Excess over the fitted trials with the best effects, and with these parameters set loose and no effect; `None` if
-    /// there is no effect to compare with.
+    /// Excess over the fitted trials with the best effects, and without effects but with wider
+    /// tolerances of these parameters. `None` if there is no effect to compare with, or if the
+    /// latter cannot be simulated.
     pub(crate) rivals: Option<(f64, f64)>,
 }
 
@@ -87,7 +93,8 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
     let sd = &problem.compare.metrics[stage].noise.sd;
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
     for segment in evidence.roles.of_role(Role::Test) {
-        // What was not measured counts for nothing, whatever value is in its place, and neither does a gross error.
+        // Samples that were not measured, and isolated outliers, do not count, whatever their
+        // value.
         for i in (segment.from..segment.to).filter(|i| sd[*i].is_finite()) {
             count += 1.0;
             sum += measured[i];
@@ -101,7 +108,8 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }
 
-/// Root mean square of what the simulator leaves of a stage as shipped or re-tuned, whichever is less, in multiples of the noise.
+/// Returns the root mean square of a stage's residual in multiples of the noise, as shipped or
+/// re-tuned, whichever is less.
 fn of_noise(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64 {
     let (traces, measured) = (&evidence.stages[stage], problem.simulator().measured(stage));
     let sd = &problem.compare.metrics[stage].noise.sd;
@@ -141,7 +149,8 @@ fn at_bounds(
     Ok(Some(AtBounds { rivals, ..worst }))
 }
 
-/// Excess of a stage without effects, some of its parameters set loose.
+/// Fits a stage without effects and with wider tolerances of the parameters `ended`, and returns
+/// its excess.
 fn loosened(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,

@@ -62,15 +62,15 @@ pub(crate) fn eliminated(
     Ok(out)
 }
 
-/// Share of the held-out gap that each effect closes, the strongest first.
+/// Returns the share of the gap on the test trials that each effect closes, the strongest first.
 pub(crate) fn shares(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
     eliminated: &[(usize, Hypothesis)],
 ) -> Result<Vec<EffectShare>, GapError> {
-    // The noise is known to a few per cent. If the best set leaves less than it, use what it
-    // leaves.
+    // The noise is known to a few per cent. If the best set leaves less than the estimated noise,
+    // measure excesses from what it leaves.
     let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
     let above =
         |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);

@@ -70,8 +70,8 @@ struct Left {
 
 impl Left {
     fn of(misfits: &[Misfit], blocks: &[Blocks], drawn: &Drawn) -> Self {
-        // A misfit is that of its blocks plus stretches too short for one, at equal transmitted
-        // noise.
+        // A misfit also includes stretches shorter than a block, and is at equal transmitted noise.
+        // Therefore it changes by as much as the mean over its blocks does.
         let moved = |whole: f64, blocks: &[f64], times: &[f64]| match blocks.is_empty() {
             true => whole,
             false => {

@@ -17,8 +17,9 @@
 //! of coordinates is triangular. Therefore a set with such effects is scored with A, where R_unread
 //! are the correlations of the residuals without any reading. What these effects explain only by
 //! errors does not count, what they explain beyond counts in full, and the score of a set without
-//! them does not change. Without reading, the parameters compensate as far as they can. With d, the
-//! contribution of the effects, and A, the sensitivities of the parameters, the residual is
+//! them does not change. Without reading, the parameters compensate as far as they can. Let d be
+//! the contribution of the effects. In the next equation, A is not the score above but the matrix
+//! of the sensitivities to the parameters:
 //!
 //! ```text
 //! r_unread = r + d - A (A'V^-1 A + b I)^-1 A'V^-1 d
@@ -48,8 +49,8 @@ pub(crate) struct Read {
     pub(crate) unread: Arc<Errors>,
 }
 
-/// A of the module's head, nats. For every output: its errors and their weights, fitted and held
-/// out.
+/// Returns A of the module's head, nats. `read` holds, for every output, its errors and the
+/// effective numbers of its fitted and held-out samples.
 pub(crate) fn taken(read: &[(&Read, [f64; 2])]) -> f64 {
     let readers = || read.iter().filter(|(read, _)| !Arc::ptr_eq(&read.left, &read.unread));
     if readers().next().is_none() {
@@ -122,8 +123,8 @@ mod tests {
         of.iter().zip(other).map(|(x, other)| x - share * other).collect()
     }
 
-    /// What one output explains of another is the error that they share: alone 80 nats. The cause
-    /// of the error keeps its score.
+    /// One output explains of another only the error that they share, which would score 80 nats
+    /// alone. The cause of that error keeps its score.
     #[test]
     fn a_shared_error_is_no_explanation_and_its_cause_is() {
         let (cause, nominal) = outputs(3.0);

@@ -25,7 +25,8 @@ use crate::{
     },
 };
 
-/// Draws of the measured input's noise; the same for every model, so that differences of models are none of the draws'.
+/// Number of draws of the measured input's noise. They are the same for every model, so that models
+/// do not differ by chance.
 const DRAWS: u64 = 4;
 
 /// A simulator and its measurements, with the metric of every stage.
@@ -41,7 +42,8 @@ pub(crate) struct Comparison<'a> {
 pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
 impl<'a> Comparison<'a> {
-    /// Noise and metrics around a model; nuisances as large as those of `like`, where there is one.
+    /// Computes noise and metrics around a model. The nuisances are as large as those of `like`, if
+    /// given.
     pub(crate) fn around(
         runs: Runs<'a>,
         roles: SampleRoles,
@@ -60,7 +62,8 @@ impl<'a> Comparison<'a> {
         Ok(Self { metrics: metrics?, runs, roles })
     }
 
-    /// Nuisances as large and as quick as the residual of a model has them; the rise of their likelihood, nats.
+    /// Re-estimates sizes and correlation times of the nuisances from the residual of a model.
+    /// Returns the rise of their log-likelihood, nats.
     pub(crate) fn adapt(&mut self, model: &Model) -> Result<f64, GapError> {
         let mut gained = 0.0;
         for stage in 0..self.metrics.len() {
@@ -93,7 +96,8 @@ impl<'a> Comparison<'a> {
         self.runs.simulator()
     }
 
-    /// An observation for each block: what the cost of a fit counts, whatever the residual's own memory is.
+    /// Returns the weight of a sample in the cost of a fit. A block counts as one observation,
+    /// however long the residual is correlated.
     pub(crate) fn weight(&self) -> f64 {
         1.0 / self.roles.block as f64
     }
@@ -108,7 +112,8 @@ impl<'a> Comparison<'a> {
         Ok(self.apart(stage, values))
     }
 
-    /// The run of a stage over the trials that fits run; may be taken from the linearisation at a run near by.
+    /// Returns the run of a stage over the trials that fits use. The simulator may answer it from a
+    /// linearisation around the parameters `near`.
     fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
         Run { near, ..Run::exact(stage, model, self.roles.fit_trials) }
     }
@@ -134,7 +139,8 @@ impl<'a> Comparison<'a> {
         outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
     }
 
-    /// [`Comparison::residual_values`] of each of some models in each of some stages, in one batch; none of a model that cannot be simulated.
+    /// [`Comparison::residual_values`] of each of some models in each of some stages, in one batch;
+    /// `None` for a model that cannot be simulated.
     pub(crate) fn possible_residuals(
         &self,
         stages: &[usize],
@@ -144,7 +150,7 @@ impl<'a> Comparison<'a> {
             models.iter().flat_map(|model| stages.iter().map(move |&s| (s, model))).collect();
         let mut there = self.residuals_of(&wanted, None).into_iter();
         let one = |_| {
-            // All of a model's residuals are taken, one that failed among them or not.
+            // Take all residuals of a model from the iterator, even if one of them failed.
             let own: Vec<Result<Vec<f64>, GapError>> = there.by_ref().take(stages.len()).collect();
             match own.into_iter().collect::<Result<Vec<_>, _>>() {
                 Ok(own) => Ok(Some(own)),
@@ -181,14 +187,15 @@ impl<'a> Comparison<'a> {
         Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves, read }
     }
 
-    /// Whether an effect of the catalogue reads the output of a stage as another measures it, or changes a stage by what it reads.
+    /// Whether an effect of the catalogue reads the measured output of this stage, or reads another
+    /// output and changes this stage.
     fn is_read(&self, stage: usize) -> bool {
         let reads =
             |e: &EffectSpec| e.reads.is_some_and(|s| s == stage || e.touches.contains(&stage));
         self.simulator().effects().iter().any(reads)
     }
 
-    /// A residual by roles, nuisance taken out.
+    /// Returns a residual without its nuisances, over the fitted and over the held-out samples.
     pub(super) fn errors(&self, stage: usize, residual: &[f64]) -> Arc<Errors> {
         let mut clean = residual.to_vec();
         self.metrics[stage].clean(&self.roles, &mut clean);
@@ -228,7 +235,8 @@ impl<'a> Comparison<'a> {
         octaves
     }
 
-    /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in variances of the noise.
+    /// Computes the transmitted noise of a stage: the mean square that the measured input's noise
+    /// causes at the output, in variances of the noise.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
         let run = Run::exact(stage, model, self.roles.fit_trials);
         let undisturbed = self.runs.run(run)?;
@@ -253,7 +261,8 @@ impl<'a> Comparison<'a> {
         Ok(mean)
     }
 
-    /// What one draw of the measured input's noise makes of an output that is `undisturbed` without it, in multiples of the noise.
+    /// Returns the change of an output by one draw of the measured input's noise, in multiples of
+    /// the noise. `undisturbed` is the output without this noise.
     pub(crate) fn arrived(&self, run: Run<'_>, undisturbed: &[f64]) -> Result<Vec<f64>, GapError> {
         let mut arrived = self.runs.run(run)?;
         let sds = &self.metrics[run.stage].noise.sd;
@@ -263,10 +272,11 @@ impl<'a> Comparison<'a> {
         Ok(arrived)
     }
 
-    /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one
-    /// batch; `None` for a coordinate that does not act, or on either side of which nothing can be simulated.
+    /// Computes the sensitivities -dr/dx of the stages to some coordinates, by one-sided
+    /// differences in one batch. `None` for a coordinate that does not act, or if neither side of
+    /// it can be simulated.
     ///
-    /// The moved runs may be taken from a run at the parameters `near`.
+    /// The simulator may answer the moved runs from a linearisation around the parameters `near`.
     pub(crate) fn sensitivities(
         &self,
         stages: &[usize],
@@ -297,7 +307,7 @@ impl<'a> Comparison<'a> {
         let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
             let ((coordinate, _), (step, _)) = (&coordinates[c], &moved[c]);
             let (step, there) = match there {
-                // What lies beyond cannot be simulated: the slope is that of the other side.
+                // This side cannot be simulated: take the slope of the other side.
                 Err(error) if !error.ends_all() => {
                     let mut other = model.clone();
                     coordinate.write(&mut other, coordinate.read(model) - step);

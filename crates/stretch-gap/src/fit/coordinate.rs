@@ -5,7 +5,7 @@
 //! | --- | --- | --- | --- |
 //! | nominal | (value - nominal)/tolerance | Gaussian, 0 and 1 | three tolerances |
 //! | strength | value/range | flat | its range |
-//! | shape, in equal ratios | ln value | Gaussian, the middle and half of its range | its range |
+//! | shape, on a logarithmic scale | ln value | Gaussian, the middle and half of its range | its range |
 //! | form | as above | Gaussian around its usual value, 0.35 of its range | its range |
 //!
 //! The prior's part of a cost is -ln p(x) without its constant. A flat prior on a strength makes

@@ -19,8 +19,8 @@
 //! N x = [A B]'V^-1 r/b,     N = [A B]'V^-1 [A B]/b + diag(1, 1/s^2)
 //! ```
 //!
-//! They lower the reduced chi-square of fitted and of held-out samples, although fitted only to the
-//! former. By Laplace's approximation they cost
+//! The deviations lower the reduced chi-square of fitted and of held-out samples, although they are
+//! fitted only to the former. By Laplace's approximation they cost
 //!
 //! ```text
 //! sum x_i^2 prior_i/2 + (ln det N - ln det N_A + 2 n ln s)/2
@@ -71,7 +71,8 @@ impl PreparedProblem<'_> {
         Ok(if deviating.score > set.score { deviating } else { set.clone() })
     }
 
-    /// What deviations make of one stage; `None` if no effect acts.
+    /// Returns the misfit of one stage with deviations, and their cost; `None` if no effect acts in
+    /// it.
     fn deviations_in(
         &self,
         stage: usize,
@@ -95,7 +96,8 @@ impl PreparedProblem<'_> {
         for effect in acting {
             let mut less = Model::clone(&set.model);
             less.effects.retain(|(e, _)| *e != effect);
-            // Where an effect cannot be left out, nothing shows what it does.
+            // If the stage cannot be simulated without the effect, the effect's contribution is
+            // unknown.
             let without = unless_lost(compare.residual_values(stage, &less))?;
             let Some(without) = without else { continue };
             let doing: Vec<f64> =
@@ -130,7 +132,8 @@ impl PreparedProblem<'_> {
         lagged.into_iter().chain(curves).collect()
     }
 
-    /// d - L d by trial, from rest.
+    /// Returns d - L d of the module's head. In every trial, the lag begins settled at the first
+    /// value.
     fn above_lag(&self, doing: &[f64], samples: f64) -> Vec<f64> {
         let kept = (-1.0 / samples).exp();
         let mut out = Vec::with_capacity(doing.len());

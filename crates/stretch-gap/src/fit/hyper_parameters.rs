@@ -1,20 +1,18 @@
-//! How large and how quick the nuisances of a stage are, from the record.
+//! Estimates the sizes and correlation times of a stage's nuisances (slow drift and offsets of
+//! parameters, drift of the recorder) from the recording.
 //!
-//! A supply drifts by a tenth of a per cent or by half of one, in half a second or in thirty; who assumes one of these finds an effect in
-//! the difference. So size a and correlation time tau of every slow drift, and the size of offsets, are those of the greatest
+//! A supply may drift by 0.1 % or by 0.5 %, within half a second or thirty. A wrong assumption
+//! would be mistaken for an effect. Therefore the size a and correlation time tau of every drift,
+//! and the size of every offset, maximise
 //!
 //! ```text
 //! L = -(r'V^-1 r + ln det V)/2 + ln p(a, tau),     V = s I + C P^-1 C'
 //! ```
 //!
-//! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
-//! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance with the others at their
-//! greatest: a record that fits at one level alone says less than one that fits at many.
-//!
-//! A recorder need not drift: a = 0 is one of its sizes. A recorder's drift is smaller than its noise. If a larger drift fits best, the recorder
-//! is not the cause, and a is 0, so that the gap remains: a prior alone only lowers the likelihood of such a drift. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
-//! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
-//! the noise alone.
+//! over the samples that are not test samples (Rasmussen and Williams 2006, section 5.4.1). The
+//! priors p are lognormal around the simulator's description, and wide enough for any lab. s keeps
+//! other parts of the residual r from being taken for a nuisance: see `Metric::spectral_level`. A
+//! recorder need not drift: a = 0 is one of its sizes.
 
 use rayon::prelude::*;
 
@@ -25,16 +23,19 @@ use crate::{
 
 /// Sizes that are tried, as multiples of what the simulator describes.
 const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
-/// Sizes that no recorder's drift has. If one of them fits best, the recorder is not the cause, and no drift is assumed.
+/// Sizes that no recorder's drift has, because it is smaller than the recorder's noise. If one of
+/// them fits best, the recorder is not the cause. No drift is then assumed, so that the gap
+/// remains; a prior would only lower the likelihood of such a drift.
 const BEYOND: [f64; 5] = [3.2, 4.0, 6.4, 10.0, 16.0];
 /// Correlation times that are tried, s.
 const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
-/// Deviations of the priors of ln a and of ln tau: a factor of two, and of three.
+/// Standard deviations of the priors of ln a and of ln tau: a factor of two, and of three.
 const SPREAD: (f64, f64) = (0.7, 1.1);
 
 impl Metric {
-    /// The metric with nuisances of the greatest likelihood for a residual in multiples of the noise, and by how many nats it is greater than with
-    /// those of this one. A recorder does not drift if the residual depends on the motion.
+    /// Returns the metric with the most likely nuisances for a residual in multiples of the noise,
+    /// and the rise of the log-likelihood compared with this metric, nats. The recorder is assumed
+    /// not to drift if the residual depends on the motion.
     pub(crate) fn adapted(
         &self,
         roles: &SampleRoles,
@@ -48,7 +49,7 @@ impl Metric {
             let levels = levels.chain([own]);
             let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let levels: Vec<Level> = levels.collect();
-            // a metric holds several columns: each is made twice, so that those of all levels need not be kept
+            // A metric is large, so build each one twice instead of keeping those of all levels.
             let noise = levels.par_iter().map(|level| one(*level).spectral_level(roles, residual));
             let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
             let fit = |m: &Self| m.beside(roles, residual, noise);
@@ -72,14 +73,17 @@ impl Metric {
         (best, gained)
     }
 
-    /// ln of the likelihood with noise that is `noise` times as large, a and tau integrated over:
+    /// Returns the log-likelihood with noise that is `noise` times as large. To compare hypotheses,
+    /// a and tau are integrated over, because a fit at a single level is weaker evidence than a fit
+    /// at many:
     ///
     /// ```text
     /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
     /// ```
     ///
-    /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the grid and the others as they are. It is
-    /// exact for one nuisance, and as independent ones are beyond.
+    /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the
+    /// grid and the others at their levels. This is exact for one nuisance, and treats several as
+    /// independent.
     pub(crate) fn evidence(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         let own = self.likelihood_beside(roles, residual, noise);
         let one = |which: usize| {
@@ -105,7 +109,8 @@ impl Metric {
         self.likelihood_beside(roles, residual, noise) - price
     }
 
-    /// The likelihood with noise that is `noise` times as large: V/s has nuisances that much smaller.
+    /// Returns the log-likelihood with noise that is `noise` times as large. Instead of the noise,
+    /// the nuisances and the residual are scaled by 1/`noise`.
     fn likelihood_beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
             return self.likelihood(roles, residual);
@@ -115,7 +120,7 @@ impl Metric {
         self.with(smaller, roles).likelihood(roles, &scaled)
     }
 
-    /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
+    /// Returns -(r'V^-1 r + ln det V)/2 over the samples that are not test samples.
     fn likelihood(&self, roles: &SampleRoles, residual: &[f64]) -> f64 {
         let column = self.column(roles, residual.to_vec());
         let square = |role| self.product(roles, &column, &column, role);
@@ -123,7 +128,9 @@ impl Metric {
         -0.5 * (square(Role::Fit) + square(Role::Held) + ln_det)
     }
 
-    /// s of the module's head for one residual.
+    /// Returns the spectral level of a residual at the blocks' rate: the mean square of block means
+    /// times the samples of a block. s of the module's head is the smallest of these over all
+    /// levels that are tried, and at least the 1 of the noise alone.
     pub(crate) fn spectral_level(&self, roles: &SampleRoles, residual: &[f64]) -> f64 {
         let mut clean = residual.to_vec();
         self.clean(roles, &mut clean);
@@ -154,7 +161,7 @@ fn levels<const N: usize>(times_s: Vec<f64>, sizes: [f64; N]) -> impl Iterator<I
     times_s.into_iter().flat_map(move |time_s| sizes.map(|size| Level { size, time_s }))
 }
 
-/// -ln p; nothing where there is no drift.
+/// Returns -ln p; 0 without drift.
 fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
     if size == 0.0 {
         return 0.0;
@@ -213,12 +220,13 @@ mod tests {
             let record = residual(size, time_s, &drive);
             let (adapted, gained) = metric.adapted(&roles, &record, |_| false);
             let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
-            // The next one of the grid at most.
+            // At most one step of the grid away.
             assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
             assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
             assert!(gained >= 0.0);
         }
-        // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
+        // The integral is below the maximum, but not below the maximum times its share of the
+        // prior.
         let record = residual(1.0, 3.0, &drive);
         let (best, _) = metric.adapted(&roles, &record, |_| false);
         let evidence = best.evidence(&roles, &record, 1.0);
@@ -229,10 +237,10 @@ mod tests {
             evidence > most - cost(&best.loose()[0], best.loose()[0].level) - count.ln(),
             "{evidence} {most}"
         );
-        // The same integral from any level that it is begun at.
+        // The integral does not depend on the level at which the metric begins.
         let begun = metric.evidence(&roles, &record, 1.0);
         approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
-        // Noise alone: as little as there is, and nothing gained by a second look.
+        // Noise alone: a small size is found, and adapting again gains nothing.
         let (quiet, _) = metric.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false);
         assert!(quiet.loose()[0].level.size < 0.5);
         assert_eq!(quiet.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false).1, 0.0);

@@ -27,8 +27,8 @@ const DETERMINED: f64 = 1.0 / 3.0;
 const WEAKLY: f64 = 0.9;
 /// Information, tolerances to the minus two, below which a parameter has no visible effect.
 const DEAD: f64 = 1e-6;
-/// Likeness from which two parameters do the same, and the factor by which the others then blur
-/// each of them.
+/// Absolute likeness above which two parameters act alike, and the ratio of `sd` to `sd_alone`
+/// above which the other parameters blur a parameter.
 const ALIKE: f64 = 0.98;
 const BLURRED: f64 = 2.0;
 /// A parameter is at a bound if it has gone this share of the way to it.

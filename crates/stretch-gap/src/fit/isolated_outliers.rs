@@ -1,38 +1,38 @@
-//! Isolated outliers: what one sample or a few in a row say and none of their neighbours is the recorder's, not the rig's.
+//! Finds isolated outliers: single samples, or a few in a row, that deviate from their neighbours.
+//! They are errors of the recorder, not of the rig.
 //!
-//! In the residual r, in multiples of the noise, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the
-//! motion becomes visible.
-//! A sample is isolated where it is off both neighbours to the same side,
+//! The search is in the residual r of the re-tuned simulator, in multiples of the noise, where the
+//! motion cannot hide outliers. A sample is isolated if it deviates from both neighbours to the
+//! same side,
 //!
 //! ```text
 //! min(|r_i - r_(i-1)|, |r_i - r_(i+1)|) > 8 max(1, s),     s = median of |steps| within half a second / 0.954
 //! ```
 //!
-//! with the deviation s of the noise that the steps near it show, so that a hum is not isolated. A step or a kink of a gap is off
-//! one neighbour only. So are all of [`RUN`] samples in a row or fewer (an encoder's glitch) that are that far off both samples next to
-//! the run, where these two differ by a quarter of that at most, and where the simulator moves by a quarter of it at most on either
-//! side: what follows a command late or not at all also leaves a few samples in a row, but there the simulator has a step. What is
-//! isolated counts for nothing, as what was lost. Where more than one of [`RARE`] are isolated they are no exceptions, and count; runs
-//! count where there are too many in addition to single ones.
+//! with the local standard deviation s of the noise, so that a hum is not isolated. A step or a
+//! kink of a gap deviates from one neighbour only. Runs of up to [`RUN`] samples are found by
+//! `is_run`. Isolated samples get no weight, like lost ones. If more than one of [`RARE`] samples
+//! are isolated, they are not exceptions and keep their weight. If only single samples and runs
+//! together are too many, the runs keep theirs.
 
 use std::{collections::BTreeSet, ops::Range};
 
-/// Deviations beyond which a sample is isolated: of normal noise one in 10^9.
+/// Standard deviations beyond which a sample is isolated: one in 10^9 samples of normal noise.
 const ALONE: f64 = 8.0;
 /// Median size of a step of white noise of one standard deviation: 0.6745 sqrt 2.
 const MEDIAN_STEP: f64 = 0.954;
-/// Steps on either side that the noise is estimated from.
+/// Number of steps on either side from which the noise is estimated.
 const NEAR: usize = 25;
-/// Samples among which an isolated one is an exception.
+/// Number of samples of which at most one may be isolated.
 const RARE: usize = 200;
 
-/// Most samples of a run.
+/// Largest number of samples in a run.
 const RUN: usize = 5;
-/// Share of its height by which the signal on either side of a run may differ.
+/// Largest difference between the two sides of a run, as a share of its height.
 const LEVEL: f64 = 0.25;
 
-/// Samples of a residual in multiples of the noise that are isolated within their trials, in order; `moves` are the simulator's own
-/// steps to each sample, in multiples of the noise.
+/// Returns the indices of the isolated samples of a residual, in order. `moves` are the steps of
+/// the simulated output to each sample. Both are in multiples of the noise.
 pub(crate) fn isolated(
     residual: &[f64],
     moves: &[f64],
@@ -64,7 +64,11 @@ pub(crate) fn isolated(
     }
 }
 
-/// Whether the samples between the first of a span and the one at its end are an isolated run.
+/// Whether the samples between the first and the last one of a span are an isolated run (an
+/// encoder's glitch). All of them must deviate as far as a single sample does, to one side of both
+/// ends of the span. The ends may differ by a quarter of that height at most. The simulator may
+/// move by at most a quarter of it on either side of the run: a late or missing response to a
+/// command also leaves a few samples in a row, but there the simulator has a step.
 fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
     let (before, after) = (span.start, span.end);
     if after >= r.len() {
@@ -77,7 +81,7 @@ fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
     height > ALONE && beside <= LEVEL * height && height > ALONE * deviation(steps, before)
 }
 
-/// Deviation of the noise that the steps around one show.
+/// Estimates the standard deviation of the noise from the steps around one of them.
 fn deviation(steps: &[f64], at: usize) -> f64 {
     let near = &steps[at.saturating_sub(NEAR)..(at + NEAR + 2).min(steps.len())];
     let mut sizes: Vec<f64> = near.iter().map(|d| d.abs()).collect();
@@ -129,7 +133,8 @@ mod tests {
         assert!(none_of(&often).is_empty());
     }
 
-    /// Two to five samples in a row, at any level; six are an event of the rig, and so is what does not come back.
+    /// Two to five samples in a row are found at any level. Six are an event of the rig, and so is
+    /// a signal that does not come back.
     #[test]
     fn a_few_values_in_a_row_are_found_and_what_lasts_longer_is_left() {
         for (length, height) in [(2, 30.0), (3, -25.0), (4, 1e6), (5, 40.0)] {
@@ -154,12 +159,13 @@ mod tests {
         // Jumps of a worn contact: three samples in every 150.
         let jumps = added(&|i| 40.0 * f64::from(i % 150 < 3));
         assert!(none_of(&jumps).is_empty());
-        // Too many runs take none of the single values with them.
+        // If there are too many runs, the single values are still found.
         let both = added(&|i| 40.0 * f64::from(i % 150 < 3) + 40.0 * f64::from(i == 1000));
         assert_eq!(none_of(&both), [1000]);
     }
 
-    /// A step that comes three samples late leaves three samples, too, and is the rig's.
+    /// A step that comes three samples late also leaves three samples in a row, but is an event of
+    /// the rig.
     #[test]
     fn a_step_that_comes_late_is_left() {
         let step = |i: usize| 40.0 * f64::from((700..3000).contains(&i));

@@ -1,4 +1,5 @@
-//! Joint fits: nominal parameters of the stages concerned and those of the effects, maximum a posteriori in a box.
+//! Fits the nominal parameters of some stages jointly with the parameters of effects: maximum a
+//! posteriori within bounds.
 //!
 //! With residuals r(x) in the [metric](crate::fit::metric) V and priors p of the [coordinates](crate::fit::coordinate) the cost is
 //!
@@ -6,19 +7,22 @@
 //! J(x) = 0.5/b sum over stages r' V^-1 r - sum ln p(x_i)
 //! ```
 //!
-//! where b, the samples of a block, keeps neighbours from counting as independent. Levenberg-Marquardt (Marquardt 1963,
-//! doi 10.1137/0111030) minimises it: with sensitivities A = -dr/dx
+//! where b, the samples of a block, keeps neighbours from counting as independent.
+//! Levenberg-Marquardt (Marquardt 1963, doi 10.1137/0111030) minimises it. With sensitivities A =
+//! -dr/dx, its step d is
 //!
 //! ```text
 //! (N + lambda diag N) d = -g,    N = A'V^-1 A/b + P'',    g = -A'V^-1 r/b + P',    low <= x + d <= high
 //! ```
 //!
-//! and each damped step is solved *within* its box ([`boxed`]) rather than clipped to it, which would leave the face along
-//! which the cost still falls. Sensitivities of the nominal parameters change little and cost one simulation each: they are renewed
-//! at a few iterations only, those of the effect at every one.
+//! Each damped step is solved *within* its bounds ([`boxed`]). Clipping it to them instead would
+//! leave the face along which the cost still falls. Sensitivities to nominal parameters change
+//! little and cost one simulation each, so they are renewed at a few iterations only. Those to
+//! parameters of effects are renewed at every iteration, unless their runs are costly.
 //!
-//! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
-//! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
+//! Effects and nominal parameters must be fitted together. Otherwise an effect is credited with
+//! what the fixed nominal parameters could have explained (Brynjarsdottir and O'Hagan 2014, doi
+//! 10.1088/0266-5611/30/11/114007).
 
 use std::borrow::Borrow;
 
@@ -53,7 +57,8 @@ pub(crate) struct Fitted {
     pub(crate) coordinates: Vec<(Coordinate, [f64; 2])>,
     /// N of the module's head.
     pub(crate) normal: DMatrix<f64>,
-    /// Whether it stopped with sensitivities that were all simulated at its last point: a further fit from here would end at once.
+    /// Whether it stopped with sensitivities that were all simulated at its last point. A further
+    /// fit from there would end at once.
     pub(crate) is_settled: bool,
     /// Fall of the cost in the last iteration, nats.
     pub(crate) last_fall: f64,
@@ -64,35 +69,37 @@ pub(crate) struct Fitted {
 pub(crate) struct Effort {
     /// Most iterations.
     iterations: usize,
-    /// Iterations at which the sensitivities of the nominal parameters are taken anew.
+    /// Iterations at which the sensitivities to the nominal parameters are renewed.
     renewals: &'static [usize],
-    /// Whether steps of the nominal parameters may be taken from a run at those that the fit starts from.
+    /// Whether the simulator may answer runs from a linearisation around the nominal parameters at
+    /// which the fit starts.
     is_rough: bool,
     /// Whether the forms of effects keep the values of the start.
     holds_forms: bool,
 }
 
-/// Enough to see which of several starts goes furthest.
+/// Enough to compare several starts.
 pub(crate) const GLANCE: Effort =
     Effort { iterations: 2, renewals: &[], is_rough: true, holds_forms: false };
 /// Enough to see whether a candidate can compete.
 pub(crate) const COARSE: Effort =
     Effort { iterations: 5, renewals: &[2], is_rough: true, holds_forms: false };
-/// Until nothing is gained.
+/// Enough to converge.
 pub(crate) const FINE: Effort =
     Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false, holds_forms: false };
-/// The same, the forms of effects held.
+/// Enough to converge, with fixed forms of effects.
 pub(crate) const FINE_OF_FORM: Effort = Effort { holds_forms: true, ..FINE };
 
-/// Nothing is moved: what a model leaves, and how well its parameters are known there.
+/// No step: only the misfit of a model, and how well its parameters are known there.
 pub(crate) const HELD: Effort =
     Effort { iterations: 0, renewals: &[], is_rough: false, holds_forms: false };
 
-/// Added to every diagonal: a coordinate that does nothing has no curvature.
+/// Added to every diagonal element, because a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
 /// Dampings tried in one iteration.
 const TRIES: usize = 5;
-/// An iteration that lowers the cost by less, nats and as a share of it, has gained nothing.
+/// Fall of the cost in one iteration below which it has gained nothing: in nats, plus a share of
+/// the cost.
 const LEAST_GAIN: (f64, f64) = (0.03, 2e-5);
 
 impl Comparison<'_> {
@@ -133,7 +140,7 @@ impl Comparison<'_> {
             descent.last_fall = before - descent.cost;
             let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
             descent.is_settled = is_still && renew && self.simulator().model_runs().is_none();
-            // With old sensitivities no progress may only mean that they are old.
+            // Without progress, old sensitivities may be the only reason.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
             }
@@ -141,7 +148,7 @@ impl Comparison<'_> {
         Ok(descent.finish())
     }
 
-    /// The same, with sensitivities of the nominal parameters around the start.
+    /// The same, after the simulator is linearised around the start.
     pub(crate) fn fit_linearised(
         &self,
         stages: &[usize],
@@ -156,7 +163,8 @@ impl Comparison<'_> {
 }
 
 impl Fitted {
-    /// What the fit says of the nominal parameters, the effects' own held.
+    /// Returns the information of the fit about the nominal parameters, with the parameters of
+    /// effects fixed.
     pub(crate) fn information(&self) -> Information {
         let nominal = self.coordinates.iter().enumerate().filter_map(|(at, (c, _))| match c {
             Coordinate::Nominal { index, .. } => Some((at, *index)),
@@ -167,7 +175,8 @@ impl Fitted {
     }
 }
 
-/// J of the module's head: of some stages and their coordinates, at a model that leaves these residuals.
+/// Returns J of the module's head for some stages and their coordinates, at a model that leaves
+/// these residuals.
 fn cost(
     compare: &Comparison<'_>,
     (stages, coordinates): (&[usize], &[(Coordinate, [f64; 2])]),
@@ -180,7 +189,7 @@ fn cost(
     0.5 * compare.weight() * data + prior
 }
 
-/// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
+/// Collects the fits that succeeded. A failed simulation excludes its candidate; a stop ends all.
 pub(crate) fn possible<T: Send>(
     fits: impl ParallelIterator<Item = Result<T, GapError>>,
 ) -> Result<Vec<T>, GapError> {
@@ -202,7 +211,7 @@ struct Descent<'a, 'b> {
     stages: &'a [usize],
     coordinates: Vec<(Coordinate, [f64; 2])>,
     model: Model,
-    /// Parameters near which steps may be taken; `None` if each is a separate run.
+    /// Parameters around which the simulator may linearise; `None` if every run is exact.
     near: Option<Vec<f64>>,
     /// The residual of each stage, in the order of `stages`.
     residuals: Vec<Column>,
@@ -265,7 +274,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         cost(self.compare, (self.stages, &self.coordinates), model, residuals)
     }
 
-    /// Sensitivities where they are due, then N and g.
+    /// Renews the sensitivities that are due, then computes N and g.
     fn linearise(
         &mut self,
         known: &[Option<Sensitivities>],
@@ -299,7 +308,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         Ok(())
     }
 
-    /// Whether a coordinate is that of an effect whose every value is a run that costs.
+    /// Whether a coordinate belongs to an effect of which every value needs a costly run.
     fn is_costly(&self, coordinate: Coordinate) -> bool {
         match coordinate {
             Coordinate::Nominal { .. } => false,
@@ -337,7 +346,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         }
     }
 
-    /// One step downhill with as little damping as will do; says whether there was one.
+    /// Takes one step downhill with as little damping as possible. Returns whether the cost fell.
     fn step(&mut self) -> Result<bool, GapError> {
         let n = self.coordinates.len();
         let x: Vec<f64> = self.coordinates.iter().map(|(c, _)| c.read(&self.model)).collect();
@@ -353,7 +362,8 @@ impl<'a, 'b> Descent<'a, 'b> {
                 damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
-            // Where runs are counted, none is made for what the line itself says is nothing.
+            // If runs are counted, make none for a step that the linearised model predicts to gain
+            // nothing.
             if is_counted && self.predicted_fall(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
                 return Ok(false);
             }
@@ -363,7 +373,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             }
             match self.residuals_of(&next) {
                 Err(error) if error.ends_all() => return Err(error),
-                // These values cannot be simulated: nearer to where it can.
+                // These values cannot be simulated: try a shorter step.
                 Err(_) => {}
                 Ok(there) => {
                     let cost = self.cost_of(&next, &there);
@@ -386,7 +396,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         -(slope + 0.5 * d.dot(&(&self.normal * &d)))
     }
 
-    /// Misfits, and standard deviations by Laplace's approximation: the covariance is N^-1.
+    /// Computes misfits, and standard deviations by Laplace's approximation: the covariance is
+    /// N^-1.
     fn finish(self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();

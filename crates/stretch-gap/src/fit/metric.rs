@@ -39,10 +39,10 @@ pub(crate) struct Metric {
     nuisances: Vec<Option<Nuisance>>,
 }
 
-/// A parameter that drifts or is offset in each trial, or the recorder where it may drift.
+/// A parameter that drifts or has an offset in each trial, or the recorder if it may drift.
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
-    /// Index of the parameter; none for the recorder.
+    /// Index of the parameter; `None` for the recorder.
     pub(crate) parameter: Option<usize>,
     /// Change of the output, in multiples of the noise, for one standard deviation as the simulator describes it.
     column: Arc<[f64]>,
@@ -52,7 +52,7 @@ pub(crate) struct Loose {
     pub(crate) drift: Option<SlowDrift>,
     /// Whether each tick of the clock has a separate offset, as large as the simulator describes it.
     pub(crate) is_by_tick: bool,
-    /// Size and correlation time that the drift is taken to have.
+    /// Assumed size and correlation time of the drift.
     pub(crate) level: Level,
     /// The drift's knots by segment; none for an offset.
     knots: Arc<[Arc<Knots>]>,
@@ -63,8 +63,8 @@ fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> 
     roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }
 
-/// Size of a nuisance, as a multiple of what the simulator describes (0: there is none), and its correlation time, s (of no meaning for an
-/// offset).
+/// Size of a nuisance, as a multiple of what the simulator describes (0 without a nuisance), and
+/// its correlation time, s (meaningless for an offset).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Level {
     pub(crate) size: f64,
@@ -85,8 +85,9 @@ pub(crate) struct Column {
 }
 
 impl Metric {
-    /// The metric of a stage around a model: its sensitivities to the parameters that drift or are offset in each trial
-    /// tell what of a residual can be theirs. They drift as the simulator describes it, unless `like` says otherwise.
+    /// Computes the metric of a stage around a model. Its sensitivities to the parameters that
+    /// drift or have an offset in each trial determine which part of a residual these can explain.
+    /// The nuisances have the sizes that the simulator describes, or those of `like`, if given.
     pub(crate) fn of(
         runs: &Runs<'_>,
         roles: &SampleRoles,
@@ -107,7 +108,7 @@ impl Metric {
         let mut metric = Self { noise, loose: Vec::new(), nuisances: Vec::new() };
         let trials = simulator.trials();
         let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect::<Vec<u32>>();
-        // First, so that its place is the same where no parameter drifts.
+        // The recorder comes first, so that its index does not depend on the parameters.
         if let Some(drift) = simulator.stages()[stage].recorder_drift {
             let column =
                 metric.noise.sd.iter().map(|sd| if sd.is_finite() { drift.sd } else { 0.0 });
@@ -149,7 +150,7 @@ impl Metric {
         Ok(metric)
     }
 
-    /// Factors of the nuisances as the loose parameters now are.
+    /// Recomputes the nuisances of all segments from the levels of the loose parameters.
     fn marginalise(&mut self, roles: &SampleRoles) {
         let one = |(at, segment): (usize, &Segment)| {
             let range = segment.from..segment.to;
@@ -246,14 +247,15 @@ impl Metric {
         pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
-    /// 2 sum ln s over the segments in a role: what noise s adds to it in the unit of the output.
+    /// Returns 2 sum ln s over the segments in a role, with noise s: what has to be added to ln det
+    /// V to express it in the unit of the output.
     pub(crate) fn ln_noise(&self, roles: &SampleRoles, role: Role) -> f64 {
         let own = roles.segments.iter().filter(|s| s.role == role);
         let sds = own.flat_map(|s| &self.noise.sd[s.from..s.to]).filter(|sd| sd.is_finite());
         2.0 * sds.map(|sd| sd.ln()).sum::<f64>()
     }
 
-    /// Takes the most likely nuisances out of a residual in multiples of the noise.
+    /// Subtracts the most likely nuisances from a residual in multiples of the noise.
     pub(crate) fn clean(&self, roles: &SampleRoles, values: &mut [f64]) {
         for (segment, nuisance) in roles.segments.iter().zip(&self.nuisances) {
             if let Some(nuisance) = nuisance.as_ref().filter(|_| segment.to <= values.len()) {

@@ -1,14 +1,17 @@
-//! Fits of one hypothesis, and what a fit is measured by.
+//! Fits hypotheses and scores them.
 //!
-//! In: the runs of a problem and the roles of its samples. Out: a [`prepared::PreparedProblem`], re-tuned, in which any set of effects becomes a
-//! [`hypothesis::Hypothesis`]: a model, what it leaves of every stage, and a score.
-//! In the order of use: the noise of every stage ([`noise_level`], less [`isolated_outliers`]); residuals in multiples of it with
-//! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]), a recorder's drift only where the residual does not depend on the [`motion`]; residuals and sensitivities of the
-//! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
-//! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]); what another form of the same effects explains ([`deviations`]); which parameters the data
-//! determine ([`identifiability`]); whether a drift swings ([`swing`]). Some samples fitted by themselves, after a diagnosis ([`sample_fit`]).
-//! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`]).
-//! Imports: `numerics`, `problem`.
+//! Input: the runs of a problem and the roles of its samples. Output: a re-tuned
+//! [`prepared::PreparedProblem`], in which any set of effects becomes a [`hypothesis::Hypothesis`]:
+//! a model, its misfit in every stage, and a score. In the order of use: the noise of every stage
+//! ([`noise_level`], [`isolated_outliers`]); residuals with slow drift and offsets marginalised
+//! ([`metric`], [`nuisance`], [`hyper_parameters`]), and with a recorder's drift only if they do
+//! not depend on the [`motion`]; residuals and sensitivities of the stages ([`comparison`]);
+//! bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
+//! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]);
+//! deviations of the forms of effects ([`deviations`]); which parameters the data determine
+//! ([`identifiability`]); whether a drift oscillates ([`swing`]); re-tuning from several starts
+//! ([`starts`]); a fit of selected samples after a diagnosis ([`sample_fit`]). Imports: `numerics`,
+//! `problem`.
 
 pub(crate) mod alike;
 pub(crate) mod comparison;

@@ -1,15 +1,17 @@
 //! Whether a residual depends on the motion.
 //!
-//! The noise of a recorder does not know where the machine is or which way it moves; the residual of a missing effect does. With cells c of
-//! level and direction of the simulated output, and the sums S_bc of the residual over parts b of the record,
+//! The noise of a recorder does not depend on the position or the direction of the machine; the
+//! residual of a missing effect does. With cells c of level and direction of the simulated output,
+//! and the sums S_bc of the residual over parts b of the recording,
 //!
 //! ```text
 //! T(e) = sum over c of ( sum over b of e_b S_bc )^2 / n_c,     e_b = +1 or -1
 //! ```
 //!
-//! has the same distribution for all signs e if the residual of each part is as likely as its negative, whatever its memory within the part
-//! (randomisation test; Davison and Hinkley 1997, section 4.3). The mean of each part is subtracted first, because a drift slower than a part
-//! joins neighbouring parts.
+//! has the same distribution for all signs e if the residual of each part is as likely as its
+//! negative, however it is correlated within the part (randomisation test; Davison and Hinkley
+//! 1997, section 4.3). The mean of each part is subtracted first, because a drift slower than a
+//! part would correlate neighbouring parts.
 
 use crate::{numerics::random::RandomGenerator, problem::sample_roles::SampleRoles};
 
@@ -19,20 +21,21 @@ const BINS: usize = 24;
 const CELLS: usize = 3 * BINS;
 /// Length of a part, s.
 const PART_S: f64 = 10.0;
-/// Fewest parts whose signs can tell.
+/// Smallest number of parts for the test.
 const LEAST_PARTS: usize = 8;
 /// Draws of signs.
 const DRAWS: usize = 399;
-/// Largest share of draws with as large a T that is taken for dependence.
+/// Significance level: largest share of draws whose T is at least as large.
 const RARE: f64 = 0.01;
-/// Least part of the residual's variance that depends on the motion, in variances of the noise. Any machine has faint unmodelled effects, and a long
-/// record shows them.
+/// Smallest variance of the part of the residual that depends on the motion, in variances of the
+/// noise. Any machine has faint unmodelled effects, and a long recording shows them.
 const LEAST_VARIANCE: f64 = 0.05;
 /// Change of the output within a block, as a share of its range, up to which it is at rest.
 const AT_REST: f64 = 1e-3;
 
-/// Whether at least a twentieth of the noise's variance in a residual, in multiples of the noise, depends on the level or the direction of the
-/// simulated output; of a record with too few parts, no.
+/// Whether a residual, in multiples of the noise, depends significantly on the level or the
+/// direction of the simulated output, by at least a twentieth of the noise's variance. False if the
+/// recording has too few parts.
 pub(crate) fn depends_on_motion(
     roles: &SampleRoles,
     residual: &[f64],
@@ -61,7 +64,8 @@ pub(crate) fn depends_on_motion(
     (1 + as_large) as f64 <= RARE * (DRAWS + 1) as f64 && variance >= LEAST_VARIANCE
 }
 
-/// The cell of each of the first `samples` samples, by the level and the direction of the output; of a constant output it is one cell.
+/// Returns the cell of each of the first `samples` samples, by the level and the direction of the
+/// output. A constant output has one cell.
 fn cells(roles: &SampleRoles, samples: usize, output: &[f64]) -> Vec<usize> {
     let segments = || roles.looked_at().filter(|s| s.to <= samples);
     let all = segments().flat_map(|s| &output[s.from..s.to]);

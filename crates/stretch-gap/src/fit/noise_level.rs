@@ -1,11 +1,11 @@
-//! The noise of every stage: what no deterministic model could remove.
+//! Estimates the noise of every stage: what no deterministic model could remove.
 //!
 //! ```text
 //! sigma_i^2 = sigma_own^2 + mean over draws and neighbours of (f(x + noise)_i - f(x)_i)^2
 //! ```
 //!
-//! Teacher forcing feeds a stage f with a *measured* input x, whose noise the stage transmits: an error in variables, which would pose
-//! as a gap where the output is steep.
+//! A stage f runs on its *measured* input x (teacher forcing), and transmits the noise of x. This
+//! error in variables would look like a gap where the output is steep.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ pub(crate) struct NoiseLevel {
     /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured and where a
     /// sample [is isolated](crate::fit::isolated_outliers).
     pub(crate) sd: Vec<f64>,
-    /// Root mean square of it.
+    /// Root mean square of the noise.
     pub(crate) rms: f64,
     pub(crate) source: String,
     /// Relative standard deviation with which the variance of the output's own noise is known.
@@ -39,16 +39,17 @@ pub(crate) struct NoiseLevel {
 
 /// Draws of the inputs' noise.
 const DRAWS: u64 = 12;
-/// Half-width over which what arrives of them is averaged, in samples.
+/// Half-width over which the transmitted variance is averaged, in samples.
 const NEAR: usize = 12;
 
-/// Noise of all stages around a model.
+/// Computes the noise of all stages around a model.
 ///
-/// The variance of the noise is that of the output's own noise, known or taken from the second differences of the record, or of what the model
-/// leaves where these are clearly less,
-/// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
-/// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the noise is one
-/// of every sample.
+/// The variance is a sum of two parts. The first is the output's own noise: known, or estimated
+/// from the second differences of the recording, or from those of the residual if these are clearly
+/// smaller. The second is the *transmitted noise*, the part of the measured input's noise that
+/// reaches the output. It is computed by Monte Carlo with the same draws for every model, and
+/// sample by sample, because it is larger where the output is steep or the input is too fast to be
+/// smoothed.
 pub(crate) fn noise_levels(
     runs: &Runs<'_>,
     roles: &SampleRoles,
@@ -94,13 +95,14 @@ fn noise_level(
     for trial in &trials {
         let part = &arrived[trial.clone()];
         for i in 0..part.len() {
-            // A dozen draws tell a variance to 40 % only: neighbours of the same trial lend theirs.
+            // A dozen draws determine a variance to 40 % only, so average over neighbours in the
+            // same trial.
             let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
             let local = near.iter().sum::<f64>() / near.len() as f64;
             sd.push((own + local).sqrt().max(1e-12));
         }
     }
-    // What was not measured weighs nothing, and neither does an isolated outlier.
+    // Samples that were not measured, and isolated outliers, get no weight.
     for (sd, _) in sd.iter_mut().zip(&simulator.record().is_lost).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
     }
@@ -141,7 +143,7 @@ fn transmitted(
     Ok(arrived)
 }
 
-/// Noise of the output of a stage, from the samples that may be looked at.
+/// Estimates the noise of a stage's output from the samples that are not test samples.
 fn of_record(simulator: &dyn Simulator, roles: &SampleRoles, stage: usize) -> Noise {
     let measured = simulator.measured(stage);
     Noise::of_differences(roles.looked_at().map(|s| &measured[s.from..s.to]), simulator.dt_s())

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! (Rasmussen and Williams 2006, appendix A.3). A product of two columns therefore costs a
-//! projection and a triangular solve each, and never a matrix as large as the record. The most
-//! likely amplitudes, with which a residual is drawn, are b = (C'C + P)^-1 C'r.
+//! projection and a triangular solve each, and never a matrix as large as the recording. The most
+//! likely amplitudes, with which a residual is cleaned, are b = (C'C + P)^-1 C'r.
 
 use std::{ops::Range, sync::Arc};
 
@@ -47,7 +47,7 @@ impl Patch {
         dot(&self.values, &x[self.from..self.from + self.values.len()])
     }
 
-    /// Product with another one where both last.
+    /// Returns the product with another patch over the samples that both contain.
     fn overlap(&self, other: &Self) -> f64 {
         let from = self.from.max(other.from);
         let to = (self.from + self.values.len()).min(other.from + other.values.len());
@@ -86,7 +86,7 @@ pub(super) struct Knots {
 }
 
 impl Knots {
-    /// Those of a clock that counts samples of `dt_s`.
+    /// Computes the knots of a clock that counts samples of `dt_s`.
     pub(super) fn of(clock: &[u32], dt_s: f64) -> Self {
         let knot = ((KNOT_S / dt_s) as usize).max(1);
         let first = clock.first().copied().unwrap_or(0);

@@ -45,10 +45,10 @@ pub(crate) struct Octaves {
 }
 
 impl Octaves {
-    /// Adds a stretch without a break: the mean squares of what is `clean`, the residual r minus
-    /// its most likely nuisances N a. The cost of these nuisances, r'V^-1 r = |r - N a|^2 + a'D^-1
-    /// a with their variances D, is added once per stretch, in the last octave. Products of r and r -
-    /// N a by octave have the same sum and may be negative.
+    /// Adds a stretch without a break: the squares of `clean`, the residual r minus its most likely
+    /// nuisances N a. These nuisances cost the second part of r'V^-1 r = |r - N a|^2 + a'D^-1 a,
+    /// with their variances D. This part is added once per stretch, in the last octave, because
+    /// products of r and r - N a by octave have the same sum, but may be negative.
     pub(crate) fn add(&mut self, residual: &[f64], clean: &[f64]) {
         for (octave, x) in coefficients(clean).iter().enumerate() {
             self.sums[octave] += dot(x, x);
@@ -67,8 +67,8 @@ impl Octaves {
         self
     }
 
-    /// Scaled by the ratio of another residual's mean squares, `from` one `to` another; at least a
-    /// tenth is kept.
+    /// Adds the difference of another residual's squares, `to` minus `from`; at least a tenth is
+    /// kept.
     pub(crate) fn moved(mut self, from: &Self, to: &Self) -> Self {
         for ((x, from), to) in self.sums.iter_mut().zip(from.sums).zip(to.sums) {
             *x = (*x + to - from).max(0.1 * *x);

@@ -58,13 +58,14 @@ pub(crate) struct PreparedProblem<'a> {
     pub(crate) sensitivities: Vec<Sensitivities>,
     /// By stage: samples that count as one observation.
     memory: Vec<f64>,
-    /// By stage: weights of its samples.
+    /// By stage: effective numbers of its samples.
     observations: Vec<Observations>,
     /// By stage: noise that the re-tuned nominal simulator transmits.
     transmitted: Vec<Misfit>,
     /// Number of starts of re-tuning, and how many of them ended at the result.
     pub(crate) starts: Starts,
-    /// Whether re-tuned parameters could not be simulated over all trials, so that others hold their place.
+    /// Whether the re-tuned parameters could not be simulated over all trials, so that others
+    /// replace them.
     pub(crate) is_held: bool,
 }
 
@@ -82,7 +83,8 @@ impl<'a> PreparedProblem<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
-        // Whatever is found is compared with the simulator as shipped, over all trials.
+        // Every result is compared with the simulator as shipped over all trials, so this must be
+        // possible.
         runs.try_all(&Model::nominal(simulator))?;
         // Try twice the step, if the change from halving it stays within the limit. Not for counted
         // runs, because these may be an external program's.
@@ -382,8 +384,8 @@ impl<'a> PreparedProblem<'a> {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))
     }
 
-    /// What a hypothesis closes of one stage's gap under another hypothesis. The noise is known to
-    /// a few per cent, so what is closed below it counts as well.
+    /// Returns how much of one stage's gap under `base` is closed by `next`. The noise is known
+    /// only to a few per cent, so a reduction below the noise counts as well.
     pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
         let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
         mean_square(base) - mean_square(next)
@@ -401,15 +403,16 @@ impl<'a> PreparedProblem<'a> {
     }
 }
 
-/// Sensitivities of all stages around a model, if runs are costly.
+/// Lets the simulator linearise all stages around a model, if runs are costly.
 pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     let mut stages = 0..compare.metrics.len();
     stages
         .try_for_each(|stage| compare.simulator().linearise(stage, model, compare.roles.fit_trials))
 }
 
-/// Every stage [re-tuned](retuned); where that cannot be simulated over all trials, the start is held, or else the parameters as shipped, and
-/// that is said.
+/// Returns every stage [re-tuned](retuned). If the result cannot be simulated over all trials, the
+/// parameters of the start, or else those as shipped, are kept. The last value is true in this
+/// case.
 fn possible_retuning(
     compare: &Comparison<'_>,
     start: &Model,
@@ -424,8 +427,8 @@ fn possible_retuning(
     Ok((nominal, information, true))
 }
 
-/// Every stage re-tuned separately, stages that share a parameter together: without effects the
-/// other stages are independent of it.
+/// Re-tunes every stage separately, but stages that share a parameter together. Without effects,
+/// stages without a common parameter are independent.
 fn retuned(
     compare: &Comparison<'_>,
     start: &Model,

@@ -1,14 +1,17 @@
-//! Some samples of a session fitted by themselves, and what they alone say of every value.
+//! Fits selected samples of a session by themselves, and determines how well these samples alone
+//! determine every value.
 //!
-//! The fit is that of [`levenberg_marquardt`](crate::fit::levenberg_marquardt), where every sample is an observation. An error that is left and
-//! lasts counts as fewer observations, so the information of the data is divided by
+//! The fit is that of [`levenberg_marquardt`](crate::fit::levenberg_marquardt), with every sample
+//! as an observation. Remaining errors are correlated and count as fewer observations, so the
+//! information of the data is divided by
 //!
 //! ```text
 //! max(1, X tau),     X = mean r^2,     tau = 1 + 2 sum of the autocorrelations of r while pairs of them are positive
 //! ```
 //!
-//! of the stage where that is greatest (Geyer's initial positive sequence). In the covariance the prior of every value is as wide as its
-//! tolerance: that of a nominal parameter, and for an effect's number the value itself, since an effect may be absent.
+//! of the stage in which this is largest (Geyer's initial positive sequence). In the covariance,
+//! the prior of every value is as wide as its tolerance. For a parameter of an effect, this is the
+//! value itself, because the effect may be absent.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -32,29 +35,31 @@ use crate::{
     },
 };
 
-/// Most descents, each with its own sensitivities.
+/// Largest number of descents, each with new sensitivities.
 const ROUNDS: usize = 4;
 /// Fall of the cost, nats, below which a further descent is not worth its runs.
 const LEAST_FALL: f64 = 0.03;
 /// Standard deviations to either side that hold 95 % of a Gaussian.
 const COVERS: f64 = 1.96;
-/// Variance of a value, in squares of its tolerance, up to which these samples give an estimate of it.
+/// Variance of a value, in squares of its tolerance, up to which an estimate of it is reported.
 const TELLING: f64 = 0.5;
 
 /// A fit of some samples.
 #[derive(Debug, Clone)]
 pub struct SampleFit {
-    /// Parameters, and the numbers of the effects.
+    /// Nominal parameters, and parameters of the effects.
     pub model: Model,
     /// Root mean square error in multiples of the noise.
     pub times_noise: f64,
-    /// The same of the model that the fit began with.
+    /// The same for the model at which the fit began.
     pub times_noise_of_start: f64,
-    /// Every value that was fitted: nominal parameters stage by stage, then the numbers of the effects without their forms.
+    /// Every value that was fitted: nominal parameters stage by stage, then the parameters of the
+    /// effects without their forms.
     pub values: Vec<SampleValue>,
 }
 
-/// A value that was fitted to some samples, with its 95 % interval, and how well these determine it.
+/// A value that was fitted to some samples, with its 95 % interval, and how well the samples
+/// determine it.
 #[derive(Debug, Clone, Serialize)]
 pub struct SampleValue {
     /// How well the samples determine the value; its name is that of a parameter, or `effect.parameter`.
@@ -64,8 +69,8 @@ pub struct SampleValue {
     pub value: f64,
     /// 95 % interval, within the range that was searched.
     pub interval: [f64; 2],
-    /// What these samples alone say, without what was known before, on the scale of [`SampleValue::at`]: the most likely place and its variance;
-    /// none if they say little.
+    /// Estimate from these samples alone, without the prior, on the scale of [`SampleValue::at`]:
+    /// the mode and its variance. `None` if the samples determine the value poorly.
     #[serde(skip)]
     pub estimate: Option<(f64, f64)>,
     #[serde(skip)]
@@ -75,18 +80,22 @@ pub struct SampleValue {
 }
 
 impl SampleValue {
-    /// The value at a place of the scale on which it is fitted, within the range that is searched.
+    /// Converts a place on the scale of the fit to the value there, limited to the range that is
+    /// searched.
     pub fn at(&self, place: f64) -> f64 {
         self.coordinate.value(place.clamp(self.bounds[0], self.bounds[1]))
     }
 }
 
-/// Fits nominal parameters within their tolerances, and the numbers of a model's effects, to some samples; the effects' forms stay as they are.
+/// Fits nominal parameters, within their tolerances, and the parameters of a model's effects to
+/// some samples. The forms of the effects stay as they are.
 ///
-/// Samples are indices into all trials end to end, in rising order; `noise` is one standard deviation by stage.
+/// `samples` are indices into all trials concatenated, in ascending order; `noise` is one standard
+/// deviation by stage.
 ///
 /// # Errors
-/// The errors of the simulator, a measured channel that is shorter than the trials or not finite, and a budget that is spent before the fit ends.
+/// Errors of the simulator, a measured channel that is shorter than the trials or not finite, and a
+/// budget that is spent before the fit ends.
 pub fn fit_samples(
     simulator: &dyn Simulator,
     noise: &[f64],
@@ -127,7 +136,7 @@ pub fn fit_samples(
     })
 }
 
-/// Where descents end that follow one another while the cost falls.
+/// Repeats descents while the cost falls, each from the end of the previous one.
 fn descended(
     compare: &Comparison<'_>,
     stages: &[usize],
@@ -151,7 +160,7 @@ fn descended(
     }
 }
 
-/// The values of a fit whose information is divided by `inflation`.
+/// Returns the values of a fit. Its information is divided by `inflation`.
 fn values(
     simulator: &dyn Simulator,
     fit: &Fitted,
@@ -198,7 +207,7 @@ fn values(
     all.into_iter().enumerate().map(value).collect()
 }
 
-/// Roles that fit these samples and no others, every one an observation.
+/// Returns roles that fit these samples and no others, each of them as an observation.
 fn fitted(trials: &[TrialSpec], samples: &[usize]) -> SampleRoles {
     let mut segments: Vec<Segment> = Vec::new();
     let (mut trial, mut end) = (0, trials.first().map_or(0, |t| t.samples));
@@ -215,7 +224,8 @@ fn fitted(trials: &[TrialSpec], samples: &[usize]) -> SampleRoles {
     SampleRoles { segments, block: 1, fit_trials: trial + 1, borrowed_test: false }
 }
 
-/// What a coordinate is known to before any data, in its own unit; `found` is where the diagnosis left it.
+/// Returns the tolerance of a coordinate before any data, in its own unit. `found` is its value
+/// after the diagnosis.
 fn tolerance(coordinate: Coordinate, found: f64) -> f64 {
     match coordinate {
         Coordinate::Linear { .. } if found == 0.0 => 0.5,
@@ -241,7 +251,7 @@ fn spec(
     let effect = &simulator.effects()[*effect];
     let (own, value) = (&effect.parameters[index], values[index]);
     let name = format!("{}.{}", effect.name, own.name);
-    // No tolerance ends: an effect may be as large as its range allows.
+    // No bounds: an effect may be as large as its range allows.
     ParameterSpec::new(&name, &own.unit, value).within(tolerance * coordinate.slope(value))
 }
 
@@ -249,7 +259,8 @@ fn mean_square(residual: &[f64]) -> f64 {
     residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64
 }
 
-/// 1 + 2 sum of the autocorrelations while pairs of them are positive.
+/// Returns 1 + 2 sum of the autocorrelations, until a pair of them is not above what chance makes,
+/// or up to a quarter of the samples.
 fn correlation_time(r: &[f64]) -> f64 {
     let mean = r.iter().sum::<f64>() / r.len().max(1) as f64;
     let at =
@@ -262,7 +273,7 @@ fn correlation_time(r: &[f64]) -> f64 {
     let mut lag = 1;
     while lag + 1 < r.len() / 4 {
         let pair = (at(lag) + at(lag + 1)) / variance;
-        // White noise has this much of it by chance.
+        // White noise reaches this by chance.
         if pair <= 2.0 / (r.len() as f64).sqrt() {
             break;
         }

@@ -8,16 +8,16 @@
 //! X = (1/N) sum r_i^2,     excess = X - 1
 //! ```
 //!
-//! 1 if only noise is left; the *excess* is the model's error, in units of the noise's variance.
-//! Neighbouring residuals are correlated, so N samples count only as the *effective sample size*
-//! N/m, where the integral time of the squares is (Bartlett 1946, doi 10.2307/2983611)
+//! X is 1 if only noise is left; the *excess* is the model's error, in units of the noise's
+//! variance. Neighbouring residuals are correlated, so N samples count only as the *effective
+//! sample size* N/m, where the integral time of the squares is (Bartlett 1946, doi 10.2307/2983611)
 //!
 //! ```text
 //! m = 1 + 2 sum_k rho_k^2
 //! ```
 //!
-//! With the noise's variance profiled out, the Gaussian log-likelihood of N/m observations is -(N/2m) ln X; two
-//! hypotheses differ in it by
+//! With the noise's variance profiled out, the Gaussian log-likelihood of N/m observations is
+//! -(N/2m) ln X. Two hypotheses differ in it by
 //!
 //! ```text
 //! S = sum over stages of (N/2m) ln(X_nominal/X) - (k/2) ln(blocks)
@@ -47,7 +47,7 @@ pub(crate) struct Misfit {
     pub(crate) read: Option<Read>,
 }
 
-/// Weights of the samples of one stage: fitted, held out.
+/// Effective numbers N/m of the samples of one stage: fitted, held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Observations {
     pub(crate) fit: f64,
@@ -63,13 +63,12 @@ const LARGER: f64 = 0.5;
 /// Smallest share of a mean square that is kept when noise is subtracted from it.
 const LEAST_KEPT: f64 = 0.1;
 
-/// The only definition: reduced chi-square minus one.
+/// Returns the excess, the reduced chi-square minus one. It is defined only here.
 pub(crate) fn excess(reduced_chi_square: f64) -> f64 {
     reduced_chi_square - 1.0
 }
 
-/// The gap for an excess (reduced chi-square minus one). By chance the residual may be below the
-/// noise, which is no gap.
+/// Returns the gap: the excess, but 0 if the residual is below the noise by chance.
 pub(crate) fn gap(reduced_chi_square: f64) -> f64 {
     excess(reduced_chi_square).max(0.0)
 }
@@ -80,8 +79,8 @@ pub(crate) fn mean_square(blocks: &[f64]) -> f64 {
 }
 
 impl Misfit {
-    /// This misfit, at the transmitted noise, scaled by the ratio of its residual's misfit, `from`
-    /// one `to` another.
+    /// Returns this misfit, at equal transmitted noise, plus the change of its residual's misfit
+    /// from `from` to `to`.
     pub(crate) fn moved(&self, from: &Self, to: &Self) -> Self {
         let moved = |x: f64, from: f64, to: f64| (x + to - from).max(LEAST_KEPT * x);
         Self {
@@ -99,9 +98,10 @@ impl Misfit {
     /// X includes the input noise that arrives at the output. A slow amplifier or a slipping sleeve
     /// transmits less of it, and would win for any noisy input, whether it exists or not. Therefore
     /// hypotheses are compared at equal transmitted noise: X + k (T_nominal - T), where T is the
-    /// transmitted noise, in multiples of the noise. It is known only to a factor, and a gap may be
-    /// noise that is larger than estimated: k is the factor that would explain the nominal
-    /// simulator's gap, at most [`LARGER`], if less is transmitted.
+    /// transmitted noise, in multiples of the noise. T is known only to a factor, and a gap may be
+    /// noise that is larger than estimated. Therefore, if less is transmitted, k is the factor on
+    /// the noise that would explain the nominal simulator's gap, at most 1 + [`LARGER`]; otherwise
+    /// k is 1.
     pub(crate) fn at_equal_noise(&self, nominal: &Self, own: &Self, gap: f64) -> Self {
         let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
         // If the noise is overestimated, more could be subtracted than there is.
@@ -148,8 +148,8 @@ pub(crate) fn score(
     sum
 }
 
-/// What effects explain by errors that outputs [share](crate::fit::alike), nats to be added to a
-/// score; `observations` by stage.
+/// Returns the correction of a score for what effects explain by errors that outputs
+/// [share](crate::fit::alike), nats, to be added; `observations` by stage.
 pub(crate) fn shared(misfits: &[Misfit], observations: &[Observations]) -> f64 {
     let read = misfits.iter().filter_map(|m| {
         let Observations { fit, held } = observations[m.stage];

@@ -1,17 +1,18 @@
-//! Re-tuning from several places within the tolerances, so that the end of one descent is not taken for the best that parameters can do.
+//! Repeats re-tuning from several points within the tolerances, so that a local minimum is not
+//! taken for the best that parameters can do.
 //!
-//! A descent ends in the nearest valley of the cost J of [a fit](crate::fit::levenberg_marquardt). What swings or turns over has many valleys: a
-//! phase that is half a turn off at the end is no further from the record than one that is a whole turn off. So where the gap that a re-tuning
-//! leaves counts, further places are looked at before anything is blamed for it:
+//! A descent ends in the nearest minimum of the cost J of [a fit](crate::fit::levenberg_marquardt).
+//! A rig that oscillates or rotates has many: a phase error of half a turn costs no less than one
+//! of a whole turn. If re-tuning leaves a gap that counts, further points are tried:
 //!
-//! 1. the costs at the parameters as shipped and at [`POINTS`] places of a Latin hypercube within [`SPREAD`] tolerances (McKay, Beckman and
-//!    Conover 1979, doi 10.1080/00401706.1979.10489755), in one batch;
-//! 2. a descent from each of the best places whose cost is near that of the re-tuning. Where the cost has one valley there are none;
-//! 3. a descent over growing parts of the trials, from the place that fits their beginnings best: at the beginning of a trial phases are nearly
-//!    right, and every longer part goes on from where the last one ended. It goes on only as long as it leaves little of the gap: a
-//!    beginning that no parameters explain is not explained in the whole.
+//! 1. the costs at the parameters as shipped and at [`POINTS`] points of a Latin hypercube within
+//!    [`SPREAD`] tolerances (McKay, Beckman and Conover 1979, doi 10.1080/00401706.1979.10489755),
+//!    in one batch;
+//! 2. a descent from each of the best points whose cost is near that of the re-tuning, if any;
+//! 3. a descent over growing parts of the trials, from the point that fits their beginnings best:
+//!    see `StartSearch::grown`.
 //!
-//! A descent that ends [`LEARNT`] nats lower takes the place of the re-tuning.
+//! A descent that ends [`LEARNT`] nats lower replaces the re-tuning.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,24 +31,24 @@ use crate::{
     problem::{error::GapError, linked_stages::groups, sample_roles::Role, simulator::Model},
 };
 
-/// Places that are screened.
+/// Number of points whose cost is computed.
 const POINTS: usize = 10;
-/// Tolerances within which they lie.
+/// Tolerances within which the points lie.
 const SPREAD: f64 = 2.0;
-/// Places that a descent begins from, the best first.
+/// Largest number of points from which a descent begins, the best first.
 const DESCENTS: usize = 3;
-/// Times the cost of the re-tuning up to which the cost at a place is near it.
+/// Multiple of the re-tuning's cost up to which the cost at a point is near it.
 const NEAR: f64 = 2.0;
-/// Descents one after the other, each with its own sensitivities.
+/// Largest number of successive descents, each with new sensitivities.
 const ROUNDS: usize = 4;
-/// Parts of the trials that a descent grows over.
+/// Growing parts of the trials to which a descent is limited.
 const PARTS: [f64; 4] = [0.1, 0.2, 0.4, 0.7];
-/// Share of the gap of the re-tuning that such a descent may leave of a part.
+/// Share of the gap of the re-tuning that such a descent may leave on a part.
 const LEFT: f64 = 0.1;
-/// Share of the cost within which two descents ended alike.
+/// Relative difference in cost within which two descents count as the same end.
 const ALIKE: f64 = 0.01;
 
-/// How often re-tuning was begun, and how often it ended where the best one did.
+/// Number of starts of re-tuning, and how many of them ended at the best result.
 ///
 /// ```
 /// use stretch_gap::Starts;
@@ -58,15 +59,16 @@ const ALIKE: f64 = 0.01;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Starts {
-    /// Places within the tolerances from which parameters were re-tuned; 1 where no other place came near what was found from the parameters as
-    /// shipped, 0 in a diagnosis of an older version.
+    /// Number of points within the tolerances from which parameters were re-tuned. It is 1 if no
+    /// other point came near the result from the parameters as shipped, 0 in a diagnosis of an
+    /// older version.
     pub tried: usize,
-    /// How many of them ended where the best one did.
+    /// How many of them ended at the best result.
     pub agreed: usize,
 }
 
 impl Starts {
-    /// That the starts disagree, in words; `None` if they agree.
+    /// Returns a note that the starts disagree; `None` if they agree.
     pub fn note(&self) -> Option<String> {
         let Self { tried, agreed } = self;
         (agreed < tried).then(|| {
@@ -76,7 +78,7 @@ impl Starts {
         })
     }
 
-    /// Those of two groups of stages: the group whose starts disagree most.
+    /// Returns the starts of the one of two groups of stages whose starts disagree most.
     fn beside(self, other: Self) -> Self {
         let misses = |s: &Self| (s.tried - s.agreed, s.tried);
         if misses(&other) > misses(&self) { other } else { self }
@@ -84,7 +86,7 @@ impl Starts {
 }
 
 impl PreparedProblem<'_> {
-    /// The problem re-tuned from several places, where a gap of more than `least_gap` is left.
+    /// Returns the problem re-tuned from several points, if a gap of more than `least_gap` is left.
     pub(crate) fn retuned_from_starts(self, least_gap: f64, seed: u64) -> Result<Self, GapError> {
         if self.gap(&self.nominal) <= least_gap {
             return Ok(self);
@@ -96,7 +98,8 @@ impl PreparedProblem<'_> {
         })
     }
 
-    /// The problem re-tuned from the parameters of a set, where that ends lower: what they do without its effects is none of the effects'.
+    /// Returns the problem re-tuned from the parameters of a set, if that ends lower: what the
+    /// parameters explain without the effects of the set is not evidence for these effects.
     pub(crate) fn retuned_from(
         &self,
         set: &Hypothesis,
@@ -144,9 +147,10 @@ enum Places<'m> {
     At(&'m Model),
 }
 
-/// A model whose re-tuned parameters leave less than those of `nominal`, `None` if there is none; and how the starts agreed.
+/// Returns a model whose re-tuned parameters leave less than those of `nominal`, `None` if there is
+/// none, and how the starts agreed.
 ///
-/// Groups of stages whose gap is at most `least_gap` are left as they are.
+/// Groups without a stage whose gap counts, according to `counts`, are left as they are.
 fn better_start(
     compare: &Comparison<'_>,
     nominal: &Model,
@@ -167,7 +171,7 @@ fn better_start(
     Ok(((best != *nominal).then_some(best), starts))
 }
 
-/// Stages that are re-tuned together, and where their re-tuning ended.
+/// Stages that are re-tuned together, and the model at which their re-tuning ended.
 struct StartSearch<'a, 'b> {
     compare: &'a Comparison<'b>,
     group: &'a [usize],
@@ -175,7 +179,8 @@ struct StartSearch<'a, 'b> {
 }
 
 impl StartSearch<'_, '_> {
-    /// The model of a descent that ends lower, and how many ended there.
+    /// Returns the model of the lowest descent, if it ends lower than the re-tuning, and how many
+    /// descents ended there.
     fn best_end(&self, places: &Places<'_>) -> Result<(Option<Model>, Starts), GapError> {
         let mut models = vec![self.nominal.clone()];
         match places {
@@ -208,7 +213,9 @@ impl StartSearch<'_, '_> {
         Ok((lowest.filter(|end| found - end.cost > LEARNT).map(|end| end.model), starts))
     }
 
-    /// The parameters as shipped, and places of a Latin hypercube: of every parameter each of as many equal parts of its range holds one place.
+    /// Returns points of a Latin hypercube, and the parameters as shipped. In the hypercube, the
+    /// range of every parameter is divided into as many equal parts as there are points, and each
+    /// part holds one point.
     fn hypercube(&self, seed: u64) -> Vec<Model> {
         let free = coordinates(self.compare.simulator(), self.group, self.nominal);
         let mut random = RandomGenerator::new(seed, 71);
@@ -226,7 +233,8 @@ impl StartSearch<'_, '_> {
         models
     }
 
-    /// Costs of some models, each over the whole and over the beginning of the trials, in one batch; `None` if one cannot be simulated.
+    /// Computes the costs of some models over the whole and over the beginning of the trials, in
+    /// one batch; `None` for a model that cannot be simulated.
     fn costs(
         &self,
         models: &[Model],
@@ -240,7 +248,8 @@ impl StartSearch<'_, '_> {
         Ok(models.iter().zip(there).map(cost).collect())
     }
 
-    /// Where descents from a model end, one after the other as long as the cost falls; `None` if it cannot be simulated.
+    /// Repeats descents from a model as long as the cost falls; `None` if the model cannot be
+    /// simulated, or no more runs may be made.
     fn descended(
         &self,
         compare: &Comparison<'_>,
@@ -268,7 +277,10 @@ impl StartSearch<'_, '_> {
         Ok(best)
     }
 
-    /// Where a descent over growing parts of the trials ends; `None` if a part is left unexplained.
+    /// Descends over growing parts of the trials. At the beginning of a trial phases are nearly
+    /// right, and each longer part continues from the end of the previous one. `None` if a part
+    /// keeps more than `LEFT` of the re-tuning's gap: a beginning that no parameters explain is
+    /// not explained in the whole.
     fn grown(&self, mut model: Model) -> Result<Option<Fitted>, GapError> {
         let gap_of = |misfits: &[Misfit]| misfits.iter().map(|m| gap(m.fit)).sum::<f64>();
         let stages = self.group.iter().map(|stage| self.compare.residual(*stage, self.nominal));
@@ -286,7 +298,7 @@ impl StartSearch<'_, '_> {
     }
 }
 
-/// A comparison of which only the first part of every fitted segment is fitted.
+/// Returns a comparison in which only the first part of every fitted segment is fitted.
 fn first_part<'a>(compare: &Comparison<'a>, part: f64) -> Comparison<'a> {
     let mut roles = compare.roles.clone();
     for segment in roles.segments.iter_mut().filter(|s| s.role == Role::Fit) {

@@ -1,8 +1,10 @@
-//! Does a parameter that drifts swing? Compares a drift with a spectral line with the drift alone.
+//! Decides whether a drifting parameter swings, i.e. oscillates: compares a drift with a spectral
+//! line with the drift alone.
 //!
-//! A drift that is adapted to the record takes a swing of its parameter for a quick drift, so that no gap is left. What
-//! [cleaning](crate::fit::metric::Metric::clean) leaves of a residual r is V^-1 r, and V holds the adapted drift. The alternative hypothesis: in segment k the
-//! parameter swings with one frequency f and amplitude s, and a phase of the segment's own,
+//! A drift that is adapted to the recording absorbs a swing of its parameter as a fast drift, so
+//! that no gap is left. [Cleaning](crate::fit::metric::Metric::clean) turns a residual r into V^-1
+//! r, and V contains the adapted drift. In the alternative hypothesis, the parameter swings with
+//! one frequency f and amplitude s, and with a separate phase in each segment k:
 //!
 //! ```text
 //! a_k cos(2 pi f t) + b_k sin(2 pi f t),     a_k, b_k ~ N(0, s^2/2),     U_k = C (cos, sin) at the knots of the drift
@@ -10,10 +12,11 @@
 //! A_k = U_k' V^-1 U_k,     q_k = U_k' V^-1 r
 //! ```
 //!
-//! with V the larger, where the median |q|^2 of the frequencies around f is larger than it predicts: what another form of an effect leaves is no line
-//! (Rasmussen and Williams 2006, section 2.7; without a drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is the
-//! mean over amplitudes of a quarter to twice the drift and over all frequencies, of which those whose |q|^2 exceeds most that of
-//! their neighbours are computed and the others taken for 0, so that it errs to the side of the drift. The odds before the data are even.
+//! V is enlarged if the median |q|^2 around f is larger than V predicts, because the residual of
+//! another form of an effect is not a line (Rasmussen and Williams 2006, section 2.7; without a
+//! drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is averaged
+//! over amplitudes and over all frequencies. Only the strongest peaks are computed; all else counts
+//! as 0, which favours the drift. The prior odds are even.
 
 use std::f64::consts::TAU;
 
@@ -26,7 +29,7 @@ use crate::{
     problem::sample_roles::SampleRoles,
 };
 
-/// A parameter whose drift is rather a swing.
+/// A drifting parameter that may swing instead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Swing {
     /// Index of the parameter.
@@ -35,24 +38,25 @@ pub(crate) struct Swing {
     pub(crate) hertz: f64,
     /// Amplitude, in the parameter's unit.
     pub(crate) amplitude: f64,
-    /// Probability compared with that of the drift alone.
+    /// Probability of the swing, against the drift alone.
     pub(crate) probability: f64,
 }
 
 /// Amplitudes that are tried, as multiples of the drift's standard deviation.
 const AMPLITUDES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
-/// Knots that a turn has at least, and turns in the longest segment.
+/// Smallest number of knots in a period, and of periods in the longest segment.
 const KNOTS: f64 = 4.0;
 const TURNS: f64 = 2.0;
-/// Frequencies that are looked at, the slow ones first: all of a segment of five minutes.
+/// Largest number of frequencies, the slow ones first: enough for all of a segment of five minutes.
 const MOST: usize = 1500;
-/// Frequencies to either side that tell the usual power.
+/// Number of frequencies on either side from which the usual power is determined.
 const BESIDE: usize = 10;
-/// Peaks that are computed.
+/// Number of peaks, those with the most power over the usual one, at which B is computed.
 const PEAKS: usize = 6;
 
 impl Metric {
-    /// The likeliest swing of every parameter that drifts; `clean` is a residual over all segments, nuisances taken out.
+    /// Returns the most likely swing of every drifting parameter. `clean` is a residual over all
+    /// segments without nuisances.
     pub(crate) fn swings(&self, roles: &SampleRoles, clean: &[f64]) -> Vec<Swing> {
         let is_drift = |l: &&Loose| l.drift.is_some() && !l.is_by_tick && l.level.size > 0.0;
         let drifts = self.loose().iter().filter(is_drift);
@@ -65,7 +69,8 @@ impl Metric {
         drifts.enumerate().filter_map(one).collect()
     }
 
-    /// Frequency of the likeliest swing of one drift, its amplitude as a multiple of the drift's standard deviation, and its probability.
+    /// Returns the frequency of the most likely swing of one drift, its amplitude as a multiple of
+    /// the drift's standard deviation, and its probability.
     fn likeliest(
         &self,
         which: usize,
@@ -107,7 +112,7 @@ impl Metric {
             for amplitude in AMPLITUDES {
                 let precision = 2.0 / (amplitude * amplitude);
                 let factor: f64 = heard.iter().map(|h| h.ln_factor(precision)).sum();
-                // odds that no record exceeds stay finite
+                // keeps the odds finite
                 sum += factor.min(300.0).exp();
                 if best.as_ref().is_none_or(|(most, ..)| factor > *most) {
                     best = Some((factor, hertz, rms_amplitude(&heard, precision)));
@@ -126,7 +131,7 @@ fn usual(powers: &[f64], k: usize) -> f64 {
     beside[beside.len() / 2].max(f64::MIN_POSITIVE)
 }
 
-/// One segment as one of its drifts sees it.
+/// One segment, projected on one of its drifts.
 struct Part<'a> {
     nuisance: &'a Nuisance,
     which: usize,
@@ -145,7 +150,7 @@ impl<'a> Part<'a> {
         self.heard.len() as f64 * self.step_s
     }
 
-    /// q of the module's head; the waves may go on behind the segment.
+    /// q of the module's head. `waves` may be longer than the segment.
     fn q(&self, waves: &[Vec<f64>; 2]) -> [f64; 2] {
         [0, 1].map(|i| dot(&waves[i][..self.heard.len()], &self.heard))
     }
@@ -160,7 +165,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Cosine and sine at knots `turn` rad apart, each turned on from the one before.
+/// Returns cosine and sine at knots `turn` rad apart, by repeated rotation.
 fn waves(turn: f64, knots: usize) -> [Vec<f64>; 2] {
     let (sin, cos) = (libm::sin(turn), libm::cos(turn));
     let turned = |&(c, s): &(f64, f64)| Some((c * cos - s * sin, s * cos + c * sin));
@@ -168,14 +173,14 @@ fn waves(turn: f64, knots: usize) -> [Vec<f64>; 2] {
     [c, s]
 }
 
-/// What one segment says of a line: A (its upper triangle) and q of the module's head.
+/// Statistics of one segment for a line: A (its upper triangle) and q of the module's head.
 struct Heard {
     a: [f64; 3],
     q: [f64; 2],
 }
 
 impl Heard {
-    /// The same where the noise around the frequency is so many times as large as V predicts.
+    /// Returns the statistics if the noise around the frequency is `times` as large as V predicts.
     fn in_noise(self, times: f64) -> Self {
         Self { a: self.a.map(|a| a / times), q: self.q.map(|q| q / times) }
     }
@@ -186,7 +191,7 @@ impl Heard {
         (m, m[0] * m[2] - m[1] * m[1])
     }
 
-    /// Cosine and sine that are the likeliest: M^-1 q.
+    /// Returns the most likely amplitudes of cosine and sine: M^-1 q.
     fn likeliest(&self, precision: f64) -> [f64; 2] {
         let ([a, b, d], det) = self.with(precision);
         let [x, y] = self.q;
@@ -201,7 +206,8 @@ impl Heard {
     }
 }
 
-/// Root mean square over segments of the likeliest amplitude, each weighed by its information.
+/// Returns the root mean square over segments of the most likely amplitude, each weighted by its
+/// information.
 fn rms_amplitude(heard: &[Heard], precision: f64) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for own in heard {
@@ -228,7 +234,8 @@ mod tests {
     const TRIAL: usize = 2000;
     const TRIALS: usize = 8;
 
-    /// What is found of a parameter that drifts, by the described size and a correlation time, and swings at 0.7 Hz with an amplitude in multiples of the drift.
+    /// Returns what is found for a parameter that drifts by the described size and with a
+    /// correlation time, and swings at 0.7 Hz with an amplitude in multiples of the drift.
     fn found(seed: u64, time_s: f64, amplitude: f64) -> Swing {
         let mut random = RandomGenerator::new(seed, 0);
         let samples = TRIAL * TRIALS;

@@ -1,14 +1,16 @@
 //! Describes how a residual that no recorded signal explains behaves in time: its time stamps
 //! jitter, it swings, jumps or drifts.
 //!
-//! With a residual r in multiples of the noise, over stretches without a break:
+//! The residual r of N samples is in multiples of the noise, over stretches without a break. A
+//! course has to explain at least half of the power above the noise, sum r^2 - N; jumps, at least
+//! half of that of the changes d_i = r_(i+1) - r_i, sum d^2 - 2 N. The first that does is reported:
 //!
-//! | course | holds when | numbers |
+//! | course | explained part | numbers |
 //! | --- | --- | --- |
-//! | jitters | noise that follows the rate is the likeliest, and takes half of what is above the noise: [`jitter`](super::jitter) | standard deviation of the time |
-//! | swings | sines of one frequency f, of any phase in each stretch, take half of what is above the noise: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 >= (sum r^2 - N)/2 | f, and the amplitude |
-//! | jumps | changes d_i = r_i+1 - r_i of more than six noises hold half of what is above theirs: sum d_i^2 >= (sum d^2 - 2 N)/2 | how many a second, and their root mean square |
-//! | drifts | else | root mean square, and the time after which it is forgotten: its autocorrelation has fallen to 1/e |
+//! | jitters | noise that follows the rate, if it is the most likely: [`jitter`](super::jitter) | standard deviation of the time |
+//! | swings | sines of one frequency f, of any phase in each stretch: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 | f, and the amplitude |
+//! | jumps | changes of more than six noises: sum of their d_i^2 | how many a second, and their root mean square |
+//! | drifts | the rest, if no other course does | root mean square, and the time after which the autocorrelation has fallen to 1/e |
 
 use std::f64::consts::TAU;
 
@@ -17,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::missing::{jitter::jitter_sd_s, proposed::three_digits};
 
-/// Share of what exceeds the noise that makes a course.
+/// Share of what exceeds the noise that a course has to explain.
 const SHARE: f64 = 0.5;
 /// A change of this many multiples of the noise is a jump: chance makes one of 3e4 samples in a
 /// thousand records.
@@ -158,7 +160,8 @@ fn jumps(stretches: &[&[f64]], noise: f64, dt_s: f64) -> Option<Course> {
     })
 }
 
-/// Samples after which the autocorrelation has fallen to 1/e of that at one sample, which holds no white noise.
+/// Returns the lag, in samples, at which the autocorrelation has fallen to 1/e of that at a lag of
+/// one sample, which contains no white noise.
 fn forgotten_after(stretches: &[&[f64]]) -> usize {
     let product = |lag: usize| -> f64 {
         let long = stretches.iter().filter(|s| s.len() > lag);
@@ -168,7 +171,7 @@ fn forgotten_after(stretches: &[&[f64]]) -> usize {
     let least = product(1) / std::f64::consts::E;
     let mut lag = 1;
     while lag < longest && product(lag) > least {
-        // Every lag as long as they are few, then in steps of a twentieth.
+        // Every lag up to 20, then in steps of a twentieth of the lag.
         lag += 1 + lag / 20;
     }
     lag
@@ -181,7 +184,7 @@ mod tests {
 
     const DT_S: f64 = 0.01;
 
-    /// A course, in multiples of a white noise of 1 that is added to it.
+    /// Returns a course plus white noise of standard deviation 1.
     fn beside_noise(course: impl Fn(usize) -> f64, seed: u64) -> Vec<f64> {
         let mut random = RandomGenerator::new(seed, 0);
         (0..12_000).map(|i| course(i) + random.gauss()).collect()

@@ -17,12 +17,12 @@
 //! | by level | a + b (y - mean)^2: a sensor whose noise grows with its value |
 //! | jitter | a + b g |
 //!
-//! e is Student's t of 3, 10 or so many degrees of freedom that it is Gaussian, in all three, so
-//! that a few jumps do not count as scale (Lange, Little and Taylor 1989, doi
+//! In all three, e follows Student's t with 3, 10 or 1e6 (Gaussian) degrees of freedom, so that a
+//! few jumps do not count as scale (Lange, Little and Taylor 1989, doi
 //! 10.1080/01621459.1989.10478852). The second parameter costs half of ln n. Jitter is accepted if
-//! it is the most likely cause and if it explains as large a share of the residual beyond the noise as a
-//! [course in time](super::course) has to explain. Errors of samples that are late, or wrong whenever the signal moves,
-//! are predicted by the previous sample and leave little in e.
+//! it is the most likely cause and if it explains as large a share of the residual beyond the noise
+//! as a [course in time](super::course) has to explain. Errors of samples that are late, or wrong
+//! whenever the signal moves, are predicted by the previous sample and leave little in e.
 
 use crate::missing::{
     coloured::{autoregression, innovations},
@@ -34,8 +34,8 @@ const DEGREES: [f64; 3] = [3.0, 10.0, 1e6];
 /// Logarithms of b over a at the mean of the regressor: jitter from a hundredth of the noise's
 /// variance to a million times it.
 const RATIOS: [f64; 2] = [-4.6, 13.8];
-/// Steps of a golden section over them, which leave a hundredth, and of the scale's fixed-point
-/// iteration.
+/// Steps of a golden section over these logarithms, which determine them to a hundredth, and steps
+/// of the fixed-point iteration of the scale.
 const SECTIONS: usize = 16;
 const ROUNDS: usize = 12;
 /// Fewest samples for a comparison: a scale, a slope, and the weights of the past have to be

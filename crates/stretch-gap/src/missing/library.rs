@@ -1,5 +1,5 @@
-//! The library: every term that a stage may lack, written from physics before any of the cases that
-//! it is judged on.
+//! The library: every term that a stage may lack. It was written from physics, before any of the
+//! cases by which it is evaluated.
 //!
 //! | kind | terms of a state x with rate v | describes |
 //! | --- | --- | --- |
@@ -8,9 +8,9 @@
 //! | memory | x - play, x - lag, late x, way since a turn, greatest x; times x and the motion | backlash, relaxation, delay, hysteresis, damage |
 //! | slow | lags of what was dissipated, travel, time in the trial, session; times x | warming, wear, drift |
 //! | crossing | one signal's x times another's x, v, memory | coupling |
-//! | commands | an opening, its lag, times x; as a rate that openings forget | valves, supply |
+//! | commands | an opening, its lag, times x; as a rate that leaks through the openings | valves, supply |
 //!
-//! The constants of the nominal simulator remove the part of a term that they could explain, so
+//! The parts of a term that parameters of the nominal simulator could explain are projected out, so
 //! terms need not be centred.
 
 use crate::missing::{
@@ -29,11 +29,11 @@ use RateForm::{Linear, Magnitude, Rising, Sign, SignedRoot, SignedSquare, Square
 const WIDTHS: [f64; 5] = [0.015, 0.04, 0.1, 0.2, 0.4];
 /// Quantiles at which knees lie.
 const QUANTILES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// Waves over the range.
+/// Periods of waves over the range.
 const TURNS: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 /// Delays, in samples.
 const DELAYS: [f64; 4] = [2.0, 5.0, 12.0, 30.0];
-/// Time constants of a session, in equal ratios from three samples to the longest fitted trial.
+/// Number of time constants, in equal ratios from three samples to the longest fitted trial.
 const TIMES: usize = 8;
 /// Travel, in ranges, over which something wears in.
 const WEAR: [f64; 2] = [2.0, 8.0];
@@ -246,7 +246,8 @@ impl Shelf<'_> {
         }
     }
 
-    /// Terms that act in the rate of an output that openings forget: the output is its integral.
+    /// Adds terms that act in the rate of an output. The output is their integral, which leaks in
+    /// proportion to the openings.
     fn rates(&mut self, states: &[usize], commands: &[usize]) {
         let mut sources = vec![Vec::new(), vec![Session { power: 1.0 }], vec![Time { power: 1.0 }]];
         for &s in states {

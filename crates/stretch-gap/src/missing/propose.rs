@@ -1,4 +1,4 @@
-//! From what a model leaves to what is proposed.
+//! Proposes a sum of terms for what a model leaves.
 
 use crate::missing::{
     coloured::odds,
@@ -17,34 +17,35 @@ use crate::{
     },
 };
 
-/// Steps of Gauss and Newton with a whole run of the moved model.
+/// Gauss-Newton steps, each with a whole run of the moved model.
 const STEPS: usize = 2;
 
-/// A sum at the model that was moved with it.
+/// A sum of terms, fitted together with the parameters of the model.
 struct Estimated {
     model: Model,
     coefficients: Vec<f64>,
     sd: Vec<f64>,
     cost: f64,
-    /// Residual of the moved model with the sum taken out.
+    /// Residual of the moved model minus the sum.
     left: Column,
 }
 
-/// A sum of terms in the place of what is missing.
+/// A sum of terms for what is missing.
 pub(crate) struct Proposal {
     pub(crate) told: Proposed,
     /// The stage that it acts in.
     pub(crate) stage: usize,
     /// Misfits of all stages with it.
     pub(crate) misfits: Vec<Misfit>,
-    /// Terms that were to choose from.
+    /// Number of terms in the library.
     pub(crate) library: usize,
 }
 
 /// Proposes what is missing in the stage with most of a hypothesis's gap; `None` if no stage has
 /// one.
 ///
-/// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is reported.
+/// Everything is chosen and fitted without the test trials. These are read at the end, for the
+/// reported share.
 pub(crate) fn propose(
     problem: &PreparedProblem<'_>,
     base: &Hypothesis,
@@ -72,21 +73,22 @@ pub(crate) fn propose(
     Ok(Some(Proposal { told, stage, misfits, library: sum.library }))
 }
 
-/// What the samples held out say of a sum.
+/// Evaluation of a sum on the held-out samples.
 struct Weighed {
-    /// ln of the odds that the rest is a function of what was recorded.
+    /// ln of the odds that the residual is a function of what was recorded.
     log_odds: f64,
     /// Whether the sum is that function.
     stands: bool,
     /// Shares of the gap that the sum closes and that many terms predict.
     closes: f64,
     predicted: f64,
-    /// How the residual goes in time, where it is no function of what was recorded.
+    /// Course of the residual in time, if it is not a function of what was recorded.
     course: Option<Course>,
 }
 
-/// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
-/// chosen few see alone was chosen by chance.
+/// Evaluates a sum on the held-out samples. Many terms at once decide whether the residual is a
+/// function of what was recorded at all, and the sum, whether it is that function. The few terms of
+/// the sum could have been chosen by chance.
 fn weigh(
     residue: &Residue<'_>,
     choice: &SampleRoles,
@@ -100,7 +102,7 @@ fn weigh(
         values
     };
     let (alone, beside) = (clean(&residue.residual), clean(&estimated.left));
-    // A function has one term of the library at least.
+    // A function has at least one term of the library.
     let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);
     let stands = log_odds > 0.0
         && !sum.terms.is_empty()
@@ -130,7 +132,7 @@ fn weigh(
     })
 }
 
-/// A proposal as it is reported.
+/// Returns a proposal as it is reported.
 fn proposed(
     residue: &Residue<'_>,
     sum: &Sum,
@@ -178,9 +180,10 @@ fn closed(before: f64, after: f64, samples: usize) -> f64 {
     if gap(before) > 0.0 { 1.0 - gap(after).max(0.0) / gap(before) } else { 0.0 }
 }
 
-/// Fits parameters and coefficients to the fitted samples, whole runs instead of lines where that is better.
+/// Fits parameters and coefficients to the fitted samples. Linearised changes are replaced by whole
+/// runs as long as these lower the cost.
 fn estimate(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum) -> Result<Estimated, GapError> {
-    // What was held out for the choice alone is fitted now.
+    // Trials that were held out only for the choice of terms are fitted now.
     let roles = match choice.count(Role::Held) == residue.roles().count(Role::Held) {
         true => choice,
         false => residue.roles(),
@@ -201,7 +204,7 @@ fn estimate(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum) -> Result<Es
         let residual = match residue.compare.residual(residue.stage, &model) {
             Ok(residual) => residual,
             Err(error) if error.ends_all() => return Err(error),
-            // Values that cannot be simulated: it stays where it was.
+            // The moved model cannot be simulated: keep the previous one.
             Err(_) => break,
         };
         let (next_products, next) = at(&model, &residual);
@@ -261,8 +264,9 @@ fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Resul
     Ok(closed(before, square(values), roles.count(Role::Test)))
 }
 
-/// The sum of terms that closes what the best set leaves where the set has `names`, else what the re-tuned nominal leaves, which may be `known`
-/// already; none that closes less than nothing of the trials that were not fitted.
+/// Proposes a sum of terms for what is left: by the best set if this set has `names`, otherwise by
+/// the re-tuned nominal simulator, for which the proposal may be `known` already. A sum that closes
+/// nothing on the test trials is dropped.
 pub(crate) fn propose_for(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

@@ -12,7 +12,8 @@ use crate::missing::{
 /// A signal of a proposal and its scale: x = (signal - offset)/scale, v = (dx/dt)/`rate_per_s`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SignalScale {
-    /// Column; the stage's own channel means the simulator's output before the terms.
+    /// Name of the column. For the stage's own channel, the signal is the simulator's output before
+    /// the terms are added.
     pub name: String,
     /// Unit of offset and scale.
     pub unit: String,
@@ -22,14 +23,14 @@ pub struct SignalScale {
     pub scale: f64,
     /// dx/dt at v = 1, 1/s.
     pub rate_per_s: f64,
-    /// Whether it is a command. Terms that leak do so by the sum of commands.
+    /// Whether it is a command. Terms that leak do so in proportion to the sum of commands.
     pub is_command: bool,
 }
 
 /// One term with its coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProposedTerm {
-    /// The term in words of the equation, dimensionless.
+    /// The term as it is written in the equation, dimensionless.
     pub name: String,
     /// Coefficient.
     pub coefficient: f64,
@@ -43,8 +44,8 @@ pub struct ProposedTerm {
 
 /// A sum of terms that the simulator and the catalogue lack, or the statement that none was found.
 ///
-/// The sum can be computed from these fields alone: `channel += sum coefficient form`, memories at
-/// rest at the start of every trial.
+/// The sum can be computed from these fields alone: `channel += sum coefficient form`, with
+/// memories at rest at the start of every trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Proposed {
     /// Stage with most of the remaining gap.
@@ -219,10 +220,10 @@ pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
     }
 }
 
-/// The sentence.
+/// Summarises a proposal in one sentence.
 pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
     let Proposed { stage, channel, equation, closes_test, .. } = proposed;
-    // The equation explains its letters.
+    // Leave out the definitions of the letters, which follow the semicolon.
     let equation = equation.split(';').next().unwrap_or_default();
     match (proposed.random, proposed.terms.is_empty()) {
         (true, _) => {

@@ -1,4 +1,5 @@
-//! Records drawn in the space of a few effects, and how often the rule of the verdict names one of them.
+//! Draws recordings in the space of the changes by a few effects, and counts how often the rule of
+//! the verdict names one of these effects.
 
 use nalgebra::DMatrix;
 
@@ -39,7 +40,7 @@ const ALIKE: f64 = 0.3;
 /// Parts of the record: fitted, held out, test.
 const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
 
-/// One stage in the space of some probes.
+/// One stage in the space of the changes of some probes.
 struct Place {
     stage: usize,
     /// Products u_i'V^-1 u_j by role.
@@ -47,44 +48,45 @@ struct Place {
     /// Products over the fitted samples with which the fit weighs amplitudes, including the prior
     /// cost of the nominal parameters.
     weighed: DMatrix<f64>,
-    /// Variance of the noise relative to its description, and its memory.
+    /// Variance of the noise relative to its estimate, and its autocorrelation sums.
     noise: f64,
     noise_lags: Lags,
     /// Draws of u'V^-1 n by role, and of |n|^2/N - 1.
     draws: Vec<[Vec<f64>; 3]>,
     squares: Vec<[f64; 3]>,
-    /// Noise as it is taken in excesses where an effect of this stage is the best.
+    /// Variance of the noise to which excesses are relative: `noise`, but at most 1.
     level: f64,
 }
 
-/// Records like the one at hand, in which one effect is missing.
+/// Random recordings like the measured one, from a rig with one effect that the simulator lacks.
 pub(super) struct Record<'a> {
     inputs: LimitInputs<'a>,
     probes: &'a Probes,
     /// The effect's own probe first, then those of the effects that can replace it.
     against: Vec<usize>,
     places: Vec<Place>,
-    /// Of the effect's own change in each stage that it touches.
+    /// The effect's own change in each stage in which it acts.
     own: Vec<Shown>,
     /// Samples by role.
     samples: [f64; 3],
 }
 
-/// How the effect's own change shows in one stage.
+/// Statistics of the effect's own change in one stage.
 struct Shown {
     stage: usize,
     octaves: Octaves,
     lags: Lags,
 }
 
-/// A hypothesis for one drawn record: the re-tuned nominal simulator, alone or with one effect.
+/// A hypothesis fitted to one drawn recording: the re-tuned nominal simulator with one effect.
 struct Drawn {
-    /// Which of the probes.
+    /// Index in `Record::against`.
     at: usize,
     standing: Standing,
-    /// Share of the gap of the test trials that closes.
+    /// Share of the gap on the test trials that the effect closes.
     closed: f64,
-    /// Reduction of the squares of the fitted samples, in nats as a screen promises them.
+    /// Half the reduction of the sum of squares over the fitted samples, to compare effects as a
+    /// screen does.
     gain: f64,
     is_accepted: bool,
 }
@@ -115,10 +117,10 @@ impl<'a> Record<'a> {
         Self { inputs, probes, against, places, own, samples }
     }
 
-    /// Whether the effect is named in as many of the drawn records as a limit requires, if it acts
-    /// with an amplitude.
+    /// Whether the effect, acting with an amplitude, is named in as many of the drawn recordings as
+    /// a detection limit requires.
     pub(super) fn names(&self, amplitude: f64) -> bool {
-        // The octaves depend only on its size.
+        // This criterion depends only on the amplitude, not on the draw.
         if self.rise(amplitude) <= self.inputs.thresholds.rise {
             return false;
         }
@@ -147,7 +149,8 @@ impl<'a> Record<'a> {
         place.noise_lags.per_observation(change, self.inputs.problem.compare.roles.block)
     }
 
-    /// Whether the effect is named in one drawn record; a share if a tie is decided by a coin.
+    /// Returns 1 if the effect is named in one drawn recording and 0 if it is not. If several sets
+    /// are equally probable, returns the share of these that the effect has.
     fn named(&self, draw: usize, amplitude: f64, memory: &[f64]) -> f64 {
         let (thresholds, catalogue) =
             (self.inputs.thresholds, self.inputs.problem.simulator().effects());
@@ -183,14 +186,14 @@ impl<'a> Record<'a> {
         if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
             return 0.0;
         }
-        // A coin decides between equally probable sets.
+        // Of equally probable sets, each would be named equally often.
         let even = most_probable(sets);
         let own = self.probes.all[self.against[0]].effect;
         let is_own = |i: &&usize| effect(weighed[**i]) == own;
         even.iter().filter(is_own).count() as f64 / even.len().max(1) as f64
     }
 
-    /// One effect fitted to a drawn record.
+    /// Fits one effect to a drawn recording.
     fn drawn(
         &self,
         draw: usize,
@@ -248,7 +251,8 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Reduced chi-square by place and role, with an amplitude of one probe fitted.
+    /// Returns the reduced chi-square by stage and role. `fitted` is a probe with its fitted
+    /// amplitude.
     fn left(&self, draw: usize, amplitude: f64, fitted: Option<(usize, f64)>) -> Vec<[f64; 3]> {
         let one = |place: &Place| {
             std::array::from_fn(|role| {
@@ -264,7 +268,7 @@ impl<'a> Record<'a> {
         self.places.iter().map(one).collect()
     }
 
-    /// The gap, the larger of those on fitted and test trials.
+    /// Returns the gap: the larger of those on fitted and test trials.
     fn gap(&self, left: &[[f64; 3]]) -> f64 {
         let compare = &self.inputs.problem.compare;
         let looked = self.places.iter().zip(left).map(|(p, x)| {
@@ -276,7 +280,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The probe and those that can replace it, the most similar first. Of the probes of its own effect only the first is taken.
+/// Returns the probe, then those of other effects that can replace it, the most similar first.
 fn against(inputs: LimitInputs<'_>, probes: &Probes, own: usize) -> Vec<usize> {
     let compare = &inputs.problem.compare;
     let product = |a: &Probe, b: &Probe| -> f64 {
@@ -338,7 +342,7 @@ impl Place {
         let noise = compare.mean_square(&inputs.best.misfits[stage]).max(f64::MIN_POSITIVE);
         let noise_lags = probes.noise_lags(stage).clone();
         let memory = noise_lags.per_observation(None, compare.roles.block);
-        // Correlated noise counts by its slow part.
+        // Noise is correlated: `memory` of its samples count as one.
         let scale = (noise * memory).sqrt();
         let factors: Vec<Cholesky> =
             [&weighed, &gram[1], &gram[2]].map(|g| Cholesky::of(g.clone())).into();

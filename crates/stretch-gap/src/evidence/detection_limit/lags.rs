@@ -1,25 +1,27 @@
-//! How many samples count as one observation if a change is part of the residual.
+//! Computes how many samples count as one observation of a residual's mean square if the change by
+//! an effect is added to the residual.
 //!
-//! The sum of [`samples_per_observation`](crate::fit::score::samples_per_observation) over the
-//! first lags and every fourth of the others, which represents its neighbours. Products of noise
-//! and of a change that is independent of it add up.
+//! This is the sum of [`samples_per_observation`](crate::fit::score::samples_per_observation) over
+//! the first lags and every fourth of the later ones, which represents its neighbours.
+//! Autocorrelation sums of noise and of a change that is independent of it add up.
 
 use crate::{fit::comparison::Comparison, numerics::linear::dot, problem::sample_roles::Role};
 
-/// Number of lags that are all summed, and the distance of the others.
+/// Number of first lags that are all summed, and the spacing of the later ones.
 const EACH: usize = 8;
 const APART: usize = 4;
 
-/// Sums over the fitted samples of products with so many samples between them.
+/// Autocorrelation sums of a signal over the fitted samples, by lag.
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
     square: f64,
-    /// Number of lags that it represents, and the sum.
+    /// By lag: the number of lags that it represents, and the sum of products.
     sums: Vec<(f64, f64)>,
 }
 
 impl Lags {
-    /// Of a residual in multiples of the noise, cleaned of nuisances, up to two blocks.
+    /// Computes the sums of a residual in multiples of the noise, without nuisances, up to a lag of
+    /// two blocks.
     pub(super) fn of(compare: &Comparison<'_>, clean: &[f64]) -> Self {
         let parts = || compare.roles.of_role(Role::Fit).map(|s| &clean[s.from..s.to]);
         let product = |lag: usize| -> f64 {
@@ -33,8 +35,8 @@ impl Lags {
         Self { square: product(0), sums: each.chain(far).collect() }
     }
 
-    /// Samples that count as one observation, with a change of so many times the amplitude added;
-    /// at most a block.
+    /// Returns the number of samples that count as one observation, at most a block. `change` holds
+    /// the sums of a change that is added, and the factor on its amplitude.
     pub(super) fn per_observation(&self, change: Option<(&Self, f64)>, block: usize) -> f64 {
         let more = change.map_or(0.0, |(c, amplitude)| amplitude * amplitude * c.square);
         let power = (self.square + more).max(f64::MIN_POSITIVE);

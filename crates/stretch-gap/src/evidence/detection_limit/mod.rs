@@ -19,8 +19,9 @@
 //! 0.9.
 //!
 //! An effect's other parameters have the values of the start from which it is detected most easily.
-//! Alternatives are taken at each of their starts. A kink bends the change; therefore a limit far
-//! from its probe is probed again, and p comes from the last two probes.
+//! Alternatives are taken at up to two of their starts. The power law holds only near the probe (an
+//! effect may have a kink). Therefore a limit far from its probe is probed again, and p comes from
+//! the last two probes.
 
 mod draws;
 mod lags;
@@ -42,12 +43,12 @@ use crate::{
     search::selection::Looked,
 };
 
-/// Halvings of the ratio within which a limit is bracketed: to a part in a hundred.
+/// Bisection steps once a limit is bracketed within a ratio: they determine it to 1 %.
 const HALVINGS: usize = 6;
 /// Strengths below this share of the range are not tried.
 const LEAST: f64 = 1e-6;
-/// Share of the range within which a limit lies, and the ratio of the strengths that are tried
-/// around a probe.
+/// Share of the range within which a limit is searched, and the ratio of successive strengths that
+/// are tried to bracket it.
 const INSIDE: f64 = 0.99;
 const STEP: f64 = 1.5;
 /// Ratio of a limit to its probe beyond which it is probed again, and how often at most.
@@ -93,8 +94,8 @@ pub(crate) struct LimitInputs<'a> {
 }
 
 /// The detection limit of every effect of the catalogue, in its order, except effects whose course
-/// is found in the record, because these have no strength. `looked` is a screen around the re-tuned
-/// nominal simulator, if there is one.
+/// in time is estimated from the recording, because these have no strength. `looked` is a screen
+/// around the re-tuned nominal simulator, if there is one.
 pub(crate) fn detection_limits(
     inputs: LimitInputs<'_>,
     looked: Option<&Looked>,
@@ -143,7 +144,8 @@ fn limits(inputs: LimitInputs<'_>, probes: &Probes) -> Result<Vec<Option<f64>>, 
     (0..count).into_par_iter().map(|effect| limit(inputs, probes, effect)).collect()
 }
 
-/// Bisection of the strength, in equal ratios, with the same draws at every strength.
+/// Finds the detection limit of an effect by bisection of the logarithm of its strength, with the
+/// same draws at every strength. `None` if the effect would not be named within its range.
 fn limit(inputs: LimitInputs<'_>, probes: &Probes, effect: usize) -> Result<Option<f64>, GapError> {
     let Some(own) = probes.first(effect) else { return Ok(None) };
     if (inputs.problem.stop())() {
@@ -151,7 +153,7 @@ fn limit(inputs: LimitInputs<'_>, probes: &Probes, effect: usize) -> Result<Opti
     }
     let record = Record::of(inputs, probes, own);
     let probe = &probes.all[own];
-    // At the very end of its range an effect rather compensates for something else.
+    // At the very end of its range, an effect is more likely to compensate for something else.
     let end = INSIDE * probe.reach;
     let (mut low, mut high) = (0.0, probe.distance.abs().min(end));
     while !record.names(probe.amplitude(high)) {

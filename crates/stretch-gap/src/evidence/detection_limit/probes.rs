@@ -1,4 +1,5 @@
-//! Probes: what each effect changes at a strength near its limit, the nominal parameters projected out.
+//! Probes: the change of the output by each effect at a strength near its detection limit, with the
+//! nominal parameters projected out.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -19,18 +20,19 @@ use crate::{
     search::{screen::Ground, selection::Looked},
 };
 
-/// Starts of one effect that are probed: the easiest, and others for what it may pose as.
+/// Number of starts per effect that are probed: the one that is easiest to detect, and another at
+/// which the effect may resemble a different effect.
 const STARTS: usize = 2;
-/// Smallest and largest power of the strength that is estimated from two probes.
+/// Smallest and largest exponent of the strength that is estimated from two probes.
 const POWERS: [f64; 2] = [0.5, 60.0];
 
-/// Where an effect is probed.
+/// Parameter values at which an effect is probed.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     pub(super) values: Vec<f64>,
-    /// Index of the parameter that says how strong the effect is.
+    /// Index of the parameter that is the strength of the effect.
     pub(super) main: usize,
-    /// Power of the strength with which the squared change grows.
+    /// Exponent with which the squared change grows with the strength.
     power: f64,
 }
 
@@ -38,15 +40,16 @@ pub(super) struct Start {
 pub(super) struct Probe {
     pub(super) effect: usize,
     pub(super) start: Start,
-    /// Signed distance of the strength from where it is off, and the greatest one in its range.
+    /// Signed distance of the strength from the value at which the effect is off, and the largest
+    /// distance within its range on the same side.
     pub(super) distance: f64,
     pub(super) reach: f64,
     off: f64,
-    /// Amplitudes that a fit may give it, as multiples of the probe.
+    /// Range of the amplitude in a fit, as multiples of the probe's change.
     pub(super) range: [f64; 2],
-    /// What the score charges for it, nats.
+    /// Penalty of the effect in the score, nats.
     pub(super) price: f64,
-    /// By stage that it touches: the projected change.
+    /// Projected changes of the stages in which the effect acts.
     pub(super) changes: Vec<Change>,
 }
 
@@ -54,12 +57,13 @@ pub(super) struct Probe {
 pub(super) struct Change {
     pub(super) stage: usize,
     pub(super) column: Column,
-    /// Shifts of the nominal parameters that it is projected with, in tolerances.
+    /// Shifts of the nominal parameters that the projection subtracts, in tolerances.
     pub(super) shifts: Vec<f64>,
 }
 
 impl Probe {
-    /// Multiple of the probe's change at a distance from where the effect is off.
+    /// Returns the change as a multiple of the probe's change, at a distance of the strength from
+    /// where the effect is off.
     pub(super) fn amplitude(&self, distance: f64) -> f64 {
         (distance / self.distance.abs()).powf(0.5 * self.start.power)
     }
@@ -70,19 +74,21 @@ impl Probe {
         self.changes.iter().map(one).sum()
     }
 
-    /// Value of the main parameter at a distance.
+    /// Returns the strength at a distance from where the effect is off.
     pub(super) fn strength(&self, distance: f64) -> f64 {
         self.off + distance * self.distance.signum()
     }
 }
 
-/// Power of the strength with which a squared change grows from one to another, at a ratio of the strengths.
+/// Estimates the exponent with which the squared change grows with the strength, from two squared
+/// changes and the ratio of their strengths.
 fn power_of(size: f64, other: f64, ratio: f64) -> f64 {
     let power = (other / size).ln() / ratio.abs().ln();
     if power.is_finite() { power.clamp(POWERS[0], POWERS[1]) } else { 2.0 }
 }
 
-/// Squared change <d,d> of every start of every effect around the re-tuned nominal over the fitted samples.
+/// Returns the squared change <d,d>, over the fitted samples, that each start of each effect makes
+/// around the re-tuned nominal simulator.
 pub(super) fn sizes(
     problem: &PreparedProblem<'_>,
     looked: Option<&Looked>,
@@ -103,7 +109,8 @@ pub(super) fn sizes(
     effects.par_iter().enumerate().map(size).collect()
 }
 
-/// The main parameter of a start, its distance from where it is off: the first strength that is on.
+/// Returns the index of the main parameter of a start, the first strength that is not off, and its
+/// distance from where it is off.
 fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
     let mut strengths = spec.parameters.iter().zip(values).enumerate();
     strengths.find_map(|(i, (p, value))| {
@@ -112,9 +119,9 @@ fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
     })
 }
 
-/// Starts of an effect at which a change is visible, one for each value of its other parameters,
-/// the easiest to detect first. Each is moved to the strength at which it may be detected; `sizes`
-/// are those of [`sizes`].
+/// Returns the starts of an effect at which it changes the output, one for each combination of its
+/// other parameters, the easiest to detect first, at most `STARTS`. Unless runs are costly, each
+/// is moved to the strength at which the effect may be detected. `sizes` are those of [`sizes`].
 pub(super) fn easiest(
     problem: &PreparedProblem<'_>,
     effect: usize,
@@ -122,7 +129,8 @@ pub(super) fn easiest(
     inputs: LimitInputs<'_>,
 ) -> Vec<Start> {
     let spec = &problem.simulator().effects()[effect];
-    // A gap that counts in the mean: where its size alone decides, the limit lies there.
+    // Squared change of the smallest gap that counts. If the size of the gap alone decides, the
+    // limit is there.
     let target = inputs.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
     let is_costly = problem.simulator().model_runs().is_some();
     let mut known: Vec<(usize, f64, f64, &Vec<f64>)> = Vec::new();
@@ -140,16 +148,17 @@ pub(super) fn easiest(
         };
         let parameter = &spec.parameters[main];
         let off = parameter.off().unwrap_or(0.0);
-        // Of a strength of either sign one side does: a fit turns the sign.
+        // Probe only positive values of a strength of either sign; the fit can flip the sign.
         if distance < 0.0 && off == 0.0 && parameter.max > 0.0 {
             continue;
         }
-        // The start of each family whose change is nearest to the target.
+        // Of starts that differ only in the strength, keep the one whose change is nearest to the
+        // target.
         let near = |size: f64| (size / target).ln().abs();
         if known.iter().filter(alike).any(|k| near(k.2) < near(size)) {
             continue;
         }
-        // Below the weakest start a change is as a rule linear.
+        // Below the weakest start, the change is usually linear.
         let weakest = known.iter().filter(alike).all(|k| k.1.abs() >= distance.abs());
         let other = known.iter().filter(alike).find(|k| k.1 != distance);
         let other = other.filter(|_| off != 0.0 || !weakest || size < target);
@@ -160,7 +169,8 @@ pub(super) fn easiest(
         if !is_costly && moved != off {
             start.values[main] = moved;
         }
-        // With another form than the usual one an effect may act where its strength is off.
+        // An effect of an unusual form may act although its strength is off, so such starts come
+        // last.
         let forms = spec.parameters.iter().zip(values);
         let is_odd =
             forms.into_iter().any(|(p, v)| p.usual_form().is_some_and(|usual| usual != *v));
@@ -170,17 +180,18 @@ pub(super) fn easiest(
     found.into_iter().take(STARTS).map(|(_, start)| start).collect()
 }
 
-/// Every probe, and what they are projected off.
+/// All probes, and the stages whose nominal parameters are projected out.
 pub(super) struct Probes {
     pub(super) all: Vec<Probe>,
     trials: usize,
     stages: Vec<TunedStage>,
-    /// By stage: how what is taken for noise is remembered.
+    /// By stage: autocorrelation sums of the residual that is taken for noise.
     noise_lags: Vec<Lags>,
 }
 
 impl Probes {
-    /// Runs every start over all trials, in one batch; over the fitted ones where each run costs.
+    /// Runs every start in one batch: over all trials, or only over the fitted ones if runs are
+    /// costly.
     pub(super) fn of(
         problem: &PreparedProblem<'_>,
         best: &Hypothesis,
@@ -218,17 +229,18 @@ impl Probes {
         roles.of_role(Role::Test).all(|s| s.to <= end)
     }
 
-    /// How what is taken for noise is remembered.
+    /// Returns the autocorrelation sums of the residual of a stage that is taken for noise.
     pub(super) fn noise_lags(&self, stage: usize) -> &Lags {
         &self.noise_lags[stage]
     }
 
-    /// The probe of an effect that its own limit is found around.
+    /// Returns the index of the probe around which an effect's own limit is searched.
     pub(super) fn first(&self, effect: usize) -> Option<usize> {
         self.all.iter().position(|p| p.effect == effect)
     }
 
-    /// Probes again what lies farther from its probe than a ratio; the effects that were.
+    /// Probes those effects again whose limit differs from their probe by more than the ratio
+    /// `far`. Returns these effects.
     pub(super) fn moved(
         &mut self,
         problem: &PreparedProblem<'_>,
@@ -239,7 +251,8 @@ impl Probes {
         for (effect, limit) in found.iter().enumerate() {
             let Some(own) = self.first(effect) else { continue };
             let probe = &self.all[own];
-            // Without a limit the probe may be where the effect looks like others: half of the way to the end of its range.
+            // Without a limit, the effect may resemble others at the strength of the probe:
+            // continue at the geometric mean of this strength and the end of the range.
             let farther = (probe.distance.abs() * probe.reach).sqrt();
             let to = limit.unwrap_or_else(|| probe.strength(farther));
             let ratio = ((to - probe.off) / probe.distance).abs();
@@ -308,7 +321,7 @@ impl Probes {
         let distance = start.values[start.main] - off;
         let reach = if distance > 0.0 { parameter.max - off } else { off - parameter.min };
         let most = (reach / distance.abs()).powf(0.5 * start.power);
-        // A strength of either sign is a fit's to turn; a threshold has one side.
+        // A fit may flip the sign of a strength of either sign; a threshold has only one side.
         let back = if distance > 0.0 { off - parameter.min } else { parameter.max - off };
         let least = if off == 0.0 && back > 0.0 { -back / distance.abs() } else { 0.0 };
         let range = [least, most];
@@ -375,7 +388,7 @@ impl TunedStage {
                     sensitivities.push(compare.metrics[stage].column(&compare.roles, change));
                 }
                 Err(error) if error.ends_all() => return Err(error),
-                // What cannot be simulated a fit does not reach either.
+                // If a value cannot be simulated, a fit does not reach it either.
                 Err(_) => {}
             }
         }
@@ -388,7 +401,7 @@ impl TunedStage {
     }
 }
 
-/// Change of an output for one step, in multiples of the noise.
+/// Returns the change of an output per unit of `step`, in multiples of the noise.
 fn change(
     compare: &Comparison<'_>,
     stage: usize,

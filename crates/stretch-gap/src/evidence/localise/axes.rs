@@ -67,7 +67,7 @@ impl Course {
         let mut travel = Vec::with_capacity(samples);
         let (mut sum, mut last, mut next) = (0.0, level.first().copied().unwrap_or(0.0), 0);
         for (i, (&x, r)) in level.iter().zip(&rate).enumerate() {
-            // Motion during the pause counts as well.
+            // Motion between trials counts as well.
             if starts[next] == i {
                 sum += f64::abs(x - last);
                 next += 1;

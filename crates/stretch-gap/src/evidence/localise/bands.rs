@@ -10,8 +10,9 @@ const WINDOW: usize = 512;
 /// Octaves counted down from half the sample rate; the last holds all lower frequencies.
 const BANDS: usize = 8;
 
-/// Power in octave bands by window (Welch's method with Hann's window): white noise of one multiple has power 1 in
-/// every line. Segments shorter than a window are left out.
+/// Computes the power in octave bands by window (Welch's method with Hann's window), scaled such
+/// that white noise of variance 1 has power 1 in every line. Segments shorter than a window are
+/// left out.
 pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
     let window: Vec<f64> =
         (0..WINDOW).map(|i| 0.5 - 0.5 * (TAU * i as f64 / WINDOW as f64).cos()).collect();
@@ -41,7 +42,7 @@ pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<St
     }
     let hertz = |band: usize| {
         let f = 0.5 / dt_s / (1 << band) as f64;
-        // a decimal, and below 0.1 Hz the first digit that is not zero
+        // one decimal; below 0.1 Hz, down to the first digit that is not zero
         let places = (-f.log10().floor()).clamp(1.0, 9.0) as usize;
         let text = format!("{f:.places$}");
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -146,8 +147,9 @@ mod tests {
         approx::assert_relative_eq!(energy(&x), 256.0 * before, max_relative = 1e-12);
     }
 
-    /// Octaves from half of 100 Hz down: a tone in the middle of one is in that one, next to nothing in the others (Hann's window is down to
-    /// 1e-3 of the power two lines off and falls with the sixth power).
+    /// Octaves count down from half of 100 Hz. A tone in the middle of an octave has almost all of
+    /// its power there: the power of Hann's window is down to 1e-3 two lines away, and falls with
+    /// the sixth power.
     #[test]
     fn a_tone_is_in_its_octave() {
         for band in 0..BANDS - 1 {
@@ -165,8 +167,9 @@ mod tests {
         }
     }
 
-    /// Noise of variance 1 has power 1 in every octave. Of 127 windows, half of them overlapping, the lowest band has 3 lines each, some 200
-    /// independent powers, whose mean is known to 0.07: three of these; wider ones better.
+    /// Noise of variance 1 has power 1 in every octave. The lowest band has 3 lines in each of 127
+    /// windows that overlap by half. These are some 200 independent powers, whose mean is known to
+    /// 0.07. The tolerance is three of these; wider bands are known better.
     #[test]
     fn white_noise_has_the_same_power_in_every_octave() {
         let mut random = crate::numerics::random::RandomGenerator::new(11, 2);

@@ -18,7 +18,7 @@ use crate::{
 /// Name of the stage in which lengths are measured. No simulator has this stage.
 const REFERENCE: &str = "reference";
 
-/// Stages with the shares of what is caused in them; unchanged if nothing is named.
+/// Returns the stages with their shares of the gap by cause; unchanged if no effect is named.
 pub(crate) fn with_causes(
     mut stages: Vec<StageGap>,
     shares: &[EffectShare],
@@ -96,7 +96,7 @@ mod tests {
         EffectShare { effect: effect.into(), closes, closes_excess: closes, at_bound: false }
     }
 
-    /// Effects of a toy with two stages, and one of the reference that shows in both.
+    /// A toy of two stages with one effect in each.
     #[test]
     fn a_gap_lies_where_its_cause_does() {
         let mut toy = Toy::of(&[Law::Lag, Law::Line]);
@@ -124,7 +124,7 @@ mod tests {
         };
         assert_eq!(place(&mut stages, &pot), Some(2));
         assert_eq!((stages[2].stage.as_str(), stages[2].is_cause_only), (REFERENCE, true));
-        // The second time it is there.
+        // The second time, the stage exists already.
         assert_eq!((place(&mut stages, &pot), stages.len()), (Some(2), 3));
         let valve = EffectSpec::new("leak", (0, "pneumatics"), Vec::new());
         assert_eq!(place(&mut stages, &valve), Some(0));

@@ -1,4 +1,4 @@
-//! Runs the stages in a chain: which stage causes the gap of the last output.
+//! Runs the stages in a chain to find which of them cause the gap of the last output.
 //!
 //! Errors of a stage pass through the following ones, so shares depend on the order in which stages
 //! are corrected. The Shapley value (1953, doi 10.1515/9781400881970-018) averages over all orders,
@@ -23,8 +23,8 @@ struct Variant {
     output: Option<Vec<f64>>,
 }
 
-/// Share of every stage; empty if a stage cannot be run on another's output or there is nothing to
-/// share.
+/// Returns the share of every stage. Empty unless there are two to six stages, if a stage cannot be
+/// run on another's output, or if the gap is at most a tenth of the noise's variance.
 pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, GapError> {
     let simulator = runs.simulator();
     let stages = simulator.stages().len();
@@ -84,8 +84,8 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
     Ok(shares(&gaps, stages))
 }
 
-/// Shapley values (1953) of a game whose value is given for every set of players, as shares of their sum; none
-/// below 0.
+/// Returns the Shapley values (1953) of a game as shares of their sum, negative ones as 0.
+/// `value_of` holds the value of every set of players.
 fn shares(value_of: &[f64], players: usize) -> Vec<f64> {
     let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
     let mut values = vec![0.0; players];
@@ -146,8 +146,8 @@ mod tests {
         }
     }
 
-    /// Random games: the shares sum to the value of all minus that of none, equal players share
-    /// equally, and neither names nor the unit matter.
+    /// Random games: the shares sum to 1, and do not depend on the order of the players or on the
+    /// unit of the values.
     #[test]
     fn shares_do_not_depend_on_names_or_units() {
         let mut random = crate::numerics::random::RandomGenerator::new(1, 0);
@@ -168,8 +168,8 @@ mod tests {
         }
     }
 
-    /// A stage whose error compensates for another's has no negative share, and nothing has a share
-    /// of nothing.
+    /// A stage whose error compensates for another's has no negative share. If there is no gap,
+    /// every share is 0.
     #[test]
     fn no_share_is_negative() {
         let helps = game(|[a, b, _]| if a && !b { 4.0 } else { f64::from(u8::from(a)) });

@@ -25,7 +25,7 @@ pub(super) struct Sliced {
     pub(super) share: f64,
     pub(super) excess: f64,
     pub(super) interval: [f64; 2],
-    /// One-sided, against the rest of the stage.
+    /// One-sided p-value, against the rest of the stage.
     pub(super) p: f64,
 }
 
@@ -279,7 +279,8 @@ mod tests {
         };
         let residual: Vec<f64> = (1..=10).map(f64::from).collect();
         let cells = Cells::of_samples(&roles, &residual, &axis);
-        // Blocks 1 2, 3 4, 5, 8 9, 10: the fifth is of no slice, the sixth and seventh of no segment.
+        // The blocks are samples 1 2, 3 4, 5, 8 9 and 10. Sample 5 is in no slice, samples 6 and 7
+        // are in no segment.
         let expected = [
             [(1.0, 1.0), (4.0, 1.0)],
             [(16.0, 1.0), (9.0, 1.0)],
@@ -312,9 +313,9 @@ mod tests {
         }
     }
 
-    /// If nothing is present, something is found in 5 of 100 records exactly (their theorem, for
-    /// independent p-values): of 2000 in 100, standard deviation 9.7; three of these to either
-    /// side.
+    /// If nothing is present, something is found in exactly 5 of 100 recordings (theorem of
+    /// Benjamini and Hochberg, for independent p-values): of 2000 in 100, standard deviation 9.7;
+    /// three of these to either side.
     #[test]
     fn false_discoveries_are_as_rare_as_allowed() {
         let mut random = RandomGenerator::new(7, 0);
@@ -346,7 +347,8 @@ mod tests {
             true_share += right / 20.0 / 500.0;
         }
         assert!((false_share - 0.025).abs() < 0.008, "{false_share}");
-        // Four standard deviations exceed the limit of about 0.025, 1.96, with probability 0.98.
+        // An effect of four standard deviations exceeds the limit (p of about 0.025, 1.96 standard
+        // deviations) with probability 0.98.
         assert!(true_share > 0.95, "{true_share}");
     }
 }

@@ -25,11 +25,11 @@ pub struct StageGap {
     pub floor: f64,
     /// Source of the noise.
     pub floor_source: String,
-    /// Unit of the two.
+    /// Unit of `rms` and `floor`.
     pub unit: String,
-    /// Whether the simulator has no such stage and only the cause of the gap lies there, in the
-    /// reference that measures lengths. Its figures are what its effects close in the channels
-    /// where they show.
+    /// Whether this is the reference that measures lengths, which the simulator does not model as a
+    /// stage: only the cause of the gap is there. Its numbers are what its effects close in the
+    /// channels in which they show.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_cause_only: bool,
 }
@@ -41,7 +41,7 @@ pub struct SliceGap {
     pub by: String,
     /// Label of the slice.
     pub slice: String,
-    /// Stage whose output it is.
+    /// Stage whose output is divided.
     pub stage: String,
     /// Share of the stage's gap.
     pub share: f64,
@@ -69,8 +69,8 @@ pub struct Where {
     pub stages: Vec<StageGap>,
     /// Gap of every slice of the trials.
     pub slices: Vec<SliceGap>,
-    /// Shares of the stages in the gap of the last output, if only the commands are given. Empty if
-    /// the stages cannot be run in a chain.
+    /// Shares of the stages in the gap of the last output if the stages run in a chain, driven by
+    /// the commands only. Empty if the stages cannot be run in a chain.
     #[serde(default)]
     pub end_to_end: Vec<StageShare>,
 }

@@ -18,7 +18,7 @@ use crate::{
 use axes::{Axis, Course};
 use excess::{Cells, Sliced};
 
-/// Divides the residual of the re-tuned nominal simulator, over all trials, along every axis.
+/// Divides a residual, selected by `of`, over all trials along every axis.
 ///
 /// The excess of a slice is the mean square in it, in multiples of the noise, minus 1. Its interval
 /// is a bootstrap over blocks of 0.5 s (over windows for frequency bands). A slice is significant
@@ -72,8 +72,8 @@ pub(crate) fn slices(
 
 /// Shapley value of every stage in the gap of the last output when the stages run in a chain.
 ///
-/// A stage outside the set is corrected by its errors on its measured input, so that errors of
-/// previous stages still pass through it. Empty if a stage cannot be run on another's output.
+/// A stage that is not simulated is corrected by its errors on its measured input, so that errors
+/// of previous stages still pass through it. Empty if a stage cannot be run on another's output.
 ///
 /// # Errors
 /// Errors of the simulator.

@@ -11,12 +11,14 @@ use crate::{
 };
 
 /// Relative to a tolerance. Each of the two fits of a preparation ends on a step damped by a
-/// thousandth, so it leaves at most that share of a way of three tolerances: 3e-6.
+/// thousandth, so it leaves at most this share of its way. Of a way of three tolerances, both
+/// together leave 3e-6.
 const DAMPED: f64 = 1e-5;
 /// Relative: sensitivities are differences of outputs near 1 over steps of 0.03 tolerances of 0.05, each rounded by 1e-16.
 const DIFFERENCED: f64 = 1e-9;
 
-/// Minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2 over the fitted samples that count, a = (x, 1), and the covariance there.
+/// Returns the minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2 over the fitted
+/// samples that count, with a = (x, 1), and the covariance there.
 ///
 /// With an offset of standard deviation `offset` in each trial, sigma^2 I becomes sigma^2 I +
 /// offset^2 11', inverted by the formula of Sherman and Morrison.
@@ -91,7 +93,7 @@ fn samples_that_do_not_count_are_left_out_of_the_regression() {
     let spiked = [130, 777, 1500, 2222];
     for i in spiked {
         assert!(!is_lost(i));
-        // thirty deviations at one isolated sample of eight
+        // thirty standard deviations; a sample is isolated from eight on
         record.outputs[0][i] += 0.3;
     }
     assert_agrees(&record, |i| !is_lost(i) && !spiked.contains(&i), 0.0);

@@ -22,7 +22,8 @@ fn drifting(drift: SlowDrift, samples: usize) -> Toy {
     toy
 }
 
-/// V = I + s W K W' s of one trial, W the straight lines between knots and K the covariance exp(-|t|/tau) at the knots, in units of the noise.
+/// Returns V = I + s W K W' s of one trial, with the linear interpolation W between knots, the
+/// covariance K = exp(-|t|/tau) at the knots, and s in units of the noise.
 fn dense(drift: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
     let knots = (samples - 1) / KNOT + 2;
     let weights = DMatrix::from_fn(samples, knots, |i, k| {

@@ -23,7 +23,8 @@ fn root_mean_square(record: &Measured, stage: usize) -> f64 {
     levels[stage].rms
 }
 
-/// sigma^2 = own^2 + gain^2 s^2 through a line, and own^2 + s^2 (1 - k)/(1 + k) through a lag of k = exp(-dt/tau) from sample to sample.
+/// Through a line, sigma^2 = own^2 + gain^2 s^2. Through a lag that keeps k = exp(-dt/tau) from
+/// sample to sample, sigma^2 = own^2 + s^2 (1 - k)/(1 + k).
 #[test]
 fn noise_of_the_input_arrives_as_theory_says() {
     let kept = (-0.1_f64).exp();

@@ -32,7 +32,7 @@ enum Noise {
     Coloured(f64),
 }
 
-/// The signal at t: it moves less and less and rests for a while, and again.
+/// The signal at t. Its motion fades to rest and returns, again and again.
 fn at(t: f64) -> f64 {
     let moves = (0.5 + 0.8 * (0.7 * t).cos()).max(0.0);
     SIGNAL * moves * moves * ((1.3 * t).sin() + 0.4 * (4.7 * t + 1.0).sin())

@@ -7,27 +7,29 @@ use crate::problem::thresholds::Thresholds;
 /// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Whether missing effects are searched for; without a search the gap is measured, and nothing is named.
+    /// Whether missing effects are searched for. Without a search the gap is measured, but no
+    /// effect is named.
     pub examines_effects: bool,
     /// Largest number of effects named at once.
     pub depth: NonZeroUsize,
-    /// Number of threads, as [`threads`] counts them: 0 uses all cores, and no more than these are used. The result does not depend on it.
+    /// Number of threads that are asked for; see [`threads`]. 0 uses all cores. The result does not
+    /// depend on this number.
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// Whether simpler methods are also run, for comparison.
+    /// Whether simpler methods are also run for comparison.
     pub baselines: bool,
-    /// Whether [responses](crate::Responses) to the parameters of the best set are gathered, for a
-    /// page where they can be varied.
+    /// Whether [responses](crate::Responses) to the parameters of the best set of effects are
+    /// computed. A report page needs them to let a reader vary these parameters.
     pub responses: bool,
-    /// Whether [detection limits](crate::DetectionLimit) are computed whatever the verdict is. If
-    /// nothing is named they are always computed.
+    /// Whether [detection limits](crate::DetectionLimit) are computed for every verdict. If no
+    /// effect is named, they are always computed.
     pub detection_limits: bool,
-    /// Calibrated numbers.
+    /// Calibrated thresholds of the decisions.
     pub thresholds: Thresholds,
 }
 
-/// Largest number of effects named at once if nothing is said.
+/// Default of `Options::depth`.
 const DEPTH: NonZeroUsize = NonZeroUsize::MIN.saturating_add(3);
 
 impl Default for Options {
@@ -45,11 +47,11 @@ impl Default for Options {
     }
 }
 
-/// The variable of the environment that says how many threads there are if no number is asked for.
+/// Environment variable that sets the number of threads if no number is asked for.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
 
-/// How many threads are started where so many are asked for: at most one a core. Where 0 are asked for it is what `RAYON_NUM_THREADS` says,
-/// or one a core.
+/// Returns the number of threads to start if `asked` threads are asked for: at most one per core.
+/// If `asked` is 0, this is the number in `RAYON_NUM_THREADS`, or else one per core.
 ///
 /// ```
 /// let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -64,15 +66,16 @@ fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// What the variable says.
+/// Returns the number in the environment variable; `None` if it is not set, not a number, or 0.
 fn said() -> Option<usize> {
     env::var(VARIABLE).ok()?.parse().ok().filter(|said| *said > 0)
 }
 
-/// Caps the threads that all else shares, where `RAYON_NUM_THREADS` asks for more than there are cores. A program calls it once at its begin.
+/// Limits the global thread pool of rayon to one thread per core if `RAYON_NUM_THREADS` asks for
+/// more. A program calls this once at its start.
 pub fn cap_threads() {
     if said().is_some_and(|said| said > cores()) {
-        // if threads were started already, their number stays what it is
+        // If the pool was already started, its size does not change.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(0)).build_global();
     }
 }

@@ -1,17 +1,17 @@
-//! The residual of a model in one stage, prepared for sums of terms.
+//! The residual of a model in one stage, prepared for fitting sums of terms.
 //!
-//! With the residual r at a model, sensitivities A of everything that was fitted, and values D of
-//! some terms, a sum with coefficients c and parameters moved by d leaves r - A d - D c.
-//! Coefficients and parameters are fitted together,
+//! Let r be the residual (measured minus simulated), A the sensitivities of the output to all
+//! fitted parameters, and D the values of some terms (functions of recorded signals). A sum of
+//! terms with coefficients c, with parameters shifted by d, leaves r - A d - D c. Both are fitted
+//! together by minimising
 //!
 //! ```text
 //! J = 0.5/b (r - A d - D c)' V^-1 (r - A d - D c) - ln p(x + d) + 0.5 sum (c_k/s_k)^2
 //! ```
 //!
-//! in the metric V of the stage and with the priors and bounds of the
-//! [coordinates](crate::fit::coordinate); b are the samples of a block. The ridge s_k is the
-//! coefficient at which a term alone is as large as the residual. A choice of terms only needs
-//! products of columns, over the fitted and over the held-out samples.
+//! V is the covariance of the residual, including nuisances. The prior p and the bounds of the
+//! parameters x are those of the [coordinates](crate::fit::coordinate). b is the number of samples
+//! in a block. The ridge s_k is the coefficient at which term k alone is as large as the residual.
 
 use nalgebra::DMatrix;
 
@@ -30,7 +30,7 @@ use crate::{
     },
 };
 
-/// Added to every diagonal, because a coordinate that does nothing has no curvature.
+/// Added to every diagonal element, because a coordinate without any effect has no curvature.
 const RIDGE: f64 = 1e-12;
 
 /// The residual of a model in a stage.
@@ -38,16 +38,17 @@ pub(crate) struct Residue<'a> {
     pub(crate) compare: &'a Comparison<'a>,
     pub(crate) stage: usize,
     pub(crate) model: Model,
-    /// Over the trials that are fitted.
+    /// The residual over the trials that are fitted, in multiples of the noise.
     pub(crate) residual: Column,
     pub(crate) inputs: TermInputs,
     /// Coordinates that are fitted together with the terms.
     coordinates: Vec<(Coordinate, [f64; 2])>,
-    /// -dr/dx of each.
+    /// Sensitivities -dr/dx, one column for each coordinate.
     columns: Vec<Column>,
 }
 
-/// Products of the residual (first), the sensitivities and the terms, from which sums are computed.
+/// Inner products among the residual (first), the sensitivities and the terms. Sums of terms are
+/// fitted from these products alone, over the fitted and over the held-out samples.
 #[derive(Clone)]
 pub(crate) struct Products {
     pub(crate) fit: DMatrix<f64>,
@@ -57,11 +58,11 @@ pub(crate) struct Products {
 /// A sum of terms fitted together with the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
-    /// Shift of each coordinate, then the coefficients.
+    /// The shift of each coordinate, followed by the coefficients of the terms.
     pub(crate) values: Vec<f64>,
-    /// J.
+    /// The minimum of J.
     pub(crate) cost: f64,
-    /// Sum of squares over the held-out samples.
+    /// Sum of squares of the remaining residual over the held-out samples, in the metric V.
     pub(crate) held: f64,
 }
 
@@ -105,12 +106,12 @@ impl<'a> Residue<'a> {
         &self.compare.roles
     }
 
-    /// The sensitivities' columns.
+    /// The columns of the sensitivities.
     pub(crate) fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// A term in multiples of the noise, over the trials that are fitted.
+    /// Returns the values of a term in multiples of the noise, over the trials that are fitted.
     pub(crate) fn values(&self, term: &Term) -> Vec<f64> {
         let mut values = term.values(&self.inputs, self.roles().fit_trials);
         let sds = &self.compare.metrics[self.stage].noise.sd;
@@ -118,7 +119,8 @@ impl<'a> Residue<'a> {
         values
     }
 
-    /// A term ready for products; `None` if the term is not finite or does nothing.
+    /// Returns the column of a term, ready for products; `None` if a value is not finite or all
+    /// values are zero.
     pub(crate) fn column(&self, term: &Term) -> Option<Column> {
         let values = self.values(term);
         let acts = values.iter().any(|x| x.abs() > 1e-9) && values.iter().all(|x| x.is_finite());
@@ -129,7 +131,8 @@ impl<'a> Residue<'a> {
         self.compare.metrics[self.stage].product(roles, a, b, role)
     }
 
-    /// Products of residual and sensitivities; `roles` says which samples are held out.
+    /// Returns the products of the residual and the sensitivities; `roles` defines the held-out
+    /// samples.
     pub(crate) fn products(&self, roles: &SampleRoles, residual: &Column) -> Products {
         let mut products = Products { fit: DMatrix::zeros(0, 0), held: DMatrix::zeros(0, 0) };
         let all: Vec<&Column> = std::iter::once(residual).chain(&self.columns).collect();
@@ -139,8 +142,8 @@ impl<'a> Residue<'a> {
         products
     }
 
-    /// The normal equations with one more column; `before` are the columns of the existing
-    /// products.
+    /// Appends the column `new` to the products; `before` lists the columns that `products` already
+    /// contains.
     pub(crate) fn with(
         &self,
         roles: &SampleRoles,
@@ -161,7 +164,7 @@ impl<'a> Residue<'a> {
         Products { fit: grown(&products.fit, Role::Fit), held: grown(&products.held, Role::Held) }
     }
 
-    /// The curvature of J in shifts and coefficients.
+    /// Returns the second derivative of J with respect to shifts and coefficients.
     pub(crate) fn normal(&self, products: &Products, model: &Model) -> DMatrix<f64> {
         let n = products.fit.nrows() - 1;
         let mut normal = products.fit.view((1, 1), (n, n)) * self.compare.weight();
@@ -175,7 +178,7 @@ impl<'a> Residue<'a> {
         normal
     }
 
-    /// The slope of J in shifts and coefficients.
+    /// Returns the gradient of J with respect to shifts and coefficients, at zero.
     pub(crate) fn slope(&self, products: &Products, model: &Model) -> Vec<f64> {
         let weight = self.compare.weight();
         let mut slope: Vec<f64> =
@@ -186,8 +189,8 @@ impl<'a> Residue<'a> {
         slope
     }
 
-    /// Minimises J around a model whose residual the products hold; parameters do not move unless
-    /// they are `free`.
+    /// Minimises J around a model whose residual is contained in the products. The parameters stay
+    /// fixed unless `free` is true.
     pub(crate) fn solve(&self, products: &Products, model: &Model, free: bool) -> Fit {
         let n = products.fit.nrows() - 1;
         let weight = self.compare.weight();
@@ -198,7 +201,7 @@ impl<'a> Residue<'a> {
         for (i, (c, bounds)) in self.coordinates.iter().enumerate() {
             let x = c.read(model);
             prior += c.prior(x).cost;
-            // At a bound it may only move back.
+            // A parameter at a bound may only move back inside.
             low[i] = if free { (bounds[0] - x).max(-c.stride()).min(0.0) } else { 0.0 };
             high[i] = if free { (bounds[1] - x).min(c.stride()).max(0.0) } else { 0.0 };
         }
@@ -210,15 +213,15 @@ impl<'a> Residue<'a> {
         Fit { held: quadratic(&products.held, &values), cost, values }
     }
 
-    /// One standard deviation of each coefficient: from the inverse curvature, with a block as one
-    /// observation.
+    /// Returns one standard deviation of each coefficient, from the inverse curvature. A block
+    /// counts as one observation.
     pub(crate) fn coefficient_sd(&self, products: &Products, model: &Model) -> Vec<f64> {
         let inverse = Cholesky::of(self.normal(products, model)).inverse();
         let diagonal = inverse.diagonal();
         diagonal.iter().skip(self.parameters()).map(|v| v.max(0.0).sqrt()).collect()
     }
 
-    /// A model moved by the shifts of a fit.
+    /// Returns the model with its parameters shifted by the fit.
     pub(crate) fn moved(&self, model: &Model, fit: &Fit) -> Model {
         let mut moved = model.clone();
         for ((c, _), shift) in self.coordinates.iter().zip(&fit.values) {
@@ -228,7 +231,7 @@ impl<'a> Residue<'a> {
     }
 }
 
-/// (r - X x)'V^-1 (r - X x) from the products of r and X.
+/// Returns (r - X x)'V^-1 (r - X x), computed from the products of r and X.
 fn quadratic(products: &DMatrix<f64>, values: &[f64]) -> f64 {
     let signed: Vec<f64> = std::iter::once(1.0).chain(values.iter().map(|x| -x)).collect();
     let x = nalgebra::DVector::from_column_slice(&signed);

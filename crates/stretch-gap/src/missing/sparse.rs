@@ -1,16 +1,16 @@
-//! The sparse sum: terms are chosen one after the other, each on samples that were not fitted.
+//! The sparse sum: terms are added one after the other, and each is chosen on held-out samples.
 //!
-//! Orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993, doi
-//! 10.1109/ACSSC.1993.342465): a term's gain is the reduction of the squared residual once
-//! parameters and previous terms are projected out,
+//! The method is orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993, doi
+//! 10.1109/ACSSC.1993.342465). The gain of a term d is the reduction of the squared residual r
+//! after the sensitivities A of the parameters and the previous terms are projected out:
 //!
 //! ```text
 //! gain = <d, r>^2/<d, d>     of what is left of d and r after A and the previous terms
 //! ```
 //!
-//! The best term of every family (terms that differ only in a width or a time) is fitted, and the
-//! best of them are refined in their shapes. The one that leaves least of the held-out samples is
-//! added if it closes a share of their gap.
+//! A family contains the terms that differ only in a shape (a width or a time). The best term of
+//! each promising family is fitted, and the shapes of the best of these are refined. The term that
+//! leaves the smallest held-out residual is added if it closes a minimum share of the held-out gap.
 
 use std::borrow::Cow;
 
@@ -27,27 +27,28 @@ use crate::{
     problem::sample_roles::{Role, SampleRoles},
 };
 
-/// Most terms of a sum.
+/// Largest number of terms in a sum.
 const MOST: usize = 3;
-/// Families that are fitted, and those of them that are refined.
+/// Number of families that are fitted, and number of those whose shapes are refined.
 const FITTED: usize = 10;
 const REFINED: usize = 5;
-/// Families whose prediction is computed together.
+/// Number of families in the prediction by many terms at once.
 const MANY: usize = 60;
-/// Share of the held-out gap that a term closes at least.
+/// Smallest share of the held-out gap that an added term closes.
 const LEAST: f64 = 0.03;
-/// Samples used for screening: means of as many samples as that requires.
+/// Smallest number of averages used for screening: neighbouring samples of a longer recording are
+/// averaged.
 const SCREENED: usize = 8000;
 /// Share of a term that must be independent of the terms already in the sum.
 const NEW: f64 = 1e-4;
-/// Largest and smallest step by which a shape is refined, as factors.
+/// First and last step of the refinement of a shape, as factors.
 const STEPS: (f64, f64) = (1.6, 1.05);
 /// Plausible values of any shape.
 const REACH: std::ops::Range<f64> = 1e-3..1e4;
-/// Held-out samples are too few for a choice below this share of the fitted ones.
+/// Smallest ratio of held-out to fitted samples at which terms are chosen on the held-out samples.
 const FEW: f64 = 0.1;
 
-/// A sum of terms and what it leaves.
+/// A sum of terms, with its fit.
 pub(crate) struct Sum {
     pub(crate) terms: Vec<Term>,
     pub(crate) columns: Vec<Column>,
@@ -55,12 +56,13 @@ pub(crate) struct Sum {
     pub(crate) fit: Fit,
     /// Number of terms in the library.
     pub(crate) library: usize,
-    /// Residual of many terms at once, without nuisances.
+    /// What remains of the residual (without nuisances) after a ridge regression on many terms at
+    /// once.
     pub(crate) beside_many: Vec<f64>,
 }
 
-/// The samples by which terms are chosen: the held-out ones, or every third trial if trials are too
-/// short for that.
+/// Returns roles in which the held-out samples suffice for choosing terms. If too few are held out,
+/// every third fitted segment is held out as well, beginning with the second.
 pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
     let mut choice = roles.clone();
     if (roles.count(Role::Held) as f64) < FEW * roles.count(Role::Fit) as f64 {
@@ -74,8 +76,8 @@ pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
     choice
 }
 
-/// Means over a few samples of the segments in a role, scaled such that noise of unit variance
-/// still has the variance 1.
+/// Averages each `count` consecutive samples of the segments in a role. The averages are scaled
+/// such that white noise of variance 1 keeps the variance 1.
 fn means(roles: &SampleRoles, role: Role, values: &[f64], count: usize) -> Vec<f64> {
     let parts = roles.of_role(role).flat_map(|s| values[s.from..s.to].chunks_exact(count));
     parts.map(|part| part.iter().sum::<f64>() / (count as f64).sqrt()).collect()
@@ -86,14 +88,14 @@ struct Pursuit<'a, 'b> {
     residue: &'a Residue<'b>,
     roles: &'a SampleRoles,
     sum: Sum,
-    /// Library, in means.
+    /// The terms of the library, with their scaled averages over the fitted samples (see `means`).
     shelf: Vec<(Term, Vec<f64>)>,
     count: usize,
-    /// V^-1 of residual, sensitivities and terms, in means.
+    /// V^-1 times the residual, the sensitivities and the terms of the sum, as scaled averages.
     cleaned: Vec<Vec<f64>>,
 }
 
-/// Chooses a sum for a residue; `roles` says which samples it is fitted to and chosen by.
+/// Chooses a sum of terms for a residual; `roles` defines the samples for fitting and for choosing.
 pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: bool) -> Sum {
     let products = residue.products(roles, &residue.residual);
     let fit = residue.solve(&products, &residue.model, true);
@@ -148,7 +150,7 @@ impl Pursuit<'_, '_> {
         self.cleaned.push(means(self.roles, Role::Fit, &values, self.count));
     }
 
-    /// The term that leaves least of the held-out samples.
+    /// Returns the term that, added to the sum, leaves the smallest held-out residual.
     fn best(&self) -> Option<Next> {
         let terms = self.promising(FITTED);
         let gain = self.gain();
@@ -158,7 +160,7 @@ impl Pursuit<'_, '_> {
         fitted.min_by(|a, b| a.fit.held.total_cmp(&b.fit.held))
     }
 
-    /// The gain of a term in means.
+    /// Returns a function that computes the gain of a term from its scaled averages.
     fn gain(&self) -> impl Fn(&[f64]) -> f64 {
         let (residue, weight) = (self.residue, self.residue.compare.weight());
         let factor = Cholesky::of(residue.normal(&self.sum.products, &residue.model) / weight);
@@ -176,7 +178,7 @@ impl Pursuit<'_, '_> {
         }
     }
 
-    /// The most promising term of each of the most promising families.
+    /// Returns the term with the largest gain of each of the `count` most promising families.
     fn promising(&self, count: usize) -> Vec<Term> {
         let gain = self.gain();
         let mut all: Vec<(f64, &Term)> = self.shelf.iter().map(|(t, d)| (gain(d), t)).collect();
@@ -196,10 +198,12 @@ impl Pursuit<'_, '_> {
         out
     }
 
-    /// What remains after the sensitivities and the most promising families together.
+    /// Returns what remains of the residual after a ridge regression on the sensitivities and the
+    /// most promising families together.
     fn beside_many(&self) -> Vec<f64> {
         let (residue, promising) = (self.residue, self.promising(MANY));
-        // computed twice, because all at once they would be larger than all else in memory
+        // The columns are computed twice, because all of them together would need more memory than
+        // everything else.
         let columns = || {
             let known = residue.columns().iter().map(|c| Cow::Borrowed(&c.values));
             known.chain(promising.iter().map(|term| Cow::Owned(residue.values(term))))
@@ -232,7 +236,7 @@ impl Pursuit<'_, '_> {
         fit.cost.is_finite().then_some(Next { term, column, products, fit })
     }
 
-    /// A term with the shapes of its largest gain.
+    /// Refines the shapes of a term so that its gain becomes a local maximum.
     fn refined(&self, mut term: Term, gain: &impl Fn(&[f64]) -> f64) -> Term {
         let of = |term: &Term| {
             gain(&means(self.roles, Role::Fit, &self.residue.values(term), self.count))
@@ -258,25 +262,26 @@ impl Pursuit<'_, '_> {
     }
 }
 
-/// The common part of terms that differ only in a shape.
+/// Returns the term with all its shapes set to 0, which identifies its family.
 fn family(term: &Term) -> Term {
     (0..term.shapes().len()).fold(term.clone(), |term, i| term.with_shape(i, 0.0))
 }
 
-/// Ridges that are tried, as shares of each diagonal element.
+/// Ridges that are tried, as shares of each diagonal element of the normal matrix.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
-/// A residual and columns over the same means, in multiples of the noise.
+/// A residual and columns, both as scaled averages in multiples of the noise.
 pub(crate) struct Rows {
     pub(crate) residual: Vec<f64>,
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
-/// Weights of the columns, fitted with the ridge that best predicts the held-out samples.
+/// Returns weights of the columns, fitted with the ridge that best predicts the held-out samples.
 ///
-/// A ridge over many terms at once (Hoerl and Kennard 1970, doi 10.1080/00401706.1970.10488634)
-/// predicts more than a sum of a few, but gives nothing that could be written into a simulator. If
-/// it predicts little as well, the form was not the problem.
+/// A ridge regression on many terms (Hoerl and Kennard 1970, doi 10.1080/00401706.1970.10488634)
+/// predicts more than a sum of a few terms, but yields no equation that could be added to a
+/// simulator. If it predicts little as well, no sum of terms of this library would explain the
+/// residual.
 pub(crate) fn ridge(fit: &Rows, held: &Rows) -> Vec<f64> {
     let matrix = |rows: &Rows| {
         DMatrix::from_fn(rows.residual.len(), rows.columns.len(), |i, j| rows.columns[j][i])

@@ -1,8 +1,8 @@
-//! Terms that a simulator may lack: products of factors of what was recorded, passed on at once or
-//! slowly.
+//! Terms that a simulator may lack: products of functions of recorded signals, which reach the
+//! output directly or through a filter.
 //!
-//! A term is dimensionless; its coefficient has the unit of the stage's output. It can be written
-//! and read ([`serde`]) together with the scales of its signals, so that it can be added to a
+//! A term is dimensionless, and its coefficient has the unit of the stage's output. Terms are
+//! serialised ([`serde`]) together with the scales of their signals, so that they can be added to a
 //! simulator.
 
 use schemars::JsonSchema;
@@ -11,7 +11,7 @@ use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
 
 use crate::missing::term_inputs::{Signal, TermInputs};
 
-/// A function of one signal's rate v.
+/// A function of one signal's scaled rate v.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RateForm {
@@ -25,36 +25,38 @@ pub enum RateForm {
     SignedSquare,
     /// sign(v) sqrt|v|
     SignedRoot,
-    /// tanh(v/0.1): a smooth sign, because noise would toss a hard one.
+    /// tanh(v/0.1): a smooth sign, because a hard sign would switch with the noise.
     Sign,
-    /// sign(v) exp(-|v|/0.3): friction that vanishes once it slides.
+    /// tanh(v/0.1) exp(-|v|/0.3): friction that vanishes once the contact slides.
     Striction,
     /// max(0, v)
     Rising,
 }
 
-/// Share of the usual rate within which a sign is uncertain, and above which sticking is over.
+/// Scale of v within which its sign is uncertain, and scale over which striction decays; v has a
+/// root mean square of 1.
 const AT_REST: f64 = 0.1;
 const SLIDING: f64 = 0.3;
-/// Way back, as a share of the range, that counts as a turn.
+/// Distance moved back that counts as a turn, as a share of the range.
 const TURN: f64 = 0.01;
 
-/// One factor of a term; `signal` is an index of the proposal's signals, x and v are scaled.
+/// One factor of a term. `signal` is an index into the proposal's signals; x is the scaled signal
+/// and v its scaled rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Factor {
-    /// x^power
+    /// max(0, x)^power
     Power { signal: usize, power: f64 },
-    /// (x - at)^power, odd or even about the centre
+    /// (x - at)^power; odd or even about `at`.
     Centred { signal: usize, at: f64, power: i32 },
     /// max(0, x - at)^power
     Above { signal: usize, at: f64, power: f64 },
     /// max(0, at - x)^power
     Below { signal: usize, at: f64, power: f64 },
-    /// exp(-x/width)
+    /// exp(-max(0, x)/width)
     Low { signal: usize, width: f64 },
-    /// exp(-(1 - x)/width)
+    /// exp(-max(0, 1 - x)/width)
     High { signal: usize, width: f64 },
     /// sin(2 pi turns x)
     Sine { signal: usize, turns: f64 },
@@ -62,46 +64,48 @@ pub enum Factor {
     Cosine { signal: usize, turns: f64 },
     /// A function of v.
     Rate { signal: usize, form: RateForm },
-    /// dv/dt times the sample time, looking back.
+    /// Difference between v and its previous value; 0 at a trial's start.
     Bend { signal: usize },
-    /// x - play(x, width), at rest at a trial's start; width is half the backlash.
+    /// x - play(x, width). The play starts each trial at rest; width is half the backlash.
     Play { signal: usize, width: f64 },
-    /// x - lag(x, tau), at rest at a trial's start.
+    /// x - lag(x, tau), a first-order lag that starts each trial settled.
     Lag { signal: usize, tau_s: f64 },
     /// x(t - delay) - x(t)
     Late { signal: usize, delay_s: f64 },
-    /// Greatest x of the trial so far - x.
+    /// Greatest x of the trial so far, minus x.
     Peak { signal: usize },
-    /// sign of the motion times 1 - exp(-way since the last turn/width)
+    /// Direction of motion (-1, 0 or 1) times 1 - exp(-d/width); d is the greatest distance since
+    /// the last turn.
     Turned { signal: usize, width: f64 },
-    /// Travel within the trial, in ranges, to a power.
+    /// Distance travelled in the trial so far, in ranges, to a power.
     Travel { signal: usize, power: f64 },
-    /// exp(-travel/width)
+    /// exp(-travel/width), with the distance travelled in the trial so far.
     TravelFade { signal: usize, width: f64 },
-    /// (t/T)^power, t in the trial, T the longest fitted trial.
+    /// (t/T)^power; t is the time in the trial, T the length of the longest fitted segment.
     Time { power: f64 },
-    /// exp(-t/tau)
+    /// exp(-t/tau); t is the time in the trial.
     TimeFade { tau_s: f64 },
-    /// (t/T)^power, t in the session, T the session.
+    /// (t/T)^power; t is the time in the session, T the session time of the last fitted sample.
     Session { power: f64 },
 }
 
-/// How a product of factors reaches the output.
+/// How a product of factors g reaches the output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Passage {
-    /// At once.
+    /// Unchanged.
     Direct,
-    /// Through a lag, z' = (g - z)/tau from 0.
+    /// Through a first-order lag, z' = (g - z)/tau, with z = 0 at a trial's start.
     Lag { tau_s: f64 },
-    /// High-pass: the part that a lag does not pass, g - z from 0.
+    /// Through a high-pass: g - z, where z is the lag of g as in `Lag`.
     Rest { tau_s: f64 },
-    /// As a rate that an opening forgets, z' = g/tau - (sum of commands) z/tau from 0.
+    /// Through an integrator that leaks while valves are open: z' = g/tau - (sum of commands)
+    /// z/tau, with z = 0 at a trial's start. A negative sum counts as 0.
     Leak { tau_s: f64 },
 }
 
-/// A term.
+/// A term: a product of factors, and how it reaches the output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Term {
     /// Factors that are multiplied; an empty product is 1.
@@ -115,7 +119,7 @@ impl Term {
         Self { factors: factors.to_vec(), passage }
     }
 
-    /// Values over the first trials.
+    /// Returns the values of the term over the first `trials` trials.
     pub(crate) fn values(&self, inputs: &TermInputs, trials: usize) -> Vec<f64> {
         let mut out = vec![1.0; inputs.samples(trials)];
         for factor in &self.factors {
@@ -125,13 +129,14 @@ impl Term {
         out
     }
 
-    /// Shapes (widths, times, knees) that may be refined.
+    /// Returns the shapes (widths, times, knees) that may be refined.
     pub(crate) fn shapes(&self) -> Vec<f64> {
         let mut copy = self.clone();
         copy.shapes_mut().into_iter().map(|x| *x).collect()
     }
 
-    /// The factor with another shape.
+    /// Returns the term with another value for one shape; an index beyond the last shape changes
+    /// nothing.
     pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut copy = self.clone();
         if let Some(shape) = copy.shapes_mut().into_iter().nth(index) {
@@ -181,7 +186,7 @@ impl RateForm {
 }
 
 impl Factor {
-    /// Multiplies values over the first trials by this factor.
+    /// Multiplies `out`, values over the first trials, by this factor.
     fn multiply(self, inputs: &TermInputs, trials: usize, out: &mut [f64]) {
         for trial in 0..trials {
             let range = inputs.trials[trial].clone();
@@ -288,7 +293,7 @@ impl Factor {
     }
 }
 
-/// x^power for x >= 0; the usual powers without a logarithm.
+/// Returns x^power for x >= 0; common powers avoid the logarithm.
 fn raised(x: f64, power: f64) -> f64 {
     match power {
         1.0 => x,
@@ -299,7 +304,7 @@ fn raised(x: f64, power: f64) -> f64 {
     }
 }
 
-/// x some samples ago; the first value before a trial.
+/// Returns x delayed by `by` samples, linearly interpolated; the first value is held before it.
 fn late(x: &[f64], i: usize, by: f64) -> f64 {
     let at = (i as f64 - by).max(0.0);
     let (whole, share) = (at as usize, at.fract());
@@ -324,7 +329,7 @@ fn lagged(inputs: &TermInputs, x: &[f64], tau_s: f64, first: f64) -> Vec<f64> {
     out
 }
 
-/// Way since the last turn, and its direction.
+/// State of `Factor::Turned`.
 struct Turns {
     turn: f64,
     furthest: f64,
@@ -349,7 +354,7 @@ impl Turns {
     }
 }
 
-/// Distance travelled so far in both directions, without the noise of a turn.
+/// Distance travelled so far, up and down. Movements within the width of a turn do not count.
 #[derive(Default)]
 struct Travel {
     held: Option<f64>,
@@ -359,7 +364,7 @@ struct Travel {
 impl Travel {
     fn follow(&mut self, x: &[f64], i: usize) -> f64 {
         let held = self.held.unwrap_or(x[0]);
-        // A play of the turn's width, because noise at rest is no travel.
+        // A play with the width of a turn removes noise at rest.
         let next = stretch_core::arithmetic::play(held, x[i], TURN);
         self.sum += (next - held).abs();
         self.held = Some(next);
@@ -391,7 +396,7 @@ impl Passage {
                         .collect();
                     let mut z = 0.0;
                     for (i, g) in own.iter_mut().enumerate() {
-                        // Exact for openings and g held over a sample.
+                        // This update is exact if the openings and g are constant between samples.
                         let opening: f64 = open.iter().map(|o| o[i]).sum();
                         let rate = opening.max(0.0) / tau_s;
                         let kept = (-rate * dt_s).exp();

@@ -1,13 +1,13 @@
-//! Recorded signals as terms use them: each scaled, so that no term depends on a unit.
+//! Recorded signals in the form that terms use: scaled, so that no term depends on a unit.
 //!
 //! ```text
 //! x = (signal - offset)/scale      0 .. 1 over the samples that are fitted; a command as it is
 //! v = (dx/dt)/rate                 of root mean square 1 there
 //! ```
 //!
-//! Scales are computed from fitted samples only. Memories begin anew in every trial and are causal.
-//! Rates are differences within the fitted part or within the test part. Therefore nothing that is
-//! fitted has seen a test sample.
+//! Scales are computed from fitted samples only. Terms with a memory begin anew in every trial and
+//! are causal. A rate at the border of the test part uses samples of one side only. Therefore no
+//! test sample influences a fit.
 
 use std::ops::Range;
 
@@ -22,44 +22,44 @@ use crate::problem::{
     simulator::Simulator,
 };
 
-/// A scaled signal.
+/// A recorded signal, scaled.
 #[derive(Debug, Clone)]
 pub(crate) struct Signal {
     pub(crate) name: String,
     pub(crate) unit: String,
     pub(crate) offset: f64,
     pub(crate) scale: f64,
-    /// Unit of v, 1/s.
+    /// Divisor that turns dx/dt into v, 1/s.
     pub(crate) rate: f64,
     pub(crate) is_command: bool,
     /// x, all trials concatenated.
     pub(crate) x: Vec<f64>,
-    /// v, the same.
+    /// v, all trials concatenated.
     pub(crate) v: Vec<f64>,
 }
 
 impl Signal {
-    /// x about which a law is odd or even: the zero of a signal that passes through zero, otherwise
-    /// the middle of its range.
+    /// Returns the x about which odd and even curves are centred: the signal's zero if the fitted
+    /// range contains it, otherwise the middle of that range.
     pub(crate) fn centre(&self) -> f64 {
         let zero = -self.offset / self.scale;
         if (0.0..=1.0).contains(&zero) { zero } else { 0.5 }
     }
 }
 
-/// Signals, trials and clocks of a session.
+/// Signals, trials and time scales of a session.
 #[derive(Debug, Clone)]
 pub(crate) struct TermInputs {
     pub(crate) signals: Vec<Signal>,
-    /// Samples of each trial.
+    /// Range of each trial's samples in the concatenated signals.
     pub(crate) trials: Vec<Range<usize>>,
     /// Session time of each trial's first sample, relative to the first trial, s.
     pub(crate) starts_s: Vec<f64>,
-    /// Longest fitted stretch and length of the session up to the last fitted sample, s: the units
-    /// of time.
+    /// Length of the longest fitted segment, and session time of the last fitted sample, s. Both
+    /// are units of time for terms.
     pub(crate) trial_s: f64,
     pub(crate) session_s: f64,
-    /// One step per sample.
+    /// Grid of an operator's steps: one step per sample.
     pub(crate) grid: Grid,
 }
 
@@ -67,8 +67,10 @@ pub(crate) struct TermInputs {
 const SAME: f64 = 0.998;
 
 impl TermInputs {
-    /// Signals that may act in a stage: everything recorded except its own channel. The model's
-    /// noise-free prediction of that channel (`own`, all trials concatenated) takes its place.
+    /// Collects the signals that a term of a stage may depend on: all recorded signals except the
+    /// stage's own output. The simulator's noise-free prediction of that output (`own`, all trials
+    /// concatenated) is used instead. A signal that correlates too closely with a previous one is
+    /// dropped.
     pub(crate) fn of(
         simulator: &dyn Simulator,
         roles: &SampleRoles,
@@ -111,17 +113,17 @@ impl TermInputs {
         Ok(inputs)
     }
 
-    /// Samples of the first `trials` trials.
+    /// Returns the number of samples in the first `trials` trials.
     pub(crate) fn samples(&self, trials: usize) -> usize {
         self.trials[..trials].last().map_or(0, |t| t.end)
     }
 
-    /// Indices of signals that are commands, or that are not.
+    /// Returns the indices of the signals that are commands (`commands` true) or are not.
     pub(crate) fn of_kind(&self, commands: bool) -> Vec<usize> {
         (0..self.signals.len()).filter(|&i| self.signals[i].is_command == commands).collect()
     }
 
-    /// x at a quantile of the fitted samples.
+    /// Returns the quantile `share` (0 to 1) of x over the fitted samples.
     pub(crate) fn quantile(&self, signal: usize, share: f64, roles: &SampleRoles) -> f64 {
         let x = &self.signals[signal].x;
         let mut sorted: Vec<f64> =
@@ -132,8 +134,9 @@ impl TermInputs {
     }
 }
 
-/// Everything that a missing term may be a function of: the signals that the record lists, or else
-/// the inputs of the stages, named after the previous channel, or else the motion.
+/// Returns every signal that a missing term may depend on: the recorded signals that the
+/// description lists. If it lists none, these are the inputs of the stages, each named after the
+/// channel of the previous stage. If there are no such inputs either, it is the motion.
 fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
     let known = &simulator.record().signals;
     if !known.is_empty() {
@@ -153,7 +156,8 @@ fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
 }
 
 impl Signal {
-    /// The signal with its rate; `None` if it does not move in the fitted samples.
+    /// Scales a signal and computes its rate; `None` if the signal is constant over the fitted
+    /// samples.
     fn of(recorded: Recorded, roles: &SampleRoles, dt_s: f64) -> Option<Self> {
         let Recorded { name, unit, mut values, is_command } = recorded;
         let (low, high) =
@@ -175,7 +179,7 @@ impl Signal {
     }
 }
 
-/// Central differences within the test part and within the rest, 1/s.
+/// Computes central differences within the test part and, separately, within the rest, 1/s.
 fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
     let mut out = vec![0.0; x.len()];
     let mut parts: Vec<(usize, bool, Range<usize>)> = Vec::new();
@@ -196,7 +200,7 @@ fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
     out
 }
 
-/// Squared correlation over the fitted samples.
+/// Returns the squared correlation of two signals over the fitted samples.
 fn alike(a: &Signal, b: &Signal, roles: &SampleRoles) -> f64 {
     let (mut n, mut x, mut y, mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for s in roles.of_role(Role::Fit) {
@@ -213,7 +217,8 @@ fn alike(a: &Signal, b: &Signal, roles: &SampleRoles) -> f64 {
     if own > 0.0 { (xy - x * y / n).powi(2) / own } else { 0.0 }
 }
 
-/// The rate of a signal that was sampled at equal times: central differences, one-sided at both ends; a single sample has no rate.
+/// Differentiates an evenly sampled signal by central differences, one-sided at both ends; the rate
+/// of a single sample is 0.
 pub(super) fn central_differences(x: &[f64], dt_s: f64) -> Vec<f64> {
     let rate = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));

@@ -1,22 +1,23 @@
-//! Factor of a matrix that is tridiagonal except for a few last rows: chains of knots, and offsets.
+//! Factor of a symmetric matrix that is tridiagonal except for a few last rows and columns (a chain
+//! of knots, and offsets).
 //!
 //! ```text
 //! A = [T B; B' D] = L L',     L = [L_T 0; G' L_D],     L_T G = B,     L_D L_D' = D - G'G
 //! ```
 //!
-//! L_T has two diagonals, so the cost of a factor and of a solution is proportional to the number
-//! of knots (Golub and Van Loan 2013, section 4.3).
+//! L_T is bidiagonal, so the cost of a factorisation and of a solution is proportional to the
+//! number of knots (Golub and Van Loan 2013, section 4.3).
 
 use nalgebra::DMatrix;
 
 use crate::numerics::linear::{Cholesky, dot};
 
-/// A symmetric positive definite matrix of such a form.
+/// The matrix A, symmetric and positive definite.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Arrow {
     /// Diagonal of T.
     pub(crate) diagonal: Vec<f64>,
-    /// The secondary diagonal: element i couples i and i + 1.
+    /// The secondary diagonal of T: element i couples knots i and i + 1.
     pub(crate) beside: Vec<f64>,
     /// Columns of B.
     pub(crate) border: Vec<Vec<f64>>,
@@ -24,7 +25,7 @@ pub(crate) struct Arrow {
     pub(crate) corner: Vec<Vec<f64>>,
 }
 
-/// L.
+/// The factor L.
 #[derive(Debug, Clone)]
 pub(crate) struct ArrowFactor {
     diagonal: Vec<f64>,
@@ -36,7 +37,7 @@ pub(crate) struct ArrowFactor {
 }
 
 impl Arrow {
-    /// A matrix of zeros with so many knots and border columns.
+    /// Creates a matrix of zeros with the given numbers of knots and of border columns.
     pub(crate) fn zeros(knots: usize, columns: usize) -> Self {
         Self {
             diagonal: vec![0.0; knots],
@@ -68,7 +69,7 @@ impl Arrow {
     }
 }
 
-/// L_T x = b in place.
+/// Solves L_T x = b in place.
 fn forward(diagonal: &[f64], below: &[f64], b: &mut [f64]) {
     for i in 0..diagonal.len() {
         let before = if i > 0 { below[i - 1] * b[i - 1] } else { 0.0 };
@@ -77,12 +78,12 @@ fn forward(diagonal: &[f64], below: &[f64], b: &mut [f64]) {
 }
 
 impl ArrowFactor {
-    /// ln det A.
+    /// Returns ln det A.
     pub(crate) fn ln_determinant(&self) -> f64 {
         self.ln_determinant
     }
 
-    /// Solves L y = b in place: knots, then the border's.
+    /// Solves L y = b in place; b holds the knots first, then the border.
     pub(crate) fn forward(&self, b: &mut [f64]) {
         let (knots, rest) = b.split_at_mut(self.diagonal.len());
         forward(&self.diagonal, &self.below, knots);

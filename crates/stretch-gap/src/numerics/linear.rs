@@ -1,13 +1,14 @@
-//! Functions that nalgebra lacks: a factor that survives rounding, and least squares within a box.
+//! Functions that nalgebra lacks: a Cholesky factor that survives rounding, and least squares
+//! within a box.
 
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 
-/// Jitter, as a share of each diagonal element.
+/// Jitter added to each diagonal element, as a share of it.
 ///
-/// A pivot of a Cholesky factor is the part of a column that the previous ones do not explain. For
-/// similar columns it is rounding, about n eps = 2e-14 of the element for a hundred columns, of
-/// either sign. Raising the diagonal by more than that keeps the factor real and changes no
-/// solution by more than the uncertainty due to rounding (Rasmussen and Williams 2006, section
+/// A pivot of a Cholesky factor is the part of a column that the previous columns do not explain.
+/// If columns are almost equal, the pivot is a rounding error of either sign, about n eps = 2e-14
+/// of the element for a hundred columns. A larger jitter keeps the factor real, and changes no
+/// solution by more than its uncertainty due to rounding (Rasmussen and Williams 2006, section
 /// 3.4.3, "jitter").
 const JITTER: f64 = 1e-13;
 
@@ -16,15 +17,15 @@ const JITTER: f64 = 1e-13;
 pub(crate) struct Cholesky(nalgebra::Cholesky<f64, nalgebra::Dyn>);
 
 impl Cholesky {
-    /// Only the lower triangle is read.
+    /// Factors `a`, of which only the lower triangle is read.
     pub(crate) fn of(mut a: DMatrix<f64>) -> Self {
         for i in 0..a.nrows() {
             // A column of zeros, from a parameter that does nothing, still gets a pivot.
             a[(i, i)] += JITTER * a[(i, i)].abs() + 1e-300;
         }
         let factor = nalgebra::Cholesky::new_with_substitute(a, f64::MIN_POSITIVE);
-        // With a positive substitute nothing is refused; a NaN stays a NaN, and the fit rejects the
-        // step.
+        // With a positive substitute, the factorisation never fails. A NaN stays a NaN, and the fit
+        // rejects that step.
         Self(factor.expect("a positive substitute"))
     }
 
@@ -34,7 +35,7 @@ impl Cholesky {
         self.0.l_dirty().solve_lower_triangular_mut(&mut b);
     }
 
-    /// L x.
+    /// Returns L x.
     pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
         let l = self.0.l_dirty();
         (0..x.len()).map(|i| (0..=i).map(|j| l[(i, j)] * x[j]).sum()).collect()
@@ -51,28 +52,30 @@ impl Cholesky {
         self.0.solve_mut(&mut DVectorViewMut::from_slice(b, b.len()));
     }
 
-    /// ln det A.
+    /// Returns ln det A.
     pub(crate) fn ln_determinant(&self) -> f64 {
         let diagonal = self.0.l_dirty().diagonal();
         2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
     }
 
-    /// A^-1.
+    /// Returns A^-1.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
         self.0.inverse()
     }
 }
 
-/// Product of two vectors of the same length.
+/// Returns the inner product of two vectors of the same length.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     DVectorView::from_slice(a, a.len()).dot(&DVectorView::from_slice(b, b.len()))
 }
 
-/// Minimiser of 0.5 x'Ax + g'x with low <= x <= high, by an active set (Nocedal and Wright 2006, algorithm 16.3).
+/// Minimises 0.5 x'Ax + g'x subject to low <= x <= high by an active-set method (Nocedal and Wright
+/// 2006, algorithm 16.3).
 ///
-/// Coordinates that would leave the box are held at its faces, one at a time, and the others are
-/// solved for. Once none would leave, one that the slope Ax + g pulls back inside is released. It
-/// ends when the conditions of Karush, Kuhn and Tucker hold.
+/// While the solution of the free coordinates leaves the box, the coordinate that is farthest
+/// outside is held at its bound and the others are solved again. Once all are inside, a held
+/// coordinate is released if the gradient Ax + g pushes it back inside. The loop ends when the
+/// Karush-Kuhn-Tucker conditions hold, or after 3 n + 3 steps.
 pub(crate) fn boxed(a: &DMatrix<f64>, g: &[f64], low: &[f64], high: &[f64]) -> Vec<f64> {
     let n = g.len();
     let mut x = DVector::zeros(n);
@@ -129,8 +132,8 @@ mod tests {
         assert_relative_eq!(held[0], -0.25, epsilon = 0.0, max_relative = FIT_WELL);
     }
 
-    /// Two equal columns, and one of zeros: the sum of the twins is determined, each alone is not,
-    /// and all stays finite.
+    /// Two columns are equal and one is zero. The sum of the two equal coordinates is determined,
+    /// although each alone is not, and all values stay finite.
     #[test]
     fn survives_columns_that_are_alike() {
         let a = DMatrix::from_row_slice(3, 3, &[4.0, 4.0, 0.0, 4.0, 4.0, 0.0, 0.0, 0.0, 0.0]);

@@ -1,11 +1,12 @@
-//! Seeded random numbers: the same on every machine.
+//! Seeded random numbers that are the same on every machine.
 
 use rand_xoshiro::{
     SplitMix64,
     rand_core::{Rng, SeedableRng},
 };
 
-/// SplitMix64 (doi 10.1145/2660193.2660195), from which a simulator takes [another draw of the input noise](crate::Run::input_noise).
+/// The generator SplitMix64 (doi 10.1145/2660193.2660195). A simulator draws [input
+/// noise](crate::Run::input_noise) from it.
 ///
 /// ```
 /// use stretch_gap::RandomGenerator;
@@ -18,7 +19,7 @@ use rand_xoshiro::{
 pub struct RandomGenerator(SplitMix64);
 
 impl RandomGenerator {
-    /// The generator of a seed and one of its streams.
+    /// Creates the generator of one of the streams of a seed.
     pub fn new(seed: u64, stream: u64) -> Self {
         let seed = seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut random = Self(SplitMix64::seed_from_u64(seed));
@@ -26,24 +27,24 @@ impl RandomGenerator {
         random
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// Uniform in 0..1.
+    /// Returns a uniform number from 0 up to, but not including, 1.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Whole number below `n`.
+    /// Returns a uniform whole number below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
-    /// Nearly normal with mean 0 and standard deviation 1: the sum of twelve uniform numbers, which
-    /// needs no transcendental function. Published results depend on these numbers, so do not
-    /// replace it by another transform.
+    /// Returns an approximately normal number with mean 0 and standard deviation 1: the sum of
+    /// twelve uniform numbers minus 6, which needs no transcendental function. Published results
+    /// depend on these numbers, so do not replace this by another transform.
     pub fn gauss(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }

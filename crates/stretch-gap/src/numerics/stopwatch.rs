@@ -1,9 +1,10 @@
 //! Measures elapsed time on targets with a clock.
 
-/// WASM in a web page has no clock, and asking for the time would abort it.
+/// Whether the target has a clock. WASM in a web page has none, and reading the time would abort
+/// it.
 const HAS_CLOCK: bool = cfg!(not(all(target_family = "wasm", target_os = "unknown")));
 
-/// When something began.
+/// The time when a measurement began.
 pub(crate) struct Stopwatch(Option<std::time::Instant>);
 
 impl Stopwatch {
@@ -11,7 +12,8 @@ impl Stopwatch {
         Self(HAS_CLOCK.then(std::time::Instant::now))
     }
 
-    /// Seconds since the start; 0 on a target without a clock, where the caller can fill it in.
+    /// Returns the seconds since the start; 0 on a target without a clock, where the caller may
+    /// fill in the time.
     pub(crate) fn elapsed_s(&self) -> f64 {
         self.0.map_or(0.0, |begun| begun.elapsed().as_secs_f64())
     }

@@ -1,4 +1,4 @@
-//! Linear algebra and random numbers, compared with nalgebra and theory.
+//! Compares linear algebra with nalgebra, and random numbers with theory.
 
 use nalgebra::{DMatrix, DVector};
 use proptest::{prelude::*, test_runner::RngSeed};
@@ -9,12 +9,12 @@ use crate::numerics::{
     random::RandomGenerator,
 };
 
-/// Relative to the largest value: matrices of up to 15 rows with a condition below 1e3, and a
-/// jitter of 1e-13 of the diagonal.
+/// Absolute tolerance of solutions. The matrices have up to 14 rows, a condition number below 1e3,
+/// and a jitter of 1e-13 of the diagonal.
 const SOLVED: f64 = 1e-9;
 
-/// B B' + I of a square matrix B of normal numbers: positive definite, with a condition of up to a
-/// few hundred.
+/// B B' + I for a square matrix B of normal numbers. It is positive definite, with a condition
+/// number of up to a few hundred.
 fn definite(n: usize, seed: u64) -> DMatrix<f64> {
     let mut random = RandomGenerator::new(seed, 1);
     let b = DMatrix::from_fn(n, n, |_, _| random.gauss());
@@ -44,15 +44,15 @@ proptest! {
         approx::assert_abs_diff_eq!(x[..], expected.as_slice()[..], epsilon = SOLVED);
         approx::assert_abs_diff_eq!(factor.ln_determinant(), exact.determinant().ln(), epsilon = SOLVED);
         approx::assert_abs_diff_eq!(factor.inverse() * &a, DMatrix::identity(n, n), epsilon = SOLVED);
-        // L then L' is the whole.
+        // Solving with L and then with L' solves with A.
         let mut halves = b.as_slice().to_vec();
         factor.forward(&mut halves);
         factor.backward(&mut halves);
         approx::assert_abs_diff_eq!(halves[..], x[..], epsilon = SOLVED);
     }
 
-    /// The conditions of Karush, Kuhn and Tucker: inside the slope is zero, at a face it points out
-    /// of the box; a convex function has no other minimum.
+    /// The Karush-Kuhn-Tucker conditions: the gradient is zero inside the box; at a bound, the
+    /// negative gradient points out of the box. A convex function has no other minimum.
     #[test]
     fn a_boxed_minimum_meets_its_conditions(n in 1_usize..8, seed: u64, width in 0.01_f64..2.0) {
         let (a, g) = (definite(n, seed), vector(n, seed));
@@ -70,7 +70,7 @@ proptest! {
         }
     }
 
-    /// An arrow with any number of knots and border columns, including none of either.
+    /// The matrix may have any number of knots and border columns, including none of either.
     #[test]
     fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
         prop_assume!(knots + columns > 0);
@@ -113,8 +113,9 @@ proptest! {
     }
 }
 
-/// Means of 100 000 draws, five standard errors each: the moments of a normal number are 0, 1, 0, and 3 less 12/120 for a sum of twelve
-/// (the fourth cumulant of a uniform number is -1/120).
+/// The moments of 100 000 draws agree with theory within five standard errors. A normal number has
+/// the moments 0, 1, 0 and 3. For a sum of twelve uniform numbers the fourth moment is smaller by
+/// 12/120, because the fourth cumulant of a uniform number is -1/120.
 #[test]
 fn gauss_has_the_moments_of_a_sum_of_twelve() {
     const DRAWS: usize = 100_000;
@@ -135,7 +136,8 @@ fn gauss_has_the_moments_of_a_sum_of_twelve() {
     }
 }
 
-/// Tenths of the unit interval hold 10 000 each of 100 000 draws, with a deviation of 95: five of them. Whole numbers below ten, as well.
+/// Each tenth of the unit interval holds 10 000 of 100 000 draws, within five standard deviations
+/// of 95. The same holds for each whole number below ten.
 #[test]
 fn uniform_numbers_are_uniform_and_below_their_bound() {
     let mut random = RandomGenerator::new(6, 0);
@@ -150,8 +152,8 @@ fn uniform_numbers_are_uniform_and_below_their_bound() {
     assert_eq!((random.below(1), random.below(0)), (0, 0));
 }
 
-/// Streams of one seed, and seeds of one stream, are independent: correlations of 10 000 draws stay
-/// within five of 1/100.
+/// Streams of one seed are independent, and so are seeds of one stream. The correlations of 10 000
+/// draws stay within five standard deviations of 1/100.
 #[test]
 fn streams_and_seeds_are_independent() {
     let draws = |seed, stream| {

@@ -1,7 +1,8 @@
-//! A simulator with other tolerances.
+//! A simulator whose parameters have other tolerances.
 //!
-//! A held parameter (tolerance 0) stays as shipped: the ablation without re-tuning. A parameter
-//! without a tolerance shows whether it could explain what effects are credited with.
+//! A tolerance of 0 holds a parameter at its nominal value, which gives the ablation without
+//! re-tuning. A very wide tolerance shows whether the parameter could explain what is attributed to
+//! effects.
 
 use crate::problem::{
     column::Distortion,
@@ -12,14 +13,15 @@ use crate::problem::{
     spectral_line::Line,
 };
 
-/// A simulator with other descriptions of its parameters: held, or free.
+/// A simulator with other specifications of its parameters.
 pub(crate) struct Altered<'a> {
     simulator: &'a dyn Simulator,
     about: Description,
 }
 
 impl<'a> Altered<'a> {
-    /// A simulator in which `altered` maps every parameter, given with its index.
+    /// Replaces the specification of every parameter by what `altered` returns for its index and
+    /// specification.
     pub(crate) fn of(
         simulator: &'a dyn Simulator,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

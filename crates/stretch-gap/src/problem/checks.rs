@@ -4,7 +4,7 @@ use stretch_effects::EffectParameter;
 
 use crate::problem::spec::{EffectSpec, ParameterSpec};
 
-/// An error of a description: where, what was found, what to do.
+/// An error in a description. Each message names the entry, what was found, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
@@ -13,7 +13,7 @@ pub enum DescriptionError {
     Empty {
         /// Entry that holds the list.
         owner: String,
-        /// What the list is of.
+        /// Kind of the entries that are missing.
         what: &'static str,
     },
     /// Two entries have the same name, so an answer could not distinguish them.
@@ -27,7 +27,7 @@ pub enum DescriptionError {
     Index {
         /// Entry that holds the index.
         owner: String,
-        /// What it refers to.
+        /// Kind of the entry that the index refers to.
         what: &'static str,
         /// The index.
         index: usize,
@@ -43,7 +43,7 @@ pub enum DescriptionError {
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Condition that it must meet.
         needs: &'static str,
     },
     /// A range whose ends are not in order.
@@ -74,8 +74,8 @@ pub(super) fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError>
     let owner = || format!("parameter `{}`", p.name);
     number(&owner, "nominal", p.nominal, "finite", f64::is_finite)?;
     number(&owner, "sd", p.sd, "0 or more", |x| x >= 0.0)?;
-    // Minus infinity is no bound; a bound above the nominal value would leave the box of a fit
-    // empty.
+    // Minus infinity means that there is no bound. A bound above the nominal value would leave no
+    // room for a fit.
     if p.least.is_nan() || p.least > p.nominal {
         let needs = "at most the nominal value";
         return Err(DescriptionError::Number {
@@ -175,7 +175,7 @@ pub(super) fn indices(
     }
 }
 
-/// Refuses what is not finite or does not meet `is_met`.
+/// Refuses a value that is not finite or does not satisfy `is_met`.
 pub(super) fn number(
     owner: &dyn Fn() -> String,
     what: &'static str,

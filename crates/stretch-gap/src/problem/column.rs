@@ -1,10 +1,10 @@
-//! Columns of a record, and their possible distortion between the rig and the file.
+//! Columns of a recording, and how a recorder may distort them between the rig and the file.
 
 use std::borrow::Cow;
 
 use crate::problem::spec::StageSpec;
 
-/// Distortion of a channel by a recorder: recorded(t) = offset + scale true(t - delay_s).
+/// Distortion of a channel by the recorder: recorded(t) = offset + scale true(t - delay_s).
 ///
 /// ```
 /// use stretch_gap::Distortion;
@@ -14,7 +14,7 @@ use crate::problem::spec::StageSpec;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
-    /// Factor, not 0.
+    /// Scale factor; must not be 0.
     pub scale: f64,
     /// Offset, in the unit of the column.
     pub offset: f64,
@@ -23,28 +23,29 @@ pub struct Distortion {
 }
 
 impl Default for Distortion {
-    /// A recorder that changes nothing.
+    /// Returns the identity: a recorder that changes nothing.
     fn default() -> Self {
         Self { scale: 1.0, offset: 0.0, delay_s: 0.0 }
     }
 }
 
 impl Distortion {
-    /// The recorded values of one trial of a true channel, sampled every `dt_s` seconds.
+    /// Returns the values that are recorded of one trial of a true channel, sampled every `dt_s`
+    /// seconds.
     pub fn distorted(&self, channel: &[f64], dt_s: f64) -> Vec<f64> {
         let late = shifted(channel, -self.delay_s / dt_s);
         late.into_iter().map(|x| self.offset + self.scale * x).collect()
     }
 
-    /// The true channel of one recorded trial.
+    /// Reconstructs the true channel from one recorded trial.
     pub fn undone(&self, column: &[f64], dt_s: f64) -> Vec<f64> {
         let early = shifted(column, self.delay_s / dt_s);
         early.into_iter().map(|x| (x - self.offset) / self.scale).collect()
     }
 }
 
-/// Values delayed by so many samples, linearly interpolated, with the first and the last value
-/// held.
+/// Advances values by `samples` (delays them if negative) with linear interpolation; the first and
+/// the last value are held.
 fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
     if samples == 0.0 || values.is_empty() {
         return values.to_vec();
@@ -60,33 +61,33 @@ fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A column of the record as the stages of a simulator use it.
+/// A column of the recording, as the stages of a simulator use it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column<'a> {
     /// Name of the column.
     pub name: Cow<'a, str>,
-    /// Unit; `1` without one.
+    /// Unit; `1` if dimensionless.
     pub unit: Cow<'a, str>,
-    /// All trials concatenated. Empty for a group of columns (commands) that is treated as a whole,
-    /// and among the [facts of a record](crate::RecordFacts) for the output of a stage, whose
-    /// values the simulator has.
+    /// Values of all trials, concatenated. They are empty for a group of columns (commands) that is
+    /// treated as a whole. They are also empty in the [facts of a record](crate::RecordFacts) for
+    /// the output of a stage, because the simulator has its values.
     pub values: Cow<'a, [f64]>,
     /// The stage whose output it is.
     pub output_of: Option<usize>,
-    /// Stages that it drives: [`Simulator::corrected`](crate::Simulator::corrected) can correct it for
-    /// them.
+    /// Stages that this column drives, and for which
+    /// [`Simulator::corrected`](crate::Simulator::corrected) can correct it.
     pub read_by: Vec<usize>,
-    /// Whether it is a command. A command can only be wrong by a constant factor.
+    /// Whether it is a command. The only error considered for a command is a constant factor.
     pub is_command: bool,
-    /// Delays that an effect of the catalogue describes, s. None of these is an error of the
-    /// record.
+    /// Range of delays that an effect of the catalogue describes, s. A delay in this range is not
+    /// reported as an error of the recording.
     pub skew_s: [f64; 2],
-    /// What to check if the column is wrong, for the end of a sentence.
+    /// What to check if the column is wrong, phrased for the end of a sentence.
     pub hint: Cow<'a, str>,
 }
 
 impl<'a> Column<'a> {
-    /// The column of a stage's output if nothing more is known of it; without its values.
+    /// Creates the column of a stage's output, without values, with defaults for everything else.
     pub fn output(stage: usize, spec: &StageSpec) -> Self {
         Self {
             name: Cow::Owned(spec.channel.clone()),
@@ -100,7 +101,7 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// The same column with borrowed texts and values.
+    /// Returns the same column with borrowed texts and values.
     pub(crate) fn borrowed(&self) -> Column<'_> {
         Column {
             name: Cow::Borrowed(&self.name),
@@ -123,7 +124,7 @@ mod tests {
         let channel: Vec<f64> = (0..50).map(|i| 0.3 * f64::from(i)).collect();
         let error = Distortion { scale: -1.7, offset: 3.0, delay_s: 0.025 };
         let back = error.undone(&error.distorted(&channel, 0.01), 0.01);
-        // Three samples at either end were held.
+        // At either end three samples were held, so they cannot be restored.
         for (a, b) in channel[3..47].iter().zip(&back[3..47]) {
             approx::assert_relative_eq!(*a, *b, max_relative = 1e3 * F64_ROUNDING);
         }

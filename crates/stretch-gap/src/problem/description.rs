@@ -11,15 +11,15 @@ use crate::problem::{
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 
-/// The structure of a simulator and the recordings, as written by a user; [`Description::new`]
-/// checks it.
+/// The structure of a simulator and its trials, as a user writes it. [`Description::new`] checks
+/// it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DescriptionSpec {
     /// Stages of the simulator.
     pub stages: Vec<StageSpec>,
     /// Nominal parameters of the simulator.
     pub parameters: Vec<ParameterSpec>,
-    /// The catalogue of effects that it may lack.
+    /// The catalogue of effects that the simulator may lack.
     pub effects: Vec<EffectSpec>,
     /// The trials, in the order of the session.
     pub trials: Vec<TrialSpec>,
@@ -27,7 +27,7 @@ pub struct DescriptionSpec {
     pub dt_s: f64,
 }
 
-/// A checked [`DescriptionSpec`]: it reads like one, and cannot be altered.
+/// A checked [`DescriptionSpec`]. It can be read like one, but not changed.
 ///
 /// Indices are in range, numbers are finite, ranges are ordered, and every effect has a start of
 /// the right length. Missing starts are derived as in [`EffectSpec::new`].
@@ -64,14 +64,14 @@ impl Description {
     /// Checks every entry, and derives missing starts of effects.
     ///
     /// # Errors
-    /// [`DescriptionError`] names the first invalid entry, and what to do about it.
+    /// [`DescriptionError`] names the first invalid entry and what to do about it.
     pub fn new(mut spec: DescriptionSpec) -> Result<Self, DescriptionError> {
         for effect in spec.effects.iter_mut().filter(|e| e.starts.is_empty()) {
             effect.starts = EffectParameter::starts(&effect.parameters);
         }
         let whole = || "description".to_owned();
-        // 1e-3 to 1e7 Hz, so that every time that is counted in samples is a valid number of
-        // samples
+        // Sample rates of 1e-3 to 1e7 Hz, so that any duration used here is a valid number of
+        // samples.
         number(&whole, "dt_s", spec.dt_s, "1e-7 .. 1e3", |x| (1e-7..=1e3).contains(&x))?;
         filled(&whole, "stages", &spec.stages)?;
         filled(&whole, "trials", &spec.trials)?;
@@ -94,37 +94,38 @@ impl Description {
         Ok(Self { spec, record: Arc::default() })
     }
 
-    /// The description with facts about the record.
+    /// Adds facts about the recording.
     ///
     /// # Errors
-    /// [`DescriptionError`] if an index or a length does not fit the stages, the parameters or the
-    /// trials.
+    /// [`DescriptionError`] if an index or a length does not match the stages, the parameters or
+    /// the trials.
     pub fn with_record(self, record: RecordFacts) -> Result<Self, DescriptionError> {
         let samples = self.trials.iter().map(|t| t.samples).sum();
         record.check(self.stages.len(), self.parameters.len(), samples)?;
         Ok(Self { record: Arc::new(record), ..self })
     }
 
-    /// What is known of the record.
+    /// Returns the facts about the recording.
     pub fn record(&self) -> &RecordFacts {
         &self.record
     }
 
-    /// Number of rows in the trials, and of rows that were read.
+    /// Returns the number of rows in the trials and the number of rows that were read.
     pub fn rows_used(&self) -> RowsUsed {
         let used = self.trials.iter().map(|t| t.samples).sum();
         self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
     }
 
-    /// The description with more effects, which have to be valid.
+    /// Returns the description with more effects, which must be valid.
     pub(crate) fn with_effects(&self, more: impl Iterator<Item = EffectSpec>) -> Self {
         let mut out = self.clone();
         out.spec.effects.extend(more);
         out
     }
 
-    /// The description with other stages touched by its effects: `touches` returns them for every
-    /// effect, and a stage that does not exist is left out.
+    /// Returns the description with other stages touched by its effects. `touches` returns the
+    /// stages of each effect; stages that do not exist are ignored. If no stage remains, the effect
+    /// keeps its stages.
     pub fn with_touches(&self, touches: impl Fn(usize, &EffectSpec) -> Vec<usize>) -> Self {
         let mut out = self.clone();
         let stages = out.spec.stages.len();
@@ -138,8 +139,8 @@ impl Description {
         out
     }
 
-    /// The description with other tolerances: `altered` returns every parameter anew, and keeps it
-    /// valid.
+    /// Returns the description with every parameter replaced by what `altered` returns. The result
+    /// must be valid.
     pub(crate) fn with_parameters(
         &self,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

@@ -1,30 +1,31 @@
-//! Why a diagnosis was refused.
+//! The reasons for which a diagnosis is refused.
 
 use crate::problem::{checks::DescriptionError, simulator::Simulator};
 
-/// Why a diagnosis was refused; carries the evidence.
+/// The reason for which a diagnosis was refused, with the relevant values.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GapError {
-    /// The simulator's description does not hold together.
+    /// The simulator's description is invalid.
     #[error(transparent)]
     Description(#[from] DescriptionError),
-    /// A measured channel does not have as many finite samples as the trials; 1e100 and more is as good as infinite.
+    /// A measured channel has fewer finite samples than the trials. A value of 1e100 or more counts
+    /// as infinite.
     #[error(
         "{stage}: {found} measured samples in a row are finite and below 1e100, the trials hold {needed}; give one such number for each sample"
     )]
     Measured {
         /// The stage.
         stage: String,
-        /// Finite samples from the first.
+        /// Number of finite samples before the first that is not finite.
         found: usize,
-        /// Samples of all trials.
+        /// Number of samples in all trials.
         needed: usize,
     },
-    /// The simulator refused these values, or could not be bound to its measurements.
+    /// The simulator failed with these values, or could not be connected to its measurements.
     #[error(transparent)]
     Simulator(Box<dyn std::error::Error + Send + Sync>),
-    /// There is nothing to fit on.
+    /// There are too few data to fit.
     #[error("{what}: {hint}")]
     TooLittle {
         /// What is missing.
@@ -32,17 +33,18 @@ pub enum GapError {
         /// What to do.
         hint: String,
     },
-    /// Integration is too coarse for the noise.
+    /// The integration step is so coarse that halving it changes the output noticeably against the
+    /// noise.
     #[error(
         "{stage}: halving the step of integration moves the output by {moved} of its noise, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
     )]
     Solver {
         /// The stage.
         stage: String,
-        /// Root mean square change in multiples of the noise.
+        /// Root mean square change of the output, in multiples of the noise.
         moved: f64,
     },
-    /// A simulated output was not finite, or so great that sums of its square would not be.
+    /// A simulated output was not finite, or so large that the sum of its squares would overflow.
     #[error(
         "{stage}: the simulation gave {value:e} at {time_s} s of trial {trial}, which is no output of a machine{}",
         in_parentheses(.asked)
@@ -50,42 +52,44 @@ pub enum GapError {
     NotFinite {
         /// The stage.
         stage: String,
-        /// What it gave.
+        /// The value.
         value: f64,
         /// Time of that sample in its trial, s.
         time_s: f64,
         /// Name of the trial.
         trial: String,
-        /// The values that it was asked for; empty where they are not known.
+        /// The parameter values of the run; empty if they are not known.
         asked: String,
     },
-    /// The simulator is gone, or gives answers without a question: nothing that it said since can be relied on.
+    /// The simulator process ended, or it sends answers without a request, so that later answers
+    /// cannot be trusted.
     #[error(transparent)]
     Broken(Box<dyn std::error::Error + Send + Sync>),
-    /// Probabilities of the hypotheses are no numbers.
+    /// The probabilities of the hypotheses are not finite.
     #[error(
         "the probabilities of the hypotheses are no numbers (the re-tuned simulator leaves {retuned:e} times the noise): check the noise that is stated; if that is right, this is an error of the program"
     )]
     NoProbability {
-        /// Gap that the re-tuned simulator leaves, in variances of the noise.
+        /// Gap that the re-tuned simulator leaves, in multiples of the noise variance.
         retuned: f64,
     },
-    /// No more runs may be made.
+    /// The budget of model runs is used up.
     #[error(
         "the budget of {budget} model runs is spent before there is an answer; give {least} or more, the least that one needs"
     )]
     Spent {
-        /// Runs that may be made.
+        /// Number of runs that are allowed.
         budget: usize,
-        /// The least budget with which there is an answer.
+        /// The smallest budget that is sufficient for a diagnosis.
         least: usize,
     },
-    /// The caller asked to stop.
+    /// The caller stopped the diagnosis.
     #[error("stopped")]
     Stopped,
 }
 
-/// What an answer can do without: `None` if a run for it failed, or may not be made any more.
+/// Returns `None` if a run failed or the budget is used up, for results that a diagnosis can do
+/// without.
 pub(crate) fn if_possible<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
     match found {
         Err(error) if error.is_of_runs() => Ok(None),
@@ -93,7 +97,7 @@ pub(crate) fn if_possible<T>(found: Result<T, GapError>) -> Result<Option<T>, Ga
     }
 }
 
-/// What a search can do without: `None` if a run for it failed.
+/// Returns `None` if a run failed, for results that a search can do without.
 pub(crate) fn unless_lost<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
     match found {
         Err(error) if error.is_lost() => Ok(None),
@@ -101,12 +105,12 @@ pub(crate) fn unless_lost<T>(found: Result<T, GapError>) -> Result<Option<T>, Ga
     }
 }
 
-/// A text in parentheses behind a space; nothing of an empty one.
+/// Returns a space and the text in parentheses; nothing if the text is empty.
 fn in_parentheses(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(" ({text})") }
 }
 
-/// An error of the simulator, with the values that it was asked for.
+/// An error of the simulator, with the parameter values of the run.
 #[derive(Debug)]
 struct Asked {
     error: Box<dyn std::error::Error + Send + Sync>,
@@ -126,12 +130,14 @@ impl std::error::Error for Asked {
 }
 
 impl GapError {
-    /// Whether all ends: other errors take the candidate out whose values could not be simulated.
+    /// Whether this error ends the diagnosis. Other errors only exclude the candidate whose values
+    /// could not be simulated.
     pub(crate) fn ends_all(&self) -> bool {
         matches!(self, Self::Stopped | Self::Broken(_))
     }
 
-    /// Whether runs failed, or may not be made any more: an answer may go on without what they were for.
+    /// Whether a run failed or the budget is used up. The diagnosis may then continue without that
+    /// result.
     ///
     /// ```
     /// use stretch_gap::GapError;
@@ -149,12 +155,12 @@ impl GapError {
         self.is_lost() || matches!(self, Self::Spent { .. })
     }
 
-    /// Whether the simulator could not simulate what it was asked for.
+    /// Whether the simulator failed to simulate the requested values.
     pub(crate) fn is_lost(&self) -> bool {
         matches!(self, Self::Simulator(_) | Self::NotFinite { .. })
     }
 
-    /// The same error of a run, with the values that were asked for.
+    /// Adds the parameter values of the failed run to the error.
     pub(crate) fn asked(self, asked: String) -> Self {
         match self {
             Self::Simulator(error) => Self::Simulator(Box::new(Asked { error, asked })),
@@ -165,7 +171,8 @@ impl GapError {
         }
     }
 
-    /// That a stage gave a value that is no output, `at` samples after the first of all trials.
+    /// Creates the error that a stage's output is not finite; `at` counts samples from the start of
+    /// the first trial.
     pub fn not_finite(simulator: &dyn Simulator, stage: usize, (at, value): (usize, f64)) -> Self {
         let (mut trial, mut sample) = (String::new(), at);
         for spec in simulator.trials() {
@@ -180,7 +187,7 @@ impl GapError {
         Self::NotFinite { stage, value, time_s, trial, asked: String::new() }
     }
 
-    /// An error of the simulator itself.
+    /// Wraps an error of the simulator itself.
     ///
     /// ```
     /// use stretch_gap::GapError;

@@ -1,8 +1,9 @@
-//! Groups of stages that are linked by a fitted parameter that acts in several of them.
+//! Groups of stages that are linked by fitted parameters that act in several stages.
 
 use crate::problem::simulator::Simulator;
 
-/// Stages in groups that share no fitted parameter, each in order; the groups in the order of their first stage.
+/// Divides the stages into groups that share no fitted parameter. Each group is in order, and the
+/// groups are ordered by their first stages.
 pub(crate) fn groups(simulator: &dyn Simulator) -> Vec<Vec<usize>> {
     let mut left: Vec<usize> = (0..simulator.stages().len()).collect();
     let mut out = Vec::new();
@@ -14,7 +15,8 @@ pub(crate) fn groups(simulator: &dyn Simulator) -> Vec<Vec<usize>> {
     out
 }
 
-/// Some stages with all that share a fitted parameter with one of them, in order.
+/// Returns the given stages and all stages linked to them, directly or through others, by a fitted
+/// parameter, in order.
 pub(crate) fn linked(simulator: &dyn Simulator, stages: &[usize]) -> Vec<usize> {
     let specs = simulator.stages();
     let is_fitted = |p: &&usize| simulator.parameters()[**p].sd > 0.0;

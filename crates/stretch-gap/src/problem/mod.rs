@@ -1,12 +1,12 @@
-//! The problem as its owner states it: a simulator and the measurements that it is compared with.
+//! The problem as a user states it: a simulator and the measurements that it is compared with.
 //!
-//! Input: an implementation of [`simulator::Simulator`] by a user, with a validated
+//! Input: an implementation of [`simulator::Simulator`], with a validated
 //! [`description::Description`] of its stages, parameters, effects and trials ([`spec`]), its noise
-//! ([`noise`]), and what is known of the record ([`record_facts`], [`mod@column`]). Output: the
-//! samples that are fitted, held out and tested ([`roles`]), and every run, counted, stoppable and
-//! finite ([`runs`]). Two simulators wrap another one: one alters parameters
-//! ([`altered_parameters`]), one corrects a column (in `record`). [`thresholds`] are the calibrated
-//! numbers of the decisions. Imports: only `numerics`.
+//! ([`noise`]), and facts about the recording ([`record_facts`], [`mod@column`]). Output: the
+//! fitted, held-out and test samples (`sample_roles`), and model runs that are counted, can be
+//! stopped, and return finite values ([`runs`]). Two simulators wrap another: one alters parameters
+//! ([`altered_parameters`]), the other corrects a column (in `record`). [`thresholds`] are the
+//! calibrated thresholds of the decisions. Imports: only `numerics`.
 
 pub(crate) mod altered_parameters;
 pub(crate) mod checks;

@@ -1,17 +1,16 @@
-//! Noise of a channel, from the record itself: white, and a part that is remembered for a while.
+//! Estimation of a channel's noise from the recording: white noise plus a slow (correlated) part.
 //!
-//! A rig file says what a data sheet says; what a recorder adds, and how long it lasts, is in the record. In windows of
-//! W samples in which nothing was done, parabolas taken out, the cosine transform makes the powers of a stationary noise nearly
-//! independent, each with a mean S_k (Whittle 1953, doi 10.1007/BF02590998):
+//! A rig file states only the data sheet's noise, without that of the recorder. The estimate uses
+//! windows of W samples in which the rig is at rest, after removal of a parabola. The cosine
+//! transform makes the powers of a stationary noise nearly independent, with means S_k (Whittle
+//! 1953, doi 10.1007/BF02590998):
 //!
 //! ```text
 //! S_k = [D M (w I + s R) M D']_kk,     R_ij = exp(-|i - j|/m),     L = -(n/2) sum_k (ln S_k + P_k/S_k)
 //! ```
 //!
-//! with the transform D, the projection M off the parabolas, the white variance w, the slow variance s, its memory m in samples, and
-//! the mean power P_k of n windows. Powers are means without their upper tenth, scaled to what is exact for a normal variable: a window that
-//! something happened in does not count. The level that was stated, white noise and slow noise are three hypotheses with 0, 1 and 3
-//! parameters; the greatest L - (parameters/2) ln(observations) wins (Schwarz 1978, doi 10.1214/aos/1176344136).
+//! D is the transform, M the projection that removes parabolas, w the variance of the white part, s
+//! that of the slow part, m its correlation time in samples, and P_k the mean power over n windows.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -19,24 +18,27 @@ use stretch_filter::log::second_differences;
 
 use crate::numerics::random::RandomGenerator;
 
-/// Samples a window.
+/// Samples per window.
 pub const WINDOW: usize = 128;
-/// Fewest windows that determine a level: a tenth in sixteen.
+/// Smallest number of windows for an estimate; sixteen windows determine the level to a tenth.
 const FEWEST: usize = 12;
-/// Waves slower than parabolas leave, in half turns a window.
+/// Index of the slowest wave that remains after parabolas are removed, in half periods per window.
 const SLOWEST: usize = 3;
-/// Share of the windows left out of each mean, those with the most power.
+/// Share of the windows, those with the most power, that each mean omits.
 const TRIMMED: f64 = 0.1;
-/// Memories that are tried, in samples.
+/// Correlation times that are tried, in samples.
 const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
-/// Shares of the slow part that are tried.
+/// Number of shares of the slow part that are tried.
 const SHARES: usize = 19;
 
-/// Medians of the sizes of differences beyond which one is a gross error: 8 standard deviations of normal noise.
+/// Size of a gross error in multiples of the median size of differences; this is 8 standard
+/// deviations for normal noise.
 const GROSS: f64 = 12.0;
-/// Fits of the waves of the mains with gross errors, each with what the last one left.
+/// Largest number of fits of the mains waves in the presence of gross errors; each is fitted to
+/// what the previous fit left.
 const ROUNDS: usize = 4;
-/// Relative rounding of a second difference: four operations, and the values' own.
+/// Relative rounding error of a second difference: its four operations, and the rounding of the
+/// values.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Noise of a channel, in its unit: white noise plus an Ornstein-Uhlenbeck process.
@@ -49,11 +51,13 @@ pub struct Noise {
     known_to: f64,
 }
 
-/// Relative standard deviation of a variance from second differences: a tenth of the noise itself, because they contain whatever else is quick.
+/// Relative standard deviation of a variance that was estimated from second differences. It
+/// corresponds to a tenth of the noise's standard deviation, because second differences also
+/// contain any fast motion.
 const DIFFERENCES_KNOWN_TO: f64 = 0.2;
 
 impl Noise {
-    /// White noise of a known standard deviation, rounding included.
+    /// White noise of a known standard deviation, which includes rounding.
     ///
     /// ```
     /// use stretch_gap::Noise;
@@ -67,27 +71,28 @@ impl Noise {
         Self { white: sd, slow: 0.0, memory_samples: 1.0, source, known_to }
     }
 
-    /// Relative standard deviation with which its variance is known; 0 where it was stated.
+    /// Returns the relative standard deviation of the estimated variance; 0 if the noise was
+    /// stated.
     pub fn known_to(&self) -> f64 {
         self.known_to
     }
 
-    /// Standard deviation of white and slow part together.
+    /// Returns the standard deviation of the white and the slow part together.
     pub fn sd(&self) -> f64 {
         self.white.hypot(self.slow)
     }
 
-    /// Share of the variance that is remembered, and for how many samples.
+    /// Returns the slow part's share of the variance, and its correlation time in samples.
     pub fn slow(&self) -> (f64, f64) {
         ((self.slow / self.sd().max(f64::MIN_POSITIVE)).powi(2), self.memory_samples)
     }
 
-    /// Where the level of the noise is known from, for a report.
+    /// Returns how the level of the noise was determined, for a report.
     pub fn source(&self) -> &str {
         &self.source
     }
 
-    /// So many samples of it.
+    /// Draws `count` consecutive samples of the noise.
     pub fn samples(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         if self.slow == 0.0 {
             return (0..count).map(|_| self.white * random.gauss()).collect();
@@ -103,9 +108,11 @@ impl Noise {
             .collect()
     }
 
-    /// Estimates noise from windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. Where they are not still,
-    /// because something moves on by itself, only the quicker half of the waves is looked at, and of slow noise nothing is said.
-    /// `None` if there are too few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
+    /// Estimates noise from windows of [`WINDOW`] samples in which the rig is at rest; `stated` is
+    /// the level in the rig file. If something still moves slowly in them (`is_still` is false),
+    /// only the faster half of the waves is used, and slow noise is not estimated. Waves of the
+    /// mains (50 and 60 Hz) are left out; `dt_s` is the sample time, s. Returns `None` if there are
+    /// too few windows or if nothing changes in them.
     ///
     /// ```
     /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
@@ -131,12 +138,13 @@ impl Noise {
         let step = steps.filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         let shapes = Shapes::new(is_still, dt_s);
         let powers = shapes.mean_powers(&whole);
-        // A coarse converter shows nothing at all of a small noise.
+        // A small noise may not show at all through a coarse converter.
         if !step.is_finite() || powers.iter().all(|p| *p <= 0.0) {
             return None;
         }
         let fitted = shapes.fit(&powers, whole.len(), stated);
-        // What lies below its step, a converter rounds: uniform errors of variance step^2/12 at least.
+        // A converter rounds to its step, which adds uniform errors of variance step^2/12. The
+        // noise cannot be smaller than that.
         let rounded = step / 12.0_f64.sqrt();
         let known_to = fitted.known_to;
         Some(match fitted.sd() < rounded {
@@ -145,7 +153,8 @@ impl Noise {
         })
     }
 
-    /// White noise from second differences: what changes from sample to sample; errors that last longer are none.
+    /// Estimates white noise from second differences, that is, from changes from sample to sample.
+    /// Errors that last longer are not included.
     ///
     /// See [`noise_variance`].
     pub fn of_differences<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
@@ -153,8 +162,11 @@ impl Noise {
         Self::white(sd, "second differences of the record".into(), DIFFERENCES_KNOWN_TO)
     }
 
-    /// The same where it is known better than second differences tell it, stated or found in rests. Second differences of a record hold whatever else is quick, such as a resonance of few
-    /// samples a turn; those of what a simulator leaves hold all noise, too, and less of that. So they count where they are clearly less.
+    /// Replaces a level that was estimated from second differences by a smaller one, estimated from
+    /// the residuals `left` of a simulator. Second differences of a recording also contain fast
+    /// motion, such as a resonance with a period of a few samples. Those of the residuals contain
+    /// the same noise but less motion, so their level is used if it is clearly smaller. A level
+    /// that is known more accurately is kept.
     pub(crate) fn at_most_left<'a>(self, left: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
         if self.known_to < DIFFERENCES_KNOWN_TO {
             return self;
@@ -171,8 +183,8 @@ impl Noise {
     }
 }
 
-/// Mean of a squared normal variable over the share `kept` of its least values: (kept - 2 z phi(z))/kept with
-/// P(|x| < z) = kept and the density phi.
+/// Returns the mean of x^2 over the share `kept` of smallest squares of a normal variable x. The
+/// mean is (kept - 2 z phi(z))/kept, with P(|x| < z) = kept and the normal density phi.
 fn trimmed_mean(kept: f64) -> f64 {
     let (mut low, mut high) = (0.0, 9.0);
     for _ in 0..60 {
@@ -184,14 +196,14 @@ fn trimmed_mean(kept: f64) -> f64 {
     (kept - 2.0 * low * density) / kept
 }
 
-/// Powers that white and slow noise have in the windows.
+/// Expected powers of white and of slow noise in a window.
 struct Shapes {
-    /// D M, waves by samples.
+    /// The transform D M, waves by samples.
     transform: DMatrix<f64>,
     white: Vec<f64>,
-    /// By memory.
+    /// One entry for each of `MEMORIES`.
     slow: Vec<Vec<f64>>,
-    /// Waves that are looked at.
+    /// Indices of the waves that are used.
     waves: Vec<usize>,
 }
 
@@ -220,11 +232,13 @@ impl Shapes {
         Self { white: of(&DMatrix::identity(n, n)), slow, transform, waves }
     }
 
-    /// Mean power of every wave, the upper tenth of the windows left out.
+    /// Returns the mean power of every wave. Each mean omits the largest tenth, so that a disturbed
+    /// window does not count, and is scaled to be exact for normal noise.
     fn mean_powers(&self, windows: &[&Vec<f64>]) -> Vec<f64> {
         let mut powers: Vec<Vec<f64>> = vec![Vec::new(); WINDOW];
         for window in windows {
-            // About its first value: a parabola is taken out anyway, and rounding stays small.
+            // The first value is subtracted to keep rounding errors small; the transform removes
+            // constants anyway.
             let values = DVector::from_iterator(WINDOW, window.iter().map(|x| x - window[0]));
             for (power, x) in powers.iter_mut().zip((&self.transform * values).iter()) {
                 power.push(x * x);
@@ -239,20 +253,22 @@ impl Shapes {
         powers.into_iter().map(mean).collect()
     }
 
-    /// The hypothesis with the greatest likelihood, its parameters paid for.
+    /// Returns the most probable hypothesis: the stated level, white noise, or white plus slow
+    /// noise, with 0, 1 and 3 parameters. It has the largest L - (parameters/2) ln(observations)
+    /// (Schwarz 1978, doi 10.1214/aos/1176344136).
     fn fit(&self, powers: &[f64], windows: usize, stated: Option<f64>) -> Noise {
         let n = windows as f64;
         let cost = |s: &dyn Fn(usize) -> f64| -> f64 {
             let each = self.waves.iter().map(|&k| s(k).ln() + powers[k] / s(k));
             0.5 * n * each.sum::<f64>()
         };
-        // The amplitude of a shape that fits best is the mean of P/S.
+        // The best amplitude of a shape S is the mean of P/S.
         let level = |s: &dyn Fn(usize) -> f64| -> f64 {
             self.waves.iter().map(|&k| powers[k] / s(k)).sum::<f64>() / self.waves.len() as f64
         };
         let price = 0.5 * (n * self.waves.len() as f64).ln();
         let white = level(&|k| self.white[k]);
-        // A mean of so many squares: its variance is 2/N of its square.
+        // The variance of a mean of N squares is 2/N of its square.
         let known_to = (2.0 / (n * self.waves.len() as f64)).sqrt();
         let mut best = Noise::white(white.sqrt(), "noise of the record".into(), known_to);
         let mut least = cost(&|k| white * self.white[k]) + price;
@@ -279,7 +295,8 @@ impl Shapes {
     }
 }
 
-/// Mains of 50 and of 60 Hz as a record shows them, turns a sample: folded into half the sample rate.
+/// Frequencies of 50 and 60 Hz mains hum in a sampled signal, in cycles per sample, folded into 0
+/// to 0.5.
 fn mains(dt_s: f64) -> [f64; 2] {
     [50.0, 60.0].map(|hertz: f64| {
         let turns = hertz * dt_s;
@@ -287,14 +304,16 @@ fn mains(dt_s: f64) -> [f64; 2] {
     })
 }
 
-/// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
-/// normal variable's square; robust against what the motion adds and against gross errors. What the mains add is not noise: in every
-/// second the waves of 50 and 60 Hz are taken out before.
+/// Estimates the variance of the noise from second differences: a sixth of their median square,
+/// corrected for the median of a normal variable's square.
 ///
-/// Second differences d_i = x_(i-1) - 2 x_i + x_(i+1) of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared
-/// normal variable is 0.4549 of its mean: sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the sample time, s; the answer has the unit of the
-/// record squared. A coarse converter, which repeats most values, makes the median 0: its noise is the mean square, without sizes
-/// beyond 12 medians of those that are not 0.
+/// The median is robust against motion and gross errors. Mains hum is not noise: waves of 50 and 60
+/// Hz are removed from every second beforehand. Second differences d_i = x_(i-1) - 2 x_i + x_(i+1)
+/// of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared normal
+/// variable is 0.4549 of its mean. Hence sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the sample
+/// time, s; the result has the squared unit of the signal. A coarse converter repeats most values,
+/// which makes the median 0. Then the mean square is used, without differences larger than 12 times
+/// the median of those that are not 0.
 ///
 /// ```
 /// use stretch_gap::{RandomGenerator, noise_variance};
@@ -325,30 +344,32 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
     let count = squares.len() as f64;
     let mean = squares.iter().filter(|x: &&f64| **x <= most).sum::<f64>() / count / 6.0;
     let median = median(squares).unwrap_or(0.0) / 6.0 / 0.4549;
-    // A coarse converter makes the median 0.
+    // The median is near 0 if a coarse converter repeats most values.
     if median > 1e-3 * mean { median } else { mean.max(1e-18) }
 }
 
-/// Second differences; 0 where there is nothing but the rounding of the values.
+/// Returns second differences; those within the rounding error of the values are set to 0.
 fn bends(stretch: &[f64]) -> Vec<f64> {
     let rounding = |x: &[f64]| ROUNDING * x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let pairs = second_differences(stretch).zip(stretch.windows(3));
     pairs.map(|(bend, x)| if bend.abs() > rounding(x) { bend } else { 0.0 }).collect()
 }
 
-/// The upper median; none of nothing.
+/// Returns the upper median; `None` without values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Takes the waves of the mains out of a stretch of differences of an order with the squares of their weights summed, one after the
-/// other; how many samples' worth of white noise went with them. `beside` are the differences before and behind the stretch, 0 where there
-/// are none.
+/// Removes mains waves from a stretch of differences, one wave after the other. `order` is the
+/// order of the differences and `power` the sum of their squared weights. `beside` holds the
+/// differences before and after the stretch, 0 if there are none. Returns how many samples of white
+/// noise carry as much power as was removed from the noise.
 ///
-/// A gross error counts in the fit of a wave as [`GROSS`] medians, so that it does not spread over the stretch; if one remains in
-/// what is left, the waves are fitted to that again. It makes differences of either sign one after the other, where a kink of the
-/// motion makes one alone.
+/// In the fit of a wave, a gross error is clipped to [`GROSS`] medians, so that it does not affect
+/// the whole stretch. If a gross error remains afterwards, the waves are fitted again to what is
+/// left. A gross error produces adjacent differences of opposite sign, whereas a kink of the motion
+/// produces a single difference.
 pub(crate) fn take_waves_out(
     values: &mut [f64],
     beside: [f64; 2],
@@ -371,14 +392,14 @@ pub(crate) fn take_waves_out(
         taken = 0.0;
         let gross: Vec<usize> = (0..values.len()).filter(|i| is_gross(values, *i, most)).collect();
         for shown in mains(dt_s) {
-            // A slow wave cannot be distinguished from motion.
+            // A slow wave could not be distinguished from motion.
             if shown < 0.15 || values.len() < 20 {
                 continue;
             }
             for phase in [0.0, 0.25] {
                 let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
                 let own: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
-                // At half the sample rate there is one wave only.
+                // At half the sample rate only one of the two phases exists.
                 if own < 1e-6 * values.len() as f64 {
                     continue;
                 }
@@ -387,7 +408,8 @@ pub(crate) fn take_waves_out(
                 let clipped = clipped.iter().enumerate();
                 let size = clipped.map(|(i, x)| x * wave(i)).sum::<f64>() / own;
                 values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
-                // Of white noise, differences of order n hold (2 - 2 cos)^n of each wave; second ones hold 6 on the average.
+                // In white noise, differences of order n have the power (2 - 2 cos)^n at this
+                // frequency; for second differences the average over all frequencies is 6.
                 taken +=
                     (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(order as i32) / power;
             }
@@ -434,7 +456,7 @@ mod tests {
         approx::assert_abs_diff_eq!(trimmed_mean(1.0), 1.0, epsilon = 1e-12);
     }
 
-    /// A stated level is kept if the record confirms it, and replaced if not.
+    /// A stated level is kept if the recording confirms it, and replaced otherwise.
     #[test]
     fn what_is_stated_is_a_hypothesis() {
         for seed in 0..20 {

@@ -1,28 +1,29 @@
-//! How quick a record is: half a second of a slow rig corresponds to a tenth of a quick one.
+//! The speed of a recording's motion, which determines the length of a block.
 //!
-//! Residuals are correlated for about as long as the motion keeps its direction. Therefore lengths
-//! in a diagnosis are counted in half turns of the motion, with a minimum of a few samples:
+//! Residuals are correlated for about as long as the motion keeps its direction. A diagnosis
+//! therefore counts lengths in blocks of half a turn (half a period of the motion), with a minimum
+//! of a few samples:
 //!
 //! ```text
 //! block = min(most, max(half a mean turn of the slowest output, 20 samples))
 //! ```
 //!
-//! A turn ends when an output has crossed its middle upwards by more than a tenth of its span and
-//! six times its noise, so that noise makes no turns. An output with fewer than [`FEWEST`] turns
-//! counts as slow.
+//! A turn ends when an output rises above its middle, after it was below. Both levels must be
+//! passed by at least a tenth of the output's range and six times its noise, so that noise makes no
+//! turns. An output with fewer than [`FEWEST`] turns counts as slow and gives the longest block.
 
 use stretch_data::ends;
 
 use crate::problem::noise::noise_variance;
 
-/// Samples of the shortest block.
+/// Number of samples in the shortest block.
 const SAMPLES: f64 = 20.0;
-/// Share of the span, and multiple of the noise, by which the middle is crossed.
+/// Share of the range, and multiple of the noise, by which an output must pass its middle.
 const CROSSED: (f64, f64) = (0.1, 6.0);
-/// Number of turns from which an output determines the pace.
+/// Smallest number of turns that determines the speed of an output.
 const FEWEST: usize = 10;
 
-/// Length of a block of a record, s, at most `most_s`, from the fitted and held-out parts of each
+/// Returns the length of a block, s, at most `most_s`, from the fitted and held-out parts of each
 /// output.
 pub(super) fn block_s<'a, P>(outputs: impl Iterator<Item = P>, dt_s: f64, most_s: f64) -> f64
 where
@@ -32,7 +33,7 @@ where
     slowest.max(SAMPLES * dt_s).min(most_s)
 }
 
-/// Half of the mean time from one turn to the next, s; infinite if there are too few turns.
+/// Returns half of the mean duration of a turn, s; infinite if there are too few turns.
 fn half_turn_s<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> f64 {
     let (low, high) = ends(parts.clone().flatten());
     let noise = noise_variance(parts.clone(), dt_s).sqrt();
@@ -80,7 +81,7 @@ mod tests {
         approx::assert_relative_eq!(block(&both[..1], 0.002), 0.1, max_relative = 0.05);
         assert_eq!(block(&both[1..], 0.002), MOST_S);
         assert_eq!(block(&both, 0.002), MOST_S);
-        // Even if turns take few samples, blocks do not.
+        // A block has at least 20 samples, even if a turn takes fewer.
         assert_eq!(block(&[wave(20.0, 0.01, at)], 0.002), 0.04);
     }
 

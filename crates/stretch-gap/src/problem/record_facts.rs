@@ -1,4 +1,4 @@
-//! What is known of a record in addition to stages, parameters, effects and trials.
+//! Facts about a recording in addition to stages, parameters, effects and trials.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::problem::{
     spec::ParameterSpec,
 };
 
-/// The measured motion by which slices are made.
+/// The measured motion by which the gap is divided into slices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<'a> {
     /// All trials concatenated.
@@ -38,13 +38,13 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// A signal that is no command.
+    /// Creates a signal that is not a command.
     pub fn measured(name: &str, unit: &str, values: Vec<f64>) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), values, is_command: false }
     }
 }
 
-/// The motion of a record, all trials concatenated, and the words for falling and rising.
+/// The motion of a recording, all trials concatenated, and the words for falling and rising.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionSpec {
     /// Values.
@@ -58,7 +58,7 @@ pub struct MotionSpec {
 }
 
 impl MotionSpec {
-    /// A motion that falls and rises.
+    /// Creates a motion with the words "falling" and "rising".
     pub fn new(values: Vec<f64>, unit: &str) -> Self {
         Self { values, unit: unit.into(), falling: "falling".into(), rising: "rising".into() }
     }
@@ -69,11 +69,11 @@ impl MotionSpec {
     }
 }
 
-/// What is known of a record in addition to a [`DescriptionSpec`](crate::DescriptionSpec); empty by
+/// Facts about a recording in addition to a [`DescriptionSpec`](crate::DescriptionSpec); empty by
 /// default.
 ///
-/// [`Description::with_record`](crate::Description::with_record) checks it. All fields with one
-/// value per sample count the samples of all concatenated trials.
+/// [`Description::with_record`](crate::Description::with_record) checks them. A field with one
+/// value per sample covers the samples of all trials, concatenated.
 ///
 /// ```
 /// use stretch_gap::{Description, DescriptionSpec, RecordFacts, StageSpec, TrialSpec};
@@ -95,33 +95,35 @@ impl MotionSpec {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordFacts {
-    /// Samples that were not measured, whatever their value. They do not count. Empty if all were
-    /// measured.
+    /// Flags of samples that were not measured. These samples are ignored, whatever their value.
+    /// Empty if all samples were measured.
     pub is_lost: Vec<bool>,
     /// Number of rows in the trials, and of rows that were read; `None` if every sample is a row.
     pub rows_used: Option<RowsUsed>,
     /// The motion by which the gap is divided into regimes, levels and rates; `None` if it is the
-    /// first stage's output.
+    /// output of the first stage.
     pub motion: Option<MotionSpec>,
-    /// Everything that a missing term may be a function of. If empty, it is the inputs of the
-    /// stages, named after the previous channel, or the motion if the stages have no inputs.
+    /// The signals that a missing term may depend on. If empty, these are the inputs of the stages,
+    /// each named after the channel of the previous stage; if the stages have no inputs, it is the
+    /// motion.
     pub signals: Vec<Recorded>,
-    /// Columns of the record, without values for the outputs of stages; empty if the outputs are
+    /// Columns of the recording, without values for the outputs of stages. Empty if the outputs are
     /// the only columns.
     pub columns: Vec<Column<'static>>,
-    /// The stage whose output a user converts back into the motion with a calibration; `None`
-    /// without such a sensor.
+    /// The stage whose output a calibration converts back into the motion; `None` if there is no
+    /// such sensor.
     pub sensor: Option<usize>,
-    /// Share of a channel's variance that may be left before names of effects are meaningless.
+    /// Share of a channel's variance above which a remaining misfit causes a warning.
     pub gross_misfit_share: f64,
-    /// Parameters, by index, that are exact if commands switch at rows of the record, and their
-    /// specification if commands switch anywhere between two rows. The diagnosis weighs both. Empty
-    /// if commands are not held from row to row.
+    /// Parameters, by index, that are exact if commands switch at rows of the recording, each with
+    /// its specification for commands that switch anywhere between two rows. The diagnosis compares
+    /// both cases. Empty if commands are not held constant from row to row.
     ///
-    /// Differences from switch to switch are given [per tick](ParameterSpec::per_tick_sd).
+    /// Differences between single switches are given [per tick](ParameterSpec::per_tick_sd).
     pub command_timing: Vec<(usize, ParameterSpec)>,
-    /// Parameters, by index, whose slow drift cannot reach the outputs at times: for every sample
-    /// the last sample, counted from the trial's start, at which it could.
+    /// Parameters, by index, whose slow drift cannot reach the outputs at certain times. Each has a
+    /// clock: for every sample, the last sample (counted from the trial's start) at which the drift
+    /// could reach the outputs.
     pub drift_clocks: Vec<(usize, Vec<u32>)>,
 }
 
@@ -142,13 +144,15 @@ impl Default for RecordFacts {
 }
 
 impl RecordFacts {
-    /// The clock of a parameter's slow drift; `None` if the drift always affects the outputs.
+    /// Returns the clock of a parameter's slow drift; `None` if the drift always affects the
+    /// outputs.
     pub(crate) fn drift_clock(&self, parameter: usize) -> Option<&[u32]> {
         let own = self.drift_clocks.iter().find(|(p, _)| *p == parameter)?;
         Some(&own.1)
     }
 
-    /// Checks the facts against the numbers of stages, parameters, and samples of all trials.
+    /// Checks the facts against the numbers of stages and parameters, and the number of samples in
+    /// all trials.
     pub(crate) fn check(
         &self,
         stages: usize,
@@ -186,7 +190,7 @@ impl RecordFacts {
     }
 }
 
-/// Number of rows in the trials, which a diagnosis uses, and of all rows that were read.
+/// Number of rows that the trials contain, and of rows that were read.
 ///
 /// ```
 /// let rows = stretch_gap::RowsUsed { used: 120, read: 1000 };
@@ -194,14 +198,14 @@ impl RecordFacts {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct RowsUsed {
-    /// Rows used.
+    /// Rows in the trials, which the diagnosis uses.
     pub used: usize,
     /// Rows read.
     pub read: usize,
 }
 
 impl RowsUsed {
-    /// Share of the rows that is used; 1 if there are none.
+    /// Returns the share of the rows that is used; 1 if no rows were read.
     pub fn share(&self) -> f64 {
         if self.read == 0 { 1.0 } else { self.used as f64 / self.read as f64 }
     }

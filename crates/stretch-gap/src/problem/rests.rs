@@ -1,40 +1,40 @@
-//! Noise of an output from its rests: spans in which all its inputs are constant.
+//! Estimation of an output's noise from rests: spans in which all its inputs are constant.
 //!
-//! What a recorder adds is visible when nothing happens. A model's residual does not show it,
-//! because it includes the model's errors, and second differences of the whole record include every
-//! quick motion. Therefore noise is estimated only from rests, without their first [`SETTLES`], by
-//! differences of sixth order. These pass white noise and almost nothing that rings slower than a
-//! fifth of the sample rate:
+//! A rest shows what the recorder adds. The residual of a model does not, because it includes the
+//! errors of the model. Second differences of the whole recording include every fast motion. Noise
+//! is therefore estimated only from rests, without the first third ([`SETTLES`]) of each, by
+//! differences of sixth order. These pass white noise and almost no oscillation below a fifth of
+//! the sample rate:
 //!
 //! ```text
 //! sigma^2 = mean over parts of mean (D^6 x)^2 / 924,     gain of D^6 at frequency f: (2 - 2 cos(2 pi f dt))^6
 //! ```
 //!
-//! with 924 = 12!/(6! 6!), the sum of the squared weights. Parts in which more than [`MOVES`] times
-//! the median power is left are still moving and do not count.
+//! The constant 924 = 12!/(6! 6!) is the sum of the squared weights. Parts with more than [`MOVES`]
+//! times the median power still contain motion and are ignored.
 
 use std::ops::Range;
 
 use crate::problem::noise::{Noise, take_waves_out};
 
-/// Share of a rest in which the output settles.
+/// Share at the beginning of a rest during which the output may still settle.
 const SETTLES: f64 = 1.0 / 3.0;
-/// Samples of a part of a rest.
+/// Number of samples in a part of a rest.
 const PART: usize = 48;
-/// Fewest parts for a level: a dozen determine it to a tenth.
+/// Smallest number of parts for an estimate; twelve determine the level to a tenth.
 const FEWEST: usize = 6;
 /// A part moves if its power exceeds the median of all parts by this factor.
 const MOVES: f64 = 3.0;
 /// Order of the differences, and the sum of their squared weights.
 const ORDER: (usize, f64) = (6, 924.0);
-/// Squared correlations of sixth differences, summed over all lags: 24!/(12! 12!)/924^2. That many
-/// differences have the information of one sample.
+/// Sum of the squared correlations of sixth differences over all lags: 24!/(12! 12!)/924^2. That
+/// many differences carry the information of one independent sample.
 const TOGETHER: f64 = 2_704_156.0 / (924.0 * 924.0);
 
 impl Noise {
-    /// Noise of an output over the permitted `trials`, from rests of all its `inputs`; `dt_s` is
-    /// the sample time, s. `None` if the inputs are hardly ever constant, or if the output does not
-    /// change at all in the rests.
+    /// Estimates the noise of an output from rests of all its `inputs` within the given `trials`;
+    /// `dt_s` is the sample time, s. Returns `None` if the inputs are hardly ever constant, or if
+    /// the output does not change at all in the rests.
     ///
     /// ```
     /// use stretch_gap::{Noise, RandomGenerator};
@@ -67,7 +67,8 @@ impl Noise {
     }
 }
 
-/// Spans of a trial in which no input changes, without the beginning in which an output settles.
+/// Returns the spans of a trial in which no input changes, without the beginning in which the
+/// output may settle.
 fn rests(inputs: &[&[f64]], trial: Range<usize>) -> Vec<Range<usize>> {
     let mut out = Vec::new();
     if inputs.is_empty() {
@@ -86,7 +87,7 @@ fn rests(inputs: &[&[f64]], trial: Range<usize>) -> Vec<Range<usize>> {
     out
 }
 
-/// Variance of white noise in a part, without mains hum.
+/// Estimates the variance of white noise in a part, after mains hum is removed.
 fn power(part: &[f64], dt_s: f64) -> f64 {
     let mut values = part.to_vec();
     for _ in 0..ORDER.0 {
@@ -105,8 +106,8 @@ mod tests {
     const DT_S: f64 = 0.01;
     const TRIALS: [Range<usize>; 2] = [0..3000, 3000..6000];
 
-    /// Steps that are held for 1.5 s, through a lag of second order, y'' = w^2 (x - y) - 2 damping
-    /// w y'.
+    /// A command with steps held for 1.5 s, and the output of a lag of second order with noise: y''
+    /// = w^2 (x - y) - 2 damping w y'.
     fn stepped(hertz: f64, damping: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut random = RandomGenerator::new(9, 0);
         let (w, h) = (std::f64::consts::TAU * hertz, DT_S / 50.0);
@@ -126,7 +127,7 @@ mod tests {
         (command, output)
     }
 
-    /// Second differences of the same record would give a third more.
+    /// Second differences of the same recording give a noise that is more than 20 % too large.
     #[test]
     fn noise_is_told_beside_what_rings() {
         for (hertz, damping) in [(1.0, 0.05), (3.0, 0.05), (6.0, 0.05), (3.0, 0.5), (10.0, 0.3)] {

@@ -1,4 +1,5 @@
-//! The one door to the simulator: every run is counted, may be stopped before it begins, and ends in finite numbers.
+//! The only access to the simulator: every run is counted, can be stopped before it begins, and
+//! returns finite numbers.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,24 +15,26 @@ use crate::problem::{
     spec::{EffectSpec, StageSpec},
 };
 
-/// Size of an output from which it is as good as infinite, and the same in multiples of the greatest measured value where that is less: sums
-/// of its square in variances of the noise would be.
+/// Size of an output that counts as infinite. If the largest measured value is below 1, the limit
+/// is this size times that value. Beyond the limit, sums of squares in multiples of the noise would
+/// overflow.
 const MOST: f64 = 1e100;
 
-/// Runs that failed or gave numbers that are not finite.
+/// Runs that failed or returned numbers that are not finite.
 #[derive(Default)]
 struct Lost {
-    /// Models that could not be simulated, bit by bit, by the names of their effects.
+    /// Models that could not be simulated (the bits of their values), by the names of their
+    /// effects.
     models: BTreeMap<Vec<String>, BTreeSet<Vec<u64>>>,
-    /// What the first of them said.
+    /// Error message of the first of these runs.
     first: Option<String>,
-    /// Effects that could not be screened or fitted somewhere because of such runs.
+    /// Effects that could not be screened or fitted somewhere because runs failed.
     not_fitted: BTreeSet<String>,
-    /// Effects of fitted sets that could not be judged because of them.
+    /// Effects of fitted sets that could not be judged because runs failed.
     not_judged: BTreeSet<String>,
 }
 
-/// A simulator, how often it was run, and whether to go on. Clones share the count.
+/// A simulator with a count of its runs and a request to stop. Clones share the count.
 #[derive(Clone)]
 pub(crate) struct Runs<'a> {
     simulator: &'a dyn Simulator,
@@ -39,17 +42,18 @@ pub(crate) struct Runs<'a> {
     count: Arc<AtomicUsize>,
     was_cut: Arc<AtomicBool>,
     lost: Arc<Mutex<Lost>>,
-    /// By stage, the size from which an output is as good as infinite.
+    /// By stage, the size from which an output counts as infinite.
     most: Arc<[f64]>,
-    /// What steps of integration are multiplied by.
+    /// Factor on the integration steps.
     step: f64,
 }
 
 impl<'a> Runs<'a> {
-    /// The runs of a simulator whose measured channels are complete.
+    /// Prepares the runs of a simulator whose measured channels are complete.
     ///
     /// # Errors
-    /// [`GapError::Measured`] where a channel is shorter than the trials or not finite: everything after indexes it.
+    /// [`GapError::Measured`] if a channel is shorter than the trials or not finite, because later
+    /// code indexes it.
     pub(crate) fn new(
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -69,7 +73,7 @@ impl<'a> Runs<'a> {
         Ok(Self { simulator, stop, count, was_cut, lost, most, step: 1.0 })
     }
 
-    /// Another simulator of the same session; its runs count here, too.
+    /// Returns the runs of another simulator of the same session. They share this count.
     pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Runs<'b>
     where
         'a: 'b,
@@ -79,7 +83,7 @@ impl<'a> Runs<'a> {
         Runs { simulator, stop: self.stop, count, was_cut, lost, most, step: self.step }
     }
 
-    /// Runs with steps of integration so many times as long.
+    /// Returns runs whose integration steps are `step` times as long.
     pub(crate) fn at_step(&self, step: f64) -> Self {
         Self { step, ..self.clone() }
     }
@@ -88,41 +92,46 @@ impl<'a> Runs<'a> {
         self.simulator
     }
 
-    /// Whether the simulator's budget allows no more than what the answer itself needs; optional work is then left out.
+    /// Whether only the runs that the answer itself needs are left in the simulator's budget.
+    /// Optional work is then skipped.
     pub(crate) fn is_spent(&self) -> bool {
         let is_spent = self.simulator.model_runs().is_some_and(|runs| runs.is_spent);
         self.was_cut.fetch_or(is_spent, Ordering::Relaxed);
         is_spent
     }
 
-    /// Runs that the simulator counts, and whether a search was cut short for want of them.
+    /// Returns the runs that the simulator counts, and whether the search was cut short by its
+    /// budget.
     pub(crate) fn counted(&self) -> Option<ModelRuns> {
         let is_spent = self.was_cut.load(Ordering::Relaxed);
         self.simulator.model_runs().map(|runs| ModelRuns { is_spent, ..runs })
     }
 
     fn lost(&self) -> MutexGuard<'_, Lost> {
-        // What was noted before a panic is as true as after it.
+        // A panic elsewhere does not invalidate these notes.
         self.lost.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes that these effects could not be screened or fitted because runs of theirs were lost.
+    /// Notes that these effects could not be screened or fitted because some of their runs failed.
     pub(crate) fn not_fitted(&self, effects: &[usize]) {
         self.lost().not_fitted.extend(self.names(effects.iter().copied()));
     }
 
-    /// Notes that the fitted set of these effects could not be judged on the trials that were not fitted.
+    /// Notes that the fitted set of these effects could not be judged on the trials that were not
+    /// fitted.
     pub(crate) fn not_judged(&self, effects: &[usize]) {
         self.lost().not_judged.extend(self.names(effects.iter().copied()));
     }
 
-    /// Names of the effects that could somewhere not be fitted, and of those that could not be judged.
+    /// Returns the names of the effects that could not be fitted somewhere, and of those that could
+    /// not be judged.
     pub(crate) fn lost_effects(&self) -> [BTreeSet<String>; 2] {
         let lost = self.lost();
         [lost.not_fitted.clone(), lost.not_judged.clone()]
     }
 
-    /// Sets of effects of which models could not be simulated, with the number of models, and what the first of them said.
+    /// Returns the sets of effects with models that could not be simulated, each with the number of
+    /// such models, and the first error message.
     pub(crate) fn lost_models(&self) -> Option<(BTreeMap<Vec<String>, usize>, String)> {
         let lost = self.lost();
         let first = lost.first.clone()?;
@@ -133,7 +142,7 @@ impl<'a> Runs<'a> {
         effects.filter_map(|e| Some(self.simulator.effects().get(e)?.name.clone()))
     }
 
-    /// Multiple of the usual step of integration of every run.
+    /// Returns the factor on the usual integration step of every run.
     pub(crate) fn step(&self) -> f64 {
         self.step
     }
@@ -142,20 +151,20 @@ impl<'a> Runs<'a> {
         self.stop
     }
 
-    /// Simulations since the count began.
+    /// Returns the number of simulations so far.
     pub(crate) fn count(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
 
-    /// Samples of the first `trials` trials.
+    /// Returns the number of samples in the first `trials` trials.
     pub(crate) fn samples(&self, trials: usize) -> usize {
         self.simulator.trials()[..trials].iter().map(|t| t.samples).sum()
     }
 
-    /// Simulates every stage of a model over all trials, of which fits run only some.
+    /// Simulates every stage of a model over all trials, including those that are not fitted.
     ///
     /// # Errors
-    /// Why a stage cannot be simulated.
+    /// The error of the first stage that cannot be simulated.
     pub(crate) fn try_all(&self, model: &Model) -> Result<(), GapError> {
         let trials = self.simulator.trials().len();
         let mut stages = 0..self.simulator.stages().len();
@@ -165,12 +174,12 @@ impl<'a> Runs<'a> {
     /// Whether every stage of a model can be simulated over all trials.
     ///
     /// # Errors
-    /// An error that ends the diagnosis.
+    /// Only errors that end the diagnosis.
     pub(crate) fn can_run(&self, model: &Model) -> Result<bool, GapError> {
         Ok(unless_lost(self.try_all(model))?.is_some())
     }
 
-    /// Output of a stage on its measured input over the first `trials` trials.
+    /// Simulates a stage on its measured input over the first `trials` trials.
     pub(crate) fn output(
         &self,
         stage: usize,
@@ -180,14 +189,14 @@ impl<'a> Runs<'a> {
         self.run(Run::exact(stage, model, trials))
     }
 
-    /// One run of one stage on its measured input.
+    /// Runs one stage on its measured input.
     pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
         let mut out = self.begin(run)?;
         let done = self.simulator.simulate(self.stepped(run), &mut out);
         self.heard(run, done.and_then(|()| self.finite(run.stage, out)))
     }
 
-    /// Some runs at once, in one batch; each ends as [`Runs::run`] would.
+    /// Runs a batch; each run returns what [`Runs::run`] would return.
     pub(crate) fn run_many(&self, runs: &[Run<'_>]) -> Vec<Result<Vec<f64>, GapError>> {
         let begun: Result<Vec<Vec<f64>>, GapError> = runs.iter().map(|r| self.begin(*r)).collect();
         let mut outs = match begun {
@@ -203,7 +212,7 @@ impl<'a> Runs<'a> {
         .collect()
     }
 
-    /// One run on an input that was not measured; `None` if the stage cannot.
+    /// Runs a stage on an input that was not measured; `None` if the stage does not support this.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
         let done = self.simulator.simulate_on(self.stepped(run), input, &mut out);
@@ -214,7 +223,7 @@ impl<'a> Runs<'a> {
         self.heard(run, done)
     }
 
-    /// Notes a run that could not be made because none may be any more, or that was lost: what it was for is missing in the answer.
+    /// Notes a run that failed or exceeded the budget. Its result is missing in the answer.
     fn heard<T>(&self, run: Run<'_>, done: Result<T, GapError>) -> Result<T, GapError> {
         match done {
             Err(GapError::Spent { .. }) => self.was_cut.store(true, Ordering::Relaxed),
@@ -234,7 +243,7 @@ impl<'a> Runs<'a> {
         done
     }
 
-    /// The values that a run is asked for, in words.
+    /// Describes the parameter values of a run in words.
     fn asked(&self, run: Run<'_>) -> String {
         let (specs, effects) = (self.simulator.parameters(), self.simulator.effects());
         let one = |name: &str, value: f64, unit: &str| {
@@ -263,7 +272,7 @@ impl<'a> Runs<'a> {
         if (self.stop)() {
             return Err(GapError::Stopped);
         }
-        // Only the sum is read, and only after the work is done: no order is needed.
+        // Relaxed ordering suffices, because the count is only read after the work is done.
         self.count.fetch_add(1, Ordering::Relaxed);
         Ok(vec![0.0; self.samples(run.trials)])
     }

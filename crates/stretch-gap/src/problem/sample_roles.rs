@@ -1,42 +1,42 @@
 //! Decides which samples are fitted, held out and tested.
 //!
-//! Selection by the fitted data is optimistic, and information criteria alone mislead if models are
-//! wrong (Schoniger et al. 2014, doi 10.1002/2014WR016062). Therefore the last part of long trials
-//! is held out to compare fits, and test trials are read once, after all decisions.
+//! Selecting models by the fitted data is optimistic, and information criteria alone mislead if the
+//! models are wrong (Schoniger et al. 2014, doi 10.1002/2014WR016062). Therefore the last part of
+//! long trials is held out to compare fits. Test trials are read only after all decisions.
 
 use serde::Serialize;
 
 use crate::problem::{error::GapError, pace, simulator::Simulator, spec::TrialSpec};
 
-/// The use of a stretch of samples.
+/// How a segment of samples is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Fitted.
+    /// Used for fits.
     Fit,
     /// Held out of every fit, used to compare fits.
     Held,
-    /// Read once, at the end.
+    /// Read only at the end, after all decisions.
     Test,
 }
 
-/// A stretch of one trial in one role; sample numbers count over all concatenated trials.
+/// A segment of one trial with one role. Sample numbers count over all concatenated trials.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Segment {
-    /// Which trial.
+    /// Index of the trial.
     pub trial: usize,
     /// First sample.
     pub from: usize,
     /// One past the last sample.
     pub to: usize,
-    /// What the stretch is used for.
+    /// How the segment is used.
     pub role: Role,
 }
 
-/// Length of a block, s. Residuals within a block count as one observation. If the motion of a
-/// record turns more than once a second, a block is half a turn.
+/// Largest length of a block, s. A block of residuals counts as one observation. If the motion
+/// turns more than once a second, a block is half a turn.
 pub const BLOCK_S: f64 = 0.5;
-/// Trials of at least so many blocks have a held-out last part.
+/// Number of blocks from which the last part of a trial is held out.
 const LONG: f64 = 60.0;
 /// Share of a long trial that is held out.
 const HELD: f64 = 0.3;
@@ -50,19 +50,19 @@ pub struct SampleRoles {
     pub segments: Vec<Segment>,
     /// Samples per block.
     pub block: usize,
-    /// Number of trials, from the first, that contain samples to fit.
+    /// Number of trials up to the last one that contains fitted samples.
     pub fit_trials: usize,
-    /// Whether the test samples are the last parts of the trials that are fitted.
+    /// Whether there is no test trial, so that the last part of each trial is used for testing.
     pub borrowed_test: bool,
 }
 
-/// Number of samples from a trial's start that are not test samples.
+/// Returns the number of samples, from a trial's start, that are not test samples.
 fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
     let share = if borrowed_test { TESTED } else { 0.0 };
     if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
 }
 
-/// By stage: the parts of its measured output that are not test samples.
+/// Returns, for each stage, the parts of its measured output that are not test samples.
 fn looked_at(
     simulator: &dyn Simulator,
 ) -> impl Iterator<Item = impl Iterator<Item = &[f64]> + Clone> {
@@ -80,8 +80,8 @@ fn looked_at(
 }
 
 impl SampleRoles {
-    /// By trial: the number of samples from its start that are not test samples. A simulator may
-    /// use only these before the end.
+    /// Returns for each trial the number of samples, from its start, that are not test samples. A
+    /// simulator may use only these samples before the final test.
     ///
     /// ```
     /// use stretch_gap::{SampleRoles, TrialSpec};
@@ -95,10 +95,10 @@ impl SampleRoles {
         trials.iter().map(|t| may_fit(t, borrowed_test)).collect()
     }
 
-    /// Divides a session.
+    /// Assigns a role to every sample of a session.
     ///
     /// # Errors
-    /// [`GapError::TooLittle`] without anything to fit.
+    /// [`GapError::TooLittle`] if there is nothing to fit.
     pub fn of(simulator: &dyn Simulator) -> Result<Self, GapError> {
         let trials = simulator.trials();
         let dt_s = simulator.dt_s();
@@ -137,27 +137,27 @@ impl SampleRoles {
         Ok(Self { segments, block, fit_trials: last + 1, borrowed_test })
     }
 
-    /// Number of samples of the first `trials` trials.
+    /// Returns the number of samples in the first `trials` trials.
     pub fn samples(&self, trials: usize) -> usize {
         self.segments.iter().filter(|s| s.trial < trials).map(|s| s.to).max().unwrap_or(0)
     }
 
-    /// Samples in a role.
+    /// Returns the number of samples in a role.
     pub fn count(&self, role: Role) -> usize {
         self.of_role(role).map(|s| s.to - s.from).sum()
     }
 
-    /// Blocks in a role.
+    /// Returns the number of blocks in a role; it may be fractional.
     pub fn blocks(&self, role: Role) -> f64 {
         self.count(role) as f64 / self.block as f64
     }
 
-    /// Segments that may be used before the end: all but test segments.
+    /// Returns the segments that may be used before the final test: all but test segments.
     pub(crate) fn looked_at(&self) -> impl Iterator<Item = &Segment> {
         self.segments.iter().filter(|s| s.role != Role::Test)
     }
 
-    /// Segments in a role.
+    /// Returns the segments in a role.
     pub fn of_role(&self, role: Role) -> impl Iterator<Item = &Segment> {
         self.segments.iter().filter(move |s| s.role == role)
     }

@@ -15,28 +15,28 @@ use crate::problem::{
     spectral_line::Line,
 };
 
-/// Nominal parameters and effects with their values.
+/// A setting of the simulator: values of the nominal parameters and of the active effects.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Model {
     /// Every nominal parameter, in the simulator's order.
     pub parameters: Vec<f64>,
-    /// Effects that are on: index in the catalogue, values.
+    /// Active effects: index in the catalogue, and values of the effect's parameters.
     pub effects: Vec<(usize, Vec<f64>)>,
 }
 
 impl Model {
-    /// The simulator as it ships.
+    /// Returns the simulator's own setting: nominal values and no effects.
     pub fn nominal(simulator: &dyn Simulator) -> Self {
         let parameters = simulator.parameters().iter().map(|p| p.nominal).collect();
         Self { parameters, effects: Vec::new() }
     }
 
-    /// Values of an effect that is on.
+    /// Returns the values of an effect; `None` if it is not active.
     pub fn effect(&self, index: usize) -> Option<&[f64]> {
         self.effects.iter().find(|(i, _)| *i == index).map(|(_, values)| values.as_slice())
     }
 
-    /// The same model with one more effect.
+    /// Returns the same model with one more effect.
     pub(crate) fn with(&self, effect: usize, values: &[f64]) -> Self {
         let mut model = self.clone();
         model.effects.push((effect, values.to_vec()));
@@ -44,7 +44,7 @@ impl Model {
     }
 }
 
-/// One run of one stage over the session.
+/// One run of one stage over the first trials of the session.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'a> {
     /// Index of the stage that is run.
@@ -53,39 +53,39 @@ pub struct Run<'a> {
     pub model: &'a Model,
     /// Number of the session's trials that are run, from the first.
     pub trials: usize,
-    /// Adds another draw of their noise to the measured inputs, from this seed, to show how much of
-    /// it arrives at the output.
+    /// If set, the seed of an additional noise realisation that is added to the measured inputs. It
+    /// shows how much input noise reaches the output.
     pub input_noise: Option<u64>,
-    /// Multiple of the usual step of integration: 0.5 for the check of the solver, 2 if that check
+    /// Factor on the usual integration step: 0.5 for the check of the solver, and 2 if that check
     /// allows longer steps.
     pub step: f64,
-    /// Nominal parameters near enough that the output may be computed from the run there and the
-    /// [linearisation](Simulator::linearise), if a run costs more than that; `None` if the output has
-    /// to be exact.
+    /// Nominal parameters from which the output may be extrapolated by the
+    /// [linearisation](Simulator::linearise) around them, if that costs less than a run. `None` if
+    /// the output must be exact.
     pub near: Option<&'a [f64]>,
 }
 
 impl<'a> Run<'a> {
-    /// An exact run on the measured inputs, at the usual step.
+    /// Describes an exact run on the measured inputs, with the usual step.
     pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
         Self { stage, model, trials, input_noise: None, step: 1.0, near: None }
     }
 }
 
-/// Runs of a costly simulator, which are counted.
+/// Count of the runs of a simulator whose runs are costly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ModelRuns {
     /// Number of runs so far.
     pub count: usize,
     /// Largest number of runs, if it is limited.
     pub budget: Option<usize>,
-    /// Whether only the runs that the answer itself needs are left; in a diagnosis, whether the
-    /// search was therefore cut short.
+    /// Whether only the runs that the answer itself needs are left. In a diagnosis: whether the
+    /// search was cut short for this reason.
     pub is_spent: bool,
 }
 
 impl ModelRuns {
-    /// A note that the search was cut short, if it was.
+    /// Returns a note if the search was cut short.
     pub(crate) fn note(&self) -> Option<String> {
         let budget = self.budget.filter(|_| self.is_spent)?;
         Some(format!(
@@ -98,51 +98,52 @@ impl ModelRuns {
 /// A simulator and the measurements that it is compared with.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that the error of one stage
-/// does not spread to the next. Memories are carried from trial to trial in the order of the
-/// session.
+/// does not reach the next. Memories (states such as hysteresis) carry over from trial to trial in
+/// the order of the session.
 ///
-/// Three methods suffice: [`Simulator::description`], [`Simulator::measured`] and
-/// [`Simulator::simulate`]. The others are abilities of some simulators.
+/// Only [`Simulator::description`], [`Simulator::measured`] and [`Simulator::simulate`] are
+/// required. The other methods are optional abilities.
 pub trait Simulator: Sync {
-    /// Stages, parameters, effects, trials, and facts about the record.
+    /// Returns stages, parameters, effects, trials, and facts about the recording.
     fn description(&self) -> &Description;
 
-    /// Measured output of a stage, all trials concatenated.
+    /// Returns the measured output of a stage, all trials concatenated.
     fn measured(&self, stage: usize) -> &[f64];
 
-    /// Simulates a stage on its measured input; effects of other stages in the model are ignored.
+    /// Simulates a stage on its measured input. Effects of other stages in the model are ignored.
     ///
     /// `out` receives the samples of the first `run.trials` trials.
     ///
     /// # Errors
-    /// The simulation is not possible with these values; the fit then rejects the step.
+    /// The simulation is not possible with these values. The fit then rejects the step.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
 
-    /// Several runs at once, each with the result of [`Simulator::simulate`]: on the available
-    /// threads, unless a batch costs the simulator little more than a run.
+    /// Simulates several runs; each result is that of [`Simulator::simulate`]. By default the runs
+    /// are distributed over the available threads. A simulator for which a batch costs little more
+    /// than one run can override this.
     ///
-    /// `outs` receives the samples of each run, and is as long as `runs`.
+    /// `outs` has one vector for each run, which receives its samples.
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         on_all_threads(self, runs, outs)
     }
 
-    /// Runs so far, if each is costly enough to be counted and saved. They are fewer than the
-    /// simulations of stages if a stored run is used again.
+    /// Returns the number of runs so far, if each run is costly enough to be counted and stored. It
+    /// is smaller than the number of simulated stages if stored runs are reused.
     fn model_runs(&self) -> Option<ModelRuns> {
         None
     }
 
     /// Whether each value of an effect needs a separate costly run. Sensitivities to the effect are
-    /// then renewed as seldom as those to the nominal parameters.
+    /// then renewed as rarely as those to the nominal parameters.
     fn is_costly(&self, effect: usize) -> bool {
         let _ = effect;
         false
     }
 
-    /// Computes sensitivities of a stage to its nominal parameters around a model. From then on,
-    /// runs that state what they are [near to](Run::near) may be answered with them. It is called
-    /// between searches, never during one, so that the answer does not depend on the threads. By
-    /// default every run stays exact.
+    /// Computes the sensitivities of a stage to its nominal parameters around a model. Later runs
+    /// that are [near](Run::near) this model may use them. The diagnosis calls this between
+    /// searches, never during one, so that the answer does not depend on the threads. By default
+    /// nothing is computed, and every run is exact.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
@@ -151,14 +152,15 @@ pub trait Simulator: Sync {
         Ok(())
     }
 
-    /// Measured input of a stage as it is fed to the stage, all trials concatenated; `None` if the
-    /// input is not the output of the previous stage.
+    /// Returns the measured input of a stage as it is fed to the stage, all trials concatenated.
+    /// `None` if the input is not the output of the previous stage.
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         let _ = stage;
         None
     }
 
-    /// As [`Simulator::simulate`] on an unmeasured input; returns whether the stage supports this.
+    /// Simulates a stage on an input that was not measured. Returns false if the stage does not
+    /// support this.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
@@ -167,8 +169,9 @@ pub trait Simulator: Sync {
         Ok(false)
     }
 
-    /// The same simulator driven by a record in which the error of one column is corrected; `None`
-    /// if that column drives no stage. The measurements of the stages' outputs may stay unchanged.
+    /// Returns the same simulator driven by a recording in which the error of one column is
+    /// corrected. `None` if that column drives no stage. The measured outputs of the stages may
+    /// stay unchanged.
     ///
     /// # Errors
     /// The corrected column cannot drive the simulator.
@@ -181,15 +184,15 @@ pub trait Simulator: Sync {
         Ok(None)
     }
 
-    /// Lines of known strength and unknown phase that the effects of a model leave in the output of
-    /// a stage on samples that are not fitted; see [`Line`].
+    /// Returns spectral lines of known amplitude and unknown phase that the effects of a model add
+    /// to a stage's output on samples that are not fitted; see [`Line`].
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         let _ = (stage, model);
         Vec::new()
     }
 }
 
-/// Several runs on the available threads.
+/// Simulates several runs on the available threads.
 pub(crate) fn on_all_threads<S: Simulator + ?Sized>(
     simulator: &S,
     runs: &[Run<'_>],
@@ -221,12 +224,12 @@ impl dyn Simulator + '_ {
     pub fn dt_s(&self) -> f64 {
         self.description().dt_s
     }
-    /// What is known of the record in addition to the description's lists.
+    /// Returns the facts about the recording in addition to the description's lists.
     pub fn record(&self) -> &RecordFacts {
         self.description().record()
     }
-    /// The motion by which the gap is divided into regimes, levels and rates: the first stage's
-    /// output unless the [record](RecordFacts::motion) has another.
+    /// Returns the motion by which the gap is divided into regimes, levels and rates: that of the
+    /// [record](RecordFacts::motion), or else the output of the first stage.
     pub fn motion(&self) -> Motion<'_> {
         match &self.record().motion {
             Some(motion) => motion.as_ref(),
@@ -236,7 +239,8 @@ impl dyn Simulator + '_ {
             }
         }
     }
-    /// Columns of the record: those of the stages' outputs, unless the [record](RecordFacts::columns) lists more.
+    /// Returns the columns of the recording: those that the [record](RecordFacts::columns) lists,
+    /// or else the outputs of the stages.
     pub fn columns(&self) -> Vec<Column<'_>> {
         let known = &self.record().columns;
         let mut columns: Vec<Column<'_>> = match known.is_empty() {

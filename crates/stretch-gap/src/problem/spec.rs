@@ -8,27 +8,28 @@ use stretch_effects::EffectParameter;
 
 use crate::problem::noise::Noise;
 
-/// A stage of a simulator: it turns a measured input into one measured output channel.
+/// A stage of a simulator, which turns a measured input into one measured output channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageSpec {
     /// Name in reports.
     pub name: String,
-    /// Output channel: the column that it is compared with.
+    /// Name of the recorded column that the output is compared with.
     pub channel: String,
     /// Unit of the output.
     pub unit: String,
-    /// Indices of the nominal parameters that act in it.
+    /// Indices of the nominal parameters that act in this stage.
     pub parameters: Vec<usize>,
-    /// Noise of the output, including rounding; `None` if it has to be estimated from the record's
+    /// Noise of the output, including rounding; `None` if it is estimated from the recording's
     /// second differences.
     pub noise: Option<Noise>,
-    /// Slow drift that the recorder may add to the output, its `sd` in multiples of the noise. Whether it is
-    /// there, how large and how quick, is estimated from the record; at most 2.5 times `sd`.
+    /// Slow drift that the recorder may add to the output, with `sd` in multiples of the noise. Its
+    /// presence, size and correlation time are estimated from the recording; the size is at most
+    /// 2.5 times `sd`.
     pub recorder_drift: Option<SlowDrift>,
 }
 
 impl StageSpec {
-    /// A stage whose noise is estimated from the record.
+    /// Creates a stage whose noise is estimated from the recording.
     pub fn new(name: &str, channel: &str, unit: &str, parameters: &[usize]) -> Self {
         Self {
             name: name.into(),
@@ -41,15 +42,15 @@ impl StageSpec {
     }
 }
 
-/// A slow drift of a parameter around its value that the simulator does not model. It belongs to
-/// the noise.
+/// A slow drift of a parameter around its value that the simulator does not model. It counts as
+/// noise.
 ///
-/// An Ornstein-Uhlenbeck process of about the standard deviation `sd` and the correlation time
-/// `correlation_s`. Both are estimated from the record, within factors of about two and three
-/// around these values.
+/// The model is an Ornstein-Uhlenbeck process with a standard deviation of about `sd` and a
+/// correlation time of about `correlation_s`. Both are estimated from the recording, within factors
+/// of about two and three around these values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SlowDrift {
-    /// Standard deviation, in the parameter's unit; of a recorder in multiples of the noise.
+    /// Standard deviation, in the parameter's unit; for a recorder, in multiples of the noise.
     pub sd: f64,
     /// Correlation time, s.
     pub correlation_s: f64,
@@ -64,27 +65,27 @@ pub struct ParameterSpec {
     pub unit: String,
     /// Value that the simulator ships with.
     pub nominal: f64,
-    /// Tolerance, one standard deviation in the parameter's unit; 0 when exact. The re-tuned value stays within
-    /// three of them.
+    /// Tolerance: one standard deviation in the parameter's unit, 0 if the parameter is exact. The
+    /// re-tuned value stays within three standard deviations.
     pub sd: f64,
     /// Smallest plausible value.
     pub least: f64,
     /// Largest plausible value.
     pub greatest: f64,
-    /// Slow drift within a trial, when there is one.
+    /// Slow drift within a trial, if there is one.
     pub drift: Option<SlowDrift>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
     pub per_trial_sd: Option<f64>,
-    /// Standard deviation of an independent offset for each tick of its [drift
-    /// clock](crate::RecordFacts::drift_clocks), in the parameter's unit: what differs from event
-    /// to event.
+    /// Standard deviation of an independent offset for each tick of the parameter's [drift
+    /// clock](crate::RecordFacts::drift_clocks), in the parameter's unit. It describes differences
+    /// from event to event.
     pub per_tick_sd: Option<f64>,
-    /// Whether its re-tuned value is evidence (it is not if others can compensate for it).
+    /// Whether the re-tuned value is evidence. It is not if other parameters can compensate for it.
     pub is_evidence: bool,
 }
 
 impl ParameterSpec {
-    /// An exact parameter; [`ParameterSpec::within`] gives it a tolerance.
+    /// Creates an exact parameter; [`ParameterSpec::within`] adds a tolerance.
     pub fn new(name: &str, unit: &str, nominal: f64) -> Self {
         Self {
             name: name.into(),
@@ -100,22 +101,24 @@ impl ParameterSpec {
         }
     }
 
-    /// The parameter with a tolerance: one standard deviation, in the parameter's unit.
+    /// Sets the tolerance: one standard deviation, in the parameter's unit.
     pub fn within(self, sd: f64) -> Self {
         Self { sd, ..self }
     }
 
-    /// Whether a re-tuned value is at the end of the parameter's tolerance.
+    /// Whether a re-tuned value is at an end of the parameter's tolerance.
     pub(crate) fn is_at_end(&self, value: f64) -> bool {
         self.sd > 0.0 && (value - self.nominal).abs() >= END * self.sd
     }
 }
 
-/// Tolerances at which a parameter counts as at its end: two of the five or so of a stage do so by chance in one rig of a few
-/// thousand.
+/// Distance from the nominal value, in standard deviations, at which a parameter counts as at its
+/// end. In a stage with about five parameters, two reach it by chance in one of a few thousand
+/// rigs.
 const END: f64 = 2.75;
 
-/// A parameter is at an end of its range if its distance is at most this share of the range.
+/// Distance from an end of the range, as a share of the range, within which an effect's parameter
+/// counts as at that end.
 const AT_END: f64 = 1e-3;
 
 /// An effect that the nominal simulator lacks.
@@ -123,7 +126,7 @@ const AT_END: f64 = 1e-3;
 pub struct EffectSpec {
     /// Name in reports.
     pub name: String,
-    /// Stage that it belongs to, as named in reports.
+    /// Name of the stage that it belongs to, as in reports.
     pub stage: String,
     /// Indices of the stages whose output it changes.
     pub touches: Vec<usize>,
@@ -131,20 +134,22 @@ pub struct EffectSpec {
     pub parameters: Vec<EffectParameter>,
     /// Values for screening, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
-    /// Whether its course in time can be found in the record. Its size then only says how much is searched.
+    /// Whether the effect's course in time can be reconstructed from the recording. Its size then
+    /// only controls how far the reconstruction searches.
     pub is_found: bool,
-    /// Whether it is a law of session time, so that trials outside the fitted time are
+    /// Whether the effect depends on session time, so that trials outside the fitted time are
     /// extrapolated.
     pub drifts: bool,
     /// Names of effects that are hard to distinguish from it.
     pub twins: Vec<String>,
-    /// Another stage whose measured output it reads, including errors. What it explains by these
-    /// errors is the common error of two outputs.
+    /// Another stage whose measured output the effect reads, including the errors of that output.
+    /// An improvement through these errors shows only an error that two outputs have in common.
     pub reads: Option<usize>,
 }
 
 impl EffectSpec {
-    /// An effect in one stage, screened at a small and a large value of each strength and at three of each shape.
+    /// Creates an effect of one stage. It is screened at a small and a large value of each strength
+    /// and at three values of each shape.
     ///
     /// ```
     /// use stretch_gap::{EffectParameter, EffectSpec};
@@ -170,8 +175,8 @@ impl EffectSpec {
         }
     }
 
-    /// Whether a size is at an end of its range, and this end is not "off". The effect then
-    /// compensates for something else.
+    /// Whether a size is at an end of its range other than "off". The effect then compensates for
+    /// something else.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
         let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted());
         fitted.any(|(p, value)| {
@@ -179,14 +184,14 @@ impl EffectSpec {
                 true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
-            // A time constant beyond its range still belongs to a memory; a size beyond its range
-            // belongs to another cause.
+            // Only sizes are checked. A time constant beyond its range still belongs to a memory,
+            // but a size beyond its range indicates another cause.
             p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
         }) && !self.is_found
     }
 }
 
-/// Facts about a trial.
+/// A trial of the session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrialSpec {
     /// Name in reports.
@@ -195,12 +200,12 @@ pub struct TrialSpec {
     pub samples: usize,
     /// Session time of its first sample, s.
     pub start_s: f64,
-    /// Whether it is a test trial: read once, at the end.
+    /// Whether it is a test trial, which is read only at the end.
     pub is_test: bool,
 }
 
 impl TrialSpec {
-    /// A trial that began at a session time, s, to be fitted or tested.
+    /// Creates a trial that begins at `start_s` of the session; `is_test` marks a test trial.
     pub fn new(name: &str, samples: usize, start_s: f64, is_test: bool) -> Self {
         Self { name: name.into(), samples, start_s, is_test }
     }

@@ -1,16 +1,17 @@
-//! A line of known strength and unknown phase, for samples where nothing may be fitted: it is
-//! judged by its power.
+//! A spectral line of known amplitude and unknown phase, judged by its power on samples where
+//! nothing may be fitted.
 //!
-//! A model that contains a hum of amplitude a predicts how strong its line is, but not its phase.
-//! In each second the residual r, in multiples of the noise s, then has the covariance
+//! A model that contains a hum of amplitude a predicts the power of its line, but not its phase. In
+//! each second the residual r, in multiples of the noise s, then has the covariance
 //!
 //! ```text
 //! V = I + C C',     C = (a/sqrt 2) (cos(2 pi f t_i)/s_i, sin(2 pi f t_i)/s_i)
 //! ```
 //!
-//! with both quadratures normal of variance a^2/2. The residual is whitened to V^-1/2 r, with the
-//! symmetric root. Its mean square is 1 if the line is as strong as predicted, larger if it is
-//! stronger, and nothing of the residual was fitted. Components outside the line do not change.
+//! Both quadratures are normal with the variance a^2/2. The residual is whitened to V^-1/2 r with
+//! the symmetric root. Nothing is fitted to the residual. After whitening, the mean square is 1 if
+//! the line is as strong as predicted, and larger if it is stronger. Components outside the line do
+//! not change.
 
 use std::f64::consts::TAU;
 
@@ -34,18 +35,19 @@ pub struct Line {
     pub amplitude: f64,
 }
 
-/// Time over which the phase is constant, s.
+/// Time over which the phase is assumed constant, s.
 const STEADY_S: f64 = 1.0;
 
 impl Line {
-    /// Whitens a residual in multiples of the noise without a break; `noise` is one standard
-    /// deviation at every sample, in the unit of the output, `dt_s` the sample time, s.
+    /// Whitens a residual in place. The residual is in multiples of the noise and has no gaps.
+    /// `noise` is one standard deviation at every sample in the unit of the output, and `dt_s` the
+    /// sample time, s.
     pub fn level(&self, residual: &mut [f64], noise: &[f64], dt_s: f64) {
         let window = ((STEADY_S / dt_s) as usize).max(8);
         for (r, sd) in residual.chunks_mut(window).zip(noise.chunks(window)) {
             let columns = self.columns(sd, dt_s);
             for (axis, variance) in principal(&columns) {
-                // Along an axis u of V the variance is 1 + lambda.
+                // The covariance V has the variance 1 + lambda along an axis u.
                 let along: f64 = axis.iter().zip(&*r).map(|(u, r)| u * r).sum();
                 let change = (1.0 / (1.0 + variance).sqrt() - 1.0) * along;
                 r.iter_mut().zip(&axis).for_each(|(r, u)| *r += change * u);
@@ -53,7 +55,7 @@ impl Line {
         }
     }
 
-    /// C of the module's head.
+    /// Returns C of the module's description.
     fn columns(&self, sd: &[f64], dt_s: f64) -> [Vec<f64>; 2] {
         [0.0, 0.25].map(|quarter| {
             let wave = |i: usize| {
@@ -66,7 +68,8 @@ impl Line {
     }
 }
 
-/// Axes of C C' and the variance along each: the eigenvectors of the 2 x 2 matrix C'C, mapped by C.
+/// Returns the axes of C C' and the variance along each: the eigenvectors of the 2 x 2 matrix C'C,
+/// mapped by C.
 fn principal([c, s]: &[Vec<f64>; 2]) -> Vec<(Vec<f64>, f64)> {
     let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
     let (cc, cs, ss) = (product(c, c), product(c, s), product(s, s));
@@ -107,13 +110,13 @@ mod tests {
 
     #[test]
     fn a_line_as_strong_as_predicted_is_no_gap_and_a_stronger_one_is() {
-        // At 50 of 100 Hz a hum of that power is visible once a second, as large as the sine of its
-        // phase.
+        // At 50 Hz and 100 samples per second, each second shows only one quadrature of the hum,
+        // with a size that depends on the phase.
         for hertz in [50.0, 60.0] {
             approx::assert_relative_eq!(left(hertz, 5.0, 5.0), 1.0, max_relative = MEDIAN_SPREAD);
         }
         assert!(left(60.0, 50.0, 5.0) > 2.0);
-        // A line that is predicted but absent removes only its own two components of a hundred.
+        // If a line is predicted but absent, only its own two of a hundred components are reduced.
         assert!(left(60.0, 0.0, 50.0) > 0.95);
     }
 

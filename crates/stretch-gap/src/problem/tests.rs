@@ -1,4 +1,4 @@
-//! Dependent stages, counted runs, and tolerances in another form, on toys.
+//! Tests of linked stages, of the count of runs, and of altered tolerances, on toy simulators.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -20,14 +20,14 @@ static GO_ON: fn() -> bool = || false;
 fn stages_that_share_a_fitted_parameter_are_one_group() {
     let mut toy = Toy::of(&[Law::Line, Law::Lag, Law::Line]);
     assert_eq!(groups(&toy.measured(1)), [vec![0], vec![1], vec![2]]);
-    // The third stage has the gain of the first.
+    // The third stage has the same gain parameter as the first.
     toy.shared = vec![(2, 0)];
     assert_eq!(groups(&toy.measured(1)), [vec![0, 2], vec![1]]);
     assert_eq!(linked(&toy.measured(1), &[2]), [0, 2]);
-    // An exact parameter is not fitted, and links nothing.
+    // An exact parameter is not fitted, so it links no stages.
     toy.parameters[0].sd = 0.0;
     assert_eq!(groups(&toy.measured(1)), [vec![0], vec![1], vec![2]]);
-    // All three are linked through the second stage.
+    // The first parameter acts in all three stages.
     toy.parameters[0].sd = 0.05;
     toy.shared = vec![(1, 0), (2, 0)];
     assert_eq!(groups(&toy.measured(1)), [vec![0, 1, 2]]);

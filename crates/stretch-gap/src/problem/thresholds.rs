@@ -1,46 +1,52 @@
-//! Numbers that were calibrated on development cases, in one file.
+//! Thresholds that were calibrated on development cases, in one file.
 
 use serde::{Deserialize, Serialize};
 
-/// Thresholds of the decision, read from `thresholds.toml`.
+/// Thresholds of the decisions, read from `thresholds.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thresholds {
-    /// Excess, summed over channels, below which there is no gap.
+    /// Excess, summed over channels, below which there is no gap. The excess of a channel is its
+    /// reduced chi-square minus one.
     pub null_excess: f64,
     /// Smallest rise of the score for an effect that closes a gap, nats.
     pub rise: f64,
-    /// Smallest rise of the score for an effect that closes less than a gap that counts.
+    /// Smallest rise of the score for an effect that closes less than `null_excess`, or no more
+    /// than model discrepancy could explain, nats.
     pub faint_rise: f64,
     /// Smallest share of the remaining gap that an effect must close.
     pub share: f64,
-    /// Share of what was closed, in a stage and in each octave of it, that model discrepancy may leave to a further effect.
+    /// Share of what a set closes that model discrepancy may leave to a further effect, in each
+    /// stage and in each octave of its residual.
     pub model_discrepancy: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,
     /// Growth of the temperature with the share of the gap that the best set leaves, nats.
     pub rho: f64,
-    /// Excess that may be left whatever the initial gap.
+    /// Excess that an explained gap may leave, whatever the initial gap.
     pub unknown_excess: f64,
-    /// Share of the excess that model discrepancy may leave.
+    /// Share of the closed excess that an explained gap may leave in addition, because of model
+    /// discrepancy.
     pub unknown_share: f64,
-    /// Width of the border to `unknown`, in logarithms of the remaining excess.
+    /// Change of the logarithm of the remaining excess that changes the odds of `unknown` by a
+    /// factor e.
     pub unknown_soft: f64,
-    /// Odds of `unknown` at its border.
+    /// Odds of `unknown` if the remaining excess is just what an explained gap may leave.
     pub unknown_odds: f64,
-    /// Excess from which a gap counts, summed over channels. A further name must close at least
-    /// this much: 0.05 is 1.025 times the noise.
+    /// Excess, summed over channels, from which a gap is relevant. A further named effect must
+    /// close at least this much. A value of 0.05 corresponds to a residual of 1.025 times the
+    /// noise.
     pub least_gap: f64,
 }
 
 impl Thresholds {
-    /// Share of an effect's contribution that another form of it changes. The discrepancy is a
-    /// share of the variance; deviations are amplitudes.
+    /// Returns the relative amplitude by which another form changes an effect's contribution. It is
+    /// the square root of `model_discrepancy`, which is a share of variance.
     pub(crate) fn discrepancy_amplitude(&self) -> f64 {
         self.model_discrepancy.sqrt()
     }
 
-    /// The thresholds of this version.
+    /// Returns the thresholds of this version.
     pub fn frozen() -> Self {
         toml::from_str(include_str!("../../thresholds.toml")).expect("a test reads it")
     }

@@ -1,25 +1,15 @@
-//! Checks of the columns alone, before any simulation: copied, dead and stuck channels.
+//! Checks of the columns alone, without any simulation, for copied, dead and stuck channels.
 //!
-//! Every test asks whether *noise* can explain the recording. The standard deviation s of noise is
-//! estimated by differences of second and of fourth order, which pass white noise equally and slow
-//! motion not at all:
+//! Every test asks whether noise can explain the recording. The standard deviation s of the noise
+//! is estimated from differences of second and of fourth order. Both pass white noise, but almost
+//! no slow motion:
 //!
 //! ```text
 //! s2^2 = median(d2^2)/(6 * 0.4549),   s4^2 = median(d4^2)/(70 * 0.4549),   white where s4 is about s2
 //! ```
 //!
-//! * copied: the residual of one column regressed on another is less than half of what two
-//!   independent noises would leave, and the second differences of the two are correlated. The
-//!   second condition is needed because a hum in one of them would pass for its noise.
-//! * dead: a column stays within its noise while another goes through most of its range (a loose
-//!   sleeve hides less). What repeats within ten samples is not noise but motion with few samples
-//!   per turn, except mains hum.
-//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would
-//!   do so once in a billion records, while another column moves. A sensor behind a play or a dead
-//!   band also repeats values if it shows no noise. Such a stretch counts only if its column has
-//!   white noise, which no play removes; or if it jumps at its end, because the output of a play
-//!   moves on from its last value; or if another column goes through more of its range than any
-//!   play takes up.
+//! A copied column shares the noise of another. A dead one shows only noise, and a stuck one
+//! repeats a single value, while other columns move. The functions below state the exact criteria.
 
 use stretch_data::ends;
 
@@ -28,29 +18,29 @@ use crate::{
     record::{fault::DELAY_S, gross::Gross},
 };
 
-/// Largest share of independent noise's standard deviation that a copy leaves.
+/// Largest residual of a copy, as a share of the standard deviation that independent noises would
+/// leave.
 const COPY: f64 = 0.5;
-/// Correlation of second differences from which two columns have the same noise.
+/// Correlation of second differences above which two columns have the same noise.
 const ALIKE: f64 = 0.9;
-/// Ratios of s4 to s2 of white noise.
+/// Range of s4/s2 in which noise counts as white.
 const WHITE: (f64, f64) = (0.7, 1.4);
-/// Share of its range that another column covers while one is dead.
+/// Share of its range that another column covers while one is dead or behind a play.
 const RANGE: f64 = 0.8;
-/// Standard deviations of a block's mean within which a dead column stays.
+/// Number of standard deviations of a block's mean within which a dead column stays.
 const KEEPS: f64 = 4.0;
-/// Samples of such a block.
+/// Number of samples in such a block.
 const BLOCK: usize = 10;
-/// Autocorrelation, at the lags of a block, that no noise has.
+/// Size of the autocorrelation, at lags up to a block, that noise does not reach.
 const REPEATS: f64 = 0.5;
 /// Smallest share of its range by which another column moves while one is stuck.
 const MOVES: f64 = 0.3;
-/// A column jumps at the end of a stuck stretch if the step exceeds the largest step of all but a
-/// thousandth by this factor.
+/// Smallest jump at the end of a stuck stretch, in multiples of the 99.9 % quantile of all steps.
 const JUMP: f64 = 3.0;
-/// ln of the probability that noise repeats itself in this way.
+/// ln of the probability below which repetitions are not attributed to chance.
 const CHANCE: f64 = -20.7;
 
-/// Everything that is wrong with the columns of a session; usually empty.
+/// Returns all errors of the columns of a session that the columns alone show; usually none.
 pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
     let own: Vec<&Column<'_>> = columns.iter().filter(|c| !c.values.is_empty()).collect();
     let mut out = Vec::new();
@@ -92,7 +82,7 @@ pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: 
     out
 }
 
-/// Standard deviation of white noise by differences of order two and four.
+/// Estimates the standard deviation of white noise from differences of order two and of order four.
 fn noise(values: &[f64]) -> (f64, f64) {
     let of = |weights: &[f64]| {
         let power: f64 = weights.iter().map(|w| w * w).sum();
@@ -110,11 +100,12 @@ fn noise(values: &[f64]) -> (f64, f64) {
     (of(&[1.0, -2.0, 1.0]), of(&[1.0, -4.0, 6.0, -4.0, 1.0]))
 }
 
-/// Factor by which column `b` is a copy of column `a`, including noise; `None` if it is no copy.
-///
-/// The residual of two channels of independent noise is sqrt(s_b^2 + factor^2 s_a^2); a copy leaves
-/// only rounding. Without white noise there is no answer, because a good sensor would look the
-/// same.
+/// Returns the factor by which column `b` is a copy of column `a`, including its noise; `None` if
+/// it is no copy.
+/// The residual of the regression of `b` on `a` must be less than half of sqrt(s_b^2 + factor^2
+/// s_a^2), which independent noises would leave; a copy leaves only rounding. The second
+/// differences must be correlated as well, because hum in one column could be taken for its noise.
+/// Without white noise the result is `None`, because two good sensors would look the same.
 ///
 /// ```
 /// use stretch_gap::{RandomGenerator, copied};
@@ -146,7 +137,7 @@ pub fn copied(a: &[f64], b: &[f64]) -> Option<f64> {
     (is_copy && is_white(a2, a4) && is_white(b2, b4)).then_some(factor)
 }
 
-/// Size of the correlation of second differences.
+/// Returns the size of the correlation of second differences.
 fn alike(a: &[f64], b: &[f64]) -> f64 {
     let bend = |w: &[f64]| w[0] - 2.0 * w[1] + w[2];
     let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
@@ -159,7 +150,7 @@ fn alike(a: &[f64], b: &[f64]) -> f64 {
     ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Whether another column moves by a share of its range within a stretch.
+/// Whether another column covers at least a share of its range within a stretch.
 fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> bool {
     others.iter().any(|other| {
         let ((low, high), (a, b)) = (ends(*other), ends(&other[from..to]));
@@ -167,7 +158,9 @@ fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> boo
     })
 }
 
-/// Stretches in which a column is only noise while another covers its range.
+/// Returns the stretches in which a column stays within its noise while another covers most of its
+/// range. A loose sleeve conceals less than that. A signal that repeats within ten samples is fast
+/// motion rather than noise, except mains hum.
 fn dead(
     values: &[f64],
     others: &[&[f64]],
@@ -189,8 +182,8 @@ fn dead(
             let next = if i < blocks { mean(i) } else { f64::INFINITY };
             if high.max(next) - low.min(next) > reach {
                 let run = (begin + first * BLOCK, begin + i * BLOCK);
-                // Late is not dead: with only a delay, the other columns are still this far from
-                // the ends of the run.
+                // A late column is not dead. With only a delay, the other columns would not move
+                // this much within the run shortened by the longest delay.
                 let inner = (run.0 + late, run.1.saturating_sub(late));
                 let is_seen = inner.1 > inner.0 && others_move(others, inner, RANGE);
                 if is_seen && !repeats_itself(&values[run.0..run.1], dt_s) {
@@ -205,8 +198,9 @@ fn dead(
     out
 }
 
-/// Whether a stretch repeats itself at a lag of a block or less, or reverses, as motion does: |r_k|
-/// above [`REPEATS`] with r_k = sum x_i x_(i+k) / sum x_i^2 about the mean, without mains hum.
+/// Whether a stretch repeats itself, or its negative, at a lag of at most a block, as motion does:
+/// |r_k| above [`REPEATS`] with r_k = sum x_i x_(i+k) / sum x_i^2 about the mean. Mains hum is
+/// removed first.
 fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let mut apart: Vec<f64> = values.iter().map(|x| x - mean).collect();
@@ -217,7 +211,12 @@ fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     (1..=BLOCK).any(|lag| product(lag).abs() > REPEATS * all)
 }
 
-/// Stretches in which a column repeats one number that is no end of its range.
+/// Returns the stretches in which a column repeats one value, not an end of its range, so often
+/// that noise would do so once in a billion recordings, while another column moves.
+///
+/// A sensor behind a play or a dead band also repeats values. A stretch therefore counts only if
+/// the column has white noise, if it jumps at the end (the output of a play continues from its last
+/// value), or if another column covers more of its range than any play.
 fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(usize, usize)> {
     let (low, high) = ends(values);
     let mut runs: Vec<(usize, usize)> = Vec::new();
@@ -231,7 +230,8 @@ fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(u
         }
     }
     runs.sort_by_key(|(from, to)| std::cmp::Reverse(to - from));
-    // Repetitions elsewhere: the longest runs are the doubtful ones.
+    // The probability of a repetition is estimated without the longest runs, because these are the
+    // ones in doubt.
     let doubted = |(from, to): &(usize, usize)| to - from > 20;
     let (mut equal, mut all) = (1.0, 2.0);
     for (from, to) in runs.iter().filter(|run| !doubted(run)) {
@@ -254,7 +254,7 @@ fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(u
     runs
 }
 
-/// Whether a column has white noise of more than the step that its values are written in.
+/// Whether a column has white noise that exceeds its resolution, the smallest step between samples.
 fn shows_noise(values: &[f64]) -> bool {
     let (s2, s4) = noise(values);
     let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
@@ -262,7 +262,7 @@ fn shows_noise(values: &[f64]) -> bool {
     (WHITE.0 * s2..=WHITE.1 * s2).contains(&s4) && s2 > step
 }
 
-/// The largest change from one sample to the next, without a thousandth of all.
+/// Returns the 99.9 % quantile of the changes from one sample to the next.
 fn greatest_step(values: &[f64]) -> f64 {
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let at = steps.len() * 999 / 1000;
@@ -292,7 +292,7 @@ mod tests {
         let copy: Vec<f64> = a.iter().map(|x| 3.0 - 2.0 * x).collect();
         assert!(copied(&a, &copy).is_some_and(|factor| (factor + 2.0).abs() < 1e-3));
         assert_eq!(copied(&a, &b), None);
-        // A hum larger than the residual of the line is no copy either.
+        // A column with hum larger than the residual of the regression is not a copy either.
         let hum = |i: usize| if i.is_multiple_of(2) { 0.2 } else { -0.2 };
         let humming: Vec<f64> = b.iter().enumerate().map(|(i, x)| x + hum(i)).collect();
         assert_eq!(copied(&a, &humming), None);
@@ -310,14 +310,14 @@ mod tests {
         died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * random.gauss());
         let found = dead(&died, &[&other], &trials, DT_S);
         assert!(matches!(found[..], [(from, to)] if from >= N / 2 - BLOCK && to == N), "{found:?}");
-        // Half of the stroke is invisible.
+        // The slack conceals half of the stroke.
         let slack: Vec<f64> =
             wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * random.gauss()).collect();
         assert_eq!(dead(&slack, &[&other], &trials, DT_S), []);
     }
 
-    /// Seven samples per turn look like noise to differences; a broken wire that hums is
-    /// nevertheless dead.
+    /// A motion with seven samples per period looks like noise to differences, but is not dead. A
+    /// broken wire that picks up hum is dead.
     #[test]
     fn quick_motion_is_not_dead_and_a_humming_wire_is() {
         let other = wave(0.05, 1);
@@ -345,8 +345,8 @@ mod tests {
         );
         let railed: Vec<f64> = wave(0.05, 2).iter().map(|x| x.min(5.0)).collect();
         assert_eq!(stuck(&railed, &[&other], &trials), []);
-        // Behind a play of a third of the range, read by a coarse encoder, it is constant at every
-        // turn and then moves on from its last value.
+        // The sensor is behind a play of a third of the range and is read by a coarse encoder. It
+        // is constant at every turn and then continues from its last value.
         let step = |x: f64| (20.0 * x).round() / 20.0;
         let mut at = 0.0_f64;
         let behind = |x: &f64| {
@@ -355,13 +355,13 @@ mod tests {
         };
         let played: Vec<f64> = wave(0.0, 2).iter().map(behind).collect();
         assert_eq!(stuck(&played, &[&other], &trials), []);
-        // The same encoder, stuck: it jumps to where the others have gone.
+        // The same encoder gets stuck. At the end it jumps to the current value.
         let mut held: Vec<f64> = wave(0.0, 2).iter().map(|x| step(*x)).collect();
         let value = held[1000];
         held[1000..1300].iter_mut().for_each(|x| *x = value);
         let found = stuck(&held, &[&other], &trials);
         assert!(matches!(found[..], [(from, to)] if from <= 1000 && to >= 1300), "{found:?}");
-        // A converter of few bits repeats values all the time.
+        // A converter with few bits repeats values throughout.
         let coarse: Vec<f64> = wave(0.05, 2).iter().map(|x| (2.0 * x).round() / 2.0).collect();
         assert_eq!(stuck(&coarse, &[&other], &trials), []);
     }

@@ -1,5 +1,5 @@
-//! Examines every error of the record and of the rig file, and fits those that could explain most
-//! of a gap.
+//! Examines every possible error of the recording and of the rig file, and fits those that could
+//! explain most of a gap.
 
 use std::collections::BTreeMap;
 
@@ -25,35 +25,36 @@ use crate::{
     search::{screen::Ground, selection::Found},
 };
 
-/// Share of the gap of its stages that an error must promise. An error has an exact form, and its
-/// screen is nearly exact.
+/// Smallest share of the gap of its stages that an error must promise to close. An error has an
+/// exact form, so its screen is nearly exact.
 const MOST: f64 = 0.5;
-/// Share of the most promising gain that others must promise.
+/// Smallest promised gain of a further error, as a share of the largest.
 const NEAR: f64 = 0.5;
 /// Largest number of errors that are fitted.
 const FITTED: usize = 4;
-/// Number of errors that are fitted to the end after a coarse fit.
+/// Number of errors that are fitted to convergence after a coarse fit.
 const POLISHED: usize = 2;
-/// Smallest scale and offset (as a share of the span) that are reported, because instruments are
-/// that accurate.
+/// Smallest deviation of a scale from 1, and smallest offset as a share of the span, that are
+/// reported. Instruments are no more accurate than that.
 const LEAST: f64 = 0.03;
-/// Smallest delay that is reported, in samples, because a channel may be read anywhere within a
+/// Smallest delay that is reported, in samples, because a channel may be read at any time within a
 /// sample.
 const LEAST_SAMPLES: f64 = 2.0;
-/// Standard deviations by which a size must lie beyond what is allowed.
+/// Number of standard deviations by which the size of an error must exceed what is allowed.
 const SURE: f64 = 3.0;
 
-/// Errors that were examined, and those that were fitted, each with the nominal parameters.
+/// Errors that were screened and errors that were fitted, each fitted together with the nominal
+/// parameters.
 #[derive(Debug, Default)]
 pub(crate) struct Doubts {
     looked: Vec<Promising>,
-    /// Errors that tolerances, instruments and effects do not cover; the best first.
+    /// Fitted errors that exceed tolerances, instrument accuracy and known effects; the best first.
     pub(crate) errors: Vec<Hypothesis>,
 }
 
 impl Doubts {
-    /// Examines every error, and fits those that could explain most of a gap; `problem` is that of
-    /// the suspect.
+    /// Screens every error and fits those that could explain most of a gap. `problem` is the
+    /// prepared problem of `suspect`.
     pub(crate) fn of(
         problem: &PreparedProblem<'_>,
         suspect: &Suspect<'_>,
@@ -69,7 +70,7 @@ impl Doubts {
         let all: Result<Vec<Option<Promising>>, GapError> =
             (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
         let looked: Vec<Promising> = all?.into_iter().flatten().collect();
-        // A gain counts as a score does: by the samples per observation.
+        // A gain is converted to a score by the number of samples per independent observation.
         let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
         let counts = |p: &&Promising| p.share > MOST && p.fall > least;
         let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
@@ -82,8 +83,8 @@ impl Doubts {
         Ok(Self { looked, errors })
     }
 
-    /// Searches more closely if the best set of effects leaves more than discrepancy may, or if
-    /// parameters are at their bounds.
+    /// Searches more closely if the best set of effects leaves more than model discrepancy may, or
+    /// if parameters are at their bounds.
     pub(crate) fn closer_if(
         mut self,
         problem: &PreparedProblem<'_>,
@@ -99,9 +100,9 @@ impl Doubts {
         Ok(self)
     }
 
-    /// A linearisation says little about a large error. Therefore errors in the stage with the
-    /// largest residual are fitted coarsely from the rig as shipped, and the best of them to the
-    /// end.
+    /// Fits errors in the stage with the largest residual coarsely, starting where possible from
+    /// the rig as shipped, and the best of them to convergence. The screen is not sufficient here,
+    /// because a linearisation predicts large errors poorly.
     fn closer(
         &mut self,
         problem: &PreparedProblem<'_>,
@@ -135,7 +136,8 @@ impl Doubts {
     }
 }
 
-/// Errors that are larger than tolerances and instruments allow, the best first.
+/// Keeps the errors that are larger than tolerances and instruments allow, and sorts them with the
+/// best first.
 fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> {
     found.retain(|one| {
         let sd = one.effect_sd.values().flatten().copied().fold(0.0, f64::max);
@@ -145,8 +147,8 @@ fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> 
     found
 }
 
-/// Whether a parameter of a model that is evidence is at an end of its tolerances, or any two of
-/// one stage are.
+/// Whether a parameter that is evidence is at an end of its tolerance, or any two parameters of one
+/// stage are.
 fn is_strained(problem: &PreparedProblem<'_>, model: &Model) -> bool {
     let specs = problem.simulator().parameters();
     let at_end = |p: &usize| {
@@ -189,8 +191,8 @@ fn fitted(
     Ok(found)
 }
 
-/// Whether the error of a model, known to `sd`, is larger than tolerances, instruments and effects
-/// of the catalogue cover.
+/// Whether the error of a model, with the standard deviation `sd` of its size, exceeds tolerances,
+/// instrument accuracy and known effects.
 fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
     let Some((fault, size)) = suspect.error_of(model) else { return false };
     let column = fault.column.map(|c| &suspect.columns()[c]);

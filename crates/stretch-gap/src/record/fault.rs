@@ -1,5 +1,5 @@
-//! The hypotheses: one error of the record or of the rig file each, as an effect with one
-//! parameter.
+//! Hypotheses about errors: each is one error of the recording or of the rig file, expressed as an
+//! effect with one parameter.
 
 use stretch_data::ends;
 use stretch_effects::{EffectParameter, Role};
@@ -12,28 +12,28 @@ use crate::problem::{
 
 /// Factors that are searched, as deviations from 1.
 const FACTORS: (f64, f64) = (-0.95, 9.0);
-/// Powers of ten around which factors of an output are searched, in addition to 1: a simulator in
-/// other units.
+/// Powers of ten around which factors of an output are searched, in addition to 1. Such factors
+/// occur if the simulator uses other units.
 const DECADES: [i32; 8] = [-4, -3, -2, -1, 1, 2, 3, 4];
-/// Factors nearest to a power of ten: a third to three times it.
+/// Range of factors around a power of ten: from a third of it to three times it.
 const NEAREST: (f64, f64) = (0.316, 3.163);
-/// Offsets that are searched, in spans of the column.
+/// Largest offset that is searched, in spans of the column.
 const SPANS: f64 = 20.0;
-/// Delays that are searched, s.
+/// Largest delay that is searched, s.
 pub(crate) const DELAY_S: f64 = 2.0;
 
-/// What is wrong.
+/// Kind of error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A column is too large by a factor.
+    /// A column is scaled by a wrong factor.
     Scale,
     /// A column has an offset.
     Offset,
     /// A column is late.
     Delay,
-    /// A column is upside down.
+    /// A column has the wrong sign.
     Sign,
-    /// A nominal parameter, by its index.
+    /// A nominal parameter, given by its index, differs from the rig file.
     Parameter(usize),
 }
 
@@ -41,7 +41,7 @@ pub(crate) enum Kind {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub(crate) kind: Kind,
-    /// Which column; `None` for a parameter.
+    /// Index of the column; `None` for a parameter.
     pub(crate) column: Option<usize>,
     /// Stages whose simulation it changes.
     pub(crate) touches: Vec<usize>,
@@ -53,13 +53,13 @@ pub(crate) struct Fault {
 }
 
 impl Fault {
-    /// Every error that a simulator's columns and parameters may have.
+    /// Returns every error that the columns and parameters of a simulator may have.
     pub(crate) fn all(simulator: &dyn Simulator, columns: &[Column<'_>]) -> Vec<Self> {
         let mut all: Vec<Self> =
             columns.iter().enumerate().flat_map(|(i, column)| Self::of_column(i, column)).collect();
         let stages = simulator.stages();
         for (p, spec) in simulator.parameters().iter().enumerate() {
-            // A factor is meaningless for 0.
+            // A factor on a nominal value of 0 would have no effect.
             if spec.sd > 0.0 && spec.nominal != 0.0 {
                 let acts = |s: &usize| stages[*s].parameters.contains(&p);
                 all.push(Self {
@@ -109,7 +109,8 @@ impl Fault {
         near.chain(decades).filter(|f| f.range.0 < f.range.1).collect()
     }
 
-    /// Size on this scale that corresponds to a factor; `None` if another scale is nearer to it.
+    /// Returns the size that corresponds to a factor, for a scale around this fault's `base`;
+    /// `None` if the fault with another base covers that factor.
     pub(crate) fn of_factor(&self, factor: f64) -> Option<f64> {
         let share = factor / self.base;
         let is_own = match self.base == 1.0 {
@@ -122,22 +123,22 @@ impl Fault {
         is_own.then_some(share - 1.0)
     }
 
-    /// Whether its factors are larger than any error of a sensor.
+    /// Whether the factors of this fault are larger than any sensor error.
     pub(crate) fn is_beyond(&self) -> bool {
         self.base != 1.0
     }
 
-    /// Factor of a scale of a size.
+    /// Returns the factor that corresponds to a size.
     pub(crate) fn factor(&self, size: f64) -> f64 {
         self.base * (1.0 + size)
     }
 
-    /// The effect that the engine fits.
+    /// Returns the error as an effect that can be fitted.
     pub(crate) fn spec(&self) -> EffectSpec {
         let (least, greatest) = self.range;
         let mut strength = EffectParameter::sized("size", &self.unit, least..=greatest);
         if self.kind == Kind::Sign {
-            // Upside down is never off.
+            // A wrong sign has no size at which it is absent.
             strength = strength.with_role(Role::Shape);
         }
         let first = self.touches.first().copied().unwrap_or(0);
@@ -151,7 +152,7 @@ impl Fault {
         size.clamp(self.range.0, self.range.1)
     }
 
-    /// Effect of a size on its column.
+    /// Returns the distortion of the column by an error of the given size.
     pub(crate) fn distortion(&self, size: f64) -> Distortion {
         let none = Distortion::default();
         match self.kind {
@@ -164,7 +165,7 @@ impl Fault {
     }
 }
 
-/// Largest minus smallest value.
+/// Returns the largest minus the smallest value.
 pub(crate) fn span(values: &[f64]) -> f64 {
     let (low, high) = ends(values);
     (high - low).max(0.0)

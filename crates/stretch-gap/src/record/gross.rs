@@ -1,4 +1,4 @@
-//! Errors of the record and of the rig file as a diagnosis reports them, and how they are weighed against effects.
+//! Gross errors of the recording and of the rig file, and their comparison with effects.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,22 +10,22 @@ use crate::{
     search::selection::Found,
 };
 
-/// What may be wrong with a record or a rig file.
+/// A kind of error of the recording or of the rig file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GrossKind {
-    /// A column is too large by a factor.
+    /// A column is scaled by a wrong factor.
     Scale,
-    /// Simulator and record differ by a factor that no sensor error explains: other units, or fixed
-    /// parameters.
+    /// Simulator and recording differ by a factor that no sensor error explains: their units
+    /// differ, or parameters of the simulator are wrong but fixed.
     Factor,
     /// A column has an offset.
     Offset,
     /// A column is late or early.
     Delay,
-    /// A column is upside down.
+    /// A column has the wrong sign.
     Sign,
-    /// A nominal parameter is not what the rig file says.
+    /// A nominal parameter differs from the rig file.
     Parameter,
     /// A column is a copy of another.
     Copied,
@@ -33,19 +33,20 @@ pub enum GrossKind {
     Dead,
 }
 
-/// An error of the record or of the rig file.
+/// An error of the recording or of the rig file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Gross {
-    /// What is wrong.
+    /// The kind of error.
     pub what: GrossKind,
     /// Name of the column that is wrong.
     pub column: Option<String>,
     /// Name of the nominal parameter that is wrong.
     pub parameter: Option<String>,
-    /// Ratio of the actual value of the column, or of the rig's parameter, to the stated one.
+    /// Ratio of the recorded column to the true channel, or of the rig's parameter to the value in
+    /// the rig file.
     pub factor: Option<f64>,
-    /// Offset of the column, in `unit`; if it is upside down, the sum of the actual and the
-    /// expected value.
+    /// Offset of the column, in `unit`. If the column has the wrong sign, this is the sum of the
+    /// recorded and the true value.
     pub offset: Option<f64>,
     /// Delay of the column, s.
     pub delay_s: Option<f64>,
@@ -55,45 +56,46 @@ pub struct Gross {
     pub found: Option<f64>,
     /// Unit of the column or the parameter.
     pub unit: String,
-    /// The units that explain a factor of an output, those of the simulator and of the record: `rpm
-    /// for rad/s`.
+    /// The units that explain a factor of an output, the simulator's and the recording's: `rpm for
+    /// rad/s`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<String>,
-    /// First trial in which it shows, for errors in stretches.
+    /// First trial in which the error occurs, for errors of limited duration.
     pub trial: Option<String>,
-    /// Begin of the stretch in which the error shows, s from the trial's start.
+    /// Start of the first such stretch, s from the trial's start.
     pub from_s: Option<f64>,
-    /// End of the stretch in which the error shows, s.
+    /// End of that stretch, s from the trial's start.
     pub to_s: Option<f64>,
-    /// What is wrong, in words.
+    /// A sentence that describes the error.
     pub sentence: String,
-    /// What to check.
+    /// What a user should check.
     pub hint: String,
 }
 
 impl Gross {
-    /// Whether the columns alone show the error, whatever the simulator is.
+    /// Whether the columns alone show the error, without a simulator.
     pub fn is_plain(&self) -> bool {
         matches!(self.what, GrossKind::Copied | GrossKind::Dead)
     }
 }
 
-/// No effect of the best set: the alternative replaces the whole set.
+/// Marks an alternative that replaces the whole set and not one of its effects.
 const WHOLE: usize = usize::MAX;
-/// Nats within which two errors are a tie.
+/// Difference of scores, in nats, within which two errors are tied.
 const TIE: f64 = 1.1;
 
-/// Gap that a set of effects, or an error, may leave.
+/// Returns the largest gap that a named set of effects, or an error, may leave.
 pub(crate) fn allowed_gap(problem: &PreparedProblem<'_>, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * problem.gap(&problem.nominal)
 }
 
-/// Weighs errors of the record against the best effects. Returns the errors with a higher score, as
-/// they are reported, and the result with the first of them in place of the effects; `None` if the
-/// effects win.
+/// Compares errors of the recording with the best set of effects. If errors win, returns those that
+/// tie for the best, as they are reported, and the search result with the best error instead of the
+/// effects. Returns `None` if the effects win.
 ///
-/// An error has an exact form and one parameter, so it leaves almost only noise. It wins if it
-/// scores higher than the best set of effects and leaves no more than a named set may.
+/// An error has an exact form and one parameter, so that it leaves almost only noise. It wins if
+/// its score is higher than that of the best set of effects and if it leaves no more than a named
+/// set may.
 pub(crate) fn weigh_errors(
     doubted: &PreparedProblem<'_>,
     suspect: &Suspect<'_>,
@@ -110,7 +112,7 @@ pub(crate) fn weigh_errors(
         errors.partition(|e| e.score > first.score - TIE);
     let told = std::iter::once(&first).chain(&tied).filter_map(|e| Gross::found(suspect, e));
     let mut gross: Vec<Gross> = told.collect();
-    // If these data cannot distinguish several errors, a factor between two units comes first.
+    // If the data cannot distinguish several errors, a factor between two units comes first.
     gross.sort_by_key(|g| g.units.is_none());
     let rivals = tied.into_iter().chain(behind).chain([found.best.clone()]);
     let rivals = rivals.map(|rival| (WHOLE, rival)).collect();

@@ -1,11 +1,11 @@
-//! Errors of the record and of the rig file: hypotheses like the effects, and more frequent than
-//! they are.
+//! Errors of the recording and of the rig file. They are hypotheses like the effects, and more
+//! frequent than these.
 //!
-//! Input: the columns of a record, a prepared problem and what the search found. Output: the
-//! [`gross::Gross`] errors, with the sentence of each ([`sentence`], [`units`]), if one is more
-//! probable than every set of effects. Columns are first checked without any simulation
+//! Input: the columns of a recording, a prepared problem, and the result of the search for effects.
+//! Output: the [`gross::Gross`] errors, if one is more probable than every set of effects, each
+//! with a sentence ([`sentence`], [`units`]). Columns are first checked without any simulation
 //! ([`columns_alone`]). Then every kind of error ([`fault`]) is a hypothesis with one parameter
-//! ([`suspect`]), screened ([`screen`]), fitted ([`examine`]) and weighed against the effects
+//! ([`suspect`]). It is screened ([`screen`]), fitted ([`examine`]) and compared with the effects
 //! ([`gross`]). Imports: `numerics`, `problem`, `fit`, `search`.
 
 pub(crate) mod columns_alone;

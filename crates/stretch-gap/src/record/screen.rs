@@ -1,14 +1,17 @@
-//! A cheap look at every error: how much of the gap it could explain, and how large it would be.
+//! Screens every error cheaply: how large it would be, and how much of the gap it could explain.
 //!
-//! What an error does to an output is known in closed form, so its size is regressed on the output as shipped without a simulation:
+//! The influence of an error on an output is known in closed form. Its size is therefore estimated
+//! by regression on the output as shipped, without a simulation:
 //!
 //! ```text
 //! scale s = <m, y>/<y, y>,   offset o = mean(m - y),   upside down c = mean(m + y),   delay d = argmin |m(t) - y(t - d)|^2
 //! ```
 //!
-//! for the measured m and the simulated y. A parameter's size is one step of Gauss and Newton with its own tolerance taken away. Then
-//! one or two simulations a stage say what is left, from either end: from the rig as shipped, after one step of all parameters within
-//! their tolerances, because a large error bends what was re-tuned; and from the re-tuned rig, because a small one does not.
+//! m is the measured and y the simulated output; the delay is searched with scale and offset left
+//! free. The size of a parameter's error is one Gauss-Newton step without its tolerance. Then one
+//! or two simulations per stage show what remains, from two starting points. One is the rig as
+//! shipped after one step of all parameters within their tolerances, because a large error distorts
+//! the re-tuned parameters. The other is the re-tuned rig, which is better for a small error.
 
 use rayon::prelude::*;
 
@@ -23,43 +26,44 @@ use crate::{
     search::screen::Ground,
 };
 
-/// Delays looked at: coarsest step, in samples.
+/// Step in samples at which the correlation with a delayed output is evaluated.
 const STEP: usize = 2;
-/// Scales of the commands that are looked at.
+/// Scale errors that are tried for commands, as deviations from 1.
 const COMMANDS: [f64; 4] = [-0.5, -0.2, 0.25, 1.0];
 /// Factors at which a parameter is tried in addition to the Gauss-Newton step, as deviations from
 /// 1: smaller, larger.
 const FACTORS: [[f64; 2]; 2] = [[-0.4, -0.8], [0.5, 4.0]];
-/// Share of a tolerance beyond which a parameter is at its end.
+/// Share of the tolerance beyond which a parameter counts as at its end.
 pub(crate) const END: f64 = 0.99;
-/// Tolerances within which no parameter is wrong.
+/// Number of standard deviations within which a parameter is not wrong.
 pub(crate) const REACH: f64 = 3.0;
 
-/// An error that could explain something.
+/// An error that could explain part of the gap.
 #[derive(Debug, Clone)]
 pub(crate) struct Promising {
     pub(crate) fault: usize,
     /// Model that a fit may start from.
     pub(crate) start: Model,
-    /// Model that a fit may start from around the rig as shipped, where a large error did not bend what was re-tuned.
+    /// Model from which a fit around the rig as shipped may start. There, a large error has not
+    /// distorted the re-tuned parameters.
     pub(crate) plain: Option<Model>,
-    /// Fall of the sum of squares, in multiples of the noise.
+    /// Reduction of the sum of squares, in multiples of the noise variance.
     pub(crate) fall: f64,
-    /// Share of the excess of the stages that it touches.
+    /// Reduction as a share of the excess in the stages that the error affects.
     pub(crate) share: f64,
 }
 
-/// What every error is compared with.
+/// The two models around which every error is screened.
 pub(crate) struct Bench<'a, 'p, 's> {
     problem: &'a PreparedProblem<'p>,
     suspect: &'a Suspect<'s>,
-    /// Around the re-tuned nominal.
+    /// Linearisation around the re-tuned nominal model.
     ground: &'a Ground,
-    /// Around the rig as shipped.
+    /// Linearisation around the rig as shipped.
     shipped: Ground,
-    /// By stage, over the trials to fit: output as shipped.
+    /// Output as shipped over the fitted trials, by stage.
     outputs: Vec<Vec<f64>>,
-    /// By stage: what the re-tuned nominal leaves.
+    /// Sum of squares that the re-tuned nominal model leaves, by stage.
     left: Vec<f64>,
 }
 
@@ -80,7 +84,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(bench)
     }
 
-    /// Best size of one error and its promise; `None` if it promises nothing.
+    /// Returns the best size of one error and its promised reduction; `None` if no size can be
+    /// simulated or none is tried.
     pub(crate) fn look(&self, fault: usize) -> Result<Option<Promising>, GapError> {
         let one = &self.suspect.faults()[fault];
         let mut best: Option<Promising> = None;
@@ -91,7 +96,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
             for (end, found) in ends.into_iter().enumerate() {
                 let found = match found {
                     Err(error) if error.ends_all() => return Err(error),
-                    // A rig that cannot be is no hypothesis.
+                    // A rig that cannot be simulated is not a hypothesis.
                     Err(_) => continue,
                     Ok(found) => found,
                 };
@@ -119,7 +124,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         model
     }
 
-    /// From the rig as shipped: the error, one step of the parameters, and what is left then.
+    /// Starts from the rig as shipped: adds the error, steps the parameters once, and simulates
+    /// what remains.
     fn beside_shipped(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
         let mut model = self.with(&self.problem.shipped, fault, size);
         let touches = &self.suspect.faults()[fault].touches;
@@ -142,12 +148,13 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(self.promising(fault, model, fall))
     }
 
-    /// From the re-tuned rig: the change that the error makes, as much of it as helps.
+    /// Starts from the re-tuned rig: simulates the change by the error, and scales it for the
+    /// largest reduction.
     fn beside_retuned(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
         let base = &self.problem.nominal.model;
         let one = &self.suspect.faults()[fault];
         let size = match one.kind {
-            // A factor of what was re-tuned.
+            // Converts the factor on the nominal value to a factor on the re-tuned value.
             Kind::Parameter(p) => {
                 let nominal = self.problem.simulator().parameters()[p].nominal;
                 (1.0 + size) * nominal / base.parameters[p] - 1.0
@@ -179,7 +186,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         self.problem.compare.residual(stage, model)
     }
 
-    /// L^-1 A'V^-1 x: what the sensitivities around a ground have to do with a column.
+    /// Returns L^-1 A'V^-1 x, the projection of a column x on the sensitivities A around a model; L
+    /// is the factor of their normal matrix.
     fn told(&self, stage: usize, ground: &Ground, x: &Weighted) -> Vec<f64> {
         let known = ground.known[stage].as_deref().unwrap_or(&[]);
         let mut told: Vec<f64> =
@@ -188,13 +196,14 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         told
     }
 
-    /// Squares of a residual over the fitted samples, what re-tuning can do projected out.
+    /// Returns the sum of squares of a residual over the fitted samples, after re-tuning is
+    /// projected out.
     fn squares(&self, stage: usize, ground: &Ground, residual: &Weighted) -> f64 {
         let told = self.told(stage, ground, residual);
         self.problem.compare.product(stage, residual, residual) - dot(&told, &told)
     }
 
-    /// Sizes that a simulation is spent on.
+    /// Returns the sizes of an error that are simulated.
     fn sizes(&self, fault: &Fault) -> Vec<f64> {
         let column = fault.column.map(|c| &self.suspect.columns()[c]);
         match (fault.kind, column) {
@@ -227,7 +236,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         }
     }
 
-    /// Delay at which the simulated output lies nearest to the measured one, an offset and a scale of it left free.
+    /// Returns the delay at which the simulated output correlates best with the measured one, with
+    /// a free offset and a free positive scale; `None` if it is zero.
     fn delay(&self, measured: &[f64], simulated: &[f64]) -> Option<f64> {
         let (roles, dt_s) = (&self.problem.compare.roles, self.problem.simulator().dt_s());
         let reach = (DELAY_S / dt_s) as i64;
@@ -254,8 +264,10 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         (best != 0).then_some(best as f64 * dt_s)
     }
 
-    /// Factors of a parameter, as deviations from 1, that are looked at: none unless re-tuning took it to an end of its tolerance or
-    /// would, without it, take it beyond. Far off, a line says which way and not how far.
+    /// Returns the factors of a parameter, as deviations from 1, that are tried. There are none
+    /// unless re-tuning moved the parameter to an end of its tolerance, or would move it beyond
+    /// without the tolerance. Several factors are tried because a linearisation shows the direction
+    /// of a large error, but not its size.
     fn factors(&self, fault: &Fault, parameter: usize) -> Vec<f64> {
         let spec = &self.problem.simulator().parameters()[parameter];
         let far = |value: f64, reach: f64| (value - spec.nominal).abs() > reach * spec.sd;
@@ -270,7 +282,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         std::iter::once(factor.clamp(smaller[1], larger[1])).chain(rest).collect()
     }
 
-    /// Value of a parameter by one step of Gauss and Newton without its tolerance.
+    /// Estimates a parameter by one Gauss-Newton step without its tolerance.
     fn free(&self, fault: &Fault, parameter: usize) -> Option<f64> {
         let compare = &self.problem.compare;
         let spec = &self.problem.simulator().parameters()[parameter];

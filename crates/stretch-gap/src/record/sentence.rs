@@ -1,4 +1,4 @@
-//! Errors of the record and of the rig file in plain words: what is wrong, and what to look at.
+//! Describes errors of the recording and of the rig file in words, with what a user should check.
 
 use crate::{
     fit::hypothesis::Hypothesis,
@@ -41,7 +41,7 @@ impl Gross {
         }
     }
 
-    /// `column` is `factor` times `source`, including noise.
+    /// Creates the error that `column` is `factor` times `source`, including noise.
     pub(crate) fn copied(column: &Column<'_>, source: &Column<'_>, factor: f64) -> Self {
         Self {
             factor: Some(factor),
@@ -56,7 +56,8 @@ impl Gross {
         }
     }
 
-    /// A column is constant, first in a stretch of a trial, `count` times in all.
+    /// Creates the error that a column is constant in `count` stretches; the arguments give the
+    /// first of them.
     pub(crate) fn still(
         column: &Column<'_>,
         (trial, from_s, to_s): &(String, f64, f64),
@@ -78,8 +79,8 @@ impl Gross {
         }
     }
 
-    /// An output that the simulator computes in other units: it is larger by a factor that no
-    /// sensor error explains, or no parameter may move.
+    /// Creates the error that simulator and recording of an output differ by a factor, because of
+    /// other units, or because no parameter of the simulator may change.
     fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
         let ratio = short(1.0 / factor);
@@ -96,7 +97,7 @@ impl Gross {
         }
     }
 
-    /// The error of a hypothesis with its size; `None` if it has none.
+    /// Describes the error of a hypothesis, with its size; `None` if the hypothesis contains none.
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
         if let Kind::Parameter(p) = fault.kind {
@@ -170,7 +171,7 @@ impl Gross {
     }
 }
 
-/// Four digits, without an exponent if none is needed.
+/// Formats a number with four significant digits, without an exponent if none is needed.
 fn short(x: f64) -> String {
     let size = x.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -184,7 +185,7 @@ fn short(x: f64) -> String {
     }
 }
 
-/// What is wrong, in one sentence: the first error, its alternatives, and what to do.
+/// Returns one sentence with the first error, its alternatives, and what a user should check.
 pub(crate) fn sentence(gross: &[Gross]) -> String {
     let Some(first) = gross.first() else { return String::new() };
     let rest: Vec<&str> = gross[1..].iter().map(|g| g.sentence.as_str()).collect();

@@ -1,9 +1,9 @@
-//! A simulator with a record or a rig file that may be wrong.
+//! A simulator whose recording or rig file may be wrong.
 //!
-//! An error is an effect like any other, so that one fit moves it together with the nominal
-//! parameters. The recorded values do not change. A simulated output is distorted as the column
-//! would be, and a stage that a column drives is driven by the corrected column. Therefore every
-//! hypothesis is compared with the same numbers.
+//! An error is treated as an effect, so that it is fitted together with the nominal parameters. The
+//! recorded values do not change. Instead, a simulated output is distorted like its column, and a
+//! stage that a column drives is driven by the corrected column. Every hypothesis is therefore
+//! compared with the same measurements.
 
 use std::{collections::VecDeque, sync::Mutex};
 
@@ -18,24 +18,23 @@ use crate::{
     record::fault::{Fault, Kind},
 };
 
-/// Number of stored simulators with a corrected column: those of the probes and steps of the
-/// current fits.
+/// Number of cached simulators with a corrected column, enough for the steps of the current fits.
 const KEPT: usize = 8;
 
 type Corrected<'a> = std::sync::Arc<dyn Simulator + Send + 'a>;
 
-/// Which error, how large (bits), and the simulator driven by the corrected column; `None` if that
-/// column drives nothing.
+/// Index of the error, bits of its size, and the simulator driven by the corrected column; `None`
+/// if the column drives no stage.
 type Entry<'a> = (usize, u64, Option<Corrected<'a>>);
 
-/// The simulator with its possible errors in place of the effects.
+/// The simulator, with its possible errors added to its effects.
 pub(crate) struct Suspect<'a> {
     simulator: &'a dyn Simulator,
     about: Description,
     columns: Vec<Column<'a>>,
     faults: Vec<Fault>,
     corrected: Mutex<VecDeque<Entry<'a>>>,
-    /// Index of the first error: effects of the catalogue come before.
+    /// Index of the first error among the effects; those of the catalogue precede it.
     first: usize,
 }
 
@@ -62,31 +61,31 @@ impl<'a> Suspect<'a> {
         &self.faults
     }
 
-    /// Index of an error among the effects.
+    /// Returns the index of an error among the effects.
     pub(crate) fn index(&self, fault: usize) -> usize {
         self.first + fault
     }
 
-    /// The error of a model, with its size.
+    /// Returns the error of a model with its size; `None` if the model has no error.
     pub(crate) fn error_of(&self, model: &Model) -> Option<(&Fault, f64)> {
         let (index, values) = model.effects.iter().find(|(e, _)| *e >= self.first)?;
         Some((self.faults.get(index - self.first)?, *values.first()?))
     }
 
-    /// A model of the simulator itself.
+    /// Returns the model without errors, as the simulator itself understands it.
     fn without_errors(&self, model: &Model) -> Model {
         let mut model = model.clone();
         model.effects.retain(|(e, _)| *e < self.first);
         model
     }
 
-    /// The simulator driven by a corrected column.
+    /// Returns the simulator driven by the corrected column, from the cache if possible.
     fn corrected_by(&self, fault: usize, size: f64) -> Result<Option<Corrected<'a>>, GapError> {
         let key = (fault, size.to_bits());
         let found = |kept: &VecDeque<Entry<'a>>| {
             kept.iter().find(|(f, s, _)| (*f, *s) == key).map(|(_, _, driven)| driven.clone())
         };
-        // A poisoned list can be used, because its entries can be made again.
+        // A poisoned lock can be ignored, because the entries of the cache can be computed again.
         let lock = || self.corrected.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(driven) = found(&lock()) {
             return Ok(driven);
@@ -162,7 +161,7 @@ impl Simulator for Suspect<'_> {
     }
 
     fn is_costly(&self, effect: usize) -> bool {
-        // An error of the record costs as much as the simulator.
+        // Each value of an error needs a run of the simulator.
         let is_error = effect >= self.first;
         is_error && self.model_runs().is_some() || self.simulator.is_costly(effect)
     }

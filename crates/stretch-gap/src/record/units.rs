@@ -1,5 +1,4 @@
-//! The units that explain a factor: a simulator that computes in other units than those of the
-//! record.
+//! Pairs of units that explain a factor between the simulator and the recording.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,7 +7,7 @@ use stretch_data::written_unit;
 /// Largest relative deviation of a factor from that of two units.
 const WITHIN: f64 = 0.01;
 
-/// Pairs of units of one quantity, and how many of the first make one of the second.
+/// Pairs of units of one quantity, with the number of first units in one second unit.
 const PAIRS: [(&str, &str, f64); 24] = [
     ("rpm", "rad/s", 60.0 / TAU),
     ("deg/s", "rad/s", 180.0 / PI),
@@ -36,10 +35,11 @@ const PAIRS: [(&str, &str, f64); 24] = [
     ("Pa", "kPa", 1e3),
 ];
 
-/// The units of a simulator whose output is `ratio` times a record in `unit`: "rpm for rad/s".
-/// `None` if no pair of units is within 1 % of the ratio, or if the record's unit belongs to no
-/// such pair. `sd` is the relative standard deviation of the ratio. The only pair of the record's
-/// unit within two of them is also accepted.
+/// Returns the units of simulator and recording that explain why the simulator's output is `ratio`
+/// times the recording, for example "rpm for rad/s". The recording is in `unit`, and `sd` is the
+/// relative standard deviation of the ratio. The ratio must match a pair of units within 1 %; if
+/// exactly one pair matches within two standard deviations, that pair is accepted as well.
+/// Otherwise returns `None`.
 pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
     let unit = if unit.is_empty() { "1" } else { written_unit(unit) };
     let all = PAIRS.iter().flat_map(|&(a, b, factor)| [(a, b, factor), (b, a, 1.0 / factor)]);
@@ -65,10 +65,10 @@ mod tests {
         assert_eq!(told(1000.0, "m").as_deref(), Some("mm for m"));
         assert_eq!(told(1e-3, "mV").as_deref(), Some("V for mV"));
         assert_eq!(told(100.0, "").as_deref(), Some("% for 1"));
-        // Not within 1 %, and units of another quantity.
+        // The first ratio is not within 1 %, and the second unit belongs to another quantity.
         assert_eq!(told(9.8, "rad/s"), None);
         assert_eq!(told(57.3, "mm"), None);
-        // Known to 5 %, one pair is near.
+        // The ratio is known to 5 %, and only one pair is close.
         assert_eq!(units(9.8, 0.05, "rad/s").as_deref(), Some("rpm for rad/s"));
     }
 }

@@ -1,17 +1,15 @@
-//! Criteria for accepting an effect: more than chance, more than a gap that counts, more than model
-//! discrepancy.
+//! The criteria for adding an effect to a set, with their limits from [`Thresholds`].
 //!
-//! There are three acceptance criteria, all of them in [`Thresholds`]. First, at least `share` of
-//! the gap that is left in the effect's stages closes. Second, the closed part is more than chance
-//! makes of noise of this colour: `rise` nats by the [octaves](crate::fit::octaves), and by the
-//! score. Third, it is more than *model discrepancy*: the rig's backlash is not the textbook's. An
-//! effect in the right place leaves a share `model_discrepancy` of what it closes, with the shape
-//! of a further effect, and evidence grows with the samples while that share does not. An effect
-//! that closes no more than that share, or that would not count as a gap, may be discrepancy within
-//! the noise; it has to raise the score by `faint_rise`. Within the share it also has to leave only
-//! noise, and to be more than the share of what was closed in the octaves in which it acts, because
-//! a discrepancy has no reason to have the exact form of one further effect. Both sets are also
-//! compared with the [deviations](crate::fit::deviations) of their own effects' forms added.
+//! 1. It closes at least `share` of the gap that is left in its stages.
+//! 2. The score and the likelihood by [octaves](crate::fit::octaves) both rise by `rise` nats.
+//! 3. It closes more than *model discrepancy*: an effect in the right place leaves up to the share
+//!    `model_discrepancy` of what it closes, with any number of samples, because its form differs
+//!    from the rig's. Otherwise, the score must rise by `faint_rise`, only noise may be left, and
+//!    the rise by octaves must exceed the discrepancy. `faint_rise` also applies below
+//!    `null_excess`.
+//!
+//! The criteria must also hold with [deviations](crate::fit::deviations) of form added to both
+//! sets.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -19,8 +17,8 @@ use crate::{
     search::screen::Screened,
 };
 
-/// Share of the remaining gap that a screen must promise for an effect that is to leave only noise.
-/// It is below 1 because a screen promises too little if the change is non-linear.
+/// Share of the remaining gap that a screen must promise for an effect that may leave only noise.
+/// It is below 1 because a screen underestimates a non-linear change.
 const ALONE: f64 = 0.5;
 
 /// The acceptance criteria of a problem.
@@ -31,9 +29,9 @@ pub(crate) struct Acceptance<'a> {
 }
 
 impl Acceptance<'_> {
-    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion:
-    /// with both unchanged, and with the deviations of their own effects' forms, because what such
-    /// a deviation explains is not evidence for a further effect.
+    /// Whether `next`, which has one effect more than `base`, meets every criterion. The criteria
+    /// are checked twice, without and with deviations of the effects' forms, because what a
+    /// deviation explains is not evidence for a further effect.
     pub(crate) fn is_accepted(
         &self,
         base: &Hypothesis,
@@ -63,15 +61,15 @@ impl Acceptance<'_> {
             && (is_beyond || self.left(next, new) <= unknown_excess)
     }
 
-    /// Whether an effect on top of `base` can explain more than the remaining model discrepancy.
+    /// Whether an effect on top of `base` could close more than the remaining model discrepancy.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();
         touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))
     }
 
-    /// The same for an effect with a screened gain. It is also promising if it may leave only
-    /// noise: if it promises [`ALONE`] of the remaining gap, and that is more than discrepancy in
-    /// the octaves.
+    /// Whether a screened effect is promising: it is possible, or it may leave only noise. For the
+    /// latter it must promise [`ALONE`] of the remaining gap, and the rise by octaves beyond
+    /// discrepancy must suffice if only noise were left.
     pub(crate) fn is_promising(&self, base: &Hypothesis, screened: &Screened) -> bool {
         let Thresholds { model_discrepancy, rise, .. } = *self.thresholds;
         let touched = self.touched(screened.effect).iter();
@@ -81,13 +79,13 @@ impl Acceptance<'_> {
             || (screened.gain() >= ALONE * all && rises.any(|most| most > rise))
     }
 
-    /// Rise of the score that one more effect has to achieve if it closes that much.
+    /// Returns the rise of the score that a further effect must achieve if it closes this much.
     pub(crate) fn least_rise(&self, closed: f64) -> f64 {
         let is_faint = closed < self.thresholds.null_excess;
         if is_faint { self.thresholds.faint_rise } else { self.thresholds.rise }
     }
 
-    /// Remaining gap in the stages that an effect touches.
+    /// Returns the remaining gap in the stages that an effect touches.
     pub(crate) fn left(&self, base: &Hypothesis, effect: usize) -> f64 {
         self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
     }
@@ -99,7 +97,7 @@ impl Acceptance<'_> {
         })
     }
 
-    /// Gap that model discrepancy may leave of what a set closes in a stage.
+    /// Returns the gap that model discrepancy may leave of what a set closes in a stage.
     fn discrepancy(&self, base: &Hypothesis, stage: usize) -> f64 {
         let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
         self.thresholds.model_discrepancy * (gap(&self.problem.nominal) - gap(base)).max(0.0)

@@ -1,4 +1,4 @@
-//! What simpler methods say of the same data, to show what the full search gains.
+//! Answers of simpler methods to the same data, which show what the full search gains.
 //!
 //! | method | leaves out |
 //! | --- | --- |
@@ -32,23 +32,25 @@ use crate::{
 /// Answers of simpler methods to the same data.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Baselines {
-    /// Effect with the largest drop of the error, nominal parameters left as shipped.
+    /// Effect with the largest reduction of the error, with nominal parameters as shipped.
     pub largest_drop: Option<String>,
-    /// Effect whose one-step signature resembles the residual most, nominal sensitivities projected out.
+    /// Effect whose simulated change correlates best with the residual, after nominal sensitivities
+    /// are projected out.
     pub signature: Option<String>,
-    /// Single effect with the best information criterion, each fitted jointly, samples counted as independent.
+    /// Single effect with the best Bayesian information criterion. Each is fitted jointly with the
+    /// parameters, and samples count as independent.
     pub bic: Option<String>,
 }
 
 /// Number of single effects that the information criterion compares: the best of the screen.
 const KEPT: usize = 8;
-/// A correlation that noise alone almost never reaches, in its standard deviations, samples counted
-/// as independent.
+/// Size of a correlation that noise alone almost never reaches, in standard deviations. Samples
+/// count as independent.
 const FAR: f64 = 4.0;
-/// Number of starts that are fitted.
+/// Number of starts of an effect that are fitted.
 const STARTS: usize = 2;
 
-/// Three methods, each of which omits one step.
+/// Applies three methods, each of which omits one step of the full search.
 pub(crate) fn baselines(
     problem: &PreparedProblem<'_>,
     tried: &BTreeMap<Vec<usize>, Hypothesis>,
@@ -64,14 +66,14 @@ pub(crate) fn baselines(
     })
 }
 
-/// The effect whose parameters, fitted alone, reduce the mean square error in multiples of the
-/// noise most, with all parameters of the simulator as shipped; `None` if the reduction is less
-/// than a gap that counts.
+/// Returns the effect that most reduces the mean square error in multiples of the noise if only its
+/// own parameters are fitted and all parameters of the simulator stay as shipped. `None` if the
+/// reduction is not above `null_excess`.
 fn largest_drop(
     problem: &PreparedProblem<'_>,
     null_excess: f64,
 ) -> Result<Option<usize>, GapError> {
-    // No parameter is re-tuned or drifts.
+    // In this copy of the problem, no parameter is re-tuned or drifts.
     let compare = &problem.compare;
     let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
         sd: 0.0,
@@ -100,9 +102,9 @@ fn largest_drop(
     Ok(best(drops).filter(|(_, drop)| *drop > null_excess).map(|(effect, _)| effect))
 }
 
-/// The effect whose change, simulated once, correlates best with the residual of the re-tuned
-/// simulator, after the contribution of the parameters is projected out of both; `None` if noise
-/// could do as well.
+/// Returns the effect whose change, simulated once, correlates best with the residual of the
+/// re-tuned simulator, after the contribution of the parameters is projected out of both. `None` if
+/// noise could correlate as well.
 fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
     let likeness = each_effect(compare, |effect| {
         let spec = &compare.simulator().effects()[effect];
@@ -117,15 +119,15 @@ fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>,
         let own = compare.product(s, residual, residual);
         (squares + own, count + compare.roles.count(Role::Fit) as f64)
     });
-    // Correlation r = product / sqrt(own squares); without correlation its standard deviation is 1
-    // / sqrt(count).
+    // The correlation is r = product/sqrt(own squares). Without a true correlation, its standard
+    // deviation is 1/sqrt(count).
     let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
     Ok(best(likeness).filter(|(_, product)| *product > least).map(|(effect, _)| effect))
 }
 
-/// The single effect, fitted together with all parameters, with the lowest
-/// BIC = n ln(mean square) + k ln(n), every sample counted as independent; `None` if the model
-/// without effects has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
+/// Returns the single effect, fitted together with all parameters, with the lowest BIC = n ln(mean
+/// square) + k ln(n). Every sample counts as independent. `None` if the model without effects has
+/// the lowest BIC (Schwarz 1978, doi 10.1214/aos/1176344136).
 fn criterion(
     problem: &PreparedProblem<'_>,
     ground: &Ground,
@@ -159,7 +161,7 @@ fn criterion(
     Ok(best(falls).map(|(effect, _)| effect))
 }
 
-/// A number for every effect.
+/// Computes a number for every effect.
 fn each_effect(
     compare: &Comparison<'_>,
     of: impl Fn(usize) -> Result<f64, GapError> + Sync + Send,
@@ -167,14 +169,14 @@ fn each_effect(
     (0..compare.simulator().effects().len()).into_par_iter().map(of).collect()
 }
 
-/// The effect with the largest number above 0.
+/// Returns the effect with the largest number above 0.
 fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
     let above = numbers.into_iter().enumerate().filter(|(_, x)| *x > 0.0);
     above.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The residual in the stages that an effect touches when it is fitted on top of a ground, from its
-/// best starts.
+/// Fits an effect on top of a model, from its best starts. Returns for each fit the misfits in the
+/// stages that the effect touches.
 fn fits(
     compare: &Comparison<'_>,
     ground: &Ground,

@@ -1,12 +1,11 @@
-//! Whether commands switch at rows of the record or anywhere between two: two hypotheses, weighed
-//! by what each explains in the end.
+//! Decides whether commands switch at rows of the recording or anywhere between two rows.
 //!
-//! If every second row of a record was dropped, a switch is visible up to a row late. Then the
-//! [parameter](crate::RecordFacts::command_timing) that says how far ahead of its row a switch acts
-//! on average is re-tuned, and the variation between switches is a marginalised nuisance. A true
-//! effect (a late valve) gains from this freedom as well, as long as it is not in the model.
-//! Therefore both hypotheses are searched to the end, and the better likelihood of the records
-//! decides.
+//! If every second row of a recording was dropped, a switch appears up to a row late. The
+//! [parameter](crate::RecordFacts::command_timing) for the mean advance of a switch before its row
+//! is then re-tuned, and the variation between switches is a marginalised nuisance. A missing
+//! effect (a late valve) also gains from this freedom as long as it is not in the model. Therefore,
+//! if the second hypothesis is likelier at first, both are searched to the end, and the larger
+//! likelihood decides.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -17,7 +16,7 @@ use crate::{
     search::selection::Search,
 };
 
-/// A simulator whose commands switch between rows; `None` if it has no such commands.
+/// Returns the simulator with commands that switch between rows; `None` if this does not apply.
 pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     let timing = &simulator.record().command_timing;
     let altered = |i: usize, p: &ParameterSpec| {
@@ -27,9 +26,9 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     (!timing.is_empty()).then(|| Altered::of(simulator, altered))
 }
 
-/// The problem with the larger likelihood of the records, and the set to continue from. The problem
-/// with commands between rows is prepared only if there are such commands and a gap that they could
-/// explain.
+/// Returns the problem with the larger likelihood, and the set of effects to continue from. The
+/// problem with commands between rows is prepared only if it applies and there is a gap in a stage
+/// that depends on the timing.
 pub(crate) fn likelier<'a>(
     at_rows: PreparedProblem<'a>,
     between_rows: Option<&'a Altered<'a>>,

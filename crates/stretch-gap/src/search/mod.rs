@@ -1,13 +1,11 @@
 //! The search for the set of effects that the simulator lacks.
 //!
 //! Input: a prepared problem and the thresholds. Output: [`selection::Found`], the best set of
-//! effects with its alternatives, and every set that was fitted on the way ([`sets`]). Effects are
-//! screened with one simulation per start ([`screen`]). The promising ones are fitted ([`sets`])
-//! and accepted if they meet the acceptance criteria ([`acceptance`]). If re-tuning moved
-//! parameters far, an effect is also fitted once from the parameters as shipped ([`sets`]). Two
-//! hypotheses of the record are weighed as well: commands that switch between its rows
-//! ([`command_timing`]) and other sizes of the nuisances ([`re_estimate`]). [`baselines`] are
-//! simpler methods. Imports: `numerics`, `problem`, `fit`.
+//! effects with its alternatives, and every set that was fitted ([`sets`]). Effects are screened
+//! with one simulation per start ([`screen`]); the promising ones are fitted ([`sets`]) and added
+//! if they meet the criteria ([`acceptance`]). Two other explanations are compared: commands that
+//! switch between rows ([`command_timing`]), and other sizes of the nuisances ([`re_estimate`]).
+//! [`baselines`] are simpler methods. Imports: `numerics`, `problem`, `fit`.
 
 pub(crate) mod acceptance;
 pub(crate) mod baselines;

@@ -1,8 +1,10 @@
-//! Re-estimates the nuisances of a record, given what was found in it.
+//! Re-estimates the nuisances (drift and offsets) of a recording, given the effects that were
+//! found.
 //!
-//! A larger nuisance of a stage may explain the same as an effect of that stage, so the two are
-//! sized together. The nuisances given the best set, and those given this set without the effects
-//! of their stage, are two hypotheses, weighed by their likelihoods.
+//! A larger nuisance of a stage may explain the same as an effect of that stage. Therefore two
+//! hypotheses are compared by their likelihoods: the best set with the nuisances estimated for it,
+//! and that set without the effects of the drifting stages, with the nuisances estimated for the
+//! smaller set.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -10,8 +12,8 @@ use crate::{
     search::sets::Sets,
 };
 
-/// The problem with the re-estimated nuisances, and the set to continue from; `None` if they are as
-/// described.
+/// Returns the problem with the re-estimated nuisances, and the set to continue from; `None` if the
+/// nuisances stay as described.
 pub(crate) fn re_estimated<'a>(
     problem: &PreparedProblem<'a>,
     sets: &mut Sets<'_>,

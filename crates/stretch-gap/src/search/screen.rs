@@ -1,19 +1,17 @@
-//! Cheap look at every effect: the change that it would make, nominal sensitivities projected out.
+//! Screens every effect with one simulation per start instead of a fit.
 //!
-//! Let d be the change of the output, in multiples of the noise, that an effect of finite severity makes, r the residual and A the sensitivities of the
-//! nominal parameters, whose prior precision is 1. What the parameters can do is marginalised as nuisances are:
+//! Let d be the change of the output by an effect at a start, in multiples of the noise, r the
+//! residual, and A the sensitivities of the nominal parameters, whose prior precision is 1. What
+//! the parameters can do is projected out:
 //!
 //! ```text
 //! <x, y> = x'V^-1 y - x'V^-1 A (A'V^-1 A + b I)^-1 A'V^-1 y
 //! ```
 //!
-//! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
-//! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
-//! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
-//! A threshold changes nothing up to where the signal reaches it, and soon too much beyond: for a state inside a simulator that place is unknown. Where
-//! its starts were not chosen for the effect, and go from one that changes nothing to one that does more than twice too much, places between the two
-//! are screened as well.
-//! A kink bends the change, so gains only say what a fit may be spent on.
+//! If the effect is a times as strong, the cost changes by (0.5 a^2 <d,d> - a <d,r>)/b, with b
+//! samples per block. The reduction at the minimum a = <d,r>/<d,d> is the *gain*, half the score
+//! statistic of Rao (1948, doi 10.1017/S0305004100023987). A strength is scaled by a; the start of
+//! a threshold is kept. Gains only select what is fitted, because real changes are not linear.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -28,24 +26,24 @@ use crate::{
     problem::{error::GapError, simulator::Model, spec::EffectSpec},
 };
 
-/// Times by which the first start's strength may be scaled.
+/// Largest factor on the strength of a start.
 const SCALED: f64 = 8.0;
-/// A change smaller than this, in variances of the noise over all samples, is none.
+/// Smallest change that counts, as a sum of squares in multiples of the noise variance.
 const NO_CHANGE: f64 = 1e-9;
 
-/// Places between a threshold that nothing reaches and one that does too much.
+/// Number of values between a threshold that changes nothing and one that changes too much.
 const BETWEEN: usize = 7;
 
-/// Values of an effect, and <d,d> and <d,r> of the change that they make.
+/// Values of an effect, with <d,d> and <d,r> of the change that they cause.
 type Tried = (Vec<f64>, (f64, f64));
 
-/// What a screen says of one effect.
+/// The result of the screen of one effect.
 #[derive(Debug, Clone)]
 pub(crate) struct Screened {
     pub(crate) effect: usize,
-    /// Starting points for a fit, the best first, with the reduction of the cost each promises.
+    /// Starting points for a fit with the reduction of the cost that each promises, the best first.
     pub(crate) starts: Vec<(Vec<f64>, f64)>,
-    /// <d,d> at each start of the catalogue, in its order; `None` if nothing changes.
+    /// <d,d> at each start of the catalogue, in the catalogue's order; `None` if nothing changes.
     pub(crate) sizes: Vec<Option<f64>>,
 }
 
@@ -55,19 +53,20 @@ impl Screened {
     }
 }
 
-/// State of a stage that screens start from.
+/// A model around which effects are screened, with its residuals and sensitivities.
 pub(crate) struct Ground {
     pub(crate) model: Model,
     /// Residuals by stage.
     pub(crate) residuals: Vec<Column>,
     /// Sensitivities of nominal parameters by stage.
     pub(crate) known: Vec<Option<Sensitivities>>,
-    /// Factor of their normal matrix (with the prior), and what it makes of the residual, by stage.
+    /// By stage: Cholesky factor L of the normal matrix of the sensitivities (with the prior), and
+    /// L^-1 A'V^-1 r.
     pub(crate) solved: Vec<(Cholesky, Vec<f64>)>,
 }
 
 impl Ground {
-    /// Around a model.
+    /// Linearises all stages around a model.
     pub(crate) fn around(compare: &Comparison<'_>, model: Model) -> Result<Self, GapError> {
         let stages = compare.metrics.len();
         let parts: Result<Vec<_>, GapError> = (0..stages)
@@ -108,7 +107,7 @@ impl Comparison<'_> {
             tried.extend(changed(&between, changes));
         }
         for (values, (own, with_residual)) in &tried {
-            // Strengths scale with the amplitude; thresholds do not scale at all.
+            // A strength scales its change. A threshold cannot be scaled.
             let scalable = spec.parameters[0].off() == Some(0.0);
             let (value, range) = (values[0], &spec.parameters[0]);
             let alpha = with_residual / own;
@@ -121,7 +120,8 @@ impl Comparison<'_> {
             let alpha = alpha.clamp(least, most);
             let promise = |a: f64| self.weight() * (a * with_residual - 0.5 * a * a * own);
             let gain = promise(alpha);
-            // A threshold has the sign of a strength and bends the change: as it was simulated, its promise is kept.
+            // The change may be non-linear, so the unscaled start is kept as well, with the gain
+            // that its simulation shows.
             if scalable && promise(1.0) > 0.0 {
                 starts.push((values.clone(), promise(1.0)));
             }
@@ -136,7 +136,8 @@ impl Comparison<'_> {
         Ok(Screened { effect, starts, sizes })
     }
 
-    /// <d,d> and <d,r> of the change d that an effect makes at each of some values; `None` if it makes none or cannot be simulated.
+    /// Returns <d,d> and <d,r> of the change d at each of some values of an effect; `None` if there
+    /// is no change or it cannot be simulated.
     pub(crate) fn changes(
         &self,
         ground: &Ground,
@@ -152,7 +153,8 @@ impl Comparison<'_> {
         Ok(there.into_iter().map(|own| self.change(ground, touches, own?)).collect())
     }
 
-    /// <d,d> and <d,r> of a change, from the residuals with it in the stages that it touches.
+    /// Returns <d,d> and <d,r> of a change, from the residuals with the effect in the stages that
+    /// it touches.
     fn change(
         &self,
         ground: &Ground,
@@ -171,7 +173,7 @@ impl Comparison<'_> {
         (own > NO_CHANGE).then_some((own, mixed))
     }
 
-    /// Factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
+    /// Returns the factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
     pub(crate) fn solved(
         &self,
         stage: usize,
@@ -187,7 +189,7 @@ impl Comparison<'_> {
                 normal[(i, j)] = p;
                 normal[(j, i)] = p;
             }
-            // The prior: one standard deviation is 1, and a block counts as one sample.
+            // The prior adds 1 for a block, that is, b for the sum over samples.
             normal[(i, i)] += self.roles.block as f64;
         }
         let factor = Cholesky::of(normal);
@@ -196,7 +198,7 @@ impl Comparison<'_> {
         (factor, of_residual)
     }
 
-    /// <d,d> and <d,r> of a change in one stage.
+    /// Returns <d,d> and <d,r> of a change in one stage.
     fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
         let residual = &ground.residuals[stage];
         let product = |a: &Column, b: &Column| self.product(stage, a, b);
@@ -213,12 +215,14 @@ impl Comparison<'_> {
     }
 }
 
-/// Places between the last start of a threshold that changes nothing and the first that does too much, with every shape; no place if a start
-/// does about as much as the residual asks for, or if the starts were chosen for the effect.
+/// Returns values of a threshold between the last start that changes nothing and the first that
+/// changes more than twice too much, with every shape. The best value may lie between two such
+/// starts. Empty if a start changes about as much as the residual requires, or if the starts were
+/// chosen for this effect.
 fn jumped_over(spec: &EffectSpec, tried: &[Tried]) -> Vec<Vec<f64>> {
     let threshold = spec.parameters[0].off().filter(|off| *off != 0.0);
     let Some(off) = threshold else { return Vec::new() };
-    // As it is it lowers the cost.
+    // This start alone lowers the cost.
     let is_promising = tried.iter().any(|(_, (own, with_residual))| *with_residual > 0.5 * own);
     if is_promising || spec.starts != EffectParameter::starts(&spec.parameters) {
         return Vec::new();

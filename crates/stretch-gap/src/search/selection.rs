@@ -1,8 +1,10 @@
 //! The search: forward selection, backward elimination, and alternatives for every effect.
 //!
-//! Greedy selection is dangerously sure of a strong effect that replaces several small ones, so the search looks back three times:
-//! sets are pruned with the rest fitted anew from the larger set; every effect of the best set is compared with alternatives
-//! fitted in its place; and an alternative with a better score replaces it, from which the search goes on.
+//! Greedy selection is too certain of a strong effect that replaces several small ones. The search
+//! therefore revises its choice in three ways. Weak effects are removed, with the rest fitted again
+//! from the larger set. Every effect of the best set is compared with alternatives fitted in its
+//! place. An alternative with a better score replaces the effect, and the search continues from
+//! there.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -18,24 +20,28 @@ use crate::{
     },
 };
 
-/// Candidates kept by a screen.
+/// Number of candidates that the first round keeps after screening.
 const KEPT: usize = 8;
-/// Candidates kept in later rounds.
+/// Number of candidates that later rounds keep.
 const KEPT_LATER: usize = 5;
-/// Leaders whose twins are kept with them.
+/// Number of leading candidates whose twins (effects that are easily confused with them) are kept
+/// as well.
 const LEADERS: usize = 4;
-/// Rivals looked at for a single effect, and for one among others.
+/// Number of alternatives that are fitted for a single effect, and for an effect in a larger set.
 pub(crate) const RIVALS: (usize, usize) = (6, 3);
-/// Share of the least rise that a screen must promise: where the change bends it promises too little.
+/// Share of the required rise that a screen must promise. It is small because a screen
+/// underestimates a non-linear change.
 const PROMISE: f64 = 0.1;
 /// Share of the best gain below which an effect is not fitted.
 const FAINT: f64 = 0.03;
-/// Share of an effect's own gain that a rival in its place must promise; twins are compared with it whatever they promise.
+/// Smallest gain of an alternative, as a share of the gain of the effect that it would replace.
+/// Twins are fitted with any gain.
 pub(crate) const RIVALRY: f64 = 0.5;
-/// How often an effect of the best set gives its place to another.
+/// Largest number of times that an effect of the best set is replaced.
 const EXCHANGES: usize = 2;
 
-/// Screens that are kept: that of the set before the last one found, and what lies between.
+/// Number of cached screens, which covers the models between an effect's selection and the search
+/// for its alternatives.
 const LOOKED: usize = 4;
 
 /// The search over sets of effects.
@@ -43,25 +49,28 @@ pub(crate) struct Search<'a> {
     problem: &'a PreparedProblem<'a>,
     acceptance: Acceptance<'a>,
     pub(crate) sets: Sets<'a>,
-    /// Most effects at once.
+    /// Largest number of effects in a set.
     depth: usize,
-    /// Whether, before a gap is left as it is, candidates are fitted of which a screen promises nothing.
+    /// Whether candidates with little promise in the screen are also fitted before a gap is left
+    /// unexplained.
     is_thorough: bool,
-    /// Screens that were made, by what they were made around: rivals of an effect alone come from the one that it was found by.
+    /// Cached screens, the newest first. The alternatives of a single effect come from the screen
+    /// that found it.
     looked: Vec<Arc<Looked>>,
 }
 
-/// A ground, and every effect that is not in it screened on top; the best come first.
+/// A model, and the screens of all effects that it does not contain; the best come first.
 pub(crate) struct Looked {
     ground: Ground,
     pub(crate) screened: Vec<Screened>,
 }
 
-/// What the search found.
+/// The result of a search.
 pub(crate) struct Found {
     /// The best set.
     pub(crate) best: Hypothesis,
-    /// Sets with one of its effects, which is named, replaced.
+    /// Sets in which one effect of the best set is replaced, each with the index of the replaced
+    /// effect.
     pub(crate) rivals: Vec<(usize, Hypothesis)>,
 }
 
@@ -75,12 +84,14 @@ impl<'a> Search<'a> {
         Self { problem, acceptance, sets, depth, is_thorough: true, looked: Vec::new() }
     }
 
-    /// The same, fitting only what a screen promises: enough to estimate the noise levels with it.
+    /// Returns a search that fits only effects that a screen promises, which suffices to estimate
+    /// the noise levels.
     pub(crate) fn quick(self) -> Self {
         Self { is_thorough: false, ..self }
     }
 
-    /// The same search of the same problem with other nuisances: fits begin where they ended before.
+    /// Returns the same search for the same problem with other nuisances. Fits start from the
+    /// previous results.
     pub(crate) fn again<'b>(self, problem: &'b PreparedProblem<'b>) -> Search<'b>
     where
         'a: 'b,
@@ -89,7 +100,7 @@ impl<'a> Search<'a> {
         Search { sets, ..Search::new(problem, self.acceptance.thresholds, self.depth) }
     }
 
-    /// A set of a quick search, grown thoroughly.
+    /// Extends a set of a quick search by a thorough search.
     pub(crate) fn thoroughly(
         &mut self,
         from: Hypothesis,
@@ -99,7 +110,8 @@ impl<'a> Search<'a> {
         self.grow(from, progress)
     }
 
-    /// The best set that grows from one of this or another problem: effects are added as long as they meet the acceptance criterion.
+    /// Finds the best set by extending a set of this or another problem. Effects are added as long
+    /// as they meet the acceptance criteria.
     pub(crate) fn best(
         &mut self,
         from: &Hypothesis,
@@ -111,8 +123,9 @@ impl<'a> Search<'a> {
         self.second_line(begun, first, progress)
     }
 
-    /// Compares a set with its alternatives. One with a better score replaces an effect of the set, because the strongest effect comes first
-    /// and may have replaced several.
+    /// Compares a set with its alternatives. An alternative with a better score replaces an effect
+    /// of the set, because the strongest effect is chosen first and may have replaced several
+    /// others.
     pub(crate) fn rivalled(
         &mut self,
         mut best: Hypothesis,
@@ -135,8 +148,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The best set that can be simulated over all trials, of which only some were fitted, or the best such rival of it; the nominal
-    /// where none can be.
+    /// Returns the best set, or else its best alternative, that can be simulated over all trials,
+    /// including those that were not fitted; the nominal simulator if none can.
     fn of_all_trials(
         &self,
         best: Hypothesis,
@@ -154,18 +167,20 @@ impl<'a> Search<'a> {
         Ok(self.problem.nominal.clone())
     }
 
-    /// The screen around a model, where it is kept.
+    /// Returns the cached screen around a model.
     fn looked_at(&self, model: &Model) -> Option<Arc<Looked>> {
         self.looked.iter().find(|l| l.ground.model == *model).map(Arc::clone)
     }
 
-    /// The screen around the re-tuned nominal, where it is kept.
+    /// Returns the cached screen around the re-tuned nominal model.
     pub(crate) fn looked_at_nominal(&self) -> Option<Arc<Looked>> {
         self.looked_at(&self.problem.nominal.model)
     }
 
-    /// The better of a set of several and of what grows from the runner-up of its first round: a strong effect that replaces two
-    /// others is replaced in no slot, because each of the two alone is worse than it.
+    /// Returns the better of two sets: the set found, and what grows from the runner-up of the
+    /// first round. A strong effect may replace two others, each of which alone is worse, so
+    /// exchanging single effects would not find the pair. Sets with fewer than two added effects
+    /// are returned unchanged.
     fn second_line(
         &mut self,
         begun: usize,
@@ -187,7 +202,7 @@ impl<'a> Search<'a> {
         Ok(if other.score > best.score { other } else { best })
     }
 
-    /// A set with its effects in order of what the score loses without each, the most first.
+    /// Sorts the effects of a set by the loss of score without each, the largest first.
     fn strongest_first(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
         let mut losses: BTreeMap<usize, f64> = BTreeMap::new();
         for &effect in &set.effects {
@@ -197,7 +212,7 @@ impl<'a> Search<'a> {
         Ok(set)
     }
 
-    /// Forward selection from a set, and backward elimination; the sets that were fitted are remembered.
+    /// Extends a set by forward selection, then removes weak effects by backward elimination.
     fn grow(&mut self, from: Hypothesis, progress: &dyn Fn(&str)) -> Result<Hypothesis, GapError> {
         let mut best = from;
         for round in best.effects.len()..self.depth {
@@ -213,7 +228,8 @@ impl<'a> Search<'a> {
             let mut next = self.first_accepted(&best, ground, &list)?;
             let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
             if next.is_none() && is_open && self.is_thorough && !self.problem.is_spent() {
-                // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
+                // A screen is linear. Before a gap is left unexplained, every effect that could
+                // cause it is fitted.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
                 let others = self.others(&best, screened, &list);
                 let least = |effect| self.least_gain(&best, effect);
@@ -230,7 +246,8 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// The best may only pick up what model discrepancy left elsewhere: the first that meets the acceptance criterion is taken.
+    /// Returns the first extension that meets the acceptance criteria, in order of score. The best
+    /// one may fail them if it only explains what model discrepancy left elsewhere.
     fn first_accepted(
         &mut self,
         base: &Hypothesis,
@@ -246,7 +263,8 @@ impl<'a> Search<'a> {
         Ok(None)
     }
 
-    /// Effects that a shortlist leaves out, where a gap is left for them, each from its best start.
+    /// Returns the effects that are not in the shortlist but could close a remaining gap, each with
+    /// its best start.
     fn others(&self, base: &Hypothesis, screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
         let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
         let is_possible = |s: &&Screened| self.acceptance.is_possible(base, s.effect);
@@ -275,7 +293,7 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// Screens every effect that is not in `base`, once a model.
+    /// Screens every effect that is not in `base`, or returns the cached screen of its model.
     fn look(&mut self, base: &Hypothesis) -> Result<Arc<Looked>, GapError> {
         if let Some(looked) = self.looked_at(&base.model) {
             return Ok(looked);
@@ -294,7 +312,7 @@ impl<'a> Search<'a> {
         Ok(looked)
     }
 
-    /// The best of a screen, and the twins of the very best.
+    /// Returns the best effects of a screen, and the twins of the leading ones.
     fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
         let screened: Vec<&Screened> =
             screened.iter().filter(|s| self.acceptance.is_promising(base, s)).collect();
@@ -316,15 +334,15 @@ impl<'a> Search<'a> {
         list
     }
 
-    /// What of a gain must show at a first look at an effect on top of `base`.
+    /// Returns the smallest gain with which an effect on top of `base` is considered.
     fn least_gain(&self, base: &Hypothesis, effect: usize) -> f64 {
         let rise = self.acceptance.least_rise(self.acceptance.left(base, effect));
-        // Gains count a block as one observation, scores the effective sample size.
+        // Gains count a block as one observation, scores use the effective sample size.
         PROMISE * rise * self.problem.finest()
     }
 
-    /// Sets in which one effect of `best` is replaced by another, the replaced one named; fitted where a screen
-    /// says that they might do.
+    /// Returns sets in which one effect of `best` is replaced by another, each with the replaced
+    /// effect. Only replacements that a screen promises, and twins, are fitted.
     fn rivals(&mut self, best: &Hypothesis) -> Result<Vec<(usize, Hypothesis)>, GapError> {
         let mut out = Vec::new();
         let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };

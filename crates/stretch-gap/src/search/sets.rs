@@ -1,10 +1,11 @@
-//! Fits sets of effects, and remembers every one.
+//! Fits sets of effects and stores every result.
 //!
-//! A smaller set is fitted twice, from below and from the larger set that holds it, and the better counts: a likelihood ratio of nested
-//! hypotheses is a ratio of maxima, and what a better start found must not be credited to the effect that is left out.
+//! A smaller set is fitted both from below and from the larger set that contains it, and the better
+//! fit counts. The likelihood ratio of nested hypotheses is a ratio of maxima, so a better start of
+//! the larger fit must not count as evidence for the additional effect.
 //!
-//! Only what hangs together is fitted anew: a set falls into components of stages that share effects, and a fit of one
-//! component leaves the others as they are.
+//! A fit changes only one component: stages that are linked through effects or fitted parameters.
+//! The other components of the set stay as they are.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,18 +28,21 @@ use crate::{
     search::screen::{Ground, Screened},
 };
 
-/// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
+/// Number of starts of one effect that are fitted, and the smallest gain of a start as a share of
+/// the best.
 const STARTS: usize = 3;
 const PROMISING_START: f64 = 0.3;
-/// Excess that must be left for parameters at the ends of their tolerances to count: more error than noise.
+/// Excess from which parameters at the ends of their tolerances are suspicious: more error than
+/// noise.
 pub(crate) const LEFT: f64 = 1.0;
-/// Places in the range of a parameter that is searched in equal ratios.
+/// Number of values that are tried in the range of a parameter on a logarithmic scale.
 const PLACES: usize = 6;
-/// Share of the best candidate's rise, and nats in addition, within which a candidate may still win once it is fitted to the end.
+/// Share of the best candidate's rise, plus a number of nats, within which a candidate may still
+/// win after a complete fit.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
 
-/// A set with one effect more, and whether its fit [is settled](Fitted::is_settled).
+/// A set with one more effect, and whether its fit [is settled](Fitted::is_settled).
 struct Extended {
     set: Hypothesis,
     is_settled: bool,
@@ -49,9 +53,9 @@ pub(crate) struct Sets<'a> {
     pub(crate) problem: &'a PreparedProblem<'a>,
     /// Every set that was fitted, by its sorted effects.
     pub(crate) tried: BTreeMap<Vec<usize>, Hypothesis>,
-    /// Sets among the fitted ones that were fitted from a larger set.
+    /// Keys of the sets that were also fitted from a larger set.
     refitted: BTreeSet<Vec<usize>>,
-    /// Where sets ended that were fitted in the same problem with other nuisances: a fit begins there.
+    /// Final models of the sets that were fitted with other nuisances; new fits start there.
     before: BTreeMap<Vec<usize>, Model>,
 }
 
@@ -61,14 +65,15 @@ impl<'a> Sets<'a> {
         Self { problem, tried, refitted, before }
     }
 
-    /// For the same problem as that of other sets, with other nuisances.
+    /// Creates an empty collection for the same problem with other nuisances; fits start from the
+    /// results of `sets`.
     pub(crate) fn after(problem: &'a PreparedProblem<'a>, sets: Sets<'_>) -> Self {
         let before = sets.tried.into_iter().map(|(key, set)| (key, set.model)).collect();
         Self { before, ..Self::new(problem) }
     }
 
-    /// Stages that hang together with some effects: those that they touch, and those that other effects of the set
-    /// which touch one of these touch.
+    /// Returns the stages that are linked to the effect `seed`, and the effects that touch them.
+    /// Stages are linked if an effect of the set touches both or a fitted parameter acts in both.
     fn component(&self, effects: &[usize], seed: usize) -> (Vec<usize>, Vec<usize>) {
         let specs = self.problem.simulator().effects();
         let simulator = self.problem.simulator();
@@ -95,7 +100,7 @@ impl<'a> Sets<'a> {
         (stages, own)
     }
 
-    /// A set of another problem, fitted in this one from its values there.
+    /// Fits a set of another problem in this one, starting from its values there.
     pub(crate) fn refit(&mut self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
         if set.effects.is_empty() {
             return Ok(self.problem.nominal.clone());
@@ -108,7 +113,7 @@ impl<'a> Sets<'a> {
         Ok(own)
     }
 
-    /// Fits the newest effect's part of a set until nothing is gained.
+    /// Fits the component of an effect in a set to convergence.
     fn polish(
         &self,
         base: &Hypothesis,
@@ -122,8 +127,8 @@ impl<'a> Sets<'a> {
         Ok(self.join(set, set.effects.clone(), &stages, fitted))
     }
 
-    /// Fits from a model, or if that cannot be simulated, from the same effects with the parameters of `base`: a rough fit takes
-    /// its steps on a linearisation, which leads to where a simulator cannot follow.
+    /// Fits from a model; if that fails, from the same effects with the parameters of `base`. A
+    /// coarse fit uses linearisations, whose steps may lead to values that cannot be simulated.
     fn fit(
         &self,
         base: &Hypothesis,
@@ -138,7 +143,8 @@ impl<'a> Sets<'a> {
         }
     }
 
-    /// The stages that a new effect of `base` hangs together with, and that part of a model.
+    /// Returns the stages linked to a new effect of `base`, and the part of a model that acts in
+    /// them.
     fn part(&self, base: &Hypothesis, effect: usize, mut model: Model) -> (Vec<usize>, Model) {
         let effects: Vec<usize> = base.effects.iter().copied().chain([effect]).collect();
         let (stages, own) = self.component(&effects, effect);
@@ -146,7 +152,7 @@ impl<'a> Sets<'a> {
         (stages, model)
     }
 
-    /// Fits `base` with one effect more, from a model that holds it, as far as it takes to see whether it can compete.
+    /// Fits `base` with one more effect from a model that contains it, with the given effort.
     fn extend(
         &self,
         base: &Hypothesis,
@@ -161,7 +167,7 @@ impl<'a> Sets<'a> {
         Ok(Extended { set: self.join(base, effects, &stages, fitted), is_settled })
     }
 
-    /// Replaces the part of a set that a fit renewed.
+    /// Replaces the component of a set that was fitted.
     fn join(
         &self,
         base: &Hypothesis,
@@ -196,10 +202,11 @@ impl<'a> Sets<'a> {
         next
     }
 
-    /// Fits every effect of a list on top of `base`, the best first.
+    /// Fits every effect of a list on top of `base`; the best come first.
     ///
-    /// A race: all are fitted coarsely, from a few starts each; those whose score comes near `aim` (or the best of them, if that is
-    /// more), and the twins of the best, until nothing is gained.
+    /// All effects are fitted coarsely from a few starts. Those whose score comes close to the
+    /// larger of `aim` and the best score, and the twins of the best, are then fitted to
+    /// convergence.
     pub(crate) fn extend_all(
         &mut self,
         base: &Hypothesis,
@@ -212,7 +219,7 @@ impl<'a> Sets<'a> {
         let fresh: Vec<&Screened> = screened.iter().filter(is_fresh).collect();
         let mut coarse = self.coarse(base, ground, &fresh)?;
         let fine = self.fine(base, &coarse, aim)?;
-        // What was fitted on a linearisation alone, and cannot be simulated, is no fit.
+        // A fit that used only linearisations and cannot be simulated is discarded.
         let (fine, lost): (Vec<_>, Vec<_>) = fine.into_iter().partition(|(_, set)| set.is_some());
         coarse.retain(|effect, _| lost.iter().all(|(lost, _)| lost != effect));
         self.take_out(&lost.iter().map(|(effect, _)| *effect).collect::<Vec<_>>(), |_| false);
@@ -226,8 +233,9 @@ impl<'a> Sets<'a> {
         Ok(found)
     }
 
-    /// A set, or where more than noise is left with parameters at the ends of their tolerances, what a fit from the parameters as shipped
-    /// finds, if that is better: they were bent before an effect was there, and then hold it where they need it.
+    /// Fits a set again from the parameters as shipped if parameters are at the ends of their
+    /// tolerances and more than noise is left; the better fit is returned. Such parameters
+    /// compensated for an effect before it was added, and may then hold the effect at wrong values.
     pub(crate) fn straightened(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
         for effect in set.effects.clone() {
             let straight = match self.is_bent(&set, effect) {
@@ -242,7 +250,8 @@ impl<'a> Sets<'a> {
         Ok(set)
     }
 
-    /// Whether parameters of the stages of an effect are at the ends of their tolerances, and more than noise is left.
+    /// Whether parameters of an effect's stages are at the ends of their tolerances while more than
+    /// noise is left.
     fn is_bent(&self, set: &Hypothesis, effect: usize) -> bool {
         let simulator = self.problem.simulator();
         let stages = simulator.effects()[effect].touches.iter();
@@ -251,8 +260,9 @@ impl<'a> Sets<'a> {
         own.any(is_at_end) && self.problem.gap(set) > LEFT && !self.problem.is_spent()
     }
 
-    /// A set fitted from the parameters as shipped: at the starts of one of its effects, and with each of that effect's parameters that is
-    /// searched in equal ratios at [`PLACES`] of its range. `None` if that ends no better.
+    /// Fits a set from the parameters as shipped. It tries all starts of one effect and, for each
+    /// parameter on a logarithmic scale, [`PLACES`] values in its range. Returns `None` if the
+    /// result is no better.
     fn begun_as_shipped(
         &self,
         set: &Hypothesis,
@@ -286,13 +296,15 @@ impl<'a> Sets<'a> {
         let Some(best) = best else { return Ok(None) };
         let fitted = self.problem.fit(&stages, best.model, &[], FINE)?;
         let straight = self.join(set, set.effects.clone(), &stages, fitted);
-        // An effect at the end of its range holds parameters no better than their own tolerances do.
+        // An effect at the end of its range is no better than a parameter at the end of its
+        // tolerance.
         let is_bound = straight.is_at_bound(effect, simulator.effects());
         Ok(Some(straight).filter(|straight| straight.score > set.score && !is_bound))
     }
 
-    /// The best coarse fit of every effect: where there are several starts, a glance at each says from which. With nuisances that are a little
-    /// others a glance from where the set ended before is enough.
+    /// Returns the best coarse fit of every effect. With several starts, a very short fit of each
+    /// selects the start. With slightly changed nuisances, a short fit from the previous result
+    /// suffices.
     fn coarse(
         &self,
         base: &Hypothesis,
@@ -323,7 +335,7 @@ impl<'a> Sets<'a> {
         Ok(fitted)
     }
 
-    /// Models from which a fit of each effect on top of `base` may begin.
+    /// Returns the models from which a fit of each effect on top of `base` may start.
     fn starts(
         &self,
         base: &Hypothesis,
@@ -339,7 +351,7 @@ impl<'a> Sets<'a> {
         screened.par_iter().map(of_one).collect()
     }
 
-    /// The best of the glances at every effect, one from each of its starts.
+    /// Returns the best of the very short fits from each start, for every effect.
     fn glanced(
         &self,
         base: &Hypothesis,
@@ -364,14 +376,14 @@ impl<'a> Sets<'a> {
         Ok(best)
     }
 
-    /// Notes the effects of which no fit was possible.
+    /// Notes the effects for which no fit was possible.
     fn take_out(&self, asked: &[usize], is_fitted: impl Fn(usize) -> bool) {
         let lost: Vec<usize> = asked.iter().copied().filter(|effect| !is_fitted(*effect)).collect();
         self.problem.compare.runs.not_fitted(&lost);
     }
 
-    /// Those of some effects of which a glance at a fit lowers the cost by what `least` asks of it, or still goes down by as much at its end, whatever
-    /// the screen said.
+    /// Selects the effects of which a very short fit lowers the cost by at least `least`, or whose
+    /// last step still lowers it by that much. The screen is ignored.
     pub(crate) fn promising(
         &self,
         base: &Hypothesis,
@@ -391,7 +403,7 @@ impl<'a> Sets<'a> {
         Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
-    /// Fits to the end of what may still win; `None` if it cannot be simulated.
+    /// Fits to convergence what may still win; `None` for an effect whose fit cannot be simulated.
     fn fine(
         &self,
         base: &Hypothesis,
@@ -416,7 +428,8 @@ impl<'a> Sets<'a> {
         )
     }
 
-    /// The set without one of its effects, fitted again; the best that is known of it, at worst the nominal, where that fit cannot be made.
+    /// Returns the set without one of its effects, fitted again. If that fit fails, returns the
+    /// best known fit of the smaller set, or else the nominal simulator.
     pub(crate) fn without(
         &mut self,
         set: &Hypothesis,
@@ -437,7 +450,8 @@ impl<'a> Sets<'a> {
             return Ok(self.tried.get(&key).unwrap_or(&self.problem.nominal).clone());
         };
         let refitted = self.join(set, rest, &stages, fitted);
-        // What the whole set has found of the others must not count for the one that is left out.
+        // The better fit counts: what the larger set found about the other effects must not count
+        // for the effect that is removed.
         let better = match self.tried.remove(&key) {
             Some(other) if other.score >= refitted.score => other,
             _ => refitted,
@@ -448,27 +462,30 @@ impl<'a> Sets<'a> {
     }
 }
 
-/// Values of an effect with its forms as usual.
+/// Returns the values of an effect with its forms at their usual values.
 fn unformed(parameters: &[EffectParameter], values: &[f64]) -> Vec<f64> {
     let usual = |(p, value): (&EffectParameter, &f64)| p.usual_form().unwrap_or(*value);
     parameters.iter().zip(values).map(usual).collect()
 }
 
-/// What a set is remembered by: its effects with one more, sorted.
+/// Returns the key of a set: its effects with one more, sorted.
 fn key(effects: &[usize], more: Option<usize>) -> Vec<usize> {
     let mut key: Vec<usize> = effects.iter().copied().chain(more).collect();
     key.sort_unstable();
     key
 }
 
-/// Tolerances from which a re-tuned parameter is far from its shipped value; one in seven is by chance.
+/// Distance from the shipped value, in tolerances, from which a re-tuned parameter counts as far;
+/// one in seven is as far by chance.
 const FAR: f64 = 1.5;
 
-/// A model with one more effect, in which parameters that re-tuning took far are as shipped; none if re-tuning took none far.
+/// Returns a model with one more effect in which parameters that re-tuning moved far are reset to
+/// their shipped values; `None` if no parameter moved far.
 ///
-/// Re-tuning takes up what it can of an effect, for example a valve's dead band by a smaller least opening. The effect then has nothing left
-/// to do, and no small step of both leads back. So the effect begins once with these parameters as shipped, at the one of its starts that
-/// costs least there.
+/// Re-tuning may absorb an effect. For example, a smaller minimum opening can replace a valve's
+/// dead band. The effect then has nothing left to explain, and small steps do not lead back.
+/// Therefore one fit starts with these parameters as shipped, at the start of the effect with the
+/// lowest cost.
 pub(crate) fn start_at_shipped(
     problem: &PreparedProblem<'_>,
     base: &Model,

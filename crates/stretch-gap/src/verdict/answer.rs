@@ -1,4 +1,5 @@
-//! The answer of a diagnosis as a value: what was found, with its numbers. [`sentence`](super::sentence) puts it into words.
+//! The answer of a diagnosis as a value: what was found, with its numbers.
+//! [`sentence`](super::sentence) describes it in words.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,80 +20,85 @@ use crate::{
     },
 };
 
-/// Least share of the gap that is reported of an effect that is not named.
+/// Smallest share of the gap for which an effect that is not named is reported.
 const LEAST_PART: f64 = 0.05;
 
-/// What a diagnosis found.
+/// The answer of a diagnosis.
 ///
-/// What is left is given in multiples of the noise, root mean square; shares are of the held-out gap.
+/// What a simulator leaves is the root mean square of its residual, in multiples of the noise.
+/// Shares refer to the gap on trials that were not fitted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Answer {
     /// Simulator and rig agree within the noise.
     Agrees {
-        /// Effects that were found and are too small to matter.
+        /// Effects that were found but are too small to matter.
         small: Vec<String>,
     },
-    /// Simulator and rig agree once parameters are re-tuned within their tolerances.
+    /// Simulator and rig agree after parameters are re-tuned within their tolerances.
     Retuned {
-        /// What the simulator leaves as shipped.
+        /// What the simulator leaves with its parameters as shipped.
         shipped: f64,
         /// What it leaves with re-tuned parameters.
         left: f64,
-        /// Effects that were found and are too small to matter.
+        /// Effects that were found but are too small to matter.
         small: Vec<String>,
     },
-    /// More is left than 19 of 20 records of the stated noise would leave, but too little to name a cause.
+    /// The simulator leaves more than the stated noise would in 19 of 20 recordings, but too little
+    /// to name a cause.
     Faint {
         /// What the re-tuned simulator leaves.
         left: f64,
-        /// What noise alone leaves in 19 of 20 records.
+        /// What noise alone leaves at most in 19 of 20 recordings.
         noise: f64,
-        /// Stage in which most of it is.
+        /// Stage that contains most of it.
         stage: String,
-        /// Effects that were found and are too small to matter.
+        /// Effects that were found but are too small to matter.
         small: Vec<String>,
     },
-    /// Effects are missing, and leave noise.
+    /// Effects are missing. With them, only noise is left.
     Missing {
         /// The effects, the strongest first.
         effects: Vec<MissingEffect>,
         /// What they close together.
         closes: Closed,
-        /// Effects that were found but close less than a name must.
+        /// Effects that were found but close less than a named effect must.
         faint: Vec<String>,
-        /// Parameters of the simulator that are at the ends of their tolerances with these effects, with the distance in tolerances.
+        /// Parameters of the simulator that are at the ends of their tolerances with these effects,
+        /// each with its distance from the nominal value in tolerances.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         ended: Vec<(String, f64)>,
     },
-    /// Effects are missing, and leave more than noise.
+    /// Effects are missing. With them, more than noise is left.
     Partly {
         /// The effects, the strongest first.
         effects: Vec<MissingEffect>,
         /// Share that they close together.
         closes: f64,
-        /// What they leave.
+        /// What is left with them.
         left: f64,
         /// Where that is.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rest: Option<Unexplained>,
-        /// Effects that were found but close less than a name must.
+        /// Effects that were found but close less than a named effect must.
         faint: Vec<String>,
-        /// Parameters of the simulator that are at the ends of their tolerances with these effects, with the distance in tolerances.
+        /// Parameters of the simulator that are at the ends of their tolerances with these effects,
+        /// each with its distance from the nominal value in tolerances.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         ended: Vec<(String, f64)>,
     },
-    /// A column of the record or a number of the rig file is wrong.
+    /// A column of the recording or a number in the rig file is wrong.
     WrongRecord {
-        /// The error with those that these data cannot tell from it, or what the columns alone say.
+        /// The errors: the most probable one and those that the data cannot distinguish from it, or
+        /// all errors that the columns alone show.
         errors: Vec<Gross>,
-        /// What closes if the first error is corrected; none if the columns alone say what is wrong.
+        /// What closes if the first error is corrected; none if the columns alone show the error.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         corrected: Option<Closed>,
     },
     /// There is a gap that the catalogue does not explain.
     Unknown {
-        /// Stage in which most of it is.
+        /// Stage that contains most of it.
         stage: String,
         /// What the re-tuned simulator leaves.
         left: f64,
@@ -104,27 +110,28 @@ pub enum Answer {
         /// What all effects close together.
         together: f64,
     },
-    /// Parameters are at the ends of their tolerances, and would explain as much as effects do.
+    /// Parameters are at the ends of their tolerances, and without tolerances would explain as much
+    /// as the effects do.
     AtBounds {
         /// Stage of the parameters.
         stage: String,
         /// The parameters.
         parameters: Vec<String>,
-        /// What is left all the same.
+        /// What is left in spite of that.
         left: f64,
-        /// The answer otherwise.
+        /// The answer without this finding.
         otherwise: Box<Answer>,
     },
-    /// The record cannot support a name.
+    /// The recording is not sufficient to name an effect.
     TooLittle {
-        /// Why.
+        /// The reason.
         why: TooLittle,
-        /// The answer otherwise.
+        /// The answer without this finding.
         otherwise: Box<Answer>,
     },
 }
 
-/// An effect that is missing.
+/// A missing effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MissingEffect {
     /// Its name.
@@ -137,7 +144,7 @@ pub struct MissingEffect {
     pub at_bound: bool,
 }
 
-/// What a hypothesis closes of the held-out gap.
+/// What a hypothesis closes of the gap on trials that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Closed {
     /// Share of the gap.
@@ -146,9 +153,10 @@ pub struct Closed {
     pub interval: [f64; 2],
     /// What is left.
     pub left: f64,
-    /// Whether more is left on the trials that were fitted than on the others.
+    /// Whether much more is left on the fitted trials than on the test trials.
     pub fits_worse: bool,
-    /// Probability of the hypothesis, given the catalogue.
+    /// Probability of the hypothesis, assuming that the catalogue is complete up to one unknown
+    /// cause.
     pub probability: f64,
 }
 
@@ -164,19 +172,20 @@ impl Closed {
     }
 }
 
-/// What the answer is made from.
+/// The findings that an answer is derived from.
 #[derive(Clone, Copy)]
 pub(crate) struct Findings<'a> {
     pub(crate) judged: &'a Judged,
     pub(crate) gap: Excess,
-    /// The most probable candidate, with its probability among all, what the catalogue lacks included.
+    /// The most probable candidate, with its probability among all candidates, including an unknown
+    /// cause.
     pub(crate) first: Option<&'a Candidate>,
     pub(crate) shares: &'a [EffectShare],
-    /// What a partial answer leaves.
+    /// What is left if the effects explain only a part.
     pub(crate) unexplained: Option<&'a Unexplained>,
-    /// What is wrong with the record or the rig file.
+    /// Errors of the recording or of the rig file.
     pub(crate) gross: &'a [Gross],
-    /// Gap that noise alone may leave.
+    /// Gap that noise alone may leave in 19 of 20 recordings.
     pub(crate) null_band: f64,
 }
 
@@ -204,7 +213,7 @@ impl Answer {
         }
     }
 
-    /// The answer if nothing overrides it.
+    /// Returns the answer if no other finding overrides it.
     fn seen(findings: Findings<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> Self {
         let Findings { judged, gap, gross, shares, null_band, .. } = findings;
         let Naming { faint, .. } = &judged.seen_naming;
@@ -261,7 +270,7 @@ impl Answer {
         }
     }
 
-    /// The effects that are named, in the order of the sentence.
+    /// Returns the named effects, in the order of the sentence.
     pub(crate) fn named(&self) -> Vec<String> {
         match self {
             Self::Missing { effects, .. } | Self::Partly { effects, .. } => {
@@ -271,7 +280,7 @@ impl Answer {
         }
     }
 
-    /// Calls every effect by another name.
+    /// Renames every effect.
     pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
         let all = |names: &mut Vec<String>| names.iter_mut().for_each(|name| *name = rename(name));
         match self {
@@ -297,7 +306,7 @@ impl Answer {
     }
 }
 
-/// The named effects with their alternatives, in their order.
+/// Returns the named effects with their alternatives, in the order of the naming.
 pub(crate) fn missing_effects(naming: &Naming, shares: &[EffectShare]) -> Vec<MissingEffect> {
     let one = |name: &String| {
         let own = shares.iter().find(|s| s.effect == *name);
@@ -312,7 +321,7 @@ pub(crate) fn missing_effects(naming: &Naming, shares: &[EffectShare]) -> Vec<Mi
     naming.named.iter().map(one).collect()
 }
 
-/// Name of the stage with the largest excess.
+/// Returns the name of the stage with the largest excess.
 fn worst(
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -323,7 +332,8 @@ fn worst(
     worst.map_or(String::new(), |(_, spec)| spec.name.clone())
 }
 
-/// Root mean square of what is left, in multiples of the noise, from an excess (mean square over the noise's, minus 1).
+/// Returns the root mean square of a residual in multiples of the noise, from its excess (reduced
+/// chi-square minus 1).
 fn multiple(excess: f64) -> f64 {
     (1.0 + excess).max(0.0).sqrt()
 }

@@ -1,12 +1,11 @@
-//! How much of the recorded data a diagnosis uses, and whether that suffices to name an effect.
+//! Checks whether a diagnosis uses enough of the recorded data to name an effect.
 //!
-//! A name is a statement about the rig, not about the rows that happened to be even enough. It
-//! needs at least the share [`LEAST_SHARE`] of the rows, because otherwise most of the recording is
-//! not in the answer. It needs [`LEAST_TEST`] blocks for testing, because a bootstrap of fewer has
-//! no 95 % interval, and twice as many for fitting. With less than [`SHORT`] blocks for fitting, a
-//! few motions, lags cannot be distinguished. Then every set that closes as much of the held-out
-//! gap, within the interval of the first, is a tie with it, however the fitted samples weigh the
-//! two.
+//! A named effect is a statement about the rig, not about the rows that happened to be usable. At
+//! least the share [`LEAST_SHARE`] of the rows is needed, so that the answer covers most of the
+//! recording. At least [`LEAST_TEST`] blocks are needed for testing, because a bootstrap of fewer
+//! gives no 95 % interval, and twice as many for fitting. With fewer than [`SHORT`] blocks for
+//! fitting, which is a few motions, lags cannot be distinguished. Then every set that closes as
+//! much as the first, within the interval of the first, ties with it, whatever the probabilities.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,32 +15,32 @@ use crate::problem::{
     sample_roles::{Role, SampleRoles},
 };
 
-/// Smallest share of the rows.
+/// Smallest share of the rows that must be used.
 const LEAST_SHARE: f64 = 0.5;
-/// Fewest blocks for testing.
+/// Smallest number of blocks for testing.
 const LEAST_TEST: f64 = 10.0;
-/// Fewest blocks for fitting.
+/// Smallest number of blocks for fitting.
 const LEAST_FIT: f64 = 20.0;
 
-/// Why a record cannot support a name.
+/// The reason why a recording is not sufficient to name an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TooLittle {
-    /// Most rows were left out.
+    /// Most rows were not used.
     Rows(RowsUsed),
-    /// The record is too short.
+    /// The recording is too short.
     Short {
-        /// Seconds for fitting.
+        /// Length of the samples for fitting, s.
         fit_s: f64,
-        /// Seconds for testing.
+        /// Length of the samples for testing, s.
         test_s: f64,
-        /// Seconds of a [block](crate::SampleRoles::block).
+        /// Length of a [block](crate::SampleRoles::block), s.
         block_s: f64,
     },
 }
 
 impl TooLittle {
-    /// A sentence that says what is missing from the record, and what to record.
+    /// Returns a sentence with the reason and with what to record.
     pub(crate) fn words(&self) -> String {
         match self {
             Self::Rows(rows) => format!(
@@ -63,15 +62,15 @@ impl TooLittle {
     }
 }
 
-/// Seconds for a text, with a decimal for small values.
+/// Formats seconds, with a decimal for small values.
 fn seconds(s: f64) -> String {
     if s < 4.95 { format!("{s:.1}") } else { format!("{s:.0}") }
 }
 
-/// With fewer fitted blocks, lags cannot be distinguished.
+/// Number of blocks for fitting below which lags cannot be distinguished.
 const SHORT: f64 = 120.0;
 
-/// Why the record cannot support a name, if it cannot.
+/// Returns the reason why the recording is not sufficient to name an effect; `None` if it is.
 pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Option<TooLittle> {
     if rows.share() < LEAST_SHARE {
         return Some(TooLittle::Rows(rows));
@@ -85,12 +84,12 @@ pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Opti
     })
 }
 
-/// Whether so little was fitted that sets that close as much are ties.
+/// Whether so little was fitted that sets that close as much are treated as ties.
 pub(crate) fn is_short(roles: &SampleRoles) -> bool {
     fitted(roles) < SHORT
 }
 
-/// Blocks that are fitted or held out.
+/// Returns the number of blocks that are fitted or held out.
 fn fitted(roles: &SampleRoles) -> f64 {
     roles.blocks(Role::Fit) + roles.blocks(Role::Held)
 }
@@ -119,7 +118,7 @@ mod tests {
         let short = too_little(&roles(375, 125), RowsUsed { used: 500, read: 500 }, 0.01);
         assert_eq!(short, Some(TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 }));
         assert!(short.is_some_and(|why| why.words().contains("Record at least 10 s")));
-        // The same at 500 Hz, for a motion that turns five times a second.
+        // The same numbers of samples at 500 Hz, for a motion that turns five times a second.
         let quick = SampleRoles { block: 50, ..roles(3000, 1000) };
         assert_eq!(too_little(&quick, all, 0.002), None);
         assert!(is_short(&quick));

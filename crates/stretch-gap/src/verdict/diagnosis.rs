@@ -1,4 +1,4 @@
-//! What a diagnosis says: its serde form is `diagnosis.json`, schema 1.
+//! The result of a diagnosis. Its serialised form is `diagnosis.json`, schema 1.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,47 +21,48 @@ use crate::{
     verdict::{answer::Answer, note::Note},
 };
 
-/// The answers.
+/// The kinds of answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VerdictKind {
     /// Simulation and measurement agree within the noise.
     NoGap,
-    /// Simulation and measurement agree once parameters are re-tuned within their tolerances.
+    /// Simulation and measurement agree after parameters are re-tuned within their tolerances.
     Parameters,
-    /// A column of the record or a number of the rig file is wrong, and is reported.
+    /// A column of the recording or a number in the rig file is wrong; the error is reported.
     Record,
-    /// Effects of the catalogue are missing, and are named.
+    /// Effects of the catalogue are missing and are named.
     Effect,
-    /// An effect of the catalogue is missing, is named, and leaves more than its model discrepancy explains.
+    /// An effect of the catalogue is missing and is named, but more is left than model discrepancy
+    /// explains.
     Partial,
     /// There is a gap that no effect of the catalogue explains.
     Unknown,
 }
 
-/// What the named effects leave of the gap.
+/// The part of the gap that the named effects leave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
-    /// Share of the held-out gap.
+    /// Share of the gap on trials that were not fitted.
     pub share: f64,
-    /// Stage where most of it sits.
+    /// Stage that contains most of it.
     pub stage: String,
-    /// Slices of that stage where the gap is largest, the largest first.
+    /// Slices of that stage with the largest gap, the largest first.
     pub sits: Vec<String>,
 }
 
-/// What the gap costs a user.
+/// The error that the gap causes in a calibration, for two models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Transfer {
-    /// Straight line.
+    /// With a straight line as the model.
     pub linear: TransferError,
-    /// Surface poly13.
+    /// With the surface `poly13` as the model.
     pub poly13: TransferError,
-    /// `percent_full_scale`.
+    /// Unit of the errors: `percent_full_scale`.
     pub unit: String,
 }
 
-/// Error of a calibration trained in one place and applied to measured trials.
+/// Errors of a calibration that was trained on different data and applied to measured trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TransferError {
     /// Trained on measured trials.
@@ -72,29 +73,29 @@ pub struct TransferError {
     pub sim_with_effect: f64,
 }
 
-/// The experiment that would tell rivals apart.
+/// The experiment that would distinguish the leading hypotheses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NextExperiment {
     /// Name of the experiment.
     pub name: String,
-    /// Rivals that it separates.
+    /// Effects that it distinguishes.
     pub separates: Vec<String>,
-    /// Difference that no re-tuning removes, in multiples of the noise.
+    /// Difference between the predictions that no re-tuning removes, in multiples of the noise.
     pub d: f64,
-    /// Minutes that it takes.
+    /// Duration including preparation, minutes.
     pub minutes: f64,
-    /// Why, in a sentence.
+    /// A sentence that describes how the experiment is done.
     pub why: String,
 }
 
-/// The diagnosis.
+/// The result of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Diagnosis {
     /// Version of this schema: 1.
     pub schema: u32,
-    /// The answer.
+    /// The kind of answer.
     pub verdict: VerdictKind,
-    /// The answer with its numbers; none in a diagnosis that a version without it has written.
+    /// The answer with its numbers; none if an older version wrote the diagnosis.
     #[serde(default)]
     pub answer: Option<Answer>,
     /// The answer in plain sentences.
@@ -102,88 +103,98 @@ pub struct Diagnosis {
     /// Effects that were not examined because their runs failed.
     #[serde(default)]
     pub not_examined: Vec<String>,
-    /// Effects that were not examined because the budget of runs was spent; none if it was not.
+    /// Effects that were not examined because the budget of runs was used up; none if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_short: Option<Vec<String>>,
-    /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
+    /// Names of the missing effects, the strongest first. Empty unless the verdict is `effect` or
+    /// `partial`.
     pub named: Vec<String>,
-    /// Effects that may replace one that is named: those in the smallest sets that hold 95 % of the probability.
+    /// Effects that may be missing instead of a named one: those in the smallest collection of sets
+    /// that holds 95 % of the probability.
     #[serde(default)]
     pub tied: Vec<String>,
-    /// Effects that were found but close less than counts: `least_gap`.
+    /// Effects that were found but close less than `least_gap`.
     #[serde(default)]
     pub faint: Vec<String>,
-    /// Excess from which a gap counts, and from which what a further name closes does, in variances of the noise.
+    /// Excess from which a gap is relevant, in multiples of the noise variance. A further named
+    /// effect must close at least this much.
     #[serde(default)]
     pub least_gap: f64,
-    /// What a partial answer leaves.
+    /// What a partial answer does not explain.
     #[serde(default)]
     pub unexplained: Option<Unexplained>,
-    /// What the catalogue lacks, where a gap is left that its effects do not explain.
+    /// The proposed term, if a gap is left that the effects of the catalogue do not explain.
     #[serde(default)]
     pub proposed: Option<Proposed>,
-    /// What is wrong with record or rig file: what the columns alone say, or one error and those that these data cannot
-    /// tell from it. Empty unless the verdict is `record`.
+    /// Errors of the recording or of the rig file: all that the columns alone show, or one error
+    /// with those that the data cannot distinguish from it. Empty unless the verdict is `record`.
     #[serde(default)]
     pub gross: Vec<Gross>,
-    /// The 95 % set: effects that these data cannot tell apart.
+    /// The effects in the smallest collection of sets that holds 95 % of the probability: the data
+    /// cannot distinguish them.
     pub ambiguous: Vec<String>,
-    /// Sets of effects, the most probable first; behind them that nothing is missing (no effect), and what the catalogue lacks (`unknown`).
+    /// Sets of effects, the most probable first. Then follow the hypothesis that nothing is missing
+    /// (no effects) and a cause outside the catalogue (`unknown`).
     pub candidates: Vec<Candidate>,
-    /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
+    /// What each effect of the best set closes of the gap on trials that were not fitted, the
+    /// strongest first, whether named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
-    /// How firmly each effect of the sets that were weighed belongs to the most probable one, the firmest first.
+    /// How certainly each effect of the compared sets belongs to the most probable set, the most
+    /// certain first.
     #[serde(default)]
     pub stabilities: Vec<EffectStability>,
     /// Size of the gap.
     #[serde(default)]
     pub gap: Excess,
-    /// Gap that 19 of 20 records like this one stay below in which nothing is missing.
+    /// Gap that 19 of 20 such recordings stay below if nothing is missing.
     #[serde(default)]
     pub null_band: f64,
-    /// How strong each effect of the catalogue would have to be to be named, in the catalogue's order; empty where something is named and no one
-    /// [asked](crate::Options::detection_limits), and where the record carries no name.
+    /// Strength from which each effect of the catalogue would be named, in the catalogue's order.
+    /// Empty if an effect is named, unless they were [requested](crate::Options::detection_limits),
+    /// and empty if the recording is not sufficient to name an effect.
     #[serde(default)]
     pub detection_limits: Vec<DetectionLimit>,
-    /// Where the gap sits.
+    /// Where the gap occurs.
     #[serde(rename = "where")]
     pub location: Where,
-    /// Nominal parameters.
+    /// Nominal parameters before and after re-tuning.
     pub parameters: Vec<ParameterShift>,
-    /// Which nominal parameters these data determine, and which not.
+    /// Which nominal parameters the data determine.
     #[serde(default)]
     pub identifiability: Vec<Identified>,
-    /// What the gap costs a calibration.
+    /// Error that the gap causes in a calibration.
     pub transfer: Option<Transfer>,
-    /// What to measure next.
+    /// The experiment that should be done next.
     pub next_experiment: Option<NextExperiment>,
-    /// What simpler methods say.
+    /// Answers of simpler methods.
     pub baselines: Option<Baselines>,
-    /// What was noticed and assumed.
+    /// Observations and assumptions.
     pub notes: Vec<Note>,
-    /// Those of the notes that say why a gap may be there although none was found.
+    /// Those of the notes that give a reason why a gap may exist although none was found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reservations: Vec<Note>,
-    /// Rows that it is based on, of those that were read.
+    /// Rows that the diagnosis used, and rows that were read.
     #[serde(default)]
     pub rows_used: RowsUsed,
-    /// Simulations of one stage that it took, simpler methods left out.
+    /// Number of simulations of one stage, without those of simpler methods.
     #[serde(default)]
     pub simulations: usize,
-    /// Runs of a black box, where that is what costs.
+    /// Runs of a black-box simulator, if its runs are costly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_runs: Option<ModelRuns>,
-    /// How often the nominal parameters were re-tuned from other places within their tolerances, and how often that ended alike.
+    /// How often the nominal parameters were re-tuned from other points within their tolerances,
+    /// and how often the result was the same.
     #[serde(default)]
     pub starts: Starts,
-    /// Seconds it took.
+    /// Duration of the diagnosis, s.
     pub runtime_s: f64,
 }
 
 impl Diagnosis {
-    /// Whether simulator and rig agree, although more is left than 19 of 20 records of the stated noise would leave: the noise is larger than
-    /// stated, or something is missing that is too small to name.
+    /// Whether simulator and rig agree, although more is left than the stated noise would leave in
+    /// 19 of 20 recordings. Either the noise is larger than stated, or something is missing that is
+    /// too small to name.
     ///
     /// ```
     /// use stretch_gap::{Diagnosis, VerdictKind};
@@ -199,7 +210,7 @@ impl Diagnosis {
         agrees && self.gap.retuned > self.null_band
     }
 
-    /// Whether simulator and rig agree, and nothing says that a gap may be there although none was found.
+    /// Whether simulator and rig agree and no note gives a reason why a gap may exist nevertheless.
     ///
     /// ```
     /// use stretch_gap::{Diagnosis, VerdictKind};
@@ -215,7 +226,7 @@ impl Diagnosis {
         agrees && self.reservations.is_empty()
     }
 
-    /// Calls every effect by another name, in lists, notes and sentences alike.
+    /// Renames every effect, in lists, notes and sentences.
     ///
     /// ```
     /// use stretch_gap::Diagnosis;
@@ -245,8 +256,9 @@ impl Diagnosis {
         self.sentence = self.headline();
     }
 
-    /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The
-    /// last candidate is what the catalogue lacks; all sum to 1.
+    /// Returns the probabilities of the candidates, in their order, under other thresholds. It
+    /// allows thresholds to be calibrated without new diagnoses. The last candidate is a cause
+    /// outside the catalogue; all probabilities sum to 1.
     ///
     /// ```
     /// use stretch_gap::{Diagnosis, Thresholds};
@@ -259,7 +271,7 @@ impl Diagnosis {
     /// ```
     pub fn probabilities(&self, thresholds: &Thresholds) -> Vec<f64> {
         let Some((lacking, sets)) = self.candidates.split_last() else { return Vec::new() };
-        // Where no function was asked for, what the catalogue lacks has no score.
+        // If no missing term was searched for, the cause outside the catalogue has no score.
         let of = |lacking: &Candidate| Function { score: lacking.score, left: lacking.left };
         let function = Some(of(lacking)).filter(|f| f.score != 0.0);
         let standing = |c: &Candidate| {

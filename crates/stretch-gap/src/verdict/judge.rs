@@ -1,19 +1,18 @@
-//! The verdict: one function of the posterior and of the sizes that matter.
+//! The verdict, a function of the posterior probabilities and of the size of the gap.
 //!
-//! | holds when | verdict |
+//! | condition | verdict |
 //! | --- | --- |
-//! | a column alone says so, or an error of record or rig file is more probable than every set of effects | `record` |
+//! | the columns alone show an error, or an error of recording or rig file is more probable than every set of effects | `record` |
 //! | a cause outside the catalogue is the most probable | `unknown` |
-//! | effects are the most probable, and the gap counts; what is left is noise and model discrepancy | `effect` |
-//! | the same, and more is left, or the strongest effect is at an end of its range | `partial` |
-//! | nothing is the most probable, or the gap is too small to matter; as shipped there is one | `parameters` |
-//! | the same, and there is none as shipped | `no_gap` |
+//! | effects are the most probable and the gap is relevant; only noise and model discrepancy are left | `effect` |
+//! | the same, but more is left, or the strongest effect is at an end of its range | `partial` |
+//! | no effect is the most probable, or the gap is too small to matter; there is a relevant gap as shipped | `parameters` |
+//! | the same, but there is no relevant gap as shipped | `no_gap` |
 //!
-//! A gap counts from `least_gap` on. More is left than noise and discrepancy if [`allowed`] is
-//! exceeded. Two checks can override the posterior because we have no likelihood for them. First,
+//! A gap is relevant from `least_gap` on. Noise and discrepancy leave at most [`allowed`]. Two
+//! checks override the posterior with `unknown`, because no likelihood is available for them:
 //! parameters are at the ends of their tolerances and, without tolerances, explain as much as the
-//! effects do (`unknown`). Second, the record is too short, or has too many gaps, to support a name
-//! (`unknown`).
+//! effects do; or the recording is too short, or has too many gaps, to name an effect.
 
 use crate::{
     evidence::{
@@ -27,38 +26,39 @@ use crate::{
     verdict::{coverage::TooLittle, diagnosis::VerdictKind, naming::Naming},
 };
 
-/// The input of the verdict.
+/// The facts that the verdict depends on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
     pub(crate) posterior: &'a Posterior,
-    /// The most probable first; the set without effects comes after the sets with effects.
+    /// The most probable first. The set without effects follows the sets with effects.
     pub(crate) candidates: &'a [Candidate],
     /// Share of each effect of the best set, the strongest first.
     pub(crate) shares: &'a [EffectShare],
     pub(crate) sanity: &'a Sanity,
-    /// Whether an error of the record or of the rig file is more probable than all sets of effects.
+    /// Whether an error of the recording or of the rig file is more probable than all sets of
+    /// effects.
     pub(crate) is_record: bool,
-    /// Why the record cannot support a name, if it cannot.
+    /// The reason why the recording is not sufficient to name an effect, if it is not.
     pub(crate) too_little: Option<TooLittle>,
-    /// Whether so little was fitted that sets that close as much are ties.
+    /// Whether so little was fitted that sets that close as much are treated as ties.
     pub(crate) is_short: bool,
 }
 
-/// The verdict with its names.
+/// The verdict with the names of effects.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Judged {
     pub(crate) kind: VerdictKind,
     /// The verdict if nothing overrode it.
     pub(crate) seen: VerdictKind,
-    /// Why the evidence supports no other verdict.
+    /// The reason for which the verdict was overridden, if it was.
     pub(crate) overruled: Option<Overruled>,
     /// The names that would be reported if nothing overrode the verdict.
     pub(crate) seen_naming: Naming,
 }
 
 impl Judged {
-    /// The names of the verdict: empty if it is overridden.
+    /// Returns the names of the verdict; empty if it is overridden.
     pub(crate) fn naming(&self) -> Naming {
         match self.overruled {
             Some(_) => Naming::default(),
@@ -67,16 +67,16 @@ impl Judged {
     }
 }
 
-/// Why the data cannot come from the simulator, or do not suffice to decide it.
+/// The reason for which a verdict is overridden.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Overruled {
     /// The parameters of a stage do not fit within their tolerances.
     AtBounds(AtBounds),
-    /// The record cannot support a name.
+    /// The recording is not sufficient to name an effect.
     TooLittle(TooLittle),
 }
 
-/// Judges.
+/// Returns the verdict of a case.
 pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
     use VerdictKind::{Effect, Partial, Record, Unknown};
     if case.is_record {
@@ -91,12 +91,12 @@ pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
     Judged { kind, seen, overruled, seen_naming: naming(case, seen, thresholds) }
 }
 
-/// The names that go with a verdict.
+/// Returns the names that belong to a verdict.
 fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming {
     let all = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
     match seen {
         VerdictKind::Effect | VerdictKind::Partial => all,
-        // What is certain and small is reported below the headline.
+        // Effects that are certain but small are reported below the headline.
         VerdictKind::Parameters | VerdictKind::NoGap
             if case.posterior.effects() > case.posterior.nothing() =>
         {
@@ -106,7 +106,7 @@ fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming
     }
 }
 
-/// The verdict of the posterior and the sizes.
+/// Returns the verdict of the posterior and the size of the gap, before checks override it.
 fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
     let Excess { raw, retuned, .. } = case.gap;
@@ -131,7 +131,7 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
 
 fn at_bounds(case: &Case<'_>) -> Option<Overruled> {
     let found = case.sanity.at_bounds.as_ref()?;
-    // The effects are kept if they explain more than free parameters would.
+    // The effects are kept if they leave less than free parameters would.
     let is_effect = found.rivals.is_some_and(|(effects, loose)| loose > effects);
     (!is_effect).then(|| Overruled::AtBounds(found.clone()))
 }
@@ -165,7 +165,8 @@ mod tests {
         }
     }
 
-    /// Probabilities of play, of nothing, and of a cause outside the catalogue; what play leaves.
+    /// A posterior with the given probabilities of play, of no effect, and of a cause outside the
+    /// catalogue; `left` is the gap that play leaves.
     fn posterior(play: f64, nothing: f64, unknown: f64, left: f64) -> Posterior {
         let set = |effects: &[usize], left: f64, probability: f64| Weighed {
             hypothesis: Hypothesis {
@@ -186,7 +187,7 @@ mod tests {
         }
     }
 
-    /// The verdict on a gap as shipped, re-tuned and left.
+    /// Judges a gap (as shipped, re-tuned, and with the best set) with the given probabilities.
     fn judged(gap: [f64; 3], probabilities: [f64; 3], change: impl Fn(&mut Case<'_>)) -> Judged {
         let [raw, retuned, left] = gap;
         let [play, nothing, unknown] = probabilities;
@@ -223,8 +224,8 @@ mod tests {
         }
     }
 
-    /// For all probabilities and sizes the verdict is that of the largest of the three, and a name
-    /// needs a gap that counts.
+    /// For random probabilities and sizes, the verdict follows the largest of the three
+    /// probabilities, and an effect is named only if the gap is relevant.
     #[test]
     fn no_verdict_contradicts_its_own_probability() {
         let mut random = crate::numerics::random::RandomGenerator::new(11, 0);
@@ -283,7 +284,7 @@ mod tests {
             judge(&case, &Thresholds::frozen()).kind
         };
         assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
-        // Free parameters leave more than the effects do: the effects are kept.
+        // Free parameters leave more than the effects do, so the effects are kept.
         assert_eq!(ended(Some((0.1, 4.0))), Effect);
         let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 };
         let verdict = judged(gap, p, |case| case.too_little = Some(short));
@@ -292,9 +293,9 @@ mod tests {
             (Unknown, Effect, 0)
         );
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
-        // The note below the verdict names what was seen.
+        // A note below the verdict names the effects that were found.
         assert_eq!(verdict.seen_naming.named, ["play"]);
-        // Without a name there is nothing that a short record could not support.
+        // If no effect would be named, a short recording does not override the verdict.
         let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
         assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
     }

@@ -1,10 +1,11 @@
-//! The verdict, and how it is put into words.
+//! The verdict of a diagnosis, and its description in words.
 //!
-//! In: the evidence, the errors of the record and the thresholds. Out: a [`diagnosis::Diagnosis`].
-//! [`judge`] decides what kind of answer the evidence carries, [`naming`] which effects are named, tied or faint, [`coverage`] whether the
-//! record carries a name at all; [`sentence`] puts the answer into words, [`notes`] adds to them. [`next_experiment`] asks of a finished
-//! diagnosis what to measure next.
-//! Imports: every folder but none of this one's callers.
+//! Input: the evidence, the errors of the recording, and the thresholds. Output: a
+//! [`diagnosis::Diagnosis`]. [`judge`] decides which kind of answer the evidence supports,
+//! [`naming`] which effects are named, tied or faint, and [`coverage`] whether the recording is
+//! sufficient to name any. [`sentence`] describes the answer in words, and [`notes`] adds remarks.
+//! [`next_experiment`] recommends what to measure after a diagnosis. Imports: every folder except
+//! those that use this one.
 
 pub(crate) mod answer;
 pub(crate) mod coverage;

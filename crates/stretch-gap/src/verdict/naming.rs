@@ -1,32 +1,31 @@
-//! Decides which names are in the headline, which are its alternatives, and which are reported
-//! below.
+//! Decides which effects are named in the headline, which are alternatives to these, and which are
+//! only reported below.
 //!
-//! Evidence is not importance: with 50 000 samples, sixty nats may correspond to a
-//! hundred-thousandth of the gap. Therefore what a name closes in one of its stages, on trials that
-//! were not fitted, must itself be a gap that counts; otherwise the name is reported as faint. A
-//! name is reported alone if its probability suffices. Otherwise, among the smallest collection of
-//! sets that holds 95 % of the probability, those that differ from the first in one effect are a
-//! declared tie with it.
+//! Significance is not relevance: with 50 000 samples, sixty nats may correspond to a
+//! hundred-thousandth of the gap. What an effect closes in one of its stages, on trials that were
+//! not fitted, must therefore be a relevant gap itself; otherwise the effect is reported as faint.
+//! Alternatives come from the smallest collection of sets that holds 95 % of the probability. A set
+//! of it that differs from the first in one effect makes these two effects a tie.
 
 use crate::{
     evidence::{candidates::Candidate, probability::covering, shares::EffectShare},
     problem::thresholds::Thresholds,
 };
 
-/// Effects of the first candidate by how they are reported.
+/// Effects of the first candidate, grouped by how they are reported.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Naming {
-    /// For the headline, the strongest first.
+    /// Effects for the headline, the strongest first.
     pub(crate) named: Vec<String>,
     /// Pairs of a name and an alternative effect.
     pub(crate) ties: Vec<(String, String)>,
-    /// Effects that were found but close less than a name must.
+    /// Effects that were found but close less than a named effect must.
     pub(crate) faint: Vec<String>,
 }
 
 impl Naming {
-    /// Names the effects of the most probable candidate and their alternatives; shares are of the
-    /// held-out gap.
+    /// Groups the effects of the most probable candidate and finds their alternatives; `shares`
+    /// refer to the gap on trials that were not fitted.
     pub(crate) fn of(
         candidates: &[Candidate],
         shares: &[EffectShare],
@@ -35,15 +34,15 @@ impl Naming {
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let size = |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_excess);
-        // If an alternative ranks first, we have no per-effect shares for it, so we reuse those of
-        // the effect it replaces.
+        // An alternative that ranks first may have no share of its own. It then counts as relevant.
         let counts = |name: &&String| size(name).is_none_or(|s| s >= thresholds.least_gap);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
-        // On a short record probabilities distinguish sets that the held-out gap does not.
+        // In a short recording, the probabilities separate sets that close the same share of the
+        // held-out gap.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
         let rivals = candidates.iter().enumerate().skip(1);
@@ -63,7 +62,7 @@ impl Naming {
         Self { named, ties, faint }
     }
 
-    /// Every name that is an alternative to another, once.
+    /// Returns every effect that is an alternative to a named one, once.
     pub(crate) fn tied(&self) -> Vec<String> {
         let mut tied: Vec<String> = Vec::new();
         for (_, other) in &self.ties {
@@ -114,7 +113,7 @@ mod tests {
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
         );
         assert_eq!(naming.ties, [("slack".into(), "saturation".into())]);
-        // On a short record a set that closes as much is a tie, whatever its probability.
+        // In a short recording, a set that closes as much is a tie, whatever its probability.
         let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
         assert_eq!(short.ties.len(), 1);
         let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
@@ -123,7 +122,7 @@ mod tests {
             Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).ties
         };
         assert_eq!((alike(false), alike(true)), (vec![], vec![("slip".into(), "lowpass".into())]));
-        // If there is an effect it is named, however little it closes.
+        // If all effects are small, the strongest is named nevertheless.
         let weak = Naming::of(
             &candidates,
             &[share("slack", 0.0), share("sag", 0.0)],

@@ -1,15 +1,17 @@
 //! The experiment that distinguishes two hypotheses.
 //!
-//! Discrimination between models after Atkinson and Fedorov (1975, doi 10.1093/biomet/62.1.57),
-//! T-optimality: in the best experiment the alternative, with its parameters free within what is
-//! already known, stays furthest from the truth. With tangents A of the alternative's predictions
-//! and differences d between the two, over what was measured (index 0) and the experiment (1),
+//! The method is T-optimality (Atkinson and Fedorov 1975, doi 10.1093/biomet/62.1.57). In the best
+//! experiment, the alternative model stays as far as possible from the true one, although its
+//! parameters are fitted within what is already known. Let A be the tangents (derivatives) of the
+//! alternative's predictions and d the differences between the two predictions, for the data
+//! measured so far (index 0) and for the experiment (index 1):
 //!
 //! ```text
 //! x = argmin of 0.5/b (|d_0 + A_0 x|^2 + |d_1 + A_1 x|^2) + 0.5 |x|^2 in its box,     D^2 = |d_1 + A_1 x|^2/samples
 //! ```
 //!
-//! It is unknown which of the two is true. Both are assumed in turn, and the smaller D counts.
+//! Because it is unknown which model is true, each is assumed to be in turn, and the smaller D
+//! counts.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -31,7 +33,7 @@ const ENOUGH: f64 = 3.0;
 /// Share of an effect parameter's range over which a sensitivity is computed.
 const SMALL: f64 = 0.02;
 
-/// An experiment in words, and the trial that does it.
+/// A candidate experiment: a description, and the trial that performs it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Name of the experiment.
@@ -45,7 +47,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Minutes including the preparation.
+    /// Returns the duration including the preparation, minutes.
     pub fn minutes(&self) -> f64 {
         self.prepare_min + self.runs_min()
     }
@@ -67,32 +69,36 @@ pub trait Laboratory: Simulator {
     fn experiments(&self) -> Vec<(Plan, Self::Setting)>;
     /// An experiment that represents what has been measured.
     fn done(&self) -> Self::Setting;
-    /// Prediction of a model for an experiment: every recorded channel in units of its noise.
+    /// Returns the prediction of a model for an experiment: every recorded channel in units of its
+    /// noise.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
     fn predict(&self, model: &Model, setting: &Self::Setting) -> Result<Vec<Vec<f64>>, GapError>;
 }
 
-/// What to measure next, and the trial that does it.
+/// The recommended experiment, and the trial that performs it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// The recommendation.
     pub next: NextExperiment,
-    /// Openings by time, and what is to be imposed from outside.
+    /// The trial: valve openings over time, and what is imposed from outside.
     pub trial: Trial,
-    /// Every candidate experiment: name, difference in multiples of the noise, minutes; the best first.
+    /// Every candidate experiment with its name, difference in multiples of the noise, and minutes;
+    /// the best first.
     pub experiments: Vec<(String, f64, f64)>,
 }
 
-/// Recommends an experiment if the 95 % set of a diagnosis holds more than one effect.
+/// Recommends an experiment if the 95 % set of a diagnosis contains an effect that the most
+/// probable set lacks.
 ///
 /// D(x) is the root mean square difference between the predictions of the two leading hypotheses
-/// for the experiment x, in multiples of the noise. It is the difference that is left when the
-/// nominal and effect parameters of one hypothesis are moved as close to the other as possible
-/// (linearised), within their tolerances and at the cost of fitting what was already measured. Both
-/// directions are tried, and the smaller counts. The experiment with the largest D^2 times blocks
-/// per minute wins, because evidence adds up in squares. The minutes include the preparation.
+/// for the experiment x, in multiples of the noise. It is the difference that remains after the
+/// nominal and effect parameters of one hypothesis were moved (by linearisation) as close to the
+/// other as possible, within their tolerances and without losing the fit to existing data. Both
+/// directions are computed, and the smaller one counts. The experiment with the largest D^2 times
+/// blocks per minute is recommended, because evidence is proportional to D^2. The minutes include
+/// the preparation.
 ///
 /// # Errors
 /// Errors of the simulator.
@@ -127,7 +133,8 @@ pub fn next_experiment<L: Laboratory>(
     Ok(Some(Proposal { next, trial, experiments: rated.collect() }))
 }
 
-/// D of every candidate experiment for two models, in multiples of the noise: see [`next_experiment`].
+/// Returns D of every candidate experiment for two models, in multiples of the noise; see
+/// [`next_experiment`].
 ///
 /// # Errors
 /// Errors of the simulator.
@@ -164,7 +171,8 @@ fn rate<L: Laboratory>(
         .collect()
 }
 
-/// How often the experiment has to be repeated until the hypotheses differ, if once is not enough.
+/// Returns a sentence on how often the experiment must be repeated to distinguish the hypotheses;
+/// empty if once suffices.
 fn repeats(d: f64, minutes: f64) -> String {
     let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / nats).ceil() {
@@ -176,8 +184,8 @@ fn repeats(d: f64, minutes: f64) -> String {
     }
 }
 
-/// The first candidate, the most probable other one with an effect of the 95 % set that the first
-/// lacks, and the effects in which they differ.
+/// Returns the first candidate, the most probable other one with an effect of the 95 % set that the
+/// first lacks, and the effects in which they differ.
 fn rivals<'a>(
     simulator: &dyn Simulator,
     diagnosis: &Diagnosis,
@@ -197,11 +205,12 @@ fn rivals<'a>(
     (holds(one) && holds(two)).then_some((one, two, separates))
 }
 
-/// Prediction of a model for an experiment, and its derivative with respect to each parameter.
+/// Prediction of a model for an experiment, with its derivatives with respect to each free
+/// parameter.
 struct Tangent {
     values: Vec<f64>,
     slopes: Vec<Vec<f64>>,
-    /// How far each parameter may move down and up, on its scale.
+    /// How far each parameter may move down and up, in tolerances or as a share of its range.
     bounds: Vec<[f64; 2]>,
     channels: usize,
 }
@@ -241,7 +250,7 @@ impl Tangent {
                 let range = p.max - p.min;
                 let x = effect_values[k];
                 let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
-                // Small relative to the value if the range is wide.
+                // If the range is wide, the step is small relative to the value.
                 let step = if p.is_log() && x > 0.0 {
                     step.signum() * (0.1 * x / range).min(SMALL)
                 } else {
@@ -261,8 +270,9 @@ impl Tangent {
     }
 }
 
-/// Root mean square difference, summed over channels, that remains when `rival` comes as near to
-/// `truth` as it can. Residuals are correlated, and `block` samples count as one observation.
+/// Returns the root mean square difference, summed over channels, that remains after `rival` came
+/// as close to `truth` as possible. Because residuals are correlated, `block` samples count as one
+/// observation.
 fn left(
     block: f64,
     truth_known: &Tangent,
@@ -271,7 +281,7 @@ fn left(
     rival: &Tangent,
 ) -> f64 {
     let n = rival.slopes.len();
-    // The prior: one tolerance is 1.
+    // The prior: one tolerance is one unit of x.
     let mut normal = DMatrix::identity(n, n);
     let mut slope = vec![0.0; n];
     for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
@@ -304,7 +314,8 @@ mod tests {
     use approx::assert_relative_eq;
     use testkit::tolerance::F64_ROUNDING;
 
-    /// One channel, with parameters that may move three tolerances in both directions.
+    /// A prediction of one channel, with parameters that may move by three tolerances in both
+    /// directions.
     fn tangent(values: &[f64], slopes: &[&[f64]]) -> Tangent {
         Tangent {
             values: values.into(),
@@ -324,21 +335,22 @@ mod tests {
         assert_eq!(left(50.0, &one, &two, &one, &two), 0.0);
     }
 
-    /// Nothing can be re-tuned: the result is the root mean square of the difference.
+    /// No parameter can change, so the result is the root mean square of the difference.
     #[test]
     fn without_parameters_the_difference_stays() {
         let (one, two) = (tangent(&[0.0; 100], &[]), tangent(&[0.3; 100], &[]));
         let d = left(50.0, &one, &two, &one, &two);
         assert_relative_eq!(d, 0.3, epsilon = 0.0, max_relative = F64_ROUNDING);
-        // Two channels of which one differs: summed, not averaged.
+        // Only one of two channels differs. The channels are summed, not averaged.
         let wide = |values| Tangent { channels: 2, ..tangent(values, &[]) };
         let both = [[0.3; 100], [0.0; 100]].concat();
         let d = left(50.0, &one, &two, &wide(&[0.0; 200]), &wide(&both));
         assert_relative_eq!(d, 0.3, epsilon = 0.0, max_relative = F64_ROUNDING);
     }
 
-    /// One parameter whose sensitivity is the difference itself, at noise level b: with n/b observations of size s^2 in what was measured and
-    /// in the experiment, x = -2 n s^2/b/(2 n s^2/b + 1), and 1 + x of the difference is left.
+    /// One parameter has the difference itself as its sensitivity. With n/b observations of size
+    /// s^2 both in the existing data and in the experiment, x = -2 n s^2/b/(2 n s^2/b + 1), and the
+    /// share 1 + x of the difference remains.
     #[test]
     fn what_re_tuning_can_do_is_taken_out_at_its_price() {
         let (n, s, block) = (200_usize, 0.4, 50.0);
@@ -346,21 +358,22 @@ mod tests {
         let (truth, rival) = (tangent(&vec![0.0; n], &[]), tangent(&values, &[&values]));
         let scale = 2.0 * n as f64 * s * s / block;
         let d = left(block, &truth, &rival, &truth, &rival);
-        // The solver lifts the diagonal by 1e-13.
+        // The solver raises the diagonal by 1e-13.
         assert_relative_eq!(d, s / (scale + 1.0), epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Measured data exclude a re-tuning that would explain the experiment away: the alternative
-    /// may not move if it was determined.
+    /// Existing data prevent a re-tuning that would explain the experiment: a parameter that they
+    /// determine cannot move.
     #[test]
     fn what_is_known_pins_the_rival() {
         let [none, one, much, half] = [0.0, 1.0, 100.0, 0.5].map(|value| vec![value; 200]);
         let (truth, rival) = (tangent(&none, &[]), tangent(&half, &[&one]));
         let d = |slope: &[f64]| left(50.0, &truth, &tangent(&none, &[slope]), &truth, &rival);
-        // Undetermined, the four blocks of the experiment pull against the prior: 1/(4 + 1) of 0.5
-        // stays.
+        // If the data do not determine the parameter, the four blocks of the experiment compete
+        // with the prior, and 1/(4 + 1) of 0.5 remains.
         assert_relative_eq!(d(&none), 0.1, epsilon = 0.0, max_relative = 1e-9);
-        // Determined by 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5) of it stays.
+        // If the data determine it with 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5)
+        // remains.
         let kept = 1.0 - 4.0 / 40_005.0;
         assert_relative_eq!(d(&much), 0.5 * kept, epsilon = 0.0, max_relative = 1e-9);
     }
@@ -370,15 +383,15 @@ mod tests {
         let (flat, slope) = (vec![0.0; 4000], vec![1.0; 4000]);
         let truth = tangent(&flat, &[]);
         let far = tangent(&vec![10.0; 4000], &[&slope]);
-        // Three tolerances of the ten: seven stay.
+        // The parameter moves by three tolerances of the ten it would need, so seven remain.
         let d = left(50.0, &truth, &tangent(&flat, &[&flat]), &truth, &far);
         assert_relative_eq!(d, 7.0, epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Evidence is half the squared difference by blocks; 3 nats are enough.
+    /// Evidence is half the squared difference, times the number of blocks; 3 nats suffice.
     #[test]
     fn runs_are_planned_where_one_will_hardly_do() {
-        // A minute holds 120 blocks: d^2 of 0.05 gives 3 nats.
+        // A minute contains 120 blocks, so d^2 = 0.05 gives 3 nats.
         assert_eq!(repeats(0.05_f64.sqrt() + 1e-9, 1.0), "");
         assert_eq!(
             repeats(0.02_f64.sqrt() + 1e-9, 1.0),

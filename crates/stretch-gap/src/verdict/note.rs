@@ -1,4 +1,4 @@
-//! A remark about a diagnosis, in which effects can be called by other names.
+//! A note about a diagnosis in which effects can be renamed.
 
 use std::fmt;
 
@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::verdict::{answer::Answer, sentence::two_digits};
 
-/// A remark about a diagnosis: text in which the names of effects are kept apart, so that a report can call them by what they are.
-/// Its serde form is the text.
+/// A note about a diagnosis. The names of effects are stored separately from the text, so that a
+/// report can rename them. Its serialised form is the text.
 ///
 /// ```
 /// use stretch_gap::Note;
@@ -28,19 +28,19 @@ enum Piece {
 }
 
 impl Note {
-    /// With more text behind it.
+    /// Appends text.
     #[must_use]
     pub fn text(self, text: impl Into<String>) -> Self {
         self.and(Piece::Text(text.into()))
     }
 
-    /// With the name of an effect behind it.
+    /// Appends the name of an effect.
     #[must_use]
     pub fn effect(self, name: impl Into<String>) -> Self {
         self.and(Piece::Effect(name.into()))
     }
 
-    /// With the names of effects behind it.
+    /// Appends the names of effects.
     #[must_use]
     pub fn effects<'a>(self, names: impl IntoIterator<Item = &'a String>, separator: &str) -> Self {
         names.into_iter().enumerate().fold(self, |note, (i, name)| match i {
@@ -49,7 +49,7 @@ impl Note {
         })
     }
 
-    /// With an answer behind it.
+    /// Appends an answer.
     pub(crate) fn answer(self, answer: Answer) -> Self {
         self.and(Piece::Answer(answer))
     }
@@ -59,7 +59,7 @@ impl Note {
         self
     }
 
-    /// Calls every effect by another name.
+    /// Renames every effect.
     pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
         for piece in &mut self.0 {
             match piece {

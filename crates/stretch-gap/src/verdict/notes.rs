@@ -1,5 +1,5 @@
-//! Notes that a verdict carries: gross errors, an implausible noise level, parameters that swing, laws of session time that were
-//! extrapolated, and effects that would have been named.
+//! Notes about a verdict: gross errors, implausible noise, oscillating parameters, extrapolated
+//! drift, and effects that would have been named.
 
 use crate::{
     evidence::{detection_limit::DetectionLimit, gathered::Evidence, sanity::Sanity},
@@ -13,7 +13,8 @@ use crate::{
     verdict::{answer::Answer, note::Note},
 };
 
-/// What the answer itself leaves to say: how it was tested, a channel that is not simulated, and what was seen before it was overridden.
+/// Returns notes that complete the answer: how it was tested, a channel that is hardly simulated,
+/// and the answer before it was overridden.
 pub(crate) fn answer_notes(
     answer: &Answer,
     sanity: &Sanity,
@@ -32,7 +33,8 @@ pub(crate) fn answer_notes(
     held.into_iter().chain(gross).chain(otherwise).collect()
 }
 
-/// A channel that the simulator has little to do with: a warning, because causes may explain it all the same.
+/// Returns a warning if most of a channel is not simulated, because effects might be named for the
+/// wrong rig.
 fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
     let left = sanity.left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
     let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
@@ -45,7 +47,7 @@ fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
     ))
 }
 
-/// A note for each output of which some samples [are isolated](crate::fit::isolated_outliers).
+/// Returns a note for each output with samples that [are isolated](crate::fit::isolated_outliers).
 pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
     let note = |(metric, stage): (&Metric, &StageSpec)| {
@@ -64,7 +66,8 @@ pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     stages.filter_map(note).collect()
 }
 
-/// How many models could not be simulated, of which sets of effects, and why the first was not.
+/// Returns a note on how many models could not be simulated, of which sets of effects, and why the
+/// first failed.
 pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
     let (models, first) = runs.lost_models()?;
     let count: usize = models.values().sum();
@@ -82,7 +85,8 @@ pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
     Some(models.iter().enumerate().fold(begin, one).text(format!("; the first: {first}")))
 }
 
-/// A note for each output whose noise is [implausible](crate::evidence::sanity): it hides gaps.
+/// Returns a note for each output whose noise is [implausible](crate::evidence::sanity), because
+/// such noise hides gaps.
 pub(crate) fn implausible_noise_notes(
     problem: &PreparedProblem<'_>,
     sanity: &Sanity,
@@ -99,12 +103,13 @@ pub(crate) fn implausible_noise_notes(
     sanity.implausible.iter().map(note).collect()
 }
 
-/// Probability from which a swing is noted.
+/// Probability from which an oscillation is noted.
 const SWINGS: f64 = 0.95;
 
-/// A note for each parameter of each stage that swings rather than drifts.
+/// Returns a note for each parameter of each stage that oscillates instead of drifting.
 ///
-/// A regulator that hunts explains no gap, and the verdict counts it as drift, but a reader should know of the line.
+/// An oscillation of a supply is not a modelling error, and the verdict counts it as drift. A user
+/// should know of it nevertheless.
 pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<String> {
     let simulator = problem.simulator();
     let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
@@ -129,7 +134,7 @@ pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) ->
         .collect()
 }
 
-/// A note for each output whose recorder is taken to add slow noise.
+/// Returns a note for each output to which the recorder seems to add slow noise.
 pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
     let note = |(metric, spec): (&Metric, &StageSpec)| {
@@ -143,12 +148,13 @@ pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     stages.filter_map(note).collect()
 }
 
-/// Share of the fitted span by which test trials must lie outside of it.
+/// Share of the fitted time span by which test trials must lie outside of it.
 const BEYOND: f64 = 0.1;
 
-/// A note for each named effect that is a law of session time and was extrapolated to test trials: from where to where.
+/// Returns a note for each named effect that depends on session time and was extrapolated to the
+/// test trials, with both time spans.
 ///
-/// Within the fitted span one law is as good as another; beyond it they differ.
+/// Within the fitted span, many functions of time fit equally well; beyond it they differ.
 pub(crate) fn extrapolation_notes(
     simulator: &dyn Simulator,
     roles: &SampleRoles,
@@ -171,7 +177,7 @@ pub(crate) fn extrapolation_notes(
     named.iter().filter(drifts).filter(|_| is_beyond).map(note).collect()
 }
 
-/// Session time of the first and behind the last sample in some roles, s.
+/// Returns the session time of the first sample and of the end of the last sample in some roles, s.
 fn span_s(
     simulator: &dyn Simulator,
     roles: &SampleRoles,
@@ -186,10 +192,11 @@ fn span_s(
     })
 }
 
-/// Most effects that are listed in words.
+/// Largest number of effects that are listed.
 const LISTED: usize = 6;
 
-/// The effects of which the least share of the range would have been named, with their limits; `None` if no effect would have been.
+/// Returns the effects that would have been named at the smallest share of their range, with their
+/// limits; `None` if there is none.
 pub(crate) fn detection_limit_note(
     limits: &[DetectionLimit],
     effects: &[EffectSpec],
@@ -215,7 +222,7 @@ pub(crate) fn detection_limit_note(
     (!known.is_empty()).then(|| listed.text(how))
 }
 
-/// Two digits.
+/// Formats a number with two digits.
 fn in_digits(x: f64) -> String {
     let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
     let is_long = rounded != 0.0 && (rounded.abs() < 1e-3 || rounded.abs() >= 1e5);

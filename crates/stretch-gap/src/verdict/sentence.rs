@@ -1,4 +1,4 @@
-//! The answer in words.
+//! The answer of a diagnosis in words.
 
 use crate::{
     record::sentence::sentence,
@@ -8,20 +8,22 @@ use crate::{
     },
 };
 
-/// Multiple of the noise above which nothing is said to be all of it, or certain.
+/// What is left, in multiples of the noise, above which the text never claims that all of the gap
+/// is closed, or that it is certain.
 const NOT_ALL: f64 = 1.5;
 
-/// Share of the gap from which a name is most of it.
+/// Share of the gap from which effects are said to explain most of it.
 const MOST: f64 = 0.5;
 
-/// Least share that is reported as a number.
+/// Smallest share that is given as a number.
 const LEAST_SHARE_IN_WORDS: f64 = 0.01;
 
-/// Effects that are listed of those that were not looked at.
+/// Largest number of effects that are listed as not examined.
 const LISTED: usize = 6;
 
 impl Diagnosis {
-    /// The answer in plain sentences, probabilities by `probability`, without the next step.
+    /// Describes the answer in plain sentences, without the next step; `probability` formats a
+    /// probability.
     ///
     /// ```
     /// use stretch_gap::Diagnosis;
@@ -36,7 +38,8 @@ impl Diagnosis {
         self.preface() + &answer.in_sentences(probability) + &proposed
     }
 
-    /// What to do next, in a sentence; empty for a diagnosis without an [answer](Self::answer).
+    /// Returns what to do next, in a sentence; empty for a diagnosis without an
+    /// [answer](Self::answer).
     ///
     /// ```
     /// use stretch_gap::Diagnosis;
@@ -76,7 +79,7 @@ impl Diagnosis {
         }
     }
 
-    /// The sentences of a diagnosis, and the next step where they do not say it.
+    /// Returns the sentences of a diagnosis, with the next step if they do not contain it.
     pub(crate) fn headline(&self) -> String {
         let finding = self.in_sentences(&two_digits);
         match &self.answer {
@@ -90,8 +93,8 @@ impl Diagnosis {
         }
     }
 
-    /// What was not examined, which is said first: an answer from a part of the catalogue is no answer about the rest. Empty if
-    /// everything was examined.
+    /// Returns what was not examined; empty if everything was. The text comes first, because an
+    /// answer from a part of the catalogue says nothing about the rest.
     pub fn preface(&self) -> String {
         let mut out = match &self.cut_short {
             None => String::new(),
@@ -112,18 +115,18 @@ impl Diagnosis {
     }
 }
 
-/// A probability as sentences give it.
+/// Formats a probability for sentences.
 pub(crate) fn two_digits(probability: f64) -> String {
     format!("{probability:.2}")
 }
 
-/// A sentence that goes on behind a colon.
+/// Returns a sentence with a small first letter, to follow a colon.
 fn decapitalised(sentence: &str) -> String {
     let mut letters = sentence.chars();
     letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// The first names, and how many more there are.
+/// Lists the first names, and the number of further ones.
 fn listed(names: &[String]) -> String {
     let first = names[..names.len().min(LISTED)].join(", ");
     match names.len().saturating_sub(LISTED) {
@@ -133,7 +136,7 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Answer {
-    /// Whether effects were found and more than noise is left with them.
+    /// Whether effects were found but more than noise is left with them.
     pub fn leaves_more_than_noise(&self) -> bool {
         match self {
             Self::Missing { closes, .. } => closes.left > NOT_ALL,
@@ -142,7 +145,7 @@ impl Answer {
         }
     }
 
-    /// The answer in plain sentences, probabilities by `probability`.
+    /// Describes the answer in plain sentences; `probability` formats a probability.
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         match self {
             Self::Agrees { small } => {
@@ -243,7 +246,8 @@ impl Answer {
     }
 }
 
-/// Share of the gap that a hypothesis closes, with its interval: never all of it where more than noise is left.
+/// Describes the share of the gap that a hypothesis closes, with its interval; never 100 % if more
+/// than noise is left.
 fn closed(closes: &Closed) -> String {
     let most = if closes.left > NOT_ALL { 99.0 } else { 100.0 };
     let percent = |share: f64| (100.0 * share).round().clamp(0.0, most);
@@ -251,8 +255,9 @@ fn closed(closes: &Closed) -> String {
     format!("{:.0} % ({low:.0} to {high:.0} %)", percent(closes.share))
 }
 
-/// What is left with a hypothesis, and how probable it is: never certain where more than noise is left. Where most of it is left on
-/// trials that were fitted, that is said: tables tell what is left on the others.
+/// Describes what is left with a hypothesis, and its probability, which is never 1 if more than
+/// noise is left. If most of it is left on the fitted trials, the text says so; tables give the
+/// value on the other trials.
 fn left_with(closes: &Closed, probability: &dyn Fn(f64) -> String) -> String {
     let most = if closes.left > NOT_ALL { 0.99 } else { 1.0 };
     format!(
@@ -269,14 +274,14 @@ impl MissingEffect {
     }
 }
 
-/// An effect or its alternatives.
+/// Lists an effect and its alternatives.
 fn alternatives(effect: &MissingEffect) -> String {
     let all: Vec<&str> =
         std::iter::once(&effect.name).chain(&effect.alternatives).map(String::as_str).collect();
     all.join(" or ")
 }
 
-/// An effect or its alternatives, with the share that it closes.
+/// Lists an effect and its alternatives, with the share of the gap that the effect closes.
 fn with_share(effect: &MissingEffect) -> String {
     let share = match effect.closes {
         share if share <= 0.0 => "nothing on its own".to_owned(),
@@ -287,7 +292,7 @@ fn with_share(effect: &MissingEffect) -> String {
     format!("{} ({share}{end})", alternatives(effect))
 }
 
-/// What was found, and is too small to matter.
+/// Lists effects that were found but are too small to matter.
 fn too_small(small: &[String]) -> String {
     match small.is_empty() {
         true => String::new(),
@@ -295,7 +300,8 @@ fn too_small(small: &[String]) -> String {
     }
 }
 
-/// Parameters at the ends of their tolerances: what bends them may have bent the values of the effects as well.
+/// Describes parameters at the ends of their tolerances. What pushes them there may also have
+/// distorted the values of the effects.
 fn at_ends(ended: &[(String, f64)]) -> String {
     let all: Vec<String> =
         ended.iter().map(|(name, sigmas)| format!("{name} ({sigmas:+.1} tolerances)")).collect();
@@ -310,7 +316,7 @@ fn at_ends(ended: &[(String, f64)]) -> String {
     }
 }
 
-/// Ties and what is faint, behind the headline.
+/// Describes ties and faint effects, for the text after the headline.
 fn below(effects: &[MissingEffect], faint: &[String]) -> String {
     let mut out = String::new();
     if effects.iter().any(MissingEffect::is_tied) {

@@ -1,4 +1,4 @@
-//! Tests terms, the library and the weighing of sums alone, on records whose every sample is known.
+//! Tests of terms, of the library and of the odds of sums, on signals whose every sample is known.
 
 mod shelf;
 mod terms;
@@ -14,14 +14,14 @@ use stretch_effects::Grid;
 /// Sample time, s.
 const DT_S: f64 = 0.01;
 
-/// A scaled signal whose rate is that of central differences.
+/// A signal whose rate is computed by central differences.
 fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
     let v = central_differences(&x, DT_S);
     let (name, unit) = (name.to_owned(), "mm".to_owned());
     Signal { name, unit, offset: 40.0, scale: 25.0, rate: 1.0, is_command, x, v }
 }
 
-/// Signals over trials of so many samples, one minute apart.
+/// Signals over trials with the given numbers of samples, starting one minute apart.
 fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
     let mut end = 0;
     let trials: Vec<std::ops::Range<usize>> = samples
@@ -41,7 +41,7 @@ fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
     }
 }
 
-/// Every trial fitted except its last part.
+/// Roles in which each trial is fitted, except its last `held` samples, which are held out.
 fn roles(samples: &[usize], held: usize) -> SampleRoles {
     let mut end = 0;
     let mut segments = Vec::new();
@@ -56,7 +56,7 @@ fn roles(samples: &[usize], held: usize) -> SampleRoles {
     SampleRoles { segments, block: 50, fit_trials: samples.len(), borrowed_test: false }
 }
 
-/// Up, down and up again between 0 and 1.
+/// A wave between 0 and 1 that starts at 0, with a period of 314 samples.
 fn wave(samples: usize) -> Vec<f64> {
     (0..samples).map(|i| 0.5 - 0.5 * (0.02 * i as f64).cos()).collect()
 }

@@ -1,4 +1,4 @@
-//! The library as a whole: what it contains, and what it must not contain.
+//! Tests of the library as a whole.
 
 use super::{inputs, roles, signal, wave};
 use crate::missing::{
@@ -11,7 +11,7 @@ use crate::missing::{
 use crate::problem::sample_roles::Role;
 use std::collections::BTreeSet;
 
-/// A state, another one that is no function of it, and a command.
+/// A state, a second state that is not a function of the first, and a command.
 fn three() -> TermInputs {
     let other: Vec<f64> = (0..600).map(|i| 0.5 + 0.4 * (0.031 * f64::from(i)).sin()).collect();
     let command: Vec<f64> = (0..600).map(|i| f64::from(i / 60 % 2)).collect();
@@ -33,7 +33,8 @@ fn no_term_stands_in_it_twice_and_each_has_its_words() {
         assert_eq!(told.len(), terms.len(), "a term twice would be paid for twice");
         let words: BTreeSet<String> = terms.iter().map(|t| words(t, &scales)).collect();
         assert!(words.iter().all(|w| !w.is_empty()));
-        // Shapes are written with three digits; the smallest difference between these is larger.
+        // Shapes are written with three digits, and all shapes in the library differ by more than
+        // that.
         assert_eq!(words.len(), terms.len());
     }
 }
@@ -47,7 +48,7 @@ fn every_term_is_finite_on_what_is_recorded() {
     }
 }
 
-/// Signals of terms exist, and shapes are within the reach of a refinement.
+/// Every term refers to an existing signal, and its shapes are finite and positive.
 #[test]
 fn terms_speak_of_what_was_recorded() {
     let inputs = three();
@@ -71,14 +72,14 @@ fn what_leaks_through_openings_is_only_where_commands_drive() {
     let is_leak = |t: &Term| matches!(t.passage, Passage::Leak { .. });
     let of = |is_commanded| library(&inputs, &roles(&[300, 300], 0), is_commanded);
     assert!(!of(false).iter().any(is_leak) && of(true).iter().any(is_leak));
-    // A signal is never crossed with itself or with an unrecorded one.
+    // With one signal there are no products of two signals, so the library is less than half as
+    // long.
     let alone = super::inputs(vec![signal("rod", wave(300), false)], &[300]);
     let terms = library(&alone, &roles(&[300], 0), false);
     assert!(terms.len() < of(false).len() / 2);
 }
 
-/// The usual test cases of missing terms are in the library: squares, cubes, products with the
-/// rate, sines, memories.
+/// The library contains squares, cubes, products of two signals, sines and memories.
 #[test]
 fn the_usual_causes_are_on_the_shelf() {
     use Factor::{Play, Power, Sine};
@@ -91,7 +92,8 @@ fn the_usual_causes_are_on_the_shelf() {
     assert!(holds(&[Play { signal: 0, width: 0.1 }]));
 }
 
-/// Knees are placed by the fitted samples, not by the test samples.
+/// Quantiles, at which knees are placed, are computed from the fitted samples and not from the test
+/// samples.
 #[test]
 fn quantiles_are_those_of_fitted_samples() {
     let x: Vec<f64> = (0..100).map(|i| if i < 60 { f64::from(i) / 59.0 } else { 50.0 }).collect();
@@ -103,8 +105,8 @@ fn quantiles_are_those_of_fitted_samples() {
     assert!((middle - 0.5).abs() < 0.02, "{middle}");
 }
 
-/// If little was held out, every third trial is used: nothing is added or lost, and the last trials
-/// do not change.
+/// If too few samples are held out, every third trial is held out. No fitted or held-out sample is
+/// lost.
 #[test]
 fn terms_are_chosen_by_samples_that_were_not_fitted() {
     let enough = roles(&[400, 400, 400], 100);

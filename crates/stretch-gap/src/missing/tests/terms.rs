@@ -1,4 +1,4 @@
-//! Every factor and passage against its equation.
+//! Compares every factor and passage with its equation.
 
 use super::{DT_S, inputs, signal, wave};
 use crate::missing::term::{
@@ -8,7 +8,7 @@ use crate::missing::term::{
 use approx::assert_abs_diff_eq;
 use testkit::tolerance::LOCAL_VALUE;
 
-/// A factor alone over one trial of a signal.
+/// Values of a single factor over one trial of a signal.
 fn of(factor: Factor, x: &[f64]) -> Vec<f64> {
     let inputs = inputs(vec![signal("x", x.to_vec(), false)], &[x.len()]);
     Term::new(&[factor], Passage::Direct).values(&inputs, 1)
@@ -39,8 +39,8 @@ fn curves_are_what_their_equations_say() {
     }
 }
 
-/// A test trial may go below the fitted range, where a power has no root and an exponential no
-/// bound: everything stays finite.
+/// A test trial may go below the fitted range, where a power has no real root and an exponential no
+/// bound. All values stay finite.
 #[test]
 fn below_its_range_a_signal_counts_as_its_least() {
     let x = [-0.5, -0.01, 0.0, 0.2];
@@ -64,7 +64,7 @@ fn forms_of_the_rate_are_even_or_odd_as_friction_is() {
     for even in [Magnitude, Square] {
         assert_abs_diff_eq!(at(even, &x), at(even, &back), epsilon = LOCAL_VALUE);
     }
-    // One range a second is the unit of v here.
+    // The rate v is 1 here, in ranges per second.
     for form in [Linear, Magnitude, Square, SignedSquare, SignedRoot, Rising] {
         assert_abs_diff_eq!(at(form, &x), 1.0, epsilon = LOCAL_VALUE);
     }
@@ -72,7 +72,7 @@ fn forms_of_the_rate_are_even_or_odd_as_friction_is() {
     assert!((at(Sign, &x) - 1.0).abs() < 1e-8 && at(Striction, &x) < 0.04);
 }
 
-/// A play of half-width w lags w behind a motion in one direction, and not at all at the start.
+/// A play of half-width w lags w behind a motion in one direction, and not at all at its start.
 #[test]
 fn a_play_follows_its_width_behind() {
     let x: Vec<f64> = (0..200).map(|i| 0.005 * f64::from(i)).collect();
@@ -80,12 +80,13 @@ fn a_play_follows_its_width_behind() {
     assert_like(&held, x.iter().map(|x| x.min(0.1)));
 }
 
-/// A lag follows a ramp of slope r with a distance of r tau once its start is forgotten.
+/// A lag follows a ramp of slope r at a distance of r tau, once its start is forgotten.
 #[test]
 fn a_lag_of_a_ramp_is_its_slope_times_its_time() {
     let x: Vec<f64> = (0..2000).map(|i| 0.0005 * f64::from(i)).collect();
     let behind = of(Lag { signal: 0, tau_s: 0.5 }, &x);
-    // Linear interpolation and steps between samples differ by half a sample of 10 ms.
+    // The result may differ by half a sample (10 ms), because the lag may interpolate or hold
+    // between samples.
     let expected = 0.05 * 0.5;
     assert!((behind[1999] - expected).abs() <= 0.05 * 0.5 * DT_S + LOCAL_VALUE, "{}", behind[1999]);
     assert_eq!(behind[0], 0.0);
@@ -109,7 +110,7 @@ fn peaks_and_turns_remember_what_they_should() {
     assert_abs_diff_eq!(peak[314], 1.0, epsilon = 1e-3); // back at the bottom, as far as samples meet it
     let turned = of(Turned { signal: 0, width: 0.1 }, &x);
     assert!(turned.iter().all(|t| t.abs() <= 1.0));
-    // A way of 1 after the turn: sign times 1 - exp(-10).
+    // The signal moved by 1 since the last turn: the value is the sign times 1 - exp(-10).
     assert!(turned[150] > 0.999 && turned[310] < -0.999, "{} {}", turned[150], turned[310]);
 }
 
@@ -117,7 +118,7 @@ fn peaks_and_turns_remember_what_they_should() {
 fn travel_counts_both_ways_and_no_noise() {
     let x = wave(629); // two ways up, two down: 4 ranges
     let far = of(Travel { signal: 0, power: 1.0 }, &x);
-    // A play of a hundredth lags at every turn: three turns and the end.
+    // The play of a hundredth loses distance at each of the three turns and at the end.
     assert!((far[628] - 4.0).abs() < 0.1, "{}", far[628]);
     assert!(far.windows(2).all(|pair| pair[0] <= pair[1]));
     let rest: Vec<f64> = (0..500).map(|i| 0.5 + 0.004 * f64::from(i % 3 - 1)).collect();
@@ -139,7 +140,7 @@ fn clocks_begin_with_the_trial_or_with_the_session() {
     assert_abs_diff_eq!(fade[100], (-1.0_f64).exp(), epsilon = LOCAL_VALUE);
 }
 
-/// Memories are cleared between trials: two equal trials have equal values, whatever came before.
+/// Memories are cleared between trials: equal trials have equal values, whatever precedes them.
 #[test]
 fn memories_begin_anew_with_every_trial() {
     let x = [wave(300), wave(300)].concat();
@@ -159,13 +160,13 @@ fn memories_begin_anew_with_every_trial() {
         for passage in passages {
             let all = Term::new(&[factor], passage).values(&inputs, 2);
             assert_eq!(all[..300], all[300..], "{factor:?} {passage:?}");
-            // The same for fewer trials.
+            // The values do not change if fewer trials are computed.
             assert_eq!(Term::new(&[factor], passage).values(&inputs, 1), all[..300]);
         }
     }
 }
 
-/// Terms are causal: later samples change nothing before.
+/// Terms are causal: a change of later samples does not change earlier values.
 #[test]
 fn no_term_looks_ahead() {
     let (x, mut other) = (wave(400), wave(400));
@@ -194,7 +195,8 @@ fn a_product_is_that_of_its_factors_and_nothing_is_one() {
     assert_like(&of(&[a, b]), product);
 }
 
-/// A lag and its remainder add up to the whole. For a constant, from 0, the lag is 1 - exp(-t/tau).
+/// A lag and its remainder add up to the whole. For a constant 1, starting from 0, the lag is 1 -
+/// exp(-t/tau).
 #[test]
 fn passages_part_what_they_are_given() {
     let inputs = inputs(vec![signal("x", wave(300), false)], &[300]);
@@ -203,14 +205,14 @@ fn passages_part_what_they_are_given() {
     assert_like(&of(Passage::Direct), lag.iter().zip(&rest).map(|(a, b)| a + b));
     let one = Term::new(&[], Passage::Lag { tau_s: 0.3 }).values(&inputs, 1);
     for (i, z) in one.iter().enumerate().skip(1) {
-        // Begun at 0 with the first sample, or a sample later.
+        // The lag may start at the first sample, or a sample earlier or later.
         let at = |i: f64| 1.0 - (-i * DT_S / 0.3).exp();
         assert!((at(i as f64 - 1.0) - 1e-9..=at(i as f64 + 1.0) + 1e-9).contains(z), "{i}: {z}");
     }
 }
 
-/// z' = g/tau - u z/tau: with everything shut it integrates, with valves open it tends to g/u with
-/// the time constant tau/u.
+/// z' = g/tau - u z/tau. With u = 0, z integrates g. With u > 0 and a constant g, z tends to g/u
+/// with the time constant tau/u.
 #[test]
 fn a_leak_integrates_while_shut_and_forgets_while_open() {
     let with = |opening: f64| {

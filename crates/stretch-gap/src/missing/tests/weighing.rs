@@ -1,5 +1,5 @@
-//! Whether a sum is a function of what was recorded: the ridge, and the odds against coloured
-//! noise.
+//! Tests of the ridge regression, and of the odds of a function of recorded signals against
+//! coloured noise.
 
 use super::roles;
 use crate::{
@@ -10,7 +10,8 @@ use crate::{
     numerics::random::RandomGenerator,
 };
 
-/// Rows whose residual is 2 a - b plus noise; a, b and `idle` other columns are noise themselves.
+/// Rows whose residual is 2 a - b plus noise. The columns a, b and `idle` further columns are
+/// random.
 fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> Rows {
     let columns: Vec<Vec<f64>> =
         (0..2 + idle).map(|_| (0..count).map(|_| random.gauss()).collect()).collect();
@@ -23,21 +24,20 @@ fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> 
 fn a_ridge_finds_weights_where_there_is_no_noise() {
     let mut random = RandomGenerator::new(1, 0);
     let weights = ridge(&rows(300, 3, 0.0, &mut random), &rows(100, 3, 0.0, &mut random));
-    // The smallest ridge is 1e-5 of the diagonal, which shrinks the weights by as much; cross
+    // The smallest ridge is 1e-5 of the diagonal and shrinks the weights by this share. The cross
     // products of 300 draws add a tenth of that.
     for (weight, expected) in weights.iter().zip([2.0, -1.0, 0.0, 0.0, 0.0]) {
         assert!((weight - expected).abs() < 1e-4, "{weights:?}");
     }
 }
 
-/// Fifty-two columns on sixty rows: least squares leave nothing of the rows and predict noise. The
-/// ridge that was chosen on held-out samples leaves less of such samples than the smallest ridge
-/// does.
+/// With 52 columns on 60 rows, least squares fits almost all of the noise. The ridge chosen on
+/// held-out samples predicts those samples better than the smallest ridge does.
 #[test]
 fn a_ridge_shrinks_where_columns_are_many() {
     let mut random = RandomGenerator::new(2, 0);
     let (fit, held) = (rows(60, 50, 3.0, &mut random), rows(400, 50, 3.0, &mut random));
-    // On the rows that they were fitted to, weights are best without a ridge.
+    // If the rows for the choice are the fitted ones, the smallest ridge is chosen.
     let again = Rows { residual: fit.residual.clone(), columns: fit.columns.clone() };
     let (chosen, least) = (ridge(&fit, &held), ridge(&fit, &again));
     let left = |rows: &Rows, weights: &[f64]| -> f64 {
@@ -54,7 +54,7 @@ fn without_columns_there_are_no_weights() {
     assert!(ridge(&empty(), &empty()).is_empty());
 }
 
-/// Noise that keeps a share of its previous value.
+/// First-order autoregressive noise that keeps the share `kept` of its previous value.
 fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64> {
     let mut x = random.gauss() / (1.0 - kept * kept).sqrt();
     let next = |_| {
@@ -64,7 +64,8 @@ fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64>
     (0..samples).map(next).collect()
 }
 
-/// A term that explains nothing gains nothing, and costs ln M for each that was chosen.
+/// A sum that explains nothing gains nothing and costs ln M for each of its terms, where M is the
+/// number of terms in the library.
 #[test]
 fn a_choice_costs_what_there_was_to_choose_from() {
     let mut random = RandomGenerator::new(3, 0);
@@ -75,16 +76,17 @@ fn a_choice_costs_what_there_was_to_choose_from() {
     }
 }
 
-/// A known function plus noise: its residual, and the same without it. The function is preferred to
-/// any coloured process if it is no slow wave; it is found in each of the 20 records.
+/// The residual is a known function plus noise; with the function subtracted, only noise is left.
+/// The odds favour the function over a coloured process in each of 20 recordings. This holds if the
+/// function is not a slow wave, which an autoregression could predict.
 #[test]
 fn a_function_is_told_from_coloured_noise() {
     let mut random = RandomGenerator::new(4, 0);
     let roles = roles(&[3000, 3000], 900);
     for inputs in 0..20 {
         let noise: Vec<f64> = (0..6000).map(|_| random.gauss()).collect();
-        // Steps at irregular times, as a play or a valve makes them, which no autoregression
-        // predicts.
+        // The function switches sign at irregular times, like a play or a valve. No autoregression
+        // predicts that.
         let mut level = 1.0;
         let function: Vec<f64> = (0..6000)
             .map(|_| {
@@ -100,9 +102,9 @@ fn a_function_is_told_from_coloured_noise() {
     }
 }
 
-/// An independent drift is predicted no better after an unrelated term was subtracted with its best
-/// weight. In none of 40 records do the odds favour the term, because one chance weight gains half
-/// a nat on average, and ln 500 are required.
+/// A random drift is predicted no better after an unrelated term was subtracted with its best
+/// weight. The odds favour such a term in none of 40 recordings, because a chance weight gains half
+/// a nat on average, and ln 500 nats are required.
 #[test]
 fn a_chance_term_is_no_function() {
     let mut random = RandomGenerator::new(5, 0);
@@ -128,7 +130,7 @@ fn odds_are_finite_whatever_is_left() {
         assert!(odds(&roles, &left, &[0.0; 300], 1, 10).is_finite());
         assert!(odds(&roles, &[0.0; 300], &left, 1, 10).is_finite());
     }
-    // A record shorter than the memory of the process cannot be scored.
+    // A recording shorter than the memory of the autoregression cannot be scored.
     let short = super::roles(&[20], 0);
     assert!(odds(&short, &[1.0; 20], &[0.5; 20], 1, 10).is_finite());
 }

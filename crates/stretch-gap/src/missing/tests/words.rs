@@ -1,4 +1,4 @@
-//! How proposals are put into words.
+//! Tests of the texts of proposals.
 
 use super::{inputs, signal, wave};
 use crate::missing::{
@@ -49,13 +49,13 @@ fn an_equation_tells_each_of_its_letters_once() {
         letters,
         "x[rod_mm] = (rod_mm - 40.0 mm)/(25.0 mm), v[rod_mm] = (d rod_mm/dt)/(25.0 mm/s)"
     );
-    // A command is what it is.
+    // A command is not scaled.
     let command = [term(&[Factor::Power { signal: 1, power: 2.0 }], Passage::Direct, 2.0)];
     assert_eq!(
         equation("volts", &command, &signals()),
         "volts += 2.00 V x[valve]^2; x[valve] = valve"
     );
-    // A constant and a clock have no letters.
+    // A term of time alone and an empty sum have no letters to define.
     let clock = [term(&[Factor::Time { power: 0.5 }], Passage::Direct, 2e-9)];
     assert_eq!(equation("volts", &clock, &signals()), "volts += 2.00e-9 V (time in trial/T)^0.5");
     assert_eq!(equation("volts", &[], &signals()), "");

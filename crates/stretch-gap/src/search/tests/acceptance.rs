@@ -1,4 +1,4 @@
-//! Criteria for accepting an effect, and how often noise meets them.
+//! Tests of the acceptance criteria, and of how often noise meets them.
 
 use super::index;
 use crate::{
@@ -18,7 +18,7 @@ fn is_any_taken(record: &Measured) -> bool {
 }
 
 /// By chance an effect with two parameters rises by 12 nats plus the penalty of 2 ln(60)/2 nats
-/// once in exp(16): none in 20 records of four toys, with seven effects each.
+/// once in exp(16) cases. It never does in 20 recordings of four toys with seven effects each.
 #[test]
 fn pure_noise_is_no_effect() {
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
@@ -29,8 +29,8 @@ fn pure_noise_is_no_effect() {
     }
 }
 
-/// The same with noise half of whose variance is remembered for 0.05 s. Its stated size includes
-/// this part, because octaves do not model colour.
+/// The same test with noise of which half of the variance is correlated over 0.05 s. The stated
+/// noise includes this part, because octaves do not model colour.
 #[test]
 fn coloured_noise_is_no_effect() {
     for seed in 0..20 {
@@ -41,8 +41,8 @@ fn coloured_noise_is_no_effect() {
     }
 }
 
-/// For a parameter that does nothing chance yields chi^2/2 with one degree of freedom: half a nat
-/// on average, with deviation 0.71. Schwarz's penalty ln(blocks)/2 is subtracted.
+/// A parameter that does nothing gains chi^2/2 with one degree of freedom: half a nat on average,
+/// with a standard deviation of 0.71. Schwarz's penalty ln(blocks)/2 is subtracted.
 #[test]
 fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
     const DRAWS: u64 = 40;
@@ -54,7 +54,7 @@ fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
         let set = sets.refit(&with_effects(&problem, &[(0, vec![0.01])])).expect("fitted");
         sum += set.score + 0.5 * problem.compare.roles.blocks(Role::Fit).ln();
     }
-    // Three standard errors of 0.71/sqrt(40).
+    // The tolerance is three standard errors of 0.71/sqrt(40).
     approx::assert_abs_diff_eq!(sum / DRAWS as f64, 0.5, epsilon = 0.34);
 }
 
@@ -73,12 +73,12 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
     assert!(is_accepted(&problem.nominal, &play));
     assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
-    // All that was left in the stage is closed, so no further effect can exceed model discrepancy.
+    // The gap of the stage is closed completely, so no further effect can exceed model discrepancy.
     assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
     assert!(!worth.is_possible(&play, index(&record, "cubic")));
 }
 
-/// An effect that closes less than a gap that counts has to rise further.
+/// An effect that closes less than `null_excess` needs a larger rise.
 #[test]
 fn what_closes_little_has_to_rise_more() {
     let record = Toy::of(&[Law::Line]).measured(1);
@@ -89,7 +89,7 @@ fn what_closes_little_has_to_rise_more() {
     assert!(thresholds.faint_rise > thresholds.rise);
 }
 
-/// An effect that is larger than its range ends at the end of the range, and reports this.
+/// An effect that is stronger than its range allows ends at a bound, and this is reported.
 #[test]
 fn an_effect_at_the_end_of_its_range_is_told() {
     for (size, is_bound) in [(0.15, false), (0.5, true)] {

@@ -1,4 +1,4 @@
-//! What another form of an effect explains, and what it must not explain.
+//! Tests of what another form of an effect may explain.
 
 use crate::{
     fit::{
@@ -10,8 +10,8 @@ use crate::{
     toys::{Effect, Law, Toy},
 };
 
-/// A quadratic fitted to a line that hides some effects: without, and with deviations of at most
-/// `share`.
+/// Fits of a quadratic to a line that hides some effects: without deviations, and with deviations
+/// of at most `share`.
 fn quadratic(hidden: &[(Effect, &[f64])], share: f64) -> [Hypothesis; 2] {
     let record = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).hiding(hidden).measured(5);
     let problem = prepared(&record);
@@ -21,8 +21,8 @@ fn quadratic(hidden: &[(Effect, &[f64])], share: f64) -> [Hypothesis; 2] {
     [set, deviating]
 }
 
-/// x + c x^2 + b x^3 with b a quarter of c is a quadratic of another form: z times the contribution
-/// of the quadratic.
+/// x + c x^2 + b x^3, with b a quarter of c, contains a quadratic of another form: the cubic term
+/// is z times the contribution of the quadratic.
 #[test]
 fn a_curve_that_bends_otherwise_is_the_same_effect() {
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.4]), (Effect::Cubic, &[0.1])];
@@ -33,7 +33,7 @@ fn a_curve_that_bends_otherwise_is_the_same_effect() {
     assert!(deviating.score > set.score);
 }
 
-/// Five coefficients that explain nothing cost more than they gain.
+/// The five coefficients of deviations explain nothing here and cost more than they gain.
 #[test]
 fn an_effect_of_the_right_form_has_no_deviations() {
     let [set, deviating] = quadratic(&[(Effect::Quadratic, &[0.4])], 0.17);
@@ -41,7 +41,8 @@ fn an_effect_of_the_right_form_has_no_deviations() {
     assert_eq!(deviating.misfits, set.misfits);
 }
 
-/// A deviation is a share of its effect's contribution, so a small effect explains no large one.
+/// A deviation is a share of its effect's contribution, so a small effect cannot explain a large
+/// one.
 #[test]
 fn a_small_effect_does_not_stand_in_for_a_large_one() {
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.02]), (Effect::Cubic, &[0.4])];

@@ -1,4 +1,4 @@
-//! The search on toys: what is screened, accepted, and removed again.
+//! Tests of the search on toys: screening, acceptance and removal of effects.
 
 mod acceptance;
 mod deviations;

@@ -1,4 +1,4 @@
-//! One simulation per start shows which effects are worth a fit.
+//! Tests that one simulation per start shows which effects are worth a fit.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -34,8 +34,8 @@ fn the_effect_that_is_hidden_promises_most() {
             let problem = prepared(&record);
             let mut all = screened(&problem);
             all.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-            // A delay and a lag of the same time differ only in the second order of time and
-            // frequency.
+            // A delay and a lag with the same time constant differ only in the second order of time
+            // times frequency.
             let mut ranks = all.iter().map(|s| Effect::ALL[s.effect]);
             let first = ranks.find(|e| effect != Effect::Late || *e != Effect::Slow);
             if first != Some(effect) {
@@ -47,8 +47,8 @@ fn the_effect_that_is_hidden_promises_most() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The reduction of a ridge regression's cost by one more regressor with a flat prior: what a
-/// screen promises for a linear effect.
+/// The promised gain of a linear effect equals the reduction of a ridge regression's cost by one
+/// more regressor with a flat prior.
 #[test]
 fn the_gain_of_a_linear_effect_is_the_fall_of_a_regression() {
     for size in [0.004, 0.02, 0.1] {
@@ -74,23 +74,23 @@ fn the_gain_of_a_linear_effect_is_the_fall_of_a_regression() {
             0.5 * weight * (r - a * &step).norm_squared()
                 + 0.5 * (step.transpose() * prior * &step)[0]
         };
-        // A screen ignores the pull of the priors, a share of 1/(1 + data) with data of at least
-        // 180, and twice that in a square.
+        // A screen ignores the pull of the priors, a share of at most 1/180 because the data
+        // outweigh the prior by 180; the square doubles it.
         approx::assert_relative_eq!(found.gain(), cost(2) - cost(3), max_relative = 0.02);
-        // ... at the size that a regression finds, known to 0.01/sqrt(3000 * 0.02) = 0.0013, three
-        // of them.
+        // The size agrees with the regression, within three standard deviations of 0.01/sqrt(3000 *
+        // 0.02) = 0.0013.
         approx::assert_abs_diff_eq!(found.starts[0].0[0], size, epsilon = 0.004);
     }
 }
 
-/// What the re-tuned parameters can do alone promises nothing: an effect of the gain alone is
-/// projected out.
+/// A change that re-tuned parameters can explain promises nothing: an effect that only changes the
+/// gain is projected out.
 #[test]
 fn what_parameters_can_do_is_no_gain() {
     let toy = Toy::of(&[Law::Lag]).may_lack(&[Effect::Slow, Effect::Late]).off_by(&[2.0, 2.0]);
     let record = toy.measured(3);
     let problem = prepared(&record);
-    // A regressor that does nothing yields half a nat per sample, and a block counts as one of
-    // fifty: 12 nats are 25 in 10^6.
+    // A regressor without effect gains half a nat on average if samples are independent. Here fifty
+    // samples count as one, which divides the gain by 50. 12 nats occur by chance 25 times in 10^6.
     assert!(screened(&problem).iter().all(|s| s.gain() < 12.0 / 50.0));
 }

@@ -1,4 +1,4 @@
-//! Forward selection and backward elimination.
+//! Tests of forward selection and backward elimination.
 
 use super::{index, names};
 use crate::{
@@ -10,8 +10,8 @@ use crate::{
 
 type Hidden = (Effect, &'static [f64]);
 
-/// Each has an excess of about six variances of the noise: less than a thirtieth of the other
-/// counts as the discrepancy of its model.
+/// Pairs of effects with an excess of about six each. The model discrepancy of one is less than a
+/// thirtieth of the other.
 const PAIRS: [[Hidden; 2]; 4] = [
     [(Effect::Play, &[0.04]), (Effect::Quadratic, &[0.2])],
     [(Effect::Cubic, &[0.4]), (Effect::Drift, &[0.0005])],
@@ -49,7 +49,7 @@ fn two_hidden_effects_are_found_and_not_a_third() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The depth is the largest number of effects: the stronger of two is left, and none with depth 0.
+/// At most `depth` effects are selected: with depth 1 the stronger of two, with depth 0 none.
 #[test]
 fn no_more_effects_are_taken_than_asked_for() {
     let record = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&PAIRS[0]).measured(1);
@@ -57,7 +57,7 @@ fn no_more_effects_are_taken_than_asked_for() {
     assert_eq!(best_of(&record, &[], 0), [""; 0]);
 }
 
-/// If it begins from a set with a superfluous effect, the search removes this effect.
+/// A search that starts from a set with a superfluous effect removes this effect.
 #[test]
 fn a_superfluous_effect_is_eliminated() {
     let mut wrong = Vec::new();
@@ -77,7 +77,7 @@ fn a_superfluous_effect_is_eliminated() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Effects in stages that share nothing are each found in their stage.
+/// Effects in stages that share nothing are each found in their own stage.
 #[test]
 fn effects_of_two_stages_are_found_in_their_stages() {
     let mut toy = Toy::of(&[Law::Lag, Law::Line]);

@@ -1,4 +1,4 @@
-//! Starting point of an effect that re-tuning has absorbed.
+//! Tests of the starting point of an effect that re-tuning has absorbed.
 
 use crate::{
     fit::tests::prepared,
@@ -17,8 +17,8 @@ fn an_effect_begins_beside_parameters_as_shipped_where_re_tuning_took_them_far()
             let begun = start_at_shipped(&problem, base, effect).expect("simulated");
             assert_eq!(begun.is_some(), is_far, "{off} {effect}");
             let Some(begun) = begun else { continue };
-            // The gain stays where re-tuning left it, the delay returns to its shipped value, the
-            // effect begins at one of its starts.
+            // The gain stays where re-tuning left it, the delay returns to its shipped value, and
+            // the effect begins at one of its starts.
             assert_eq!(begun.parameters, [base.parameters[0], shipped.parameters[1]]);
             assert!(spec.starts.contains(&begun.effects[0].1));
         }

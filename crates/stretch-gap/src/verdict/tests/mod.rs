@@ -1,4 +1,4 @@
-//! What is named, and how it is put into words.
+//! Tests of which effects are named, and of the description in words.
 
 mod naming;
 mod sentence;

@@ -1,4 +1,4 @@
-//! Properties of the naming for all candidates, over thousands of drawn cases.
+//! Properties of the naming that hold for all candidates, tested on thousands of random cases.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::{
 
 const NAMES: [&str; 6] = ["play", "drift", "lag", "leak", "slack", "sag"];
 
-/// A set of up to three different effects.
+/// A random set of up to three different effects.
 fn set(random: &mut RandomGenerator) -> Vec<String> {
     let count = random.below(4);
     let mut names: Vec<String> = Vec::new();
@@ -42,7 +42,8 @@ fn candidate(effects: Vec<String>, probability: f64, random: &mut RandomGenerato
     }
 }
 
-/// Candidates, the most probable first, and the shares of the first one's effects, the strongest first.
+/// Random candidates, the most probable first, and shares of the first one's effects, the strongest
+/// first.
 fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
     let mut candidates = Vec::new();
     for probability in [0.6, 0.3, 0.1] {
@@ -62,8 +63,8 @@ fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, boo
     (candidates, shares, random.unit() < 0.2)
 }
 
-/// Named and faint effects together are the first set. A tie is between a name and an effect
-/// outside the first set. Every name is reported once.
+/// Named and faint effects together form the first set. A tie is between a named effect and one
+/// outside the first set. Every effect is reported once.
 #[test]
 fn names_part_the_first_set() {
     let mut random = RandomGenerator::new(4, 0);
@@ -90,7 +91,7 @@ fn names_part_the_first_set() {
     assert!(ties > 100, "{ties} ties are enough to say something");
 }
 
-/// An effect that closes less than a gap that counts is not in the headline with a larger one.
+/// An effect that closes less than `least_gap` is not named together with a larger one.
 #[test]
 fn what_is_named_counts() {
     let mut random = RandomGenerator::new(5, 0);

@@ -1,4 +1,5 @@
-//! What is said of answers of every kind, each built from values: `sentences.txt` has them all, and `answers.json` their values.
+//! Tests of the sentences for answers of every kind, each built from values. `sentences.txt`
+//! contains the sentences, and `answers.json` the values.
 
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
@@ -30,13 +31,13 @@ const PLAY: &str = "lag.output.backlash";
 const LAG: &str = "line.input.lag";
 const LOOP: &str = "lag.output.bouc_wen";
 
-/// An answer by its values. By default simulator and rig agree, and nothing was noticed.
+/// An answer defined by its values. By default simulator and rig agree, and there are no findings.
 struct Case {
     seen: VerdictKind,
     overruled: Option<Overruled>,
     naming: Naming,
     proposed: Option<Proposed>,
-    /// Excess as shipped, re-tuned and with the best set.
+    /// Excess as shipped, after re-tuning, and with the best set.
     gap: [f64; 3],
     first: Candidate,
     shares: Vec<EffectShare>,
@@ -44,7 +45,7 @@ struct Case {
     unexplained: Option<Unexplained>,
     gross: Vec<Gross>,
     borrowed_test: bool,
-    /// Whether some effect closes a part of the gap.
+    /// Whether any effect closes a part of the gap.
     has_best: bool,
 }
 
@@ -98,7 +99,7 @@ fn share(effect: &str, closes: f64, at_bound: bool) -> EffectShare {
     EffectShare { effect: effect.into(), closes, closes_excess: 8.0 * closes, at_bound }
 }
 
-/// Effects are missing, which close nearly all of the gap.
+/// Missing effects that close nearly all of the gap.
 fn missing(named: &[&str]) -> Case {
     Case {
         seen: VerdictKind::Effect,
@@ -108,7 +109,7 @@ fn missing(named: &[&str]) -> Case {
     }
 }
 
-/// Effects are missing that close a share of the gap.
+/// Missing effects that close a share of the gap.
 fn part(closed: f64, shares: Vec<EffectShare>) -> Case {
     let named: Vec<&str> = shares.iter().map(|s| s.effect.as_str()).collect();
     Case {
@@ -125,12 +126,12 @@ fn part(closed: f64, shares: Vec<EffectShare>) -> Case {
     .shared(shares)
 }
 
-/// There is a gap that nothing explains.
+/// A gap that nothing explains.
 fn unknown() -> Case {
     Case { seen: VerdictKind::Unknown, gap: [30.0, 8.0, 8.0], ..Case::default() }
 }
 
-/// Something is wrong with the record or the rig file.
+/// An error of the recording or of the rig file.
 fn wrong(gross: Vec<Gross>) -> Case {
     Case { seen: VerdictKind::Record, gap: [30.0, 8.0, 0.002], gross, ..Case::default() }
 }
@@ -140,7 +141,7 @@ fn gross(what: &str, sentence: &str, hint: &str) -> Gross {
         .expect("an error of the record")
 }
 
-/// A term that the catalogue does not hold.
+/// A proposed term that is not in the catalogue.
 fn proposed() -> Proposed {
     from_value(json!({
         "stage": "line", "channel": "y0", "equation": "y0 += 0.31 x^2", "terms": [], "signals": [],
@@ -170,7 +171,7 @@ impl Case {
         Self { overruled: Some(by), ..self }
     }
 
-    /// A diagnosis with the answer and its notes.
+    /// Returns a diagnosis with the answer and its notes.
     fn told(
         &self,
         simulator: &dyn Simulator,
@@ -202,7 +203,7 @@ impl Case {
     }
 }
 
-/// A line with a lag behind it, which leaves most.
+/// A line followed by a lag, where most of the gap is in the second.
 fn line_and_lag() -> (Measured, Diagnosis, Evidence) {
     let toy = Toy { trials: vec![(600, false), (400, true)], ..Toy::of(&[Law::Line, Law::Lag]) };
     let measured = toy.may_lack(&[Effect::Quadratic]).measured(1);
@@ -350,12 +351,13 @@ fn every_answer_has_its_words() {
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests");
     is_in_file(&folder.join("sentences.txt"), &text);
-    // The tests of reports read these.
+    // The tests of reports read these values.
     let values = serde_json::to_string_pretty(&values).expect("written");
     is_in_file(&folder.join("answers.json"), &(values + "\n"));
 }
 
-/// Names are given with values, and values mean less where parameters had to be bent for them.
+/// Every sentence that names effects also lists parameters at the ends of their tolerances, because
+/// the values of the effects are then less reliable.
 #[test]
 fn parameters_at_the_ends_of_their_tolerances_are_said_with_every_name() {
     let (measured, plain, mut evidence) = line_and_lag();

@@ -18,9 +18,10 @@ pub struct Causes {
 }
 
 impl Causes {
-    /// The effects of trials that are diagnosed as a gauge alone; no effects and a note where the trials cannot be diagnosed.
+    /// Diagnoses trials as a gauge alone and returns the effects of the gauge. If the trials cannot
+    /// be diagnosed, the result has no effects, and a note.
     ///
-    /// `progress` and `stop` mean what they mean to [`diagnose`].
+    /// `progress` and `stop` are those of [`diagnose`].
     pub fn of(
         trials: &[Trial],
         options: &Options,
@@ -52,7 +53,8 @@ impl Causes {
         }
     }
 
-    /// Leaves out effects that need a pressure, with a note for each, where some trial has no pressure.
+    /// Leaves out effects that need a pressure, with a note for each, if some trial has no
+    /// pressure.
     pub fn without_missing_pressure(mut self, trials: &[Trial], options: &Options) -> Self {
         let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
         let needs = |cause: &Cause| {
@@ -68,11 +70,13 @@ impl Causes {
     }
 }
 
-/// The effects of the gauge and its reference in the first candidate of a diagnosis, with values in shares of the reference's range:
-/// values of the whole rig are divided by its strokes, values of a gauge alone stay as they are. The list is empty if no effect is
-/// missing, or if the recording is wrong.
+/// The effects of the gauge and its reference in the first candidate of a diagnosis, with values in
+/// shares of the reference's range: values of the whole rig are divided by its strokes, values of a
+/// gauge alone stay as they are. The list is empty if no effect is missing, or if the recording is
+/// wrong.
 ///
-/// The first candidate is taken even where the verdict does not name it: a calibration finds out on trials left out whether its effects help.
+/// The first candidate is used even if the verdict does not name it, because a calibration tests on
+/// held-out trials whether its effects help.
 pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
     use VerdictKind::{Effect, Partial, Unknown};
     let first: Option<&Candidate> = diagnosis.candidates.first();
@@ -82,7 +86,8 @@ pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
     };
     let is_alone = diagnosis.location.stages.len() == 1;
     let cause = |effect: &'static Known| {
-        // The off value of a voltage is left out: a fit finds where the rails lie.
+        // A voltage level of a whole rig is left out, because the calibration's fit finds where the
+        // rails lie.
         let is_level = |p: &EffectParameter| p.unit == "V" && p.off().is_some_and(|off| off != 0.0);
         let value = |p: &EffectParameter| {
             let mut own = first.parameters.iter().filter(|own| own.effect == effect.name);

@@ -57,7 +57,7 @@ pub enum ProblemError {
         #[source]
         cause: SimError,
     },
-    /// A column is not what its name says.
+    /// The values of a column are not plausible.
     #[error("{column}: {found}; {hint}")]
     Implausible {
         /// The column.
@@ -85,7 +85,8 @@ pub enum ProblemError {
     },
 }
 
-/// Refuses a sample rate outside 1e-3 .. 1e7 Hz, before anything is counted in samples: such time stamps are in another unit.
+/// Refuses a sample rate outside 1e-3 .. 1e7 Hz, because such time stamps are in another unit. The
+/// check comes before any time is converted to samples.
 pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
     if (1e-7..=1e3).contains(&dt_s) {
         return Ok(());
@@ -134,12 +135,12 @@ impl ProblemError {
         Self::Implausible { column: column.into(), found: found.into(), hint: hint.into() }
     }
 
-    /// A column that stays constant.
+    /// Returns the error for a column that stays constant.
     pub(crate) fn dead(column: impl Into<String>, found: String) -> Self {
         Self::implausible(column, found, "the channel is dead: check the sensor and its cable")
     }
 
-    /// Fewer samples to fit than are needed.
+    /// Returns the error for too few samples to fit.
     pub(crate) fn few_samples(samples: usize, least: usize) -> Self {
         let what = format!("the trials to fit have {samples} samples");
         Self::too_little(what, format!("at least {least} are needed to tell anything"))

@@ -1,4 +1,5 @@
-//! The one flow: a problem is diagnosed, and experiment, fix, code and JSON are made from the diagnosis.
+//! Examines a problem: diagnoses it, and derives the next experiment, the fix, the code and the
+//! JSON from the diagnosis.
 
 use std::{fmt, sync::atomic::AtomicUsize};
 
@@ -21,21 +22,22 @@ use crate::{
     transfer::transfer,
 };
 
-/// A diagnosis, its evidence, and what follows from the diagnosis.
+/// A diagnosis, its evidence, and the results derived from the diagnosis.
 pub struct Examined {
     /// Name of the data.
     pub name: String,
-    /// Seed of the intervals.
+    /// Seed of the random numbers from which intervals are computed.
     pub seed: u64,
     /// The diagnosis, with the notes on the recordings before its own.
     pub diagnosis: Diagnosis,
-    /// The evidence for the diagnosis, from which a report draws.
+    /// The evidence for the diagnosis, which a report shows.
     pub evidence: Evidence,
     /// The experiment that would distinguish the alternatives; `None` if no experiment was looked for or found.
     pub experiment: Option<Trial>,
-    /// The named effects, as code to type.
+    /// Code for the named effects.
     pub implementations: Vec<Implementation>,
-    /// Families of effects that the data do not tell apart, with what the members agree on.
+    /// Families of effects that the data cannot distinguish, with the quantity on which the members
+    /// agree.
     pub families: Vec<Agreed>,
     /// The fixed simulator as a file, or why there is no such file.
     pub fix: Result<Fix, NoFix>,
@@ -48,8 +50,9 @@ impl fmt::Debug for Examined {
 }
 
 impl Problem {
-    /// Diagnoses the problem; with `looks_on` also looks for the experiment that would tell rivals apart, where there are rivals. `progress`
-    /// and `stop` mean what they mean to [`diagnose`].
+    /// Diagnoses the problem. If `looks_on` is set and there are several alternatives, it also
+    /// looks for the experiment that would distinguish them. `progress` and `stop` are those of
+    /// [`diagnose`].
     ///
     /// # Errors
     /// Those of [`diagnose`] and [`next_experiment`](stretch_gap::next_experiment).
@@ -93,7 +96,8 @@ impl Problem {
             report("what the gap costs a calibration");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
-            // where runs fail, or may not be made any more, what was found is reported without it
+            // if a run fails or the run budget is spent, the diagnosis is reported without the
+            // transfer errors
             diagnosis.transfer = match transfer(self.simulator(), &evidence, asked) {
                 Err(error) if error.is_of_runs() => None,
                 found => found?,
@@ -125,7 +129,8 @@ impl Problem {
 }
 
 impl Examined {
-    /// Everything as JSON, in the form of [`diagnosis_schema`]: the diagnosis, its data set, seed and version, and what follows from it.
+    /// Returns everything as JSON, in the form of [`diagnosis_schema`]: the diagnosis, its data
+    /// set, seed and version, and the results derived from it.
     pub fn to_json(&self) -> Value {
         let fixed = self.fix.as_ref().ok().map(|fix| &fix.file);
         let written = Written {
@@ -144,12 +149,12 @@ impl Examined {
             seed: self.seed,
             version: env!("CARGO_PKG_VERSION"),
         };
-        // Every key is a text, as JSON demands.
+        // Every key is a string, so that this does not fail.
         serde_json::to_value(written).unwrap_or_default()
     }
 }
 
-/// The JSON Schema of what [`Examined::to_json`] writes.
+/// The JSON Schema of the value that [`Examined::to_json`] returns.
 ///
 /// ```
 /// let schema = stretch_problem::diagnosis_schema();
@@ -161,7 +166,8 @@ pub fn diagnosis_schema() -> Value {
     settings.into_generator().into_root_schema_for::<Written<'_>>().to_value()
 }
 
-/// JSON has no number that is not finite: it is written as null.
+/// Transform that allows null for every number, because a number that is not finite is written as
+/// null.
 #[derive(Debug, Clone)]
 struct NumbersMayBeNull;
 

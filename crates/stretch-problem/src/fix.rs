@@ -1,4 +1,4 @@
-//! The fix of a simulator: what a diagnosis found, as a file.
+//! The fix of a simulator: a file that contains the findings of a diagnosis.
 
 use std::{f64::consts::TAU, path::Path};
 
@@ -12,11 +12,13 @@ use stretch_sim::{Effect, SimError, Tolerance};
 
 use crate::black_box::ProblemSpec;
 
-/// A rig file or a problem's file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
-/// parameter and form. Comments at the entries say where each entry comes from.
+/// A rig file or a problem's file that holds the findings of a diagnosis: re-tuned parameters with
+/// tolerances from the fit, and the effects with every parameter and form. Comments at the entries
+/// say where each entry comes from.
 ///
-/// A tolerance is one standard deviation of the fit, and never wider than the tolerance before. A tolerance is right if the model is right.
-/// If two parameters can replace one another, the interval of each is given with the other one free; the two together are narrower.
+/// A tolerance is one standard deviation of the fit, and never wider than the tolerance before. It
+/// is valid only if the model is. If two parameters can replace one another, the interval of each
+/// is computed with the other one free; the two together are narrower.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The file.
@@ -32,7 +34,8 @@ pub struct Fix {
 pub enum Fixed {
     /// The built-in rig, or a gauge alone.
     Rig(RigFile),
-    /// The problem's file of a user's own simulator: parameters re-tuned, effects around the simulator under `[[wrapped]]`.
+    /// The problem's file of a user's own simulator: parameters re-tuned, effects around the
+    /// simulator under `[[wrapped]]`.
     Problem(Box<ProblemSpec>),
 }
 
@@ -60,7 +63,7 @@ impl From<&Effect> for Meaning<'static> {
     }
 }
 
-/// Why a diagnosis leaves nothing to write.
+/// Reasons why a diagnosis gives no file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoFix {
@@ -75,7 +78,7 @@ pub enum NoFix {
         "the gap is not explained, so that no file closes it; what is known of it is in the diagnosis"
     )]
     Unknown,
-    /// No rig file may hold what was found.
+    /// A rig file cannot express the effects or values that were found.
     #[error("what was found cannot be written as a rig file: {0}")]
     Refused(#[from] SimError),
 }
@@ -87,17 +90,19 @@ pub(crate) struct Chosen<'a> {
     /// One standard deviation of every nominal parameter.
     pub(crate) sd: &'a [f64],
     diagnosis: &'a Diagnosis,
-    /// The candidate whose effects are written, where effects are named.
+    /// The candidate whose effects are written, if effects are named.
     found: Option<&'a Candidate>,
 }
 
 /// Standard deviations to either side that hold 95 % of a Gaussian.
 const COVERS: f64 = 1.96;
-/// Least tolerance, a share of the value: a parameter without a tolerance would count as exact.
+/// Least tolerance as a share of the value, because a parameter without a tolerance would count as
+/// exact.
 const LEAST: f64 = 1e-6;
 
 impl<'a> Chosen<'a> {
-    /// The first candidate where effects are named, the re-tuned nominal model where no effect is missing.
+    /// Selects the first candidate if effects are named, or the re-tuned nominal model if no effect
+    /// is missing.
     pub(crate) fn of(diagnosis: &'a Diagnosis, evidence: &'a Evidence) -> Result<Self, NoFix> {
         match diagnosis.verdict {
             VerdictKind::Record => {
@@ -144,7 +149,7 @@ impl<'a> Chosen<'a> {
         named
     }
 
-    /// Tolerance of a re-tuned parameter, relative where the old tolerance was relative.
+    /// Tolerance of a re-tuned parameter, relative if the old tolerance was relative.
     pub(crate) fn tolerance(&self, index: usize, value: f64, old: Tolerance) -> Tolerance {
         let found = self.sd.get(index).copied().unwrap_or(0.0);
         let sd = found.min(old.sd(value)).max(LEAST * value.abs()).max(f64::MIN_POSITIVE);
@@ -257,9 +262,11 @@ pub(crate) fn digits(x: f64) -> String {
     }
 }
 
-/// Values of an effect with the amplitude and phase of its spectral line, which a diagnosis takes from the recording. Amplitude and phase are
-/// those of the residual of the model without the effect, over the samples that are not tested on. An effect without a line keeps its
-/// values. `place` is the stage that shows the line, and what an amplitude of one is in units of that stage's output.
+/// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
+/// diagnosis does. They are the amplitude and phase of the residual of the model without the
+/// effect, over the samples outside the test samples. An effect without a line keeps its values.
+/// `place` is the stage that shows the line, and the size of a unit amplitude in units of that
+/// stage's output.
 pub(crate) fn with_line(
     simulator: &dyn Simulator,
     place: (usize, f64),
@@ -304,13 +311,15 @@ fn found_line(
     Some(sine(line.hertz, &left))
 }
 
-/// Time for which the phase of the mains is taken as steady, s.
+/// Time over which the phase of the mains is assumed constant, s.
 const STEADY_S: f64 = 1.0;
 
-/// Amplitude and phase of a sine in pairs of time (s) and value. Where the sine fitted to the whole holds at least half of the mean power of
-/// the sines fitted second by second, its amplitude and phase are given, else the root of that mean power with the phase of the whole.
+/// Amplitude and phase of a sine in pairs of time (s) and value. One sine is fitted to all samples,
+/// and one to each second. If the power of the first is at least half of the mean power of the
+/// others, its amplitude and phase are returned. Otherwise the amplitude is the root of that mean
+/// power, and the phase is that of the fit to all samples.
 ///
-/// On samples at twice the frequency one quadrature is never seen and counts as zero.
+/// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
 fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
     let of = |part: &[(f64, f64)]| -> [f64; 2] {
         let mut sums = [0.0; 5];
@@ -321,7 +330,8 @@ fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
             sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
         }
         let [cc, cs, ss, rc, rs] = sums;
-        // A quadrature that is not seen has no power: a millionth of the whole is taken instead.
+        // A quadrature that cannot be observed has no power, which would make the matrix singular:
+        // a millionth of the total power is added.
         let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
         let (cc, ss) = (cc + ridge, ss + ridge);
         let determinant = cc * ss - cs * cs;
@@ -352,7 +362,7 @@ mod tests {
         let [a, phase] = sine(60.0, &wave(60.0, &|_| 1.0));
         assert_abs_diff_eq!(a, 0.02, epsilon = 1e-6);
         assert_abs_diff_eq!(phase, 1.0, epsilon = 1e-4);
-        // At twice the frequency only the sine of the phase is seen.
+        // At a sample rate of twice the frequency, only the sine of the phase can be observed.
         let [a, phase] = sine(50.0, &wave(50.0, &|_| 0.7));
         assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
         let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));

@@ -32,7 +32,7 @@ impl Implementation {
         }
     }
 
-    /// What the effect remembers, and the initial value of the memory, in words.
+    /// The internal state of the effect and its initial value, in words.
     pub fn state(&self) -> String {
         let state = self.sketch.as_ref().and_then(Sketch::initial_state);
         state.unwrap_or_else(|| "it remembers nothing".to_owned())
@@ -50,7 +50,8 @@ impl Implementation {
     }
 }
 
-/// The effects of the built-in catalogue that a diagnosis names; `complete` adds the values that are found in the recording.
+/// The effects of the built-in catalogue that a diagnosis names; `complete` adds the values that
+/// are estimated from the recording.
 pub(crate) fn implementations(
     (diagnosis, evidence): (&Diagnosis, &Evidence),
     catalogue: &[EffectSpec],

@@ -115,7 +115,7 @@ struct Known {
 }
 
 impl Known {
-    /// Whether it is held, or called like a command.
+    /// Whether the column repeats most of its samples, or has a name like a command.
     fn is_command(&self) -> bool {
         self.is_called || self.is_held
     }
@@ -193,7 +193,8 @@ const NO_OUTPUT: &str = "
 fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     let moves = |c: &&Known| c.range[1] > c.range[0];
     let moving = || columns.iter().filter(moves);
-    // A coarse encoder holds its values, too; what is called like a command is never measured.
+    // A coarse encoder also repeats its values. A column with a name like a command is never an
+    // output.
     let output = moving().rfind(|c| !c.is_command()).or(moving().rfind(|c| !c.is_called));
     let Some(own) = output.map(|c| c.name.as_str()) else {
         return NO_OUTPUT.to_owned();
@@ -201,7 +202,7 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     let commands = moving().filter(|c| c.is_command() && c.name != own);
     let mut commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
     if commands.is_empty() {
-        // A force that was measured drives what moves.
+        // A measured force drives the output, unless the output is a force too.
         let is_force = |name: &&str| Quantity::of(name, "").is_some_and(Quantity::is_force);
         let others = moving().map(|c| c.name.as_str()).filter(|name| *name != own);
         commands = others.filter(|name| is_force(name) && !is_force(&own)).collect();
@@ -234,8 +235,9 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     }
 }
 
-/// The column at which a stage rubs, and the key that it is: the output where it is a position, an angle or a speed, else another column
-/// that was measured. `None` if commands are known and none may be a force or a torque.
+/// The column that gives the motion of the parts with friction, and its key: the output if it is a
+/// position, an angle or a speed, otherwise another measured column that is. `None` if commands are
+/// known and none of them can be a force or a torque.
 fn rubbing<'a>(
     output: &'a str,
     commands: &[&str],
@@ -253,7 +255,8 @@ fn rubbing<'a>(
     })
 }
 
-/// The noise of an output while its commands are constant, in all recordings but those that are tested on.
+/// The noise of an output while its commands are constant, in all recordings except the test
+/// recordings.
 fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<Noise> {
     let fitted = &trials[..trials.len() - tested(trials)];
     let dt_s = 1.0 / fitted.first()?.1.rate_hz()?;
@@ -271,7 +274,7 @@ fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<
     Noise::of_rests(&output, &commands, &ranges, dt_s)
 }
 
-/// Three digits.
+/// Rounds to three significant digits.
 fn rounded(x: f64) -> f64 {
     let unit = 10.0_f64.powi(x.log10().floor() as i32 - 2);
     (x / unit).round() * unit
@@ -327,11 +330,13 @@ mod tests {
             let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
             stage(columns, &[("a".into(), trial(&names))])
         };
-        // The command is in a column behind the measurement, and the encoder is so coarse that it holds its values.
+        // The command column comes after the measured column, and the encoder is so coarse that it
+        // repeats its values.
         let coarse = of(&[column("angle_deg", true), column("command_V", false)]);
         assert!(coarse.contains("output = \"angle_deg\"\n"), "{coarse}");
         assert!(coarse.contains("inputs = [\"command_V\"]"), "{coarse}");
-        // A force or torque rubs at the output where that moves, else at what else was measured.
+        // Friction acts at the output if that is a position or a speed, otherwise at another
+        // measured column.
         for (columns, line) in [
             (["torque_nm", "q_rad"], "\nposition = \"q_rad\"  #"),
             (["u", "heading"], "\nposition = \"heading\"  #"),

@@ -18,13 +18,14 @@ use crate::{
     worker::Workers,
 };
 
-/// How far a fitted range may be left before it counts, as a share of the range.
+/// Distance beyond a fitted range that is not reported yet, as a share of the range.
 const MARGIN: f64 = 0.025;
-/// Pause between recordings without a start, s: it matters for an effect that drifts.
+/// Pause that is assumed between recordings without a start, s. It matters for an effect that
+/// drifts.
 pub const PAUSE_S: f64 = 15.0;
 
-/// What a simulator predicts of new recordings, with a fix and without. Its serde form is the JSON of `stretch predict`, schema 2, without
-/// the traces.
+/// Predictions of new recordings, with a fix of the simulator and without. Its serde form is the
+/// JSON of `stretch predict`, schema 2, without the traces.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
     /// Version of this schema: 2.
@@ -37,7 +38,8 @@ pub struct Prediction {
     pub dt_s: f64,
     /// Geometric mean of the ratios of all outputs of all recordings.
     pub ratio: f64,
-    /// The largest error with the fix of any output of any recording, in multiples of the noise: `--fail-above` looks at it.
+    /// The largest error with the fix of any output of any recording, in multiples of the noise.
+    /// `--fail-above` compares it with a limit.
     pub largest_times_noise: f64,
     /// The new recordings; a recording with a long gap has several parts.
     pub trials: Vec<PredictedTrial>,
@@ -54,7 +56,8 @@ pub struct PredictedTrial {
     pub seconds: f64,
     /// Its outputs, in the order of the stages.
     pub outputs: Vec<PredictedOutput>,
-    /// Columns and rates that leave the range in which the fix was fitted, in sentences: do not trust the prediction there.
+    /// Columns and rates that leave the range in which the fix was fitted, in sentences: do not
+    /// trust the prediction there.
     pub extrapolated: Vec<String>,
 }
 
@@ -71,7 +74,7 @@ pub struct PredictedOutput {
     pub noise: f64,
     /// Root mean square error with the fix, in the unit.
     pub rmse: f64,
-    /// The same without the fix, parameters re-tuned.
+    /// Root mean square error without the fix, with parameters that were re-tuned without it.
     pub rmse_without: f64,
     /// Root mean square error with the fix in multiples of the noise.
     pub times_noise: f64,
@@ -107,11 +110,14 @@ impl Prediction {
     }
 }
 
-/// Predicts recordings with the problem's file that a fix was written as (`stretch diagnose --fix`): every stage is simulated on the measured
-/// inputs of the new recordings, once with the effects of the fix and once without any, its parameters re-tuned alone (`alone` in the file).
+/// Predicts new recordings with a problem's file that holds a fix (written by
+/// `stretch diagnose --fix`). Every stage is simulated on the measured inputs of the new
+/// recordings, once with the effects of the fix and once without any. Without effects, the
+/// parameters have the values that were re-tuned without effects (`alone` in the file).
 ///
-/// The recordings that were fitted are read as well, because the noise and the fitted ranges come from them. The new ones follow them in
-/// session time, which matters for an effect that drifts.
+/// The recordings that were fitted are read as well, because the noise and the fitted ranges come
+/// from them. The new recordings follow them in session time, which matters for an effect that
+/// drifts.
 ///
 /// # Errors
 /// Files that cannot be read, a file without a fix, unknown names, and a simulator that fails.
@@ -142,7 +148,8 @@ pub fn predict(
         trial.split = Split::Test;
         spec.trials.push(trial);
     }
-    // Recordings without a start follow one another by themselves.
+    // If the fitted recordings state no starts, `Checked` places all recordings one after the
+    // other.
     if spec.trials[..fitted].windows(2).all(|pair| pair[1].start_s > pair[0].start_s) {
         for at in fitted.max(1)..spec.trials.len() {
             let before = &spec.trials[at - 1];
@@ -207,7 +214,8 @@ fn effects_of(spec: &ProblemSpec) -> Vec<String> {
     spec.wrapped.iter().map(|w| w.name.clone()).chain(own).collect()
 }
 
-/// The problem without its fix, parameters as they were re-tuned alone, and whether the file has such parameters.
+/// The problem without its fix, with the parameter values that were re-tuned without effects, and
+/// whether the file has such values.
 fn without_fix(spec: &ProblemSpec) -> (ProblemSpec, bool) {
     let mut spec = spec.clone();
     spec.wrapped.clear();

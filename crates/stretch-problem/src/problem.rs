@@ -18,17 +18,19 @@ use crate::{
     worker::Workers,
 };
 
-/// A simulator with its recordings, with everything that [`Problem::examine`] asks. A new kind of simulator implements this trait.
+/// A simulator with its recordings that provides everything [`Problem::examine`] needs. A new kind
+/// of simulator implements this trait.
 pub trait Diagnosable: Simulator + Debug + Send {
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     fn notes(&self) -> Vec<String>;
 
-    /// Notes after the diagnosis, in sentences.
+    /// Notes that are known only after the diagnosis, in sentences.
     fn afterwards(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Families of effects that a diagnosis cannot tell apart, with what the members agree on.
+    /// Families of effects that a diagnosis cannot distinguish, with the quantity on which the
+    /// members agree.
     fn families(&self, _diagnosis: &Diagnosis) -> Vec<Agreed> {
         Vec::new()
     }
@@ -43,7 +45,8 @@ pub trait Diagnosable: Simulator + Debug + Send {
         stage.map(|stage| self.measured(stage).to_vec()).or_else(columns).or_else(signals)
     }
 
-    /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no candidate does, or the simulator predicts none.
+    /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no
+    /// candidate experiment distinguishes them, or if the simulator cannot predict experiments.
     ///
     /// # Errors
     /// The errors of the simulator.
@@ -53,7 +56,7 @@ pub trait Diagnosable: Simulator + Debug + Send {
         evidence: &Evidence,
     ) -> Result<Option<Proposal>, GapError>;
 
-    /// The effects that a diagnosis names, as code to type.
+    /// Code for the effects that a diagnosis names, for the user to copy into the simulator.
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation>;
 
     /// The fixed simulator, as a file.
@@ -80,29 +83,31 @@ impl<S: Diagnosable + 'static> From<S> for Problem {
 /// How a problem is read from a path.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Reading<'a> {
-    /// Rig file in place of that of the data.
+    /// Rig file that replaces the rig file of the data set.
     pub rig: Option<&'a Path>,
-    /// Columns of reference and signal, of a gauge alone or of a stage that is a sensor.
+    /// Names of the reference and signal columns, for a gauge alone or for a stage that is a
+    /// sensor.
     pub columns: Option<(&'a str, &'a str)>,
     /// A column that distinguishes runs ([`Problem::by_column`]), which is read in addition to those of the problem.
     pub by: Option<&'a str>,
-    /// How recordings are read, in place of what the data say.
+    /// Options for reading recordings, which replace the options that the data state.
     pub recorded: Option<&'a ReadOptions>,
     /// Whether a recording with a row that cannot be read is refused ([`ReadOptions::strict`]).
     pub strict: bool,
     /// Effects that are not looked for.
     pub without: &'a [String],
-    /// Hears in one line which program is going to run, before it runs.
+    /// Called before a program runs, with one line that names the program.
     pub announce: Option<fn(&str)>,
 }
 
 impl Problem {
-    /// Reads a problem from a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
-    /// workers of a simulator that is not built in are started if the path names the problem's file, and not if it names its folder.
+    /// Reads a problem from a path: the folder of a data set, a trial of a gauge alone (`-` is
+    /// standard input), or a problem's file. If the simulator is not built in, its workers are
+    /// started only if the path names the problem's file. A folder never runs a program.
     ///
     /// # Errors
-    /// Files that cannot be read, names that match nothing, options that mean nothing to the simulator, and a folder whose `problem.toml`
-    /// would run a program.
+    /// Files that cannot be read, names that match nothing, options that do not apply to the
+    /// simulator, and a folder whose `problem.toml` would run a program.
     pub fn read(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
         let Some(file) = ProblemSpec::at(path)? else { return Self::built_in(path, reading) };
         let Some(own) = file.simulator.as_ref().filter(|own| own.builtin.is_some()) else {
@@ -195,7 +200,7 @@ impl Problem {
         &*self.source
     }
 
-    /// The simulator with everything that is asked of a [`Diagnosable`].
+    /// The simulator as a [`Diagnosable`].
     pub(crate) fn source(&self) -> &dyn Diagnosable {
         &*self.source
     }
@@ -205,7 +210,7 @@ fn no_option(option: &str, found: &str, hint: &str) -> ProblemError {
     ProblemError::value(option, found, hint)
 }
 
-/// Name of data: that of the folder or the file.
+/// Returns the name of data: the name of the folder or file without its extension.
 pub fn name_of(path: &Path) -> String {
     if path.as_os_str() == "-" {
         return "standard input".to_owned();

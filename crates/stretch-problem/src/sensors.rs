@@ -14,10 +14,10 @@ use crate::{
     error::ProblemError,
 };
 
-/// Tolerance of offset and gain, in ranges of the signal: they are free.
+/// Tolerance of offset and gain, in ranges of the signal, so that both are practically free.
 const FREE: f64 = 3.0;
 
-/// A sensor as it should be: y = offset + gain e.
+/// A nominal sensor: y = offset + gain e.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     offset: f64,
@@ -26,11 +26,13 @@ struct Line {
     size: f64,
 }
 
-/// Several sensors that one recorder recorded together with one reference: of each y = offset + gain e, with e the reference over its range. All
-/// kinds of effects are looked for behind each, and what the recorder's clock does to all of them at once (`record.skew`,
-/// `record.clock_drift`).
+/// Builds a problem from several sensors that one recorder recorded together with one reference.
+/// The model of each is y = offset + gain e, with e the reference over its range. All kinds of
+/// effects are looked for on each output, and effects of the recorder's clock on all outputs at
+/// once (`record.skew`, `record.clock_drift`).
 ///
-/// In one signal, a shift cannot be distinguished from other causes of a loop. Several signals with the same shift have one cause.
+/// In one signal, a shift cannot be distinguished from other causes of a loop. Several signals with
+/// the same shift have one cause.
 ///
 /// # Errors
 /// Columns that are missing or dead, trials that cannot be brought onto one grid.
@@ -107,7 +109,8 @@ fn line(references: &[&[f64]], signals: &[&[f64]], (low, span): (f64, f64)) -> L
     Line { offset: y - gain * e, gain, size: (greatest - least).max(f64::MIN_POSITIVE) }
 }
 
-/// Reads several sensors from a trial or the folder of a data set; `signals` are parted by commas.
+/// Reads several sensors from a trial or the folder of a data set; `signals` are separated by
+/// commas.
 pub(crate) fn read_sensors(
     path: &Path,
     (reference, signals): (&str, &str),

@@ -1,7 +1,10 @@
-//! What the gap costs a calibration that is trained in the simulator and runs on the rig.
+//! Computes the cost of the gap for a calibration that is trained in the simulator and used on the
+//! rig.
 //!
-//! The *transfer gap* is the error on measured test trials of a calibration trained in the simulator minus that of one trained on measured
-//! trials. A user pays the transfer gap and not the chi-square: a true effect can close the gap and leave a calibration as it was.
+//! The *transfer gap* is the error on measured test trials of a calibration trained in the
+//! simulator minus that of one trained on measured trials. The transfer gap matters to a user more
+//! than the chi-square: a true effect can close the gap without any change of the calibration's
+//! error.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -23,13 +26,14 @@ struct Records {
     signal: Vec<f64>,
 }
 
-/// Errors on the measured test trials of calibrations that were trained on the measured fit trials, in the re-tuned
-/// simulator, and in the simulator with the effects; `None` where the simulator has no sensor, or the recordings do not
-/// determine a calibration.
+/// Errors on the measured test trials of calibrations that were trained on the measured fit trials,
+/// in the re-tuned simulator, and in the simulator with the effects; `None` if the simulator has no
+/// sensor, or the recordings do not determine a calibration.
 ///
-/// In the simulator only the commands are measured: each stage runs on the output of the stage before, and the simulated reference and
-/// signal get the known noise of their channels. A sensor that is the first stage sees the measured motion. Every run of a stage is added
-/// to `simulations`.
+/// In the simulator only the input of the first stage is measured: each other stage runs on the
+/// output of the stage before, and the simulated reference and signal get the known noise of their
+/// channels. If the sensor is the first stage, the reference is the measured motion. Every run of a
+/// stage is added to `simulations`.
 pub(crate) fn transfer(
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -79,8 +83,8 @@ struct Chain<'a> {
 }
 
 impl Chain<'_> {
-    /// The fitted trials as a model records them, with `first` as the output of the first stage; `None` where a stage cannot run on the
-    /// output of the stage before.
+    /// Reference and signal of the fitted trials as a model simulates them, with `first` as the
+    /// output of the first stage; `None` if a stage cannot run on the output of the stage before.
     fn records(&self, model: &Model, first: &[f64]) -> Result<Option<Records>, GapError> {
         let samples = self.evidence.roles.samples(self.evidence.roles.fit_trials);
         let mut output = first[..samples].to_vec();
@@ -96,7 +100,8 @@ impl Chain<'_> {
         Ok(Some(Records { reference, signal: self.noisy(output, self.sensor) }))
     }
 
-    /// The output of a stage on an input that was not measured; `None` where the stage cannot run on such an input.
+    /// The output of a stage on an input that was not measured; `None` if the stage cannot run on
+    /// such an input.
     fn run_on(
         &self,
         stage: usize,

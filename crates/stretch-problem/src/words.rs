@@ -1,15 +1,16 @@
-//! Effects of a diagnosis by what they are, in place of the names by which files and options call them.
+//! Describes the effects of a diagnosis in words, instead of the names used in files and options.
 
 use stretch_effects::kind_named;
 use stretch_gap::Diagnosis;
 use stretch_sim::{RigStage, effect_named};
 
-/// What an effect is, as a noun: `the gauge's hysteresis` for `gauge_hysteresis`, `backlash at the output` for `output.backlash`. A name that no
-/// catalogue has, such as an effect of one's own simulator, is returned as it is.
+/// Returns a noun phrase for an effect: `the gauge's hysteresis` for `gauge_hysteresis`,
+/// `backlash at the output` for `output.backlash`. A name that is in no catalogue, such as that of
+/// an effect in a user's simulator, is returned unchanged.
 pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
     let Some((place, kind)) = name.rsplit_once('.') else {
         let is_ours = |stage: &str| RigStage::ALL.iter().any(|own| own.name() == stage);
-        // a user's own simulator may call something else by the same name
+        // a user's simulator may use the same name for another effect
         let is_ours = diagnosis.location.stages.iter().all(|s| is_ours(&s.stage));
         let own = effect_named(name).filter(|_| is_ours);
         return own.map_or(name, |effect| effect.title).to_owned();
@@ -30,14 +31,16 @@ pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
     format!("{}{from} at {place}", kind.title)
 }
 
-/// A diagnosis whose effects are called by what they are, to be shown: what is computed with, and what is stored, keeps the names.
+/// Returns a copy of a diagnosis for display, in which effects are described in words. Computations
+/// and stored files keep the names.
 pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
     let mut out = diagnosis.clone();
     out.rename(&|name| effect_in_words(name, diagnosis));
     out
 }
 
-/// A sentence to be shown below equations: what `mean_rev`, `play` and braces mean. `None` where no equation has one of them.
+/// Returns a sentence to show below equations, which explains `mean_rev`, `play` and braces. `None`
+/// if no equation contains `mean_rev(` or `play(`.
 ///
 /// ```
 /// use stretch_problem::notation;

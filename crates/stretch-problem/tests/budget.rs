@@ -1,4 +1,5 @@
-//! A budget of runs ends in a diagnosis, or in a refusal that says which budget is the least, and never in anything else.
+//! A budget of runs ends in a diagnosis, or in a refusal that says which budget is the least, and
+//! never in anything else.
 
 use std::sync::{
     Arc,
@@ -88,7 +89,8 @@ fn within(spec: ProblemSpec, budget: Option<usize>) -> (Result<Diagnosis, GapErr
     (found, calls.load(Ordering::Relaxed))
 }
 
-/// Where noise of an input is drawn, an answer takes more runs; where an effect is there, a search spends more.
+/// Input noise raises the least number of runs, because it is drawn in further runs. An effect
+/// makes a search spend more runs.
 #[test]
 fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
     for (noise, lag, least, all) in [(0.0, 4, 4, 40), (0.05, 4, 20, 60)] {

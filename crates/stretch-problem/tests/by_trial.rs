@@ -1,4 +1,4 @@
-//! Do the runs agree: a servo with play whose runs are alike, or not.
+//! Comparison of the runs of a servo with play, which are alike or differ.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn command(run: usize) -> Vec<f64> {
     (0..SAMPLES).map(|i| wave(i as f64 * DT_S) + step(i)).collect()
 }
 
-/// Angle behind a servo of first order and a play.
+/// Angle of a servo of first order behind a play.
 fn servo([gain, tau, play]: [f64; 3], u: &[f64]) -> Vec<f64> {
     let decay = (-DT_S / tau).exp();
     let (mut angle, mut held) = (0.0, 0.0_f64);
@@ -56,7 +56,8 @@ fn parameter(name: &str, value: f64, share: f64) -> Parameter {
     Parameter { name: name.into(), unit: "1".into(), value, tolerance, ..Parameter::default() }
 }
 
-/// An examined problem; with a gear that acts as the gain does, where it is wanted.
+/// An examined problem. With `has_gear` it also has a gear, which acts like the gain, and an
+/// inertia, which does nothing.
 fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examined) {
     let mut parameters = vec![parameter("gain", 10.0, 0.1), parameter("tau", 0.1, 0.2)];
     if has_gear {
@@ -102,7 +103,7 @@ fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examine
     (problem, examined)
 }
 
-/// Every run fitted by itself, and what is named.
+/// Fits every run separately; also returns the named effects.
 fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<String>) {
     let (problem, examined) = examined(servos, seed, has_gear);
     let by_trial = problem.by_trial(&examined, &|_| (), &|| false).expect("fits");
@@ -184,7 +185,7 @@ fn what_another_absorbs_and_what_is_free_is_said() {
     );
 }
 
-/// Servos that are drawn.
+/// Number of random servos.
 const SERVOS: usize = 200;
 
 #[test]

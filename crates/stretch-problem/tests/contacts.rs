@@ -1,5 +1,6 @@
-//! Contacts that rub by position, by load or behind a play, and a motor that gets weaker: forces from recorded motions, each written from
-//! its equation, with no operator of the project.
+//! Friction of contacts by position, by load or behind a play, and a motor that gets weaker with
+//! speed. The forces are computed from recorded motions by their equations, without any operator of
+//! the project.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ const DT_S: f64 = 0.01;
 const SAMPLES: usize = 3000;
 const NOISE: f64 = 0.3;
 
-/// What is recorded at a time: position, velocity, acceleration, load.
+/// Recorded quantities at one time.
 #[derive(Clone, Copy)]
 struct Motion {
     position: f64,
@@ -37,7 +38,8 @@ fn motion(trial: usize, t: f64) -> Motion {
 /// What a contact adds to the force, sample by sample.
 type Contact = fn() -> Box<dyn FnMut(Motion) -> f64>;
 
-/// Trials of a mass whose force, from its motion, is what `contact` makes of it.
+/// Trials of a mass. The force is computed from the motion, with the friction of `contact` and
+/// limited by `limit`.
 fn recorded(contact: Contact, limit: Option<(f64, f64)>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let mut random = RandomGenerator::new(90, trial as u64);
@@ -102,7 +104,7 @@ fn diagnosed(trials: Vec<SessionTrial>) -> Diagnosis {
     diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// The effect is named, or what is named is declared to be no better than it.
+/// Whether the effect is named, or reported as an alternative to the named effects.
 fn is_told(found: &Diagnosis, name: &str) -> bool {
     let name = name.to_owned();
     println!("{name}: {:?}, tied {:?}, {}", found.named, found.tied, found.sentence);

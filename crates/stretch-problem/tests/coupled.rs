@@ -1,4 +1,4 @@
-//! Coupled stages: what acts in front of one stage acts on the outputs of others.
+//! Coupled stages: an effect in front of one stage acts on the outputs of others.
 
 use std::sync::Arc;
 
@@ -115,7 +115,7 @@ fn recorded(carried: f64, lost: Lost) -> Vec<SessionTrial> {
     (0..3).map(one).collect()
 }
 
-/// The problem, with the joints in which the hip's parameters are said to act.
+/// The problem; `of_hip` names the joints in which the hip's parameters are declared to act.
 fn problem(carried: f64, lost: Lost, of_hip: &[&str]) -> ProblemSpec {
     let stage = |name: &&str| StageEntry {
         name: (*name).into(),
@@ -173,7 +173,8 @@ fn what_the_knee_carries_of_the_hips_dead_zone_is_no_effect_of_its_own() {
     let note = "altered inputs act on outputs of other stages: hip_V of hip moves knee; these outputs are compared as well";
     assert_eq!(bench.afterwards(), [note]);
 
-    // A simulator that takes altered inputs of one stage at a time: the knee's share stays without a cause.
+    // A simulator that takes altered inputs of one stage at a time: the effect on the knee stays
+    // without a cause.
     let (left_out, bench) = diagnosed(problem(CARRIED, DEAD, &NAMES), CARRIED, false);
     assert_ne!(left_out.named, found.named, "{}", left_out.sentence);
     assert!(bench.afterwards()[0].contains("this is left out"), "{:?}", bench.afterwards());

@@ -1,4 +1,5 @@
-//! A simulator that diverges: what cannot be simulated takes out what asked for it, and nothing else.
+//! A simulator that diverges: a run that fails discards the candidate that needed it, and nothing
+//! else.
 
 use std::sync::{Arc, Mutex};
 
@@ -22,7 +23,7 @@ fn first_order(tau_s: f64, u: &[f64]) -> Vec<f64> {
     u.iter().map(step).collect()
 }
 
-/// Steps, and a response within a sample that is stamped 0.15 s early.
+/// Trials of step commands and a response within about a sample, which is recorded 0.15 s early.
 fn recorded() -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let mut random = RandomGenerator::new(5, trial as u64);
@@ -46,7 +47,7 @@ fn recorded() -> Vec<SessionTrial> {
     (0..2).map(one).collect()
 }
 
-/// Diagnoses with the time constant as it ships; with the least one that was asked for.
+/// Diagnoses with a nominal time constant; also returns the least time constant of any run.
 fn diagnosed(tau: Parameter) -> (Result<Diagnosis, GapError>, f64) {
     let problem = Checked::new(ProblemSpec {
         stages: vec![StageEntry {
@@ -105,7 +106,7 @@ fn what_diverges_ends_nothing_and_a_share_of_a_value_keeps_its_sign() {
 
 #[test]
 fn a_simulator_that_diverges_as_shipped_is_refused_with_its_values() {
-    // To infinity, and to numbers whose squares are.
+    // One diverges to infinity, the other to numbers whose squares are infinite.
     for tau in [0.01, 0.02] {
         let (told, _) = diagnosed(Parameter { value: tau, ..Parameter::default() });
         let said = told.expect_err("it diverges").to_string();
@@ -114,7 +115,8 @@ fn a_simulator_that_diverges_as_shipped_is_refused_with_its_values() {
     }
 }
 
-/// A spring whose length follows its load; what it gives in a trial is up to the simulator, which is asked with a compliance.
+/// Diagnoses a spring with play whose length follows its load. `simulate` returns the simulator's
+/// output from the compliance, the trial and the load.
 fn spring_told(
     compliance: f64,
     wrap: &[&str],
@@ -169,7 +171,7 @@ fn spring_told(
     Ok(diagnose(&bench, &Options::default(), &|_| (), &|| false)?.0)
 }
 
-/// Fits run the fitted trials alone, so that only the end would see it.
+/// Fits run only the fitted trials, so the failure appears only in the final evaluation.
 #[test]
 fn re_tuned_parameters_that_diverge_on_test_trials_end_nothing() {
     for beyond in [f64::INFINITY, f64::NAN, 1e160, -1e160] {

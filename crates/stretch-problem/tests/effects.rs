@@ -1,5 +1,5 @@
-//! Effects are written once: the simulator runs an effect, the diagnosis finds it, and candidate experiments tell it from others; so it is with
-//! a user's own effects.
+//! Every effect is defined once: the simulator runs it, the diagnosis finds it, and candidate
+//! experiments distinguish it from others. The same holds for a user's own effects.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use stretch_sim::{
     CATALOGUE, Catalogue, EffectSet, GaugeRig, GaugeSpec, Rig, RunSettings, Tolerance, TrialPlan,
 };
 
-/// A charger that swings a channel: no kind of the catalogue swings slowly by itself.
+/// A charger that adds a slow oscillation to a channel, which no kind of the catalogue does.
 static RIPPLE: Kind = Kind {
     name: "ripple",
     words: "a charger swings it",
@@ -45,7 +45,7 @@ static CHARGER: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Arbitrary trials of a rig, the last to test on.
+/// Arbitrary trials of a rig; the last one is a test trial if there are several.
 fn recorded(rig: &Rig, count: usize) -> Vec<SessionTrial> {
     let mut session = stretch_sim::Session::new(rig, &RunSettings::default()).unwrap();
     let trial = |number: usize| {
@@ -77,7 +77,7 @@ fn gauge() -> GaugeSimulator {
     .unwrap()
 }
 
-/// Models of one effect each, at the points where it is looked for.
+/// Models with one effect, one for each point at which the search for it begins.
 fn models(simulator: &dyn Simulator, effect: usize) -> Vec<Model> {
     let starts = simulator.effects()[effect].starts.iter();
     let with = |values: &Vec<f64>| Model {
@@ -87,7 +87,7 @@ fn models(simulator: &dyn Simulator, effect: usize) -> Vec<Model> {
     starts.map(with).collect()
 }
 
-/// Effects that change no candidate experiment at any point where they are looked for.
+/// Effects that change no candidate experiment at any point at which the search for them begins.
 fn unseen<L: Laboratory>(simulator: &L) -> Vec<String> {
     let candidates = simulator.experiments();
     let nominal = Model::nominal(simulator);
@@ -168,7 +168,7 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     assert_eq!(diagnosis.verdict, VerdictKind::Effect, "{}", diagnosis.sentence);
     assert_eq!(diagnosis.named, ["charger_ripple"]);
     let a = &diagnosis.candidates[0].parameters[0];
-    // The noise of 6000 samples leaves the amplitude to a hundredth.
+    // With the noise of 6000 samples, the amplitude is known to a hundredth.
     assert_relative_eq!(a.value, 0.02, epsilon = 0.0, max_relative = 0.02);
     let before = Catalogue::default().without(&["charger_ripple"]);
     assert!(before.is_err());
@@ -228,7 +228,7 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
     let (diagnosis, _) = diagnose(&black_box, &Options::default(), &|_| (), &|| false).unwrap();
     assert_eq!(diagnosis.named, ["output.ripple"], "{}", diagnosis.sentence);
     let a = diagnosis.candidates[0].parameters[0].value;
-    // The noise of 1500 samples leaves the amplitude to a thousandth.
+    // With the noise of 1500 samples, the amplitude is known to a thousandth.
     assert_relative_eq!(a, 4.0, epsilon = 0.0, max_relative = 0.005);
     let code = black_box.problem().sketch(at, &[a]).unwrap().code(Language::C, "ripple", &[]);
     assert!(code.contains("double ripple(double x, double t)"), "{code}");

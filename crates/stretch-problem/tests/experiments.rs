@@ -1,11 +1,12 @@
-//! Candidate experiments: some tell effects apart that motion alone does not.
+//! Candidate experiments: some distinguish effects that motion alone does not.
 
 use stretch_data::SessionTrial;
 use stretch_gap::{Laboratory, Model, Simulator, differences};
 use stretch_problem::{RigSession, RigSetup, RigSimulator};
 use stretch_sim::Catalogue;
 
-/// Noises by which a prediction, in steps of 10 ms, may lie off a simulation in steps of 2.5 ms.
+/// Greatest difference between a prediction in steps of 10 ms and a simulation in steps of 2.5 ms,
+/// in standard deviations of the noise.
 const SAME: f64 = 1.0;
 
 /// A rig with an arbitrary trial.
@@ -45,13 +46,14 @@ fn what_motion_cannot_part_other_experiments_do() {
     let top = bridge.volts(bridge.resistance(strain));
     let all = of(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));
     assert!(d(&all, "excitation_0.7") > 3.0 * d(&all, "arbitrary"), "{all:?}");
-    // Which of two scales bends shows only where the length is known otherwise.
+    // An independent length is needed to distinguish which of two scales is nonlinear.
     let all = of(&rig, ("pot_nonlinearity", 0.6), ("gauge_nonlinearity", -0.01));
     assert!(d(&all, "gauge_blocks") > 2.0 * d(&all, "minor_loops"), "{all:?}");
     assert!(all.iter().all(|x| x.1.is_finite()));
 }
 
-/// The trial of a candidate experiment holds all of it: the simulator that replays the trial gives what the candidate predicts.
+/// The trial of a candidate experiment describes it completely: a simulator that replays the trial
+/// gives the prediction of the candidate.
 #[test]
 fn every_experiment_is_replayed_from_its_columns() {
     let rig = rig();
@@ -61,10 +63,11 @@ fn every_experiment_is_replayed_from_its_columns() {
         let quiet = stretch_sim::RunSettings { noise: false, ..Default::default() };
         let mut session = stretch_sim::Session::new(&Default::default(), &quiet).unwrap();
         let (_, trial) = session.run(&replay).unwrap();
-        // Length and voltage in noises; there is no pressure here.
+        // Length and voltage in multiples of their noise; there is no pressure here.
         let predicted = rig.predict(&nominal, &setting).unwrap();
         for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&predicted) {
-            // A vented muscle shows the voltage of its own pressure if the candidate lets the pressure follow a separate course.
+            // If the candidate gives the pressure a separate course, the replayed vented muscle has
+            // the voltage of its own pressure.
             let noise = if column == "length_mm" { 0.05 } else { 0.002 };
             let shown = trial.channel(column).unwrap();
             let worst = shown.iter().zip(values).map(|(a, b)| (a / noise - b).abs());

@@ -1,5 +1,6 @@
-//! The one flow, by toy simulators: a line, an oscillator's command, a delay. What is named is written into the problem, after which it
-//! agrees; what is asked for in addition to the diagnosis is there for any simulator.
+//! The whole flow with small simulators: a line, a lag, a delay. The named effect is written into
+//! the problem, after which simulator and recordings agree. The results in addition to the
+//! diagnosis exist for any simulator.
 
 use std::sync::Arc;
 
@@ -17,7 +18,7 @@ fn shaft(trial: usize, t: f64) -> f64 {
     10.0 * (0.9 * t + trial as f64).sin() + 6.0 * (2.3 * t).sin()
 }
 
-/// What a toy is.
+/// A small simulator.
 type Toy = fn(gain: f64, bend: f64, x: &[f64]) -> Vec<f64>;
 
 fn line(gain: f64, bend: f64, x: &[f64]) -> Vec<f64> {
@@ -52,7 +53,7 @@ fn play(w: f64, x: &[f64]) -> Vec<f64> {
     x.chunks(SAMPLES).flat_map(one).collect()
 }
 
-/// Three trials of what a real toy shows for its shaft.
+/// Three trials in which the machine `real` responds to its shaft.
 fn recorded(real: impl Fn(&[f64]) -> Vec<f64>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let mut random = RandomGenerator::new(7, trial as u64);
@@ -68,7 +69,7 @@ fn recorded(real: impl Fn(&[f64]) -> Vec<f64>) -> Vec<SessionTrial> {
     (0..3).map(one).collect()
 }
 
-/// A trial of one sine, shown 0.12 s late: a delay and a lag give the same.
+/// A trial of one sine, recorded 0.12 s late: a delay and a lag have the same effect.
 fn one_sine() -> Vec<SessionTrial> {
     let sine = |t: f64| 5.0 * (2.0 * t).sin();
     let mut random = RandomGenerator::new(5, 0);
@@ -80,7 +81,8 @@ fn one_sine() -> Vec<SessionTrial> {
     vec![SessionTrial::new(Trial { name: "sine.csv".into(), time_s, channels })]
 }
 
-/// The toy as its owner describes it: its ratio is 3, more or less, and it has an argument that bends.
+/// The problem of the small simulator: its ratio is 3 within 5 %, and it has an effect `bend` of
+/// its own.
 fn described(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
     ProblemSpec {
         stages: vec![StageEntry {
@@ -175,7 +177,7 @@ fn what_stands_in_front_of_a_simulator_is_written_as_well() {
     assert!(agrees(&again), "{}", again.diagnosis.sentence);
 }
 
-/// Before the first command arrives a plant is where an idle command left it, which no recording shows.
+/// Before the delayed command arrives, the plant rests at an idle command that was not recorded.
 #[test]
 fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
     let late = |x: &[f64]| {
@@ -338,7 +340,7 @@ split = "test"
     assert_eq!(file.wrapped[0].parameters["w"], 0.4);
     let again = ProblemSpec::parse("p.toml", &file.to_toml()).expect("the same");
     assert_eq!(again, file, "{}", file.to_toml());
-    // Wrappers with values that are not theirs are refused.
+    // Wrappers with missing or unknown values are refused.
     let trials = recorded(|x| line(3.0, 0.0, x));
     let with = |values: &[(&str, f64)]| {
         let mut spec = described(trials.clone(), &[]);

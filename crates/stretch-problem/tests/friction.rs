@@ -1,4 +1,5 @@
-//! Friction is looked for wherever a force or a torque drives what moves, however its column is called; where that is unknown, a note says so.
+//! Friction is looked for if a force or a torque drives a motion, for any usual name of its column.
+//! If that is unknown, a note states it.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use stretch_problem::{
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 1500;
 
-/// A pendulum with a drag and a weight of 20 Nm, whose joint rubs by `dry`.
+/// A pendulum with a drag and a weight of 20 Nm, and dry friction `dry` in its joint.
 fn pendulum(drag: f64, dry: f64, torque: &[f64]) -> Vec<f64> {
     let (mut x, mut v) = (0.0_f64, 0.0_f64);
     let step = |u: &f64| {
@@ -134,7 +135,7 @@ fn a_note_says_where_friction_is_not_looked_for() {
         assert_eq!(notes.len(), usize::from(!says.is_empty()), "{columns:?}: {notes:?}");
         assert!(notes.iter().all(|note| note.contains(says)), "{notes:?}");
     }
-    // a stage that names its position is meant to rub
+    // a stage that names its position is expected to have friction
     let mut named = spec(["command_V", "angle_rad"]);
     named.stages[0].position = Some("angle_rad".into());
     let notes = Checked::new(named).expect("a problem").notes().join("; ");

@@ -14,7 +14,8 @@ const DT_S: f64 = 0.01;
 const NOISE: f64 = 2e-3;
 const NOISE_MM: f64 = 0.02;
 
-/// A course of e in 0..1 as a hand makes it: moves of 0.15 to 2 s between random levels, some followed by a rest.
+/// A time course of e in 0..1 like a motion by hand: moves of 0.15 to 2 s between random levels,
+/// some followed by a rest.
 fn course(seconds: f64, noise: &mut Noise) -> Vec<f64> {
     let samples = (seconds / DT_S) as usize;
     let (mut e, mut at) = (vec![0.0; 100], 0.0);
@@ -34,7 +35,7 @@ fn course(seconds: f64, noise: &mut Noise) -> Vec<f64> {
     e
 }
 
-/// What is wrong with the gauge, in forms of this file: a `strength` of one is large.
+/// Fault of the gauge, with equations of this file; a `strength` of one is large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     None,
@@ -78,7 +79,7 @@ impl Gauge {
         }
     }
 
-    /// Signal (0..1 without a fault), and the e that the reference shows.
+    /// Signal (0..1 without a fault), and the e that the reference measures.
     fn step(&mut self, e: f64, t: f64, session: f64) -> (f64, f64) {
         let s = self.strength;
         let last = self.last.replace(e);
@@ -137,7 +138,8 @@ impl Gauge {
     }
 }
 
-/// Trials of 60 s, the last a test trial when there are several: rod in mm, and a signal of offset 0.4 and gain -0.9.
+/// Trials of 60 s, the last a test trial if there are several: length of a rod in mm, and a signal
+/// with offset 0.4 and gain -0.9.
 fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<SessionTrial> {
     let mut noise = Noise(seed);
     let mut gauge = Gauge::new(fault, strength);
@@ -191,7 +193,8 @@ fn run(trials: &[SessionTrial], without: &[&str]) -> Diagnosis {
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// What each fault is called, and what the data may take it for besides.
+/// For each fault, the effect of the catalogue that describes it, and other effects that the data
+/// may not distinguish from it.
 const FAULTS: [(Fault, &str, &[&str]); 13] = [
     (Fault::HardSlack, "sleeve_slack", &[]),
     (Fault::DahlSlip, "sleeve_slip", &["gauge_hysteresis", "pot_backlash"]),
@@ -208,7 +211,7 @@ const FAULTS: [(Fault, &str, &[&str]); 13] = [
     (Fault::LooseReference, "pot_backlash", &["sleeve_slip", "gauge_hysteresis"]),
 ];
 
-/// Diagnoses of many cases, the machine's threads shared by them.
+/// Diagnoses many cases in parallel.
 fn all<T: Sync, R: Send>(cases: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let of = &of;
@@ -231,7 +234,7 @@ fn every_fault_is_named_or_shares_the_set_with_its_twins() {
         assert_eq!(d.verdict, VerdictKind::Effect, "{what}");
         assert!(d.named.len() == 1 && d.ambiguous.iter().any(|a| a == name), "{what}");
         assert!(d.named[0] == *name || twins.contains(&d.named[0].as_str()), "{what}");
-        // What is left is what a form that the catalogue does not have leaves.
+        // The rest of the gap comes from the different equation of the fault.
         let best = &d.candidates[0];
         assert!(best.closed > 0.9 && best.closed_ci[0] > 0.5, "{what}, {best:?}");
         let shares: f64 = d.shares.iter().map(|s| s.closes).sum();
@@ -257,10 +260,10 @@ fn what_the_catalogue_lacks_is_not_given_a_name_but_shares_are_told() {
         assert_eq!(d.verdict, VerdictKind::Unknown, "{}", d.sentence);
         assert!(d.named.is_empty() && !d.shares.is_empty());
         assert!(d.sentence.contains("Parts of it close"), "{}", d.sentence);
-        // It sits where the direction changes: rising and falling are no twin halves of a curve.
+        // The gap differs between regimes of motion (rising, falling, at rest).
         assert!(d.location.slices.iter().any(|s| s.by == "regime" && s.stands_out));
     }
-    // A removed entry whose twin is not in the catalogue either.
+    // The effect and the effect that imitates it are both removed from the catalogue.
     let d = run(&trials(Fault::Wear, 1.0, 3, 11), &["gauge_softening", "thermal_drift"]);
     assert!(!d.named.contains(&"gauge_softening".to_owned()));
     assert_ne!(d.verdict, VerdictKind::NoGap);
@@ -268,7 +271,8 @@ fn what_the_catalogue_lacks_is_not_given_a_name_but_shares_are_told() {
 
 #[test]
 fn play_in_the_reference_is_never_given_another_name() {
-    // Inside of the play the position of the gauge is unknown: more may be left than form explains.
+    // Inside of the play the position of the gauge is unknown, so that more of the gap may remain
+    // than the different equation explains.
     let found = all(&[31, 32], |&seed| run(&trials(Fault::LooseReference, 1.0, 3, seed), &[]));
     for d in found {
         assert!(
@@ -320,7 +324,7 @@ fn a_rig_file_gives_the_nominal_gauge() {
     assert_eq!(d.verdict, VerdictKind::Parameters, "{}", d.sentence);
     assert!(gain(&d).is_evidence);
     assert_abs_diff_eq!(gain(&d).fitted, -0.9, epsilon = GAIN_FOUND);
-    // One that is right is left alone.
+    // A gain that is right is not re-tuned.
     assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
     let refused = GaugeRig::from_file(&whole).unwrap_err();

@@ -10,27 +10,27 @@ use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimul
 use stretch_sim::{Catalogue, EffectSet, GaugeRig, GaugeSpec, Key, Rig, Tolerance};
 use testkit::tolerance::GAIN_FOUND;
 
-/// What is done to a record or a rig file.
+/// An error that is put into a recording or a rig file.
 #[derive(Debug, Clone, Copy)]
 enum Done {
-    /// Every value of a column, in every trial.
+    /// Every value of a column is changed, in every trial.
     Column(&'static str, fn(f64) -> f64),
-    /// A column that comes so many samples late.
+    /// A column is late by a number of samples.
     Late(&'static str, i64),
-    /// A column that holds another one, in the unit given.
+    /// A column is replaced by a function of another column.
     Holds(&'static str, &'static str, fn(f64) -> f64),
-    /// Two columns whose names are exchanged.
+    /// The names of two columns are exchanged.
     Swap(&'static str, &'static str),
-    /// A column that holds its noise only: from a sample of a trial to its end, or throughout.
+    /// A column holds only noise: from a sample of a trial to its end, or throughout.
     Dead(&'static str, Option<(usize, usize)>),
-    /// A column that repeats its value from a sample of a trial to another.
+    /// A column repeats its value from one sample of a trial to another.
     Stuck(&'static str, usize, (usize, usize)),
-    /// A parameter of the rig file, by a factor.
+    /// A parameter of the rig file is multiplied by a factor.
     Rig(Key, f64),
 }
 
-/// A case: what is done, whether there is a pressure column, and what may be reported: kinds with a name in the
-/// sentence, or a refusal with words of it.
+/// A case: the error, whether there is a pressure column, and the right answers. These are kinds of
+/// errors with a name in the sentence, or a refusal with certain words.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     name: &'static str,
@@ -38,7 +38,7 @@ struct Case {
     done: Done,
     reported: &'static [(GrossKind, &'static str)],
     refused: &'static str,
-    /// A gauge alone in the place of a rig, its gain and offset in a rig file.
+    /// Whether a gauge alone replaces the rig, with gain and offset in a rig file.
     alone: bool,
 }
 
@@ -46,9 +46,9 @@ struct Case {
 #[derive(Debug)]
 struct Answer {
     verdict: String,
-    /// Answered as it should be.
+    /// Whether the answer is right.
     is_right: bool,
-    /// Names that are not there.
+    /// Whether an effect is named that is not there.
     is_wrong: bool,
     sentence: String,
     simulations: usize,
@@ -90,7 +90,7 @@ fn cases() -> Vec<Case> {
         refused,
         alone: false,
     };
-    // A rig within its tolerances explains it: that is no error.
+    // A rig within its tolerances explains this change, so it is no error.
     let within = |name, pressure, done| Case {
         name,
         pressure,
@@ -132,13 +132,13 @@ fn cases() -> Vec<Case> {
                 &[(G::Copied, V)],
             ),
             case("voltage holds the length", p, Holds(V, L, |l| l), &[(G::Copied, V)]),
-            // Without a pressure column the muscle's own tolerances explain it.
+            // Without a pressure column, the muscle's tolerances explain this change.
             Case {
                 reported: if p { SUPPLY } else { &[] },
                 ..within("supply 5 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.05))
             },
             case("supply 30 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.3), SUPPLY),
-            // Pre-stretch, trim and gain replace one another.
+            // Pre-stretch, trim and gain can replace one another.
             within("pre-stretch half of the rig file's", p, InRig(Key::E0, 2.0)),
             case(
                 "inlet five times the rig file's",
@@ -208,7 +208,7 @@ fn column<'a>(trial: &'a mut SessionTrial, name: &str) -> Option<&'a mut Vec<f64
     trial.trial.channels.iter_mut().find(|c| c.name == name).map(|c| &mut c.values)
 }
 
-/// A trial in which one column comes late, as the recorder leaves it that starts when all columns have begun.
+/// Delays one column of a trial. The trial keeps the time for which all columns have samples.
 fn delayed(trial: &mut SessionTrial, name: &str, samples: i64) {
     let (lost, keep) = (samples.unsigned_abs() as usize, trial.trial.len());
     for channel in &mut trial.trial.channels {
@@ -219,7 +219,7 @@ fn delayed(trial: &mut SessionTrial, name: &str, samples: i64) {
     trial.trial.time_s.truncate(keep - lost);
 }
 
-/// Does it to a record.
+/// Puts an error into a recording.
 fn do_to(trials: &mut [SessionTrial], done: Done) {
     let mut noise = Noise(7);
     for (i, trial) in trials.iter_mut().enumerate() {
@@ -265,7 +265,8 @@ fn do_to(trials: &mut [SessionTrial], done: Done) {
     }
 }
 
-/// A gauge alone on a rod that is moved by hand, nothing wrong with it: two trials, the second to test on.
+/// A gauge alone without an error, on a rod that is moved by hand: two trials, of which the second
+/// is a test trial.
 fn gauge(seed: u64) -> Vec<SessionTrial> {
     let mut noise = Noise(seed);
     let trial = |i: usize| {
@@ -287,7 +288,7 @@ fn gauge(seed: u64) -> Vec<SessionTrial> {
     (0..2).map(trial).collect()
 }
 
-/// Its rig file.
+/// The rig file of the gauge alone.
 fn gauge_rig() -> GaugeRig {
     let spec = GaugeSpec { zero: 158.0, span: 24.0, offset: 1.2, gain: 1.0, pressure_scale: None };
     let (offset, gain) = (Tolerance::Absolute(0.02), Tolerance::Relative(0.01));
@@ -350,7 +351,7 @@ fn answer(case: &Case, seed: u64) -> Answer {
     }
 }
 
-/// A few of the table, quick ones.
+/// A few quick cases of the table.
 #[test]
 fn errors_are_told_as_what_they_are() {
     let few = [

@@ -1,4 +1,5 @@
-//! What no file could hold, put together in memory: refused with a reason, without a panic.
+//! Invalid data that no file could hold, built in memory, are refused with a reason and without a
+//! panic.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -31,7 +32,7 @@ fn trial_of(rows: u32) -> Trial {
     }
 }
 
-/// Every way in which a trial can be none, with what it is called.
+/// Invalid trials of all kinds, each with a description.
 fn spoilt() -> Vec<(String, Trial)> {
     let mut all = vec![("no sample".to_owned(), Trial { time_s: Vec::new(), ..trial() })];
     all.push(("nothing".to_owned(), Trial::default()));
@@ -57,7 +58,7 @@ fn spoilt() -> Vec<(String, Trial)> {
     all
 }
 
-/// Whether a call refuses; a panic is reported with the input of the call.
+/// Asserts that a call returns an error; a panic is reported with the description of the input.
 #[track_caller]
 fn refuses<T, E: std::fmt::Display>(what: &str, call: impl FnOnce() -> Result<T, E>) {
     match catch_unwind(AssertUnwindSafe(call)) {
@@ -67,7 +68,7 @@ fn refuses<T, E: std::fmt::Display>(what: &str, call: impl FnOnce() -> Result<T,
     }
 }
 
-/// The same, where both answers are right.
+/// Asserts that a call does not panic; it may succeed or fail.
 #[track_caller]
 fn survives<T>(what: &str, call: impl FnOnce() -> T) {
     assert!(catch_unwind(AssertUnwindSafe(call)).is_ok(), "{what}: it panicked");
@@ -127,7 +128,8 @@ fn trials_that_are_none_are_refused_by_calibrations() {
 /// Samples of each trial that is used, and notes.
 type Shortened = (Vec<usize>, Vec<String>);
 
-/// What shortens long trials, and the most rows that it takes.
+/// A simulator that shortens long trials: its name, the greatest number of rows that it takes, and
+/// its constructor.
 type Shortening =
     (&'static str, usize, Box<dyn Fn(&[SessionTrial]) -> Result<Shortened, ProblemError>>);
 

@@ -1,5 +1,6 @@
-//! What must not change a name: rows dropped, time shifted, units scaled, trials permuted or one less, noise of a known level; and
-//! that nothing follows what is tested on.
+//! Changes that must not change the named effects: dropped rows, shifted time, scaled units,
+//! permuted trials, a trial less, noise of a known level. Also, no simulation may depend on test
+//! samples.
 
 use crate::support::Noise;
 use crate::support::effects::effect;
@@ -10,7 +11,7 @@ use stretch_gap::{Diagnosis, Model, Options, Run, Simulator, VerdictKind, diagno
 use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams};
 
-/// A rig as it is in its file, and effects that the real one has.
+/// A case: effects that the real rig has in addition to its file.
 struct Case {
     name: &'static str,
     effects: EffectSet,
@@ -38,7 +39,8 @@ fn diagnosed(trials: &[SessionTrial], rig: Rig) -> Diagnosis {
     diagnose(&rig, &options, &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// Verdict, names and 95 % set are those of the case as it was recorded.
+/// Asserts that a change keeps the verdict and the names, and that the 95 % set still holds the
+/// true effect.
 fn holds(what: &str, change: impl Fn(&Case, &mut Vec<SessionTrial>) -> Rig) {
     for case in cases() {
         let before = diagnosed(&recorded(&case), Rig::default());
@@ -50,7 +52,7 @@ fn holds(what: &str, change: impl Fn(&Case, &mut Vec<SessionTrial>) -> Rig) {
         let what = format!("{what}, {}: {}", case.name, after.sentence);
         assert_eq!(after.named, before.named, "{what}");
         assert_eq!(after.verdict, before.verdict, "{what}");
-        // A set may lose or win what it held for little; it still holds the truth.
+        // A set may lose or gain improbable effects; it still holds the true effect.
         assert!(expected.iter().all(|name| after.ambiguous.iter().any(|a| a == name)), "{what}");
         assert_eq!(after.verdict == VerdictKind::Parameters, case.name == "none", "{what}");
     }
@@ -84,7 +86,7 @@ fn rows_lost_while_valves_switch() {
         for one in trials.iter_mut() {
             let inlet = &one.trial.channels[0].values;
             let switches = (1..inlet.len()).filter(|&i| inlet[i] != inlet[i - 1]);
-            // One in each trial, the sixth.
+            // The sixth switch of each trial.
             let lost: Vec<usize> = switches.skip(5).take(1).collect();
             let mut row = 0..;
             one.trial.time_s.retain(|_| row.next().is_none_or(|i| !lost.contains(&i)));
@@ -130,7 +132,8 @@ fn time_shifted() {
     });
 }
 
-/// Twice the gain of the amplifier: volts and the rig file's numbers in volts alike.
+/// An amplifier of twice the gain: the voltages and the rig file's values for them are doubled
+/// together.
 #[test]
 #[ignore = "whole diagnoses of three rigs; ./ci.sh runs it"]
 fn units_scaled_together() {
@@ -148,7 +151,7 @@ fn units_scaled_together() {
 #[ignore = "whole diagnoses of three rigs; ./ci.sh runs it"]
 fn trials_permuted_within_their_split() {
     holds("fitted trials in another order", |_, trials| {
-        // Contents change places, the times at which they were recorded stay.
+        // The contents of trials change places; the start times stay.
         let starts: Vec<f64> = trials.iter().map(|t| t.start_s).collect();
         trials.swap(1, 2);
         trials.iter_mut().zip(starts).for_each(|(t, start_s)| t.start_s = start_s);
@@ -165,7 +168,7 @@ fn a_trial_less() {
     });
 }
 
-/// Noise of the size of the channel's own, and the rig file says so.
+/// Adds noise as large as the channel's own, which the rig file states.
 #[test]
 #[ignore = "whole diagnoses of three rigs; ./ci.sh runs it"]
 fn noise_added_to_a_known_level() {
@@ -187,8 +190,8 @@ fn noise_added_to_a_known_level() {
     });
 }
 
-/// A model with a hum simulates the same whatever was measured in the samples that are tested on: those of test trials, or the last
-/// quarter of each trial where there is none.
+/// The simulation of a model with a hum does not depend on the measured test samples: those of test
+/// trials, or the last quarter of each trial if there is no test trial.
 #[test]
 fn nothing_follows_what_is_tested_on() {
     let all = session(&own_rig(), &effect("mains_hum", &[("a", 0.02)]), true, 5);
@@ -233,7 +236,7 @@ fn nothing_follows_what_is_tested_on() {
     }
 }
 
-/// A record that is too slow to show the mains does not name them, and says so.
+/// In a recording that is too slow to show the mains, hum is not looked for, and a note states it.
 #[test]
 fn what_a_rate_cannot_show_is_not_looked_for() {
     let mut trials = session(&RigParams::default(), &EffectSet::new(), true, 6);
@@ -251,8 +254,9 @@ fn what_a_rate_cannot_show_is_not_looked_for() {
     assert_eq!(rig.description().dt_s, 2.0 * DT_S);
 }
 
-/// Slack and a saturated amplifier bend the same end of the voltage; at 0.7 of the excitation only one of them moves with it. The trial
-/// is read at its excitation: a rig without either has no gap there.
+/// Slack and a saturated amplifier bend the same end of the voltage, but only one of them moves
+/// with the excitation. A trial at 0.7 of the excitation is simulated at that excitation, so that a
+/// rig without either effect has no gap.
 #[test]
 fn a_trial_at_another_excitation_is_no_gap() {
     let mut low = own_rig();
@@ -264,18 +268,20 @@ fn a_trial_at_another_excitation_is_no_gap() {
     trials[2] = dimmed;
     let diagnosis = diagnosed(&trials, Rig::default());
     assert_eq!(diagnosis.verdict, VerdictKind::Parameters, "{}", diagnosis.sentence);
-    // Without the column the same records are a gap.
+    // Without the column, the same recordings show a gap.
     trials[2].trial.channels.pop();
     let blind = diagnosed(&trials, Rig::default());
     assert!(blind.gap.retuned > 1.0, "{}", blind.sentence);
 }
 
-/// Gaps that leave less than half of the rows carry no name, and the answer says on how many rows it is based.
+/// If gaps leave less than half of the rows, no effect is named, and the answer states the share of
+/// the rows on which it is based.
 #[test]
 fn few_rows_carry_no_name() {
     let mut trials = session(&own_rig(), &effect("amplifier_lowpass", &[("tau", 0.08)]), true, 9);
     for one in &mut trials {
-        // Four seconds in one piece, then pieces of half a second, too short, with gaps of 0.6 s: shorter ones may be bridged.
+        // Four seconds in one piece, then pieces of half a second, which are too short, with gaps
+        // of 0.6 s, because shorter gaps may be bridged.
         let keep = |i: usize| !(380..).contains(&i) || i % 110 < 50;
         let decimate = |values: &mut Vec<f64>| {
             *values =

@@ -12,7 +12,8 @@ use stretch_problem::{
 const JOINTS: usize = 6;
 const DT_S: f64 = 0.02;
 const SAMPLES: usize = 1500;
-/// Parameters of each joint, and of all joints together: their shipped values.
+/// Parameters of each joint (`OWN`) and of all joints together (`SHARED`), with their shipped
+/// values.
 const OWN: [(&str, f64); 9] = [
     ("gain", 8.0),
     ("tau", 0.12),
@@ -46,7 +47,8 @@ fn command(trial: usize, joint: usize) -> Vec<f64> {
     (0..SAMPLES).map(one).collect()
 }
 
-/// Angles of all joints over one trial, joint by joint; an angle carries a share of the joint before.
+/// Angles of all joints over one trial, joint by joint; an angle contains a share of the angle of
+/// the joint before.
 fn arm(p: &[f64], commands: &[&[f64]]) -> Vec<Vec<f64>> {
     let shared = &p[JOINTS * OWN.len()..];
     let mut out = vec![Vec::new(); JOINTS];
@@ -103,7 +105,8 @@ impl Source for Arm {
     }
 }
 
-/// Recordings of an arm whose second joint has play behind it, and whose fifth passes over small commands.
+/// Recordings of an arm whose second joint has play at its output, and whose fifth joint ignores
+/// small commands.
 fn recorded(truth: &[f64]) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let mut random = RandomGenerator::new(3, trial as u64);
@@ -144,7 +147,8 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     };
     for joint in 0..JOINTS {
         for (name, value) in OWN {
-            // What moves a joint moves the next one, which carries a share of it; what only shows there does not.
+            // A parameter that moves a joint also moves the next one, which contains a share of its
+            // angle. A parameter that only changes the measured angle does not.
             let is_carried = !["offset", "bend", "carry"].contains(&name);
             let last = (joint + usize::from(is_carried)).min(JOINTS - 1);
             let stages = (joint..=last).map(|j| format!("joint{j}")).collect();

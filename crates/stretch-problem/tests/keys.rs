@@ -1,4 +1,5 @@
-//! Keys of a problem's file that recordings at slow rates and with times in other units ask for.
+//! Keys of a problem's file: those for slow recordings and for times in other units, the schema,
+//! errors, and writing and reading of any problem.
 
 use std::{fmt::Write, num::NonZeroUsize};
 
@@ -14,7 +15,8 @@ use stretch_problem::{
 };
 use stretch_recording::TimeUnit;
 
-/// A file whose times count milliseconds without saying so, two samples a second, fifteen seconds a trial.
+/// A problem's file with two trials of fifteen seconds at two samples a second. Times are in
+/// milliseconds, which the name of their column does not state.
 fn file(unit: &str) -> (tempfile::TempDir, Result<ProblemSpec, String>) {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["a.csv", "b.csv"] {
@@ -289,7 +291,7 @@ fn comments_stand_behind_values_and_above_effects() {
     }
 }
 
-/// Names that would end a line, a text or a comment of a file, or hide what is in it.
+/// Names that would end a line, a text or a comment of a file, or hide its contents.
 const HOSTILE: [&str; 9] = [
     "deg\nbudget = 1",
     "deg\u{7}\u{0}",

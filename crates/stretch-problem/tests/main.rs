@@ -1,4 +1,5 @@
-//! The tests of stretch-problem from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-problem, in one program because linking takes longer than most
+//! of them.
 
 mod budget;
 mod by_trial;

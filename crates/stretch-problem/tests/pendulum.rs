@@ -1,4 +1,5 @@
-//! A pendulum that goes over the top, as a user's own simulator: its re-tuning has several ends.
+//! A pendulum that goes over the top, as a user's own simulator: its re-tuning has several local
+//! minima.
 
 use std::sync::Arc;
 
@@ -89,8 +90,8 @@ fn problem(truth: [f64; 3]) -> BlackBox {
     BlackBox::new(problem, Arc::new(source))
 }
 
-/// True parameters within the tolerances and the same equation: nothing is missing, whatever a wrapper seems to close where turns are
-/// miscounted.
+/// The true parameters are within the tolerances and the equation is the same, so nothing is
+/// missing. A wrapper may only seem to close the gap of a fit with a wrong number of turns.
 #[test]
 fn a_pendulum_that_turns_over_lacks_no_wrapper() {
     for truth in [[1.65, 0.975, 0.11], [1.58, 1.03, 0.08], [1.42, 0.95, 0.12]] {
@@ -102,7 +103,7 @@ fn a_pendulum_that_turns_over_lacks_no_wrapper() {
         for (p, truth) in told.parameters.iter().zip(truth) {
             approx::assert_relative_eq!(p.fitted, truth, max_relative = 0.01);
         }
-        // As many as a diagnosis with one effect takes.
+        // A diagnosis with one effect takes as many runs.
         assert!(bench.model_runs() < 300, "{}", bench.model_runs());
     }
 }

@@ -1,4 +1,4 @@
-//! A fix predicts recordings that were not fitted, and says where they leave the fitted ranges.
+//! A fix predicts recordings that were not fitted, and reports where they leave the fitted ranges.
 
 use std::sync::Arc;
 
@@ -12,7 +12,8 @@ use stretch_problem::{
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 2000;
 
-/// A shaft turned by hand, as far and as quickly as these say, and the gear behind it with a play of 0.4 and a ratio of 3.05.
+/// A shaft that is turned by hand with the amplitude `far` and the relative speed `quick`, and the
+/// gear behind it with a play of 0.4 and a ratio of 3.05.
 fn recorded(number: u64, far: f64, quick: f64) -> SessionTrial {
     let mut random = RandomGenerator::new(8, number);
     let phase = number as f64;
@@ -56,7 +57,7 @@ fn predicted(new: &[(f64, f64)], play: f64) -> Prediction {
         trials,
         ..ProblemSpec::default()
     };
-    // What drives the gear is measured: the closure is handed the recorded shaft.
+    // The measured shaft drives the gear, so the closure holds the recorded shaft.
     let shafts: Vec<f64> =
         spec.trials.iter().flat_map(|t| t.trial.channels[1].values.iter().copied()).collect();
     let gear = closure(move |ask: &Ask<'_>| {

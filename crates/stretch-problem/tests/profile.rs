@@ -1,4 +1,5 @@
-//! A servo whose firmware makes a trapezoid of each command: the limits are found at their values, the gains stay as shipped.
+//! A servo whose firmware follows each command by a trapezoidal profile. The limits are found at
+//! their values, and the gains stay as shipped.
 
 use std::sync::Arc;
 
@@ -28,7 +29,7 @@ fn servo([kp, kd]: [f64; 2], command: &[f64]) -> Vec<f64> {
     command.iter().map(step).collect()
 }
 
-/// The machine: a profile of so great an acceleration and rate in front of the servo.
+/// The machine: a profile with limits of acceleration and rate in front of the servo.
 fn machine([kp, kd]: [f64; 2], [a, rate]: [f64; 2], command: &[f64]) -> Vec<f64> {
     let (mut x, mut v, mut p, mut w) = (0.0, 0.0, 0.0, 0.0_f64);
     let h = DT_S / STEPS as f64;
@@ -118,7 +119,7 @@ fn the_limits_of_a_profile_are_found_beside_gains_of_any_tolerance() {
             assert!((value.value / truth - 1.0).abs() < 0.05, "{truth} {case}");
         }
         assert!(told.parameters.iter().all(|p| p.sigmas.abs() < 0.5), "{case}");
-        // The machine's profile goes on within a sample.
+        // A small gap is left, because the machine's profile changes within a sample.
         assert!(told.gap.left < 3.0, "{} {case}", told.gap.left);
     }
 }

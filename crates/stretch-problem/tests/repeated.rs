@@ -1,4 +1,4 @@
-//! A simulator that does not answer what it is asked is found out before it is believed.
+//! A simulator whose answers are not repeatable or ignore its parameters is detected.
 
 use std::sync::{
     Arc,
@@ -14,7 +14,8 @@ use stretch_problem::{
 /// Rows of a trial.
 const ROWS: usize = 3000;
 
-/// A spring in so many trials; its simulator has the compliance, the forces of the run, and the number of the run.
+/// A spring in a number of trials. Its simulator receives the compliance, the forces of the run,
+/// and the number of the run.
 fn springs(
     trials: usize,
     simulator: impl Fn(f64, &[f64], u64) -> Vec<f64> + Send + Sync + 'static,
@@ -57,12 +58,12 @@ fn springs(
     BlackBox::new(problem.expect("a problem"), Arc::new(source))
 }
 
-/// The spring as it is.
+/// The correct spring.
 fn sound(compliance: f64, force: &[f64]) -> Vec<f64> {
     force.iter().map(|f| compliance * f).collect()
 }
 
-/// Noise without a seed, from a row on.
+/// The spring with noise that differs from run to run, from row 1234 on.
 fn noisy(compliance: f64, force: &[f64], run: u64) -> Vec<f64> {
     let mut random = RandomGenerator::new(run, 1);
     let mut out = sound(compliance, force);
@@ -70,7 +71,8 @@ fn noisy(compliance: f64, force: &[f64], run: u64) -> Vec<f64> {
     out
 }
 
-/// A simulator that may not answer what it is asked: so many trials, the simulator, whether it is refused, and what is said of it.
+/// A doubtful simulator: the number of trials, the simulator, whether it is refused, and parts of
+/// the message.
 type Doubtful = (usize, fn(f64, &[f64], u64) -> Vec<f64>, bool, &'static [&'static str]);
 
 const REFUSED: [&str; 2] = [
@@ -108,7 +110,7 @@ const DOUBTFUL: [Doubtful; 7] = [
             "ignores the parameters of spring: its output is the same to the bit whatever compliance is",
         ],
     ),
-    // a sum in another order is no other answer
+    // a difference by rounding, as from a sum in another order, is accepted
     (1, |compliance, force, run| sound(compliance * (1.0 + 1e-15 * run as f64), force), false, &[]),
     (2, |compliance, force, _| sound(compliance, force), false, &[]),
 ];

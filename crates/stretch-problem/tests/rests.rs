@@ -1,4 +1,4 @@
-//! Noise of a black box is what its recordings hold while nothing is commanded.
+//! The noise of a black box is estimated from its recordings while its commands are constant.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! Small sessions simulated by the catalogue's own rig, diagnosed from end to end.
+//! Small sessions simulated by the built-in rig, diagnosed from end to end.
 
 use crate::support::effects::effect;
 use crate::support::rigs::own_rig;
@@ -23,7 +23,7 @@ fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagno
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// A diagnosis with everything that comes of asking for it.
+/// An examination with baselines.
 fn examined(trials: Vec<SessionTrial>) -> Diagnosis {
     let catalogue = Catalogue::default();
     let rig = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
@@ -101,7 +101,7 @@ fn turned_numbers_answer_as_the_simulator_does() {
     let stage = responses.stage;
     assert_eq!(diagnosis.location.worst(), Some(stage));
     assert_eq!(responses.parameters[0].effect, diagnosis.named[0]);
-    // what is left at the fit is what the tables say
+    // the residual at the fit agrees with the excess of the stage
     let own = &evidence.stages[stage];
     assert_relative_eq!(responses.products[0][0], 1.0 + own.excess_after, max_relative = TURNED);
     for (turned, one) in responses.parameters.iter().enumerate() {
@@ -119,7 +119,7 @@ fn turned_numbers_answer_as_the_simulator_does() {
                 .zip(predicted)
                 .all(|(y, predicted)| (y - predicted).abs() <= TURNED * y.abs())
         );
-        // the fit is the best there is on trials of the same rig
+        // a changed value fits worse, because all trials are of the same rig
         let k = 1 + responses.parameters[..turned].iter().map(|p| p.answers.len()).sum::<usize>();
         let products = &responses.products;
         let left = products[0][0] - 2.0 * products[0][k] + products[k][k];
@@ -137,7 +137,8 @@ fn a_calibration_trained_with_the_effect_is_as_good_as_one_trained_on_the_rig() 
         assert_eq!(diagnosis.named, ["gauge_relaxation"], "{}", diagnosis.sentence);
         let transfer = diagnosis.transfer.expect("a gauge has a calibration");
         let poly13 = transfer.poly13;
-        // Without the effect the rate says nothing in the simulator; with it the two trainings differ by their noise.
+        // Without the effect, the simulated signal does not depend on the rate. With it, the two
+        // trained calibrations differ only by noise.
         assert!(poly13.sim > 1.5 * poly13.real, "{poly13:?}");
         let (with, real) = (poly13.sim_with_effect, poly13.real);
         assert_abs_diff_eq!(with, real, epsilon = TRAINED_AGAIN * real);
@@ -264,7 +265,7 @@ fn what_becomes_of_lost_rows_is_told() {
     let samples = |s: &RigSession| s.trials().iter().map(|t| t.bridge_v().len()).sum::<usize>();
     let all = samples(&RigSession::new(&trials).expect("a session"));
     let read = RigSession::new(&with_lost_rows(&trials, 0.01, 5)).expect("a session");
-    // A row lost at the very end of a trial leaves nothing to bridge to.
+    // A row that is lost at the very end of a trial cannot be bridged.
     assert!(samples(&read) + 4 >= all, "{} of {all}", samples(&read));
     assert!(read.notes().iter().any(|n| n.starts_with("rows: ")), "{:?}", read.notes());
 }
@@ -289,7 +290,8 @@ fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
         let rig = with_effect(entry);
         let pressure = seed % 2 == 0;
         let trials = session(&own_rig(), &rig.effects, pressure, 11 + seed as u64);
-        // The first trial winds the loops: a rig that is measured has moved before.
+        // The first trial, which starts without any motion before it, is left out, because a
+        // measured rig has moved before.
         let session = RigSession::new(&trials[1..]).expect("a session");
         let simulator =
             RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })
@@ -311,7 +313,8 @@ fn a_parameter_without_tolerance_stays_put() {
         .expect("a simulator");
     let tuned: Vec<&str> =
         simulator.description().parameters.iter().map(|p| p.name.as_str()).collect();
-    // What the file leaves out keeps its stock tolerance, what the file frees is free in its stage.
+    // A parameter that the file omits keeps its stock tolerance. A parameter to which the file
+    // gives a tolerance is free in its stage.
     assert!(!tuned.contains(&"tau_m") && tuned.contains(&"k_max"), "{tuned:?}");
     let at = tuned.iter().position(|name| *name == "L0").expect("L0 is free");
     assert!(simulator.description().stages[1].parameters.contains(&at));

@@ -1,4 +1,4 @@
-//! All sensors of a recorder in one problem: what they share is the recorder's.
+//! All sensors of a recorder in one problem: a shift that they share comes from the recorder.
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, RandomGenerator};
@@ -8,12 +8,14 @@ const DT_S: f64 = 0.01;
 const SAMPLES: usize = 2500;
 const SIGNALS: [&str; 3] = ["s1", "s2", "s3"];
 
-/// Trials in which all signals show the angle of some time earlier, later and later where the clock drifts; the second one slips.
+/// Trials in which all signals are late by `late_s`, and increasingly so if the clock drifts. The
+/// second signal has a play of `slip_deg`.
 fn recorded(late_s: f64, drift: f64, slip_deg: f64) -> Vec<SessionTrial> {
     moved(late_s, drift, slip_deg, 0.0)
 }
 
-/// Those trials, with a movement of so many degrees below the sensors, which drifts within seconds and which nothing recorded.
+/// The same trials with a movement below the sensors that was not recorded. It drifts within
+/// seconds, with a standard deviation of `below_deg`.
 fn moved(late_s: f64, drift: f64, slip_deg: f64, below_deg: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let angle = |t: f64| {
@@ -47,7 +49,7 @@ fn moved(late_s: f64, drift: f64, slip_deg: f64, below_deg: f64) -> Vec<SessionT
     (0..3).map(one).collect()
 }
 
-/// An Ornstein-Uhlenbeck process of a standard deviation and 3 s.
+/// An Ornstein-Uhlenbeck process with a standard deviation of `sd` and a correlation time of 3 s.
 fn wandering(trial: usize, sd: f64) -> Vec<f64> {
     let mut random = RandomGenerator::new(32, trial as u64);
     let (kept, mut z) = ((-DT_S / 3.0).exp(), random.gauss());
@@ -92,8 +94,8 @@ fn sensors_that_do_as_they_should_lack_nothing() {
     assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
 }
 
-/// Each of three sensors could be explained by the others, round a circle: what they share is an error, not crosstalk, and what the recorder did
-/// to all of them is still its own.
+/// Each of three sensors could be explained by crosstalk from the others, in a circle. An error
+/// that they share is not named as crosstalk, and a shift by the recorder is still found.
 #[test]
 fn an_error_that_all_sensors_share_is_no_crosstalk() {
     for late_s in [0.0, 0.08] {

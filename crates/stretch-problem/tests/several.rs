@@ -1,4 +1,5 @@
-//! Several signals of one recorder: what is late in all of them is its clock, what is late in one is that one's own.
+//! Several signals of one recorder: a delay of all signals comes from the recorder's clock, a delay
+//! of one signal from that signal.
 
 use std::sync::Arc;
 
@@ -17,12 +18,12 @@ fn motion(trial: usize, t: f64) -> f64 {
     waves.iter().map(|(w, a)| a * (w * t + 1.3 * trial as f64 * w).sin()).sum()
 }
 
-/// What each signal makes of the motion.
+/// Each signal as a function of the motion.
 fn signal(which: usize, x: f64) -> f64 {
     [2.0 * x, 1.0 + x + 0.2 * x * x, x.powi(3) - x][which]
 }
 
-/// Trials in which each signal is late by its own time, and the last one slow.
+/// Trials in which each signal has its own delay, and the last one a lag of `tau_s`.
 fn recorded(late_s: [f64; 3], tau_s: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let t = |i: usize| i as f64 * DT_S;

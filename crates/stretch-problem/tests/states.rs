@@ -1,4 +1,4 @@
-//! A state that spills: named by its value, because the simulator lets its states be held.
+//! A state that spills is named with its level, because the simulator can limit its states.
 
 use std::{path::Path, sync::Arc};
 
@@ -12,7 +12,7 @@ use stretch_problem::{
 const DT_S: f64 = 0.5;
 const SAMPLES: usize = 800;
 
-/// Levels of two tanks, of which the upper one spills; the lower one's is measured.
+/// Level of the lower of two tanks, which is measured; the upper tank spills.
 fn tanks([inflow, drain, spill]: [f64; 3], pump: &[f64]) -> Vec<f64> {
     let (mut upper, mut lower) = (2.0_f64, 2.0_f64);
     let one = |u: &f64| {
@@ -77,7 +77,8 @@ fn states(greatest: f64) -> Vec<State> {
     vec![state("upper"), state("lower")]
 }
 
-/// Diagnoses with the tanks of this file as the simulator, whose levels are said to reach a greatest one.
+/// Diagnoses with the tanks of this file as the simulator; `greatest` is the greatest level that it
+/// declares.
 fn diagnosed(spill: f64, greatest: f64) -> Diagnosis {
     let spec = problem(spill, &WRAP).with_states(&states(greatest)).expect("states");
     let problem = Checked::new(spec).expect("a problem");
@@ -124,7 +125,8 @@ fn an_overflow_is_named_with_its_level() {
     is_overflow(&diagnosed(5.0, 12.0), 5.0);
 }
 
-/// A range that goes far beyond what the level reaches: of its starts, at 28.5, 24, 12 and 3 cm, three change nothing, and the last one does far too much.
+/// The declared range goes far beyond the levels that are reached. Of the starts of the search, at
+/// 28.5, 24, 12 and 3 cm, three have no effect, and the last one has far too much.
 #[test]
 fn an_overflow_is_named_where_most_of_its_range_does_nothing() {
     for spill in [5.0, 6.0, 7.0] {

@@ -22,12 +22,12 @@ fn servo(lag_s: f64, mut x: f64, command: &[f64]) -> Vec<f64> {
     command.iter().map(step).collect()
 }
 
-/// What the firmware of the machine makes of a command that was `before`.
+/// Operator of the machine's firmware in front of the servo.
 #[derive(Debug, Clone, Copy)]
 enum Front {
     /// Rate of 2 units/s.
     Limit,
-    /// 0.1 s.
+    /// Delay of 0.1 s.
     Delay,
 }
 
@@ -49,7 +49,7 @@ fn fronted(front: Front, before: f64, command: &[f64]) -> Vec<f64> {
     command.iter().enumerate().map(after).collect()
 }
 
-/// The diagnosis of step tests from a level, with so many samples of rest in front of each.
+/// Diagnoses step tests from a level, each with `rest` samples of rest before the step.
 fn told(front: Front, level: f64, rest: usize) -> (Diagnosis, Vec<String>) {
     let samples = rest + 90;
     let mut random = RandomGenerator::new(5, 0);

@@ -1,4 +1,4 @@
-//! A simulator in other units than the record is reported as such.
+//! A simulator with other units than the recording is reported as such.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use stretch_problem::{
     Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
 };
 
-/// A first-order lag whose record is in `unit`, with 1 % of noise; the simulator answers `ratio` times as much, and its parameters have these
-/// tolerances.
+/// Diagnoses a first-order lag that is recorded in `unit`, with 1 % of noise. The simulator's
+/// output is `ratio` times as large, and its parameters have these tolerances.
 fn told(unit: &str, ratio: f64, tolerances: [f64; 2]) -> Diagnosis {
     const DT_S: f64 = 0.01;
     let lag = |gain: f64, tau: f64, u: &[f64]| -> Vec<f64> {
@@ -21,7 +21,7 @@ fn told(unit: &str, ratio: f64, tolerances: [f64; 2]) -> Diagnosis {
         };
         u.iter().map(&mut next).collect()
     };
-    // Parameters that may not move are right.
+    // Parameters without a tolerance have their true values.
     let true_value = |nominal: f64, other, tolerance| if tolerance > 0.0 { other } else { nominal };
     let (true_gain, true_tau) =
         (true_value(0.5, 0.51, tolerances[0]), true_value(0.1, 0.11, tolerances[1]));
@@ -84,7 +84,8 @@ fn other_units_are_told_by_their_names() {
     }
 }
 
-/// Where no parameter may move a factor is no more the sensor's than the simulator's.
+/// If no parameter may change, a factor cannot be attributed to the sensor rather than the
+/// simulator.
 #[test]
 fn a_factor_beside_parameters_without_tolerance_is_told_as_a_factor() {
     for (ratio, says) in [(0.8, "0.8"), (1.25, "1.25")] {

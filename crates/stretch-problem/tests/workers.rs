@@ -103,7 +103,7 @@ fn with_numpy_a_worker_in_c_and_one_in_python_diagnose_to_the_same_bits() {
     assert_eq!(in_c(), diagnosed(&["python3", "servo.py"], 2));
 }
 
-/// The servo of the examples, built by the compiler that Rust links with.
+/// Diagnosis with the servo of the examples in C, built by the compiler `cc`.
 fn in_c() -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let servo = folder.path().join("servo");
@@ -167,7 +167,7 @@ fn with_numpy_altered_columns_of_several_stages_reach_a_simulator_in_python() {
     assert!(alone[400..].iter().zip(b).all(|(y, b)| *y == 5.0 - b));
 }
 
-/// What a worker that is a few lines of Python answers to one ask.
+/// The answer to one ask of a worker that is a few lines of Python.
 fn answer(script: &str, jobs: usize) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
     const HEAD: &str = r#"
 import json, struct, sys, os, time

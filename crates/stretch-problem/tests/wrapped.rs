@@ -1,4 +1,5 @@
-//! Angles that wrap, in the record, in the command and in the simulator's answer, are compared as if they did not.
+//! Angles that wrap in the recording, in the command or in the simulator's answer are compared as
+//! if they did not.
 
 use std::sync::Arc;
 
@@ -42,7 +43,8 @@ fn wrapped(x: f64, low: f64) -> f64 {
     (x - low).rem_euclid(360.0) + low
 }
 
-/// The diagnosis of a table whose angle wraps from `low` on, called `output` and `scale` degrees.
+/// Diagnoses a turntable whose angle wraps to the range from `low` to `low` + 360 degrees. The
+/// column `output` holds `scale` times the angle in degrees.
 fn told(output: &str, scale: f64, low: f64, wraps: [bool; 2]) -> (Diagnosis, Vec<String>) {
     let mut random = RandomGenerator::new(11, 0);
     let [command_wraps, simulator_wraps] = wraps;

@@ -1,9 +1,10 @@
-//! Effects of a model: effects that stages run, and effects whose values are found in the recording.
+//! Divides the effects of a model into effects that stages simulate and effects whose values are
+//! estimated from the recording.
 
 use stretch_gap::{Line, Model, SampleRoles, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Find, Measured, SimError};
 
-/// The measured samples of a channel that are not tested on, in which effects may be found.
+/// The measured samples of a channel outside the test samples, from which effects may be estimated.
 #[derive(Debug, Clone)]
 pub(crate) struct FitRecord {
     /// By trial, from its start; empty for a test trial.
@@ -36,13 +37,14 @@ impl FitRecord {
 
 /// The effects of a model.
 pub(crate) struct Acting<'a> {
-    /// Effects that the stages run.
+    /// Effects that the stages simulate.
     pub(crate) inside: EffectSet,
-    /// Effects whose values are found in the recording.
+    /// Effects whose values are estimated from the recording.
     found: Vec<(Find, &'a [f64])>,
 }
 
-/// Effects that a simulator already has, then the effects of a model, with their values; `rows` are the entries of the model's catalogue.
+/// Effects that a simulator already has, then the effects of a model, with their values; `rows` are
+/// the entries of the model's catalogue.
 fn all<'a>(
     base: &'a EffectSet,
     rows: &'a [&'static Effect],
@@ -52,7 +54,8 @@ fn all<'a>(
     own.chain(model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice())))
 }
 
-/// Spectral lines, in units of the output, that the effects of a simulator and of a model leave in samples that are tested on.
+/// Spectral lines, in units of the output, that the effects of a simulator and of a model leave in
+/// the test samples.
 pub(crate) fn lines(
     base: &EffectSet,
     rows: &[&'static Effect],
@@ -66,8 +69,8 @@ pub(crate) fn lines(
 }
 
 impl<'a> Acting<'a> {
-    /// Sorts the effects of a model and the effects that the simulator already has. A rig file's effect is found in the recording as well, where
-    /// its kind is.
+    /// Divides the effects of a model, and the effects that the simulator already has, into these
+    /// two groups. An effect of a rig file is also estimated from the recording if its kind is.
     pub(crate) fn of(
         base: &'a EffectSet,
         rows: &'a [&'static Effect],
@@ -83,7 +86,8 @@ impl<'a> Acting<'a> {
         Ok(acting)
     }
 
-    /// Lets effects that are found in the recording act on the samples of a simulated trial that are not tested on.
+    /// Applies the effects that are estimated from the recording to the samples of a simulated
+    /// trial outside the test samples.
     pub(crate) fn follow(&self, record: Measured<'_>, simulated: &mut [f64]) {
         let fit = &mut simulated[..record.samples.len()];
         for (find, values) in &self.found {
@@ -92,7 +96,8 @@ impl<'a> Acting<'a> {
     }
 }
 
-/// The effects of a model without a recording: typical values replace those that would be found in a recording.
+/// The effects of a model without a recording: typical values replace those that would be estimated
+/// from a recording.
 pub(crate) fn unrecorded(
     base: &EffectSet,
     rows: &[&'static Effect],

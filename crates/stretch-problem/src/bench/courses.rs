@@ -1,4 +1,5 @@
-//! Courses of a signal in shares of its range, for candidate experiments on a gauge and on any input of a simulator.
+//! Time courses of a signal in shares of its range, for candidate experiments on a gauge and on any
+//! input of a simulator.
 
 /// Points of a course: share of the range, and time from the point before, s.
 pub(crate) type Points = Vec<(f64, f64)>;

@@ -6,16 +6,20 @@
 //! d_i = x_i - (-x_(i-2) + 4 x_(i-1) + 4 x_(i+1) - x_(i+2))/6
 //! ```
 //!
-//! The sample is an outlier where |d_i| is more than eight standard deviations of the recording's own d plus half of what the recording moves
-//! on either side, and more than 1.25 times |d| of either neighbour: a kink and a step of the motion are no outliers. The cubic replaces an outlier.
+//! The sample is an outlier if |d_i| exceeds two limits: eight standard deviations of d over the
+//! recording plus half of the greater of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1), and
+//! 1.25 times |d| of either neighbour. A kink or a step of the motion therefore is no outlier. An
+//! outlier is replaced by the value of the cubic.
 
 use stretch_data::SessionTrial;
 
 /// Standard deviations beyond which a sample is an outlier.
 const OUTLIER: f64 = 8.0;
-/// Share of the motion on either side that is added to the limit: a kink gives a third of that motion.
+/// Share of the motion on either side that is added to the limit, because a kink gives a |d| of a
+/// third of that motion.
 const KINK: f64 = 0.5;
-/// Ratio of |d| to that of a neighbour beyond which a sample is an outlier: a step gives 1, a single value 3/2.
+/// Ratio of |d| to that of a neighbour beyond which a sample is an outlier: a step of the motion
+/// gives 1, a single outlier 3/2.
 const STEP: f64 = 1.25;
 
 /// Measured columns of a rig.
@@ -60,7 +64,8 @@ fn replace_outliers(values: &mut [f64]) -> usize {
     outliers.len()
 }
 
-/// Standard deviation from the median size, which is 0.6745 standard deviations of a normal variable; `None` if most values are 0.
+/// Estimates the standard deviation from the median size, which is 0.6745 standard deviations of a
+/// normal variable; `None` if most values are 0.
 fn deviation(off: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = off.iter().map(|d| d.abs()).collect();
     let middle = sizes.len() / 2;

@@ -1,4 +1,5 @@
-//! Parts that a whole rig and a gauge alone share: recordings are read and cleaned here, and effects of the catalogue act.
+//! Parts that a whole rig and a gauge alone share: reading and cleaning of recordings, and effects
+//! of the catalogue.
 
 pub(crate) mod acting;
 pub(crate) mod courses;

@@ -1,4 +1,4 @@
-//! Rig files, read as simulation and diagnosis read them, with the file's name in every error.
+//! Reads rig files as simulation and diagnosis do, with the file's name in every error.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Recordings that are too long for a diagnosis to compare in memory.
+//! Shortens recordings that are too long for a diagnosis in memory.
 
 use std::borrow::Cow;
 
@@ -6,19 +6,23 @@ use stretch_data::{Channel, SessionTrial, Trial, check_rows};
 
 use crate::error::ProblemError;
 
-/// The most rows times simulated outputs: 40 minutes of a gauge at 100 Hz, or 13 minutes of a rig, which has three outputs.
+/// Greatest product of rows and simulated outputs: 40 minutes of a gauge at 100 Hz, or 13 minutes
+/// of a rig, which has three outputs.
 ///
-/// A diagnosis needs 550 to 950 bytes a row and output, so that it needs less than 256 MB and four times the size of the recordings.
+/// A diagnosis needs 550 to 950 bytes for each row and output. It therefore needs less than 256 MB
+/// and less than four times the size of the recordings.
 const MOST_SAMPLES: usize = 240_000;
 /// A trial that is cut keeps at least this many rows.
 const LEAST: usize = 1000;
 
-/// The trials, or their beginnings if they are too long together, with a note on what is left out.
+/// Returns the trials, or their beginnings if all trials together are too long, with a note on the
+/// parts that are left out.
 ///
-/// Trials are cut to one number of rows, so that shorter ones stay whole.
+/// All trials that are cut keep the same number of rows; shorter trials stay whole.
 ///
 /// # Errors
-/// [`DataError::TooLong`](stretch_data::DataError::TooLong) where beginnings of 1000 rows would still be too long.
+/// [`DataError::TooLong`](stretch_data::DataError::TooLong) if beginnings of 1000 rows would still
+/// be too long.
 pub(crate) fn shortened(
     trials: &[SessionTrial],
     outputs: usize,
@@ -47,7 +51,8 @@ pub(crate) fn shortened(
     Ok((trials.iter().map(|own| beginning(own, rows)).collect(), Some(note)))
 }
 
-/// The number of rows to which long trials are cut so that all of them have `most` together.
+/// The number of rows to which long trials are cut so that all trials together have at most `most`
+/// rows.
 fn longest(mut rows: Vec<usize>, most: usize) -> usize {
     rows.sort_unstable();
     let (mut left, mut longest) = (most, most);

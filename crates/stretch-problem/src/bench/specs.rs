@@ -1,4 +1,4 @@
-//! Effects as the diagnosis takes them.
+//! Converts effects of the catalogue into effects for the diagnosis.
 
 use stretch_gap::{Description, EffectSpec};
 use stretch_sim::{Effect, EffectParameter, Search};
@@ -8,11 +8,11 @@ pub(crate) struct Place {
     /// Stages whose output the effect changes.
     pub(crate) touches: Vec<usize>,
     pub(crate) search: Search,
-    /// The catalogue's unit of a parameter, in the unit that the parameter has at this place.
+    /// Factor from the catalogue's unit of a parameter to its unit at this place.
     pub(crate) unit: fn(&EffectParameter) -> f64,
 }
 
-/// An effect at a place.
+/// Converts an effect that acts at a place.
 pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
     let Place { touches, search, unit } = place;
     let parameter = |(p, range): (&EffectParameter, &[f64; 2])| {
@@ -33,16 +33,18 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
     }
 }
 
-/// Effect of a channel that is sampled a little late or early.
+/// Name of the effect of a channel that is sampled a little late or early.
 const SKEW: &str = "channel_skew";
 
-/// Range of the delays that the catalogue's skew covers, s; the `usual` range where the catalogue has no skew.
+/// Range of the delays that the catalogue's skew covers, s; the `usual` range if the catalogue has
+/// no skew.
 pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
     let skew = about.effects.iter().find(|e| e.name == SKEW);
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
-/// Effects that a recording of this sample time can show, each with its place; a note for each other effect says why it is left out.
+/// Effects that a recording of this sample time can show, each with its place; a note for each
+/// other effect says why it is left out.
 pub(crate) fn shown(
     effects: impl Iterator<Item = (&'static Effect, Place)>,
     dt_s: f64,

@@ -2,11 +2,12 @@
 
 /// Greatest number of lost samples in a row that a straight line bridges well.
 const SHORT: usize = 3;
-/// Number of samples before a longer gap whose smoothing reaches into the gap.
+/// Number of samples before a longer gap that are smoothed together with samples in the gap.
 const BEFORE: usize = 3;
 
-/// Marks lost samples, and behind a longer gap as many samples as were lost: these depend on values that were not measured, and the memory of a stage
-/// is shorter than a gap that splits no trial.
+/// Marks lost samples. Around a gap of more than three samples, it also marks the three samples
+/// before the gap and as many samples after the gap as were lost, because these depend on values
+/// that were not measured. This assumes that the memory of a stage is shorter than the gap.
 pub(crate) fn undetermined(is_lost: &[bool]) -> Vec<bool> {
     let mut out = is_lost.to_vec();
     let mut from = 0;
@@ -21,10 +22,12 @@ pub(crate) fn undetermined(is_lost: &[bool]) -> Vec<bool> {
     out
 }
 
-/// Time for which a part of a trial that begins amid a motion depends on the motion before it, s: a few time constants of a muscle.
+/// Time for which a part of a trial that begins during a motion depends on the motion before it, s:
+/// a few time constants of a muscle.
 const AMID_S: f64 = 1.0;
 
-/// Marks samples as [`undetermined`] does in a part of a trial that goes on behind a gap, and its first second: the motion of the gap still acts there.
+/// Marks samples as [`undetermined`] does in a part of a trial that follows a gap. It also marks
+/// the first second of the part, because the motion during the gap still acts there.
 pub(crate) fn undetermined_behind_gap(is_lost: &[bool], dt_s: f64) -> Vec<bool> {
     let mut out = undetermined(is_lost);
     let amid = ((AMID_S / dt_s) as usize).min(out.len());

@@ -1,37 +1,40 @@
-//! The command at which the operators in front of a stage begin a trial.
+//! Estimates the command from before a trial, at which the operators in front of a stage begin.
 //!
-//! A trial that begins with the step of its command begins at rest at the command before the step, which was not recorded. A memory
-//! in front of the stage (a limit of the rate, a lag, a delay) is still there, and so is the output. Where the output says which command
-//! that was, the memory begins with it:
+//! If the first sample of a trial is already a step of the command, the output still rests at the
+//! command from before the step, which was not recorded. An operator with memory in front of the
+//! stage (a rate limit, a lag, a delay) still holds that command too. If the output determines that
+//! command, the operator begins with it:
 //!
 //! ```text
 //! u = a + b y     least squares over the ends of all spans in which the input is constant and the output has come to rest
 //! u_before = a + b y_0,     taken where |u_before - u_0| > 5 sqrt(s^2 + (b sigma)^2)
 //! ```
 //!
-//! with the first sample u_0, y_0 of a trial, what the line leaves s, and the noise of the output sigma. The line counts where it explains
-//! [`EXPLAINED`] of what the commands do: a servo has such a line, a force that pushes a mass has none. Of a trial that is tested on only y_0
-//! is read, as an initial value.
+//! Here u_0, y_0 is the first sample of a trial, s is the residual standard deviation of the line,
+//! and sigma is the noise of the output. The line is used only if its squared correlation is at
+//! least [`EXPLAINED`]: a servo has such a line, a force that pushes a mass has none. Of a test
+//! trial only y_0 is read, as an initial value.
 
 use std::ops::Range;
 
 use stretch_data::ends;
 
-/// Least samples of a span.
+/// Least number of samples of a span in which the inputs are constant.
 const SPAN: usize = 20;
-/// Fewest spans that determine a line and what it leaves.
+/// Least number of spans that determine a line and its residual.
 const FEWEST: usize = 4;
-/// Squared correlation from which the line counts.
+/// Least squared correlation for which the line is used.
 const EXPLAINED: f64 = 0.99;
-/// Standard deviations by which the command from before differs at least.
+/// Least difference between the command from before and the first command, in standard deviations.
 const FAR: f64 = 5.0;
-/// Share of what the output ever does by which it moves at least in a trial that begins with a step.
+/// Least motion of the output in a trial that begins with a step, as a share of the output's range.
 const MOVES: f64 = 0.1;
 
-/// By trial, the command from before a step at its first sample; `None` if a trial begins otherwise, or the command is unknown.
+/// By trial, the command from before a step at its first sample; `None` if a trial begins
+/// otherwise, or the command is unknown.
 pub(crate) type Before = Vec<Option<f64>>;
 
-/// What is known of the beginnings of all trials of a stage.
+/// The beginnings of all trials of a stage.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Begins {
     pub(crate) before: Before,
@@ -39,7 +42,8 @@ pub(crate) struct Begins {
     pub(crate) unknown: usize,
 }
 
-/// The beginnings of the trials of a stage; `looked_at` are the samples that are not tested on, `noise` is that of the output.
+/// Finds the beginnings of the trials of a stage; `looked_at` are the samples outside the test
+/// samples, `noise` is that of the output.
 pub(crate) fn begins(
     (inputs, output): (&[&[f64]], &[f64]),
     (trials, looked_at): (&[Range<usize>], &[Range<usize>]),
@@ -48,7 +52,7 @@ pub(crate) fn begins(
     let line = match inputs {
         [] => return Begins { before: vec![None; trials.len()], unknown: 0 },
         [input] => Line::of(input, output, looked_at),
-        // what the output says is one number
+        // one output cannot determine several commands
         _ => None,
     };
     let (least, greatest) = ends(looked_at.iter().flat_map(|part| &output[part.clone()]));
@@ -72,7 +76,7 @@ pub(crate) fn begins(
     Begins { before, unknown }
 }
 
-/// The command at which an output rests.
+/// Line that gives the command at which an output rests.
 struct Line {
     offset: f64,
     slope: f64,
@@ -101,7 +105,7 @@ impl Line {
         };
         let (uu, yy) = (sum(&u, u_mean, &u, u_mean), sum(&y, y_mean, &y, y_mean));
         let uy = sum(&u, u_mean, &y, y_mean);
-        // a command or an output that never changes says nothing
+        // a command or an output that never changes determines no line
         if uy == 0.0 || uy * uy < EXPLAINED * uu * yy {
             return None;
         }
@@ -137,8 +141,9 @@ mod tests {
     const SAMPLES: usize = 100;
     const NOISE: f64 = 0.01;
 
-    /// Trials that rest at 0 for `rest` samples and step to a target each; the output follows within ten samples, `offset` off, or, of a
-    /// `mass`, runs on.
+    /// Trials that rest at 0 for `rest` samples and then step to a target. The output follows
+    /// within ten samples, with an error of `offset`. If `is_mass`, the output keeps moving
+    /// instead.
     fn steps(rest: usize, offset: f64, is_mass: bool) -> (Vec<f64>, Vec<f64>, Vec<Range<usize>>) {
         let mut random = RandomGenerator::new(3, 0);
         let (mut u, mut y, mut trials) = (Vec::new(), Vec::new(), Vec::new());
@@ -177,7 +182,7 @@ mod tests {
             let (u, y, trials) = steps(rest, offset, false);
             assert_eq!(found(&[&u], &y, &trials), Begins { before: vec![None; 6], unknown: 0 });
         }
-        // a command that moves all the time says nothing of the command from before
+        // a command that always moves does not determine the command from before
         let y: Vec<f64> = (0..600).map(|i| f64::from(i).sin()).collect();
         let (_, _, trials) = steps(0, 0.0, false);
         assert_eq!(found(&[&y], &y, &trials), Begins { before: vec![None; 6], unknown: 0 });
@@ -187,7 +192,7 @@ mod tests {
     fn where_no_line_says_the_command_from_before_steps_are_counted() {
         let (u, y, trials) = steps(0, 0.0, true);
         assert_eq!(found(&[&u], &y, &trials), Begins { before: vec![None; 6], unknown: 6 });
-        // of two commands one output does not say both
+        // one output cannot determine two commands
         let (u, y, trials) = steps(0, 0.0, false);
         let still = vec![1.0; u.len()];
         assert_eq!(found(&[&u, &still], &y, &trials).unknown, 6);

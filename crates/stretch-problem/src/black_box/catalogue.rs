@@ -24,7 +24,8 @@ pub(crate) enum Acting {
 /// An effect that is looked for.
 pub(crate) type Entry = (Acting, EffectSpec);
 
-/// Kinds that a recorder's clock gives to all outputs at once, and what they are called then.
+/// Kinds of wrapper that the recorder's clock applies to all outputs at once, and the name of each
+/// as an effect of the recorder.
 const RECORDERS: [(&str, &str); 2] =
     [("skew", "record.skew"), ("clock_drift", "record.clock_drift")];
 
@@ -41,7 +42,7 @@ pub(crate) struct Around {
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
     /// By wrapper, whether it is looked for.
     is_open: Vec<bool>,
-    /// Names of what is known of the recorder's clock.
+    /// Names of effects of the recorder's clock that already have values.
     known_clocks: Vec<String>,
 }
 
@@ -94,7 +95,7 @@ impl Around {
         out
     }
 
-    /// A catalogue without some effects; a wrapper is also named by its kind or its place.
+    /// Removes effects from a catalogue. A name may also be the kind or the place of a wrapper.
     ///
     /// # Errors
     /// A name that matches no effect of the catalogue.
@@ -121,13 +122,15 @@ impl Around {
     }
 }
 
-/// The stage whose output a column is, where a stage reads it that is not driven by it anyway.
+/// The stage whose output is `column`; `None` if that stage is the reader, or if `column` is one of
+/// the reader's inputs.
 fn read_by(stages: &[StageEntry], reader: usize, column: &str) -> Option<usize> {
     let is_input = stages[reader].inputs.iter().any(|input| input == column);
     stages.iter().position(|s| s.output == column).filter(|s| *s != reader && !is_input)
 }
 
-/// The name of the wrappers behind an effect: those of the outputs for the recorder's clock, else the name itself.
+/// The name of the wrappers that implement an effect: `output.KIND` for an effect of the recorder's
+/// clock, otherwise the effect's own name.
 fn outputs_of(name: &str) -> String {
     let recorder = RECORDERS.iter().find(|(_, recorder)| *recorder == name);
     recorder.map_or_else(|| name.to_owned(), |(kind, _)| format!("output.{kind}"))
@@ -150,7 +153,7 @@ fn values_of(wrapper: &Placed, known: &EffectEntry) -> Result<Vec<f64>, ProblemE
     parameters.iter().map(value).collect()
 }
 
-/// Wrappers of a kind behind the outputs among some wrappers, each with its index.
+/// Returns the wrappers of one kind that act on outputs, each with its index.
 pub(crate) fn behind_outputs<'a>(
     kind: &'a str,
     wrappers: &'a [Placed],
@@ -159,8 +162,9 @@ pub(crate) fn behind_outputs<'a>(
     all.filter(move |(_, w)| w.kind.name == kind && w.site.side == Side::Output)
 }
 
-/// The kind that all outputs share, where there are several: one effect in place of one for each output. A shift of all outputs comes
-/// from the recorder, a shift of a single output from its sensor.
+/// The effect of the recorder's clock that acts on all outputs at once; `None` unless several
+/// outputs have a wrapper of this kind. A shift of all outputs comes from the recorder, a shift of
+/// a single output from its sensor.
 fn recorder(
     (kind, name): (&str, &str),
     wrappers: &[Placed],
@@ -177,7 +181,8 @@ fn recorder(
     })
 }
 
-/// The user's own effects that are looked for, and the values of the arguments of all own effects while none is looked for.
+/// The user's own effects that are looked for, and the values of the arguments of all own effects
+/// in a run that tries none of them.
 pub(crate) fn own_effects(
     effects: &[OwnEffect],
     stages: &[StageEntry],
@@ -199,7 +204,7 @@ pub(crate) fn own_effects(
         for a in &effect.arguments {
             let name = if a.name.is_empty() { &effect.name } else { &a.name };
             let [min, max] = a.range;
-            // what is searched in equal ratios never reaches the 0 at which it does nothing
+            // a logarithmic search never reaches 0, so an off value of 0 may be outside the range
             let is_off = |off: f64| (min..=max).contains(&off) || a.is_log && off == 0.0;
             // an empty range is reported by the fit
             if let Some(off) = a.off.filter(|off| min < max && !is_off(*off)) {

@@ -29,7 +29,7 @@ pub struct Checked {
     about: Description,
     session: RecordedSession,
     pub(crate) columns: Columns,
-    /// A column that distinguishes runs, which no effect looks at.
+    /// Name and values of a column that distinguishes runs; no effect uses it.
     pub(crate) by: Option<(String, Vec<f64>)>,
     pub(crate) stages: Vec<StageEntry>,
     /// Noise of the inputs of each stage.
@@ -39,7 +39,8 @@ pub struct Checked {
     pub(crate) wrappers: Vec<Placed>,
     /// The action behind each effect of the catalogue.
     pub(crate) acting: Vec<Acting>,
-    /// Values of the own effects' arguments while no own effect is looked for: the off values, or the values that were found before.
+    /// Values of the arguments of the user's own effects while no own effect is tried: the off
+    /// values, or the values that were found before.
     pub(crate) off: Vec<f64>,
     /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
@@ -156,7 +157,7 @@ impl Checked {
         &self.about
     }
 
-    /// The problem with a note more.
+    /// Adds a note.
     pub(crate) fn noting(mut self, note: &str) -> Self {
         self.notes.push(note.to_owned());
         self
@@ -167,7 +168,8 @@ impl Checked {
         &self.notes
     }
 
-    /// The kind of the wrapper behind an effect of the catalogue; none for the user's own effects.
+    /// The kind of the wrapper that implements an effect of the catalogue; `None` for the user's
+    /// own effects.
     pub fn wrapper(&self, effect: usize) -> Option<&'static Kind> {
         self.placed(effect).map(|wrapper| wrapper.kind)
     }
@@ -180,13 +182,14 @@ impl Checked {
         }
     }
 
-    /// The code of the wrapper behind an effect of the catalogue, with these values, in front of the simulator or behind it; none for the
-    /// user's own effects.
+    /// Code for the wrapper that implements an effect of the catalogue, with these values, in front
+    /// of the simulator or behind it; `None` for the user's own effects.
     pub fn sketch(&self, effect: usize, values: &[f64]) -> Option<Sketch> {
         self.placed(effect)?.sketch(values, self.grid.dt_s())
     }
 
-    /// The index of the wrapper behind an effect of the catalogue, if that wrapper acts on this side of the stage.
+    /// The index of the wrapper that implements an effect of the catalogue, if that wrapper acts on
+    /// this side of the stage.
     pub(crate) fn around(&self, effect: usize, stage: usize, side: Side) -> Option<usize> {
         let is_here = |at: usize| self.is_at(at, stage, side);
         match self.acting[effect] {
@@ -237,7 +240,8 @@ fn input_noise(stage: &StageEntry, inputs: &[Input]) -> Vec<f64> {
     stage.inputs.iter().map(noise).collect()
 }
 
-/// Noise of the output of a stage: as stated, or from the rests of its inputs, or from second differences of the recordings.
+/// Noise of the output of a stage: as stated, or estimated while its inputs rest, or from second
+/// differences of the recordings.
 fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
     let of = |name: &String| columns.of(name).unwrap_or(&[]);
     let (values, looked) = (of(&stage.output), columns.looked_at());
@@ -313,7 +317,8 @@ fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     recorded.map(<[f64]>::to_vec).or_else(|| position().map(differences))
 }
 
-/// The position of the rubbing parts of a stage: recorded, or the integral of a recorded velocity.
+/// The position of the parts of a stage that have friction: recorded, or the integral of a recorded
+/// velocity.
 fn position(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     let recorded = stage.position.as_ref().and_then(|c| columns.of(c));
     let velocity = || stage.velocity.as_ref().and_then(|c| columns.of(c));
@@ -336,20 +341,21 @@ fn sites(stages: &[StageEntry], inputs: &[Input], unit_of: &impl Fn(&str) -> Str
     out
 }
 
-/// The unit that a problem states of a column; empty where it states none.
+/// The unit that a problem states for a column, or an empty string.
 fn stated_unit<'a>(stages: &'a [StageEntry], inputs: &'a [Input], column: &str) -> &'a str {
     let inputs = inputs.iter().filter(|i| i.column == column).map(|i| &i.unit);
     let outputs = stages.iter().filter(|s| s.output == column).map(|s| &s.unit);
     inputs.chain(outputs).find(|unit| !unit.is_empty()).map_or("", String::as_str)
 }
 
-/// Whether a stage says at which velocity or position it rubs.
+/// Whether a stage names the velocity or the position of its parts with friction.
 fn names_motion(stage: &StageEntry) -> bool {
     stage.velocity.is_some() || stage.position.is_some()
 }
 
-/// A stage with its output as the position or the velocity at which it rubs, where it names none, a force or a torque drives it, and the
-/// output is one.
+/// Returns a copy of a stage. If the stage names no velocity or position of its parts with
+/// friction, a force or a torque drives it, and its output is a speed or a position, then the copy
+/// names its output as that motion.
 fn rubbing(stage: &StageEntry, spec: &ProblemSpec) -> StageEntry {
     let mut stage = stage.clone();
     let of = |column: &str| Quantity::of(column, stated_unit(&spec.stages, &spec.inputs, column));
@@ -379,7 +385,7 @@ fn stage_spec(
     StageSpec { noise: Some(noise.clone()), ..spec }
 }
 
-/// Share of its value that a parameter keeps which does not change its sign.
+/// Bound of a parameter that keeps its sign, as a share of its nominal value.
 const KEPT: f64 = 0.02;
 
 fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
@@ -393,7 +399,7 @@ fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
         ));
     }
     let spec = ParameterSpec::new(&p.name, &p.unit, p.value).within(p.tolerance.sd(p.value));
-    // A value whose tolerance is a share of it, or less than it, keeps its sign.
+    // A parameter keeps its sign if its tolerance is relative, or smaller than its value.
     let is_relative = matches!(p.tolerance, Tolerance::Relative(_));
     let keeps_sign = is_relative || spec.sd < p.value.abs();
     let [least, greatest] = match keeps_sign {
@@ -441,7 +447,8 @@ fn session(
     }
 }
 
-/// Checks that the stages which parameters and effects name are there.
+/// Checks that parameters and effects name existing stages, and that no stage has its own output as
+/// an input.
 fn check_known(
     stages: &[StageEntry],
     parameters: &[Parameter],
@@ -470,8 +477,8 @@ fn check_known(
     })
 }
 
-/// Checks what is stated of columns against what was recorded in them: a unit that the column's own name contradicts, and a noise greater
-/// than the whole change of the column, which would hide everything.
+/// Checks the stated units and noises of columns. Refuses a unit that contradicts the unit in the
+/// column's name, and a noise at least as great as the range of the column.
 fn check_stated(
     stages: &[StageEntry],
     inputs: &[Input],
@@ -481,7 +488,8 @@ fn check_stated(
     let driving = inputs.iter().map(|i| ("input", &i.column, &i.column, &i.unit, Some(i.noise)));
     for (what, name, column, stated, noise) in outputs.chain(driving) {
         let owner = || format!("{what} {name}");
-        // a single letter at the end of a name may as well be that of the second motor, and `in` and `min` are words
+        // a single letter at the end of a name may be a label, such as that of the second motor,
+        // and `in` and `min` are also words
         let is_unit = |named: &&str| named.len() > 1 && !matches!(*named, "in" | "min");
         let named = unit(column).filter(|named| !stated.is_empty() && is_unit(named));
         let measured = |stated: &str| Quantity::of(column, stated);
@@ -504,14 +512,15 @@ fn check_stated(
     Ok(())
 }
 
-/// Checks that the twins of the user's own effects are effects.
+/// Checks that the twins of the user's own effects (effects that are hard to distinguish from them)
+/// exist.
 fn check_twins<'a>(
     effects: &'a [OwnEffect],
     looked_for: impl Iterator<Item = &'a str> + Clone,
 ) -> Result<(), ProblemError> {
     let own = effects.iter().map(|e| e.name.as_str());
     for effect in effects {
-        // an effect that is not looked for this time may be a twin
+        // a twin may be an effect that is not looked for this time
         let known = own.clone().chain(looked_for.clone());
         let is_wrapper =
             |name: &str| name.rsplit('.').next().is_some_and(|k| kind_named(k).is_some());

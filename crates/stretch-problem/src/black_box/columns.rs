@@ -1,4 +1,4 @@
-//! Recorded columns on one grid, and the samples that are not tested on.
+//! Recorded columns on one grid, and the samples outside the test samples.
 
 use std::ops::Range;
 
@@ -8,11 +8,12 @@ use stretch_gap::{SampleRoles, TrialSpec};
 use super::spec::StageEntry;
 use crate::error::ProblemError;
 
-/// Parts of a trial with fewer samples are left out: those of five seconds, and no more than the second nor fewer than the first.
+/// Bounds of the least number of samples of a part of a trial. The least number is that of five
+/// seconds, within these bounds. Shorter parts are left out.
 const SHORTEST: [usize; 2] = [20, 50];
 const SHORTEST_S: f64 = 5.0;
 
-/// Least samples of a part at the rate of some trials.
+/// Returns the least number of samples of a part, from the sample rate of the trials.
 fn shortest(trials: &[SessionTrial]) -> usize {
     let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).unwrap_or(f64::INFINITY);
     ((SHORTEST_S * rate_hz) as usize).clamp(SHORTEST[0], SHORTEST[1])
@@ -23,10 +24,11 @@ fn shortest(trials: &[SessionTrial]) -> usize {
 pub(crate) struct Columns {
     pub(crate) names: Vec<String>,
     pub(crate) values: Vec<Vec<f64>>,
-    /// By column, the turn by which it wrapped; its values are unwrapped.
+    /// For each column, the period at which it wrapped (a full turn), if it did; the values are
+    /// unwrapped.
     turns: Vec<Option<f64>>,
     pub(crate) trials: Vec<TrialSpec>,
-    /// Which recording each trial is, or is a part of.
+    /// For each trial, the index of the recording that contains it.
     sources: Vec<usize>,
     pub(crate) is_lost: Vec<bool>,
     pub(crate) dt_s: f64,
@@ -78,13 +80,15 @@ impl Columns {
         Some(&self.values[at])
     }
 
-    /// The turn by which a column wrapped.
+    /// The period at which a column wrapped.
     pub(crate) fn turn_of(&self, name: &str) -> Option<f64> {
         self.turns[self.names.iter().position(|n| n == name)?]
     }
 
-    /// Chooses the turn in which columns that wrapped begin, in each trial: the one nearest to 0, where simulators begin, and for what drives a
-    /// stage the one nearest to its output, because at the seam noise decides which side each is on.
+    /// Shifts the columns that wrapped by whole turns in each trial. A column begins as near as
+    /// possible to 0, where simulators begin. The inputs and the position of a stage begin as near
+    /// as possible to its output if both wrap at the same period, because noise decides on which
+    /// side of the seam each of them begins.
     pub(crate) fn choose_turns(&mut self, stages: &[StageEntry]) {
         let shift = |values: &mut [f64], to: f64, turn: f64| {
             let turns = turn * values.first().map_or(0.0, |x| ((x - to) / turn).round());
@@ -109,12 +113,12 @@ impl Columns {
         }
     }
 
-    /// Takes the last column away: its name and values.
+    /// Removes the last column and returns its name and values.
     pub(crate) fn take_last(&mut self) -> Option<(String, Vec<f64>)> {
         self.names.pop().zip(self.values.pop())
     }
 
-    /// Trials that are a recording from the index `first` on, or a part of one.
+    /// Trials that come from recordings with an index of at least `first`.
     pub(crate) fn sources_from(&self, first: usize) -> Vec<usize> {
         (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()
     }
@@ -129,7 +133,7 @@ impl Columns {
         self.trials.iter().map(one).collect()
     }
 
-    /// Ranges of samples that are not tested on.
+    /// Ranges of the samples outside the test samples.
     pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
         let fit = SampleRoles::not_tested(&self.trials);
         let parts = self.ranges().into_iter().zip(fit);

@@ -1,14 +1,18 @@
-//! Stages that hang together inside a simulator: which outputs move where the inputs of one stage are altered.
+//! Finds stages that are coupled inside a simulator: which outputs move if the inputs of one stage
+//! are altered.
 //!
-//! A simulator that runs as a whole carries an altered input of one stage on to the outputs of others: an arm's angle carries a share of the
-//! joint before. So a wrapper in front of a stage acts on every output that it moves. For each column that drives one stage alone and has
-//! wrappers in front of it, one run with the column as one of them alters it most, y', and the run as shipped, y, show which stages t move:
+//! A simulator that runs as a whole passes an altered input of one stage on to the outputs of
+//! others. For example, a joint of an arm moves with the joint before it. A wrapper in front of a
+//! stage therefore acts on every output that it moves. Columns that drive only one stage and have
+//! wrappers in front of them are tested. In one run, y', the column is altered by the wrapper that
+//! changes it most. A comparison with the unaltered run, y, shows which stages t move:
 //!
 //! ```text
 //! sqrt(mean over all samples of (y'_t - y_t)^2) > 0.02 sd_t        sd_t  the noise of the output of stage t
 //! ```
 //!
-//! A column that several stages share is passed over: each of them has its own wrappers in front of it.
+//! A column that several stages share is not tested, because each of them has its own wrappers in
+//! front of it.
 
 use stretch_data::listed;
 use stretch_effects::Side;
@@ -22,27 +26,29 @@ use super::{
 };
 use crate::wrap::{Placed, Trials};
 
-/// Share of its noise by which an output moves at least.
+/// Least change of an output that counts as motion, as a share of its noise.
 const MOVED: f64 = 0.02;
-/// Change of an output that is rounding, as a share of its greatest value.
+/// Greatest change of an output that counts as rounding, as a share of its greatest value.
 const ROUNDING: f64 = 1e-9;
-/// What is done about it.
+/// Ends of the note on coupled stages.
 const LOOKED_AT: &str = "these outputs are compared as well";
 const LEFT_OUT: &str = "this is left out, for the simulator takes altered inputs of one stage at a time (several in a worker's hello)";
 
-/// What the wrappers in front of the stages act on.
+/// Stages on which the wrappers in front of stages act.
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
-    /// The problem's description, with every stage that an effect moves; `None` if each moves its own stage alone.
+    /// The problem's description, in which each effect lists every stage that it moves; `None` if
+    /// each effect moves only its own stage.
     pub(super) about: Option<Description>,
     /// By wrapper, the stages on which it acts in addition to its own.
     beside: Vec<Vec<usize>>,
-    /// What moves what, in a sentence.
+    /// A sentence that lists which input moves which outputs.
     pub(super) note: Option<String>,
 }
 
-/// Columns, each as the wrapper in front of it that alters it most begins; empty if the source answers one stage at a time, or takes no
-/// inputs.
+/// Returns altered columns to test, each altered by the wrapper in front of it that changes it most
+/// at its start values. Empty if there is only one stage, or if the source answers one stage at a
+/// time or takes no inputs.
 pub(super) fn probes(problem: &Checked, source: &dyn Source) -> Vec<Altered> {
     let session = problem.session();
     if session.stages.len() < 2 || !source.answers_all() || !source.takes_inputs() {
@@ -53,7 +59,8 @@ pub(super) fn probes(problem: &Checked, source: &dyn Source) -> Vec<Altered> {
     columns.filter_map(|(stage, input)| probe(problem, stage, input)).collect()
 }
 
-/// A column as the wrapper in front of it that alters it most begins; `None` if no wrapper alters it.
+/// A column, altered by the wrapper in front of it that changes it most at its start values; `None`
+/// if no wrapper alters it.
 fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     let trials = Trials { grid: &problem.grid, parts: &problem.parts };
     let mut columns: Vec<Vec<f64>> = problem.stage_inputs(stage).map(<[f64]>::to_vec).collect();
@@ -73,7 +80,7 @@ fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     (by > 0.0).then(|| Altered { stage, columns, which: vec![input], how })
 }
 
-/// Wrappers in front of stages that are looked for, or act in every run.
+/// Wrappers that are looked for, or act in every run.
 fn acting(problem: &Checked) -> impl Iterator<Item = (usize, &Placed)> {
     let looked_for = |at: usize| problem.acting.contains(&Acting::Wrapper(at));
     let stands = |at: usize| problem.standing.iter().any(|(own, _)| *own == at);
@@ -86,7 +93,7 @@ fn is_at(wrapper: &Placed, stage: usize, input: usize) -> bool {
     (site.side, site.stage, site.input) == (Side::Input, stage, input)
 }
 
-/// Root mean square of a difference; 0 for one that is no number.
+/// Root mean square of a difference; 0 if it is not finite.
 pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
     let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
     let rms = (sum / a.len().max(1) as f64).sqrt();
@@ -94,7 +101,8 @@ pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Coupled {
-    /// Runs the probes. Where the runs are spent, or a probe cannot be simulated, a stage is taken to move its own output alone.
+    /// Runs the probes. If the run budget is spent or a probe cannot be simulated, a stage is
+    /// assumed to move only its own output.
     pub(super) fn of(problem: &Checked, runs: &Runs, probes: &[Altered]) -> Self {
         let stages = &problem.session().stages;
         let mut beside = vec![Vec::new(); problem.wrappers.len()];
@@ -130,7 +138,7 @@ impl Coupled {
     }
 }
 
-/// Every probe that moves outputs of other stages, with these.
+/// Every probe that moves outputs of other stages, with the indices of these stages.
 fn moved<'a>(
     problem: &Checked,
     runs: &Runs,

@@ -1,7 +1,8 @@
-//! Candidate experiments on a user's own simulator, and what a model predicts of each.
+//! Candidate experiments on a user's own simulator, and the outputs that a model predicts for each.
 //!
-//! A candidate moves one input over the range in which it was measured, for as long as the first trial lasted; the other inputs rest at their
-//! median. The simulator runs a candidate as it runs any altered input, so that every simulator that takes altered inputs predicts experiments.
+//! A candidate moves one input over the range in which it was measured, for as long as the first
+//! trial lasted; the other inputs rest at their median. The simulator runs a candidate as it runs
+//! any altered input, so that every simulator that takes altered inputs predicts experiments.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -22,7 +23,7 @@ const PREPARE_MIN: f64 = 0.25;
 /// Least noise of an output, a share of its range.
 const LEAST_NOISE: f64 = 1e-6;
 
-/// The inputs of the simulator from outside, by column, for the samples of the first trial.
+/// The external inputs of the simulator, by column, with as many samples as the first trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course(Vec<(String, Vec<f64>)>);
 
@@ -47,7 +48,7 @@ impl Course {
     }
 }
 
-/// An input that comes from outside: its name, and its range and median over the samples that are not tested on.
+/// An external input: its name, and its range and median over the samples outside the test samples.
 struct Driven {
     name: String,
     range: (f64, f64),
@@ -55,7 +56,7 @@ struct Driven {
 }
 
 impl BlackBox {
-    /// The inputs that are no output of a stage.
+    /// The external inputs: inputs that are not the output of any stage.
     fn driven(&self) -> Vec<Driven> {
         let session = self.problem.session();
         let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
@@ -79,7 +80,8 @@ impl BlackBox {
         out
     }
 
-    /// A course with all inputs at rest but one, which goes through shares of its range.
+    /// A course in which one input goes through shares of its range and all others rest at their
+    /// medians.
     fn moved(&self, all: &[Driven], moved: Option<(usize, &[f64])>) -> Course {
         let samples = self.problem.session().samples(1);
         let one = |(at, d): (usize, &Driven)| {
@@ -139,7 +141,7 @@ impl BlackBox {
         }
     }
 
-    /// The inputs of a stage in an experiment, behind the wrappers in front of it.
+    /// The inputs of a stage in an experiment, after the wrappers in front of it have acted.
     fn driven_in(
         &self,
         run: &Run<'_>,
@@ -189,7 +191,7 @@ impl Laboratory for BlackBox {
         candidates
     }
 
-    /// The first trial.
+    /// Returns the measured inputs of the first trial.
     fn done(&self) -> Course {
         let samples = self.problem.session().samples(1);
         let measured = |d: Driven| {
@@ -206,7 +208,8 @@ impl Laboratory for BlackBox {
         for stage in 0..session.stages.len() {
             let run = Run::exact(stage, model, 1);
             let own = self.driven_in(&run, stage, course, &outputs)?;
-            // A simulator whose stages hang together is driven as a whole, as far as the outputs before are known.
+            // A simulator with coupled stages needs the inputs of all stages, as far as these are
+            // already predicted.
             let all = if self.is_coupled() { 0..session.stages.len() } else { 0..0 };
             let others = all.filter(|other| *other != stage);
             let others = others.filter_map(|s| self.driven_in(&run, s, course, &outputs).ok());

@@ -1,4 +1,4 @@
-//! What is known of the recordings of a user's simulator.
+//! Facts about the recordings of a user's simulator.
 
 use std::borrow::Cow;
 
@@ -9,7 +9,7 @@ use super::{columns::Columns, source::RecordedSession};
 /// Range of the delays that skews of the catalogue represent, s.
 const SKEW_S: [f64; 2] = [-0.2, 0.2];
 
-/// The facts of recordings.
+/// Collects the facts about recordings.
 pub(super) fn facts(
     about: &Description,
     session: &RecordedSession,
@@ -44,8 +44,8 @@ fn signals(session: &RecordedSession) -> Vec<Recorded> {
     out
 }
 
-/// The outputs of the stages, and every other column but commands: a command may stay constant while the rest moves, and nothing is wrong
-/// with such a command.
+/// The outputs of the stages, and every other column except commands, because a command may stay
+/// constant while the rest moves.
 fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<'static>> {
     let stages = about.stages.iter().enumerate();
     let output = |(stage, spec)| Column { skew_s: SKEW_S, ..Column::output(stage, spec) };
@@ -68,7 +68,8 @@ fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<
     out
 }
 
-/// Whether a column is held from sample to sample, as commands are: at least a tenth of its samples equal the sample before.
+/// Whether a column is held from sample to sample, as commands are: at least a tenth of its samples
+/// equal the sample before.
 fn is_command(values: &[f64]) -> bool {
     let held = values.windows(2).filter(|w| w[0] == w[1]).count();
     10 * held >= values.len()

@@ -1,16 +1,17 @@
-//! Families of wrappers that data do not tell apart, and what the members of a family agree on.
+//! Families of wrappers that the data cannot distinguish, and the quantity on which the members of
+//! a family agree.
 
 use stretch_effects::Family;
 use stretch_gap::{Candidate, Diagnosis, Note};
 
 use super::checked::Checked;
 
-/// Wrappers of one family, any of which may be what is missing.
+/// Wrappers of one family, any of which may be the missing effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
     /// Names of the wrappers, the most probable first.
     pub names: Vec<String>,
-    /// The family, which says what the wrappers agree on.
+    /// The family, which determines the quantity on which the wrappers agree.
     pub family: Family,
     /// Range of the agreed quantity, from the least to the greatest value of any wrapper, uncertainties included.
     pub range: [f64; 2],
@@ -85,8 +86,8 @@ pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
     out
 }
 
-/// The range of a family's quantity by the most probable candidate with an effect: the effect's first value moves by 1.96 standard
-/// deviations to either side.
+/// The range of a family's quantity from the most probable candidate that contains the effect. The
+/// effect's first value varies by 1.96 standard deviations to either side.
 fn said(diagnosis: &Diagnosis, name: &str, of: fn(&[f64]) -> f64) -> Option<[f64; 2]> {
     let holds = |c: &&Candidate| c.effects.iter().any(|e| e == name);
     let candidate = diagnosis.candidates.iter().find(holds)?;

@@ -1,4 +1,5 @@
-//! A user's own problem with what a diagnosis found.
+//! Results of a diagnosis of a user's own problem: notes, the next experiment, code for effects,
+//! and the fixed problem file.
 
 use std::num::NonZeroUsize;
 
@@ -54,7 +55,8 @@ impl Diagnosable for BlackBox {
         apart.or_else(|| self.problem.columns.of(name).map(<[f64]>::to_vec))
     }
 
-    /// The notes of the source on its runs.
+    /// Returns the notes of the source on its runs, and notes on coupled stages and on undeclared
+    /// parameters.
     fn afterwards(&self) -> Vec<String> {
         let mut notes = self.runs.notes();
         notes.extend(self.coupled.get().and_then(|coupled| coupled.note.clone()));
@@ -72,7 +74,8 @@ impl Diagnosable for BlackBox {
         evidence: &Evidence,
     ) -> Result<Option<Proposal>, GapError> {
         match next_experiment(self, diagnosis, evidence) {
-            // Where the runs are spent, or a model cannot be run on other inputs, there is no prediction.
+            // There is no prediction if the run budget is spent or a model cannot be run on other
+            // inputs.
             Err(GapError::Simulator(_) | GapError::Spent { .. }) => Ok(None),
             proposal => proposal,
         }
@@ -110,7 +113,7 @@ impl Diagnosable for BlackBox {
             parameter.tolerance = chosen.tolerance(index, *value, parameter.tolerance);
             parameter.value = *value;
             if !is_bare {
-                // of a simulator with several fixes the one before the first
+                // if the file already is a fix, the value from the first fix is kept
                 parameter.alone.get_or_insert(evidence.retuned.parameters[index]);
             }
         }

@@ -1,4 +1,5 @@
-//! The run of the source that a model needs: parameters, effects of the simulator's own, and inputs as they are altered.
+//! Builds the run of the source that a model needs: parameters, the simulator's own effects, and
+//! altered inputs.
 
 use stretch_effects::Side;
 use stretch_gap::{RandomGenerator, Run};
@@ -10,12 +11,13 @@ use super::{
 };
 
 impl BlackBox {
-    /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the model, and wrappers that act in every run.
+    /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the
+    /// model, and wrappers that act in every run.
     pub(super) fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
         self.acting_at(run, run.stage, side)
     }
 
-    /// The same of any stage, whichever is run.
+    /// As `acting`, for a stage other than the one that is run.
     pub(super) fn acting_at<'a>(
         &'a self,
         run: &Run<'a>,
@@ -37,7 +39,7 @@ impl BlackBox {
         self.driven_by(run, stages.filter_map(|stage| self.altered(run, stage)).collect())
     }
 
-    /// The inputs of a stage as they are altered for a run; `None` if they stay as they are.
+    /// The altered inputs of a stage for a run; `None` if they stay as measured.
     fn altered(&self, run: &Run<'_>, stage: usize) -> Option<Altered> {
         let problem = &self.problem;
         let is_own = stage == run.stage;
@@ -74,8 +76,9 @@ impl BlackBox {
         Some(Altered { stage, columns, which, how })
     }
 
-    /// The run of a model on inputs that were altered. A simulator whose stages hang together is run with all parameters of the model, so
-    /// that one run serves every stage; any other with those of the stage.
+    /// The run of a model on altered inputs. If stages are coupled, the run has all parameters of
+    /// the model, so that one run serves every stage. Otherwise only the parameters of the run's
+    /// stage differ from the nominal values.
     pub(super) fn driven_by(&self, run: &Run<'_>, altered: Vec<Altered>) -> Inner {
         let about = self.problem.description();
         let mut parameters: Vec<f64> = about.parameters.iter().map(|p| p.nominal).collect();

@@ -4,8 +4,9 @@
 //! y(p) = y(p_near) + sum over i of J_i (p_i - p_near,i),     J_i = (y(p_0 + d_i) - y(p_0))/d_i
 //! ```
 //!
-//! J is taken at p_0 and kept while fits stay around p_0 (a chord). The run at p_near is exact. A probe of a fit, which is a small step from
-//! a run that was just made, costs no run that way; the values that a diagnosis reports come from exact runs.
+//! J is computed at p_0 and kept while fits stay near p_0 (a chord method). The run at p_near is
+//! exact. A trial point of a fit that is a small step from an exact run therefore costs no run. The
+//! values that a diagnosis reports come from exact runs.
 
 use std::sync::Arc;
 
@@ -13,16 +14,16 @@ use stretch_gap::ParameterSpec;
 
 use crate::black_box::runs::Inner;
 
-/// Step of a difference, in tolerances.
+/// Step of a finite difference, in tolerances.
 const STEP: f64 = 0.1;
-/// Tolerances within which a linearisation serves as it is.
+/// Greatest change of a parameter for which a linearisation is reused, in tolerances.
 const SERVES: f64 = 0.5;
 
 /// Sensitivities of the output of one stage.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     at: Inner,
-    /// By parameter: its index, and the change of the output for one unit of it.
+    /// For each parameter: its index, and the change of the output for one unit of the parameter.
     columns: Vec<(usize, Vec<f64>)>,
 }
 
@@ -35,7 +36,8 @@ pub(crate) struct Move {
 }
 
 impl Linear {
-    /// The runs that a linearisation takes in addition to the run at p_0: each parameter with a tolerance is moved alone, downwards at its upper bound.
+    /// The runs that a linearisation takes in addition to the run at p_0: each run moves one
+    /// parameter that has a tolerance, downwards if an upward step would exceed its upper bound.
     pub(crate) fn moves(at: &Inner, own: &[usize], specs: &[ParameterSpec]) -> Vec<Move> {
         let tuned = own.iter().copied().filter(|&p| specs[p].sd > 0.0);
         tuned
@@ -51,7 +53,7 @@ impl Linear {
             .collect()
     }
 
-    /// The linearisation from the outputs of the run itself and of its moves.
+    /// Computes the linearisation from the outputs of the run at p_0 and of its moves.
     pub(crate) fn of(at: Inner, moves: &[Move], outputs: &[Arc<Vec<f64>>]) -> Self {
         let (unmoved, moved) = (&outputs[0], &outputs[1..]);
         let column = |(m, there): (&Move, &Arc<Vec<f64>>)| {
@@ -66,8 +68,8 @@ impl Linear {
         self.at.trials
     }
 
-    /// Whether the linearisation serves another run: effects and inputs are the same, the stage's own parameters differ by at most half a
-    /// tolerance.
+    /// Whether the linearisation can be reused for another run. It covers the run's trials, effects
+    /// and inputs are the same, and the stage's own parameters differ by at most half a tolerance.
     pub(crate) fn serves(&self, run: &Inner, own: &[usize], specs: &[ParameterSpec]) -> bool {
         let apart = |p: usize| (self.at.parameters[p] - run.parameters[p]).abs();
         let how = |inner: &Inner| -> Vec<(usize, Vec<u64>)> {
@@ -79,7 +81,7 @@ impl Linear {
             && own.iter().all(|&p| apart(p) <= SERVES * specs[p].sd)
     }
 
-    /// Moves an output by differences of the parameters.
+    /// Adds the change that follows from differences of the parameters to an output.
     pub(crate) fn shift(&self, apart: &[f64], out: &mut [f64]) {
         for (parameter, column) in self.columns.iter().filter(|(p, _)| apart[*p] != 0.0) {
             let by = apart[*parameter];

@@ -44,8 +44,8 @@ pub use states::State;
 
 /// A checked problem and a source, bound together: a [`Simulator`].
 ///
-/// A change of parameters, own effects or wrappers in front of a stage takes a run of the source; wrappers behind a stage act on a run that
-/// is kept.
+/// A change of parameters, own effects or wrappers in front of a stage takes a run of the source;
+/// wrappers behind a stage act on a cached run.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -96,7 +96,7 @@ pub use states::State;
 pub struct BlackBox {
     problem: Checked,
     runs: Runs,
-    /// By stage, the last linearisation.
+    /// For each stage, the last linearisation.
     lines: RwLock<Vec<Option<Arc<Linear>>>>,
     /// Columns that are altered to see which outputs they move.
     probes: Vec<Altered>,
@@ -133,9 +133,12 @@ impl BlackBox {
         self.runs.count()
     }
 
-    /// The least number of runs with which there is an answer: of every stage the run as shipped, one a parameter, and the draws of the
-    /// noise of its inputs; one for each column that may move the outputs of several stages, and one without the effects that always act in
-    /// front of these; one run is repeated.
+    /// The least number of runs that a diagnosis needs:
+    /// - for every stage the unaltered run, one run for each parameter, and the draws of the noise
+    ///   of its inputs;
+    /// - one run for each column that may move the outputs of several stages, and one without the
+    ///   wrappers that always act in front of stages, if there are both;
+    /// - one repeated run.
     pub fn least_runs(&self) -> usize {
         let stages = &self.problem.description().stages;
         let each = stages.iter().map(|spec| 1 + spec.parameters.len());
@@ -144,23 +147,25 @@ impl BlackBox {
         1 + each.sum::<usize>() + self.draws() + probes + usize::from(stands && probes > 0)
     }
 
-    /// What the wrappers in front of the stages act on, found by runs the first time.
+    /// The stages on which the wrappers in front of stages act. The first call makes runs to find
+    /// them.
     fn coupled(&self) -> &Coupled {
         self.coupled.get_or_init(|| Coupled::of(&self.problem, &self.runs, &self.probes))
     }
 
-    /// Runs with draws of the noise of inputs, of all stages together.
+    /// Number of runs with random draws of the input noise, for all stages together.
     fn draws(&self) -> usize {
         let is_noisy = |noise: &&Vec<f64>| noise.iter().any(|sd| *sd > 0.0);
         DRAWS * self.problem.input_noise.iter().filter(is_noisy).count()
     }
 
-    /// Whether what alters the input of one stage acts on the outputs of others.
+    /// Whether an altered input of one stage acts on the outputs of others.
     fn is_coupled(&self) -> bool {
         self.coupled().about.is_some()
     }
 
-    /// The run that a run is predicted from, and the difference of the parameters; the run itself where it has to be exact.
+    /// The run from which a run is predicted, with the linearisation and the differences of the
+    /// parameters; or the run itself and `None` if it has to be exact.
     fn base_of(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
         let inner = self.inner(run);
         let line = run.near.filter(|_| run.input_noise.is_none()).zip(self.line(run.stage));
@@ -178,7 +183,7 @@ impl BlackBox {
     }
 
     fn line(&self, stage: usize) -> Option<Arc<Linear>> {
-        // A poisoned list only holds what can be made again.
+        // The list can be used after a panic, because its entries can be computed again.
         self.lines.read().unwrap_or_else(PoisonError::into_inner)[stage].clone()
     }
 
@@ -203,7 +208,8 @@ impl BlackBox {
         }
     }
 
-    /// Applies an effect that is found in the recording, on the samples that are not tested on.
+    /// Applies an effect that is estimated from the recording, on the samples outside the test
+    /// samples.
     fn follow(&self, find: Find, stage: usize, values: &[f64], out: &mut [f64]) {
         let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
         let end = out.len();
@@ -217,14 +223,16 @@ impl BlackBox {
 /// A linearisation, and the differences of the parameters between a run and the run that it is predicted from.
 type Apart = (Arc<Linear>, Vec<f64>);
 
-/// Runs that the final evaluation needs once the search is over, and further runs for each stage.
+/// Runs that are reserved for the final evaluation after the search: a fixed number, and a number
+/// for each stage.
 const FINAL: (usize, usize) = (20, 8);
 
-/// Draws of the noise of a stage's inputs with which a diagnosis begins: those that the noise of the output and what of it arrives there
-/// are computed from.
+/// Number of random draws of the noise of a stage's inputs at the start of a diagnosis. They show
+/// how much of that noise reaches the output.
 const DRAWS: usize = 16;
 
-/// A source's error as the diagnosis takes it: a fit turns back where values cannot be simulated.
+/// Converts an error of a source for the diagnosis. A fit steps back from values that cannot be
+/// simulated; any other error ends the search.
 fn refused(error: SourceError, least: usize) -> GapError {
     match error {
         SourceError::Spent { budget } => GapError::Spent { budget, least },
@@ -304,7 +312,7 @@ impl Simulator for BlackBox {
     fn model_runs(&self) -> Option<ModelRuns> {
         let (count, budget) = (self.runs.count(), self.runs.budget());
         let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
-        // once parameters were re-tuned the noise is drawn anew
+        // the noise is drawn again after parameters are re-tuned
         let is_spent = budget.is_some_and(|budget| count + kept + self.draws() >= budget);
         Some(ModelRuns { count, budget, is_spent })
     }

@@ -1,9 +1,13 @@
-//! Whether a source answers the same question twice alike, and a run over more trials begins as one over fewer.
+//! Checks that a source gives the same answer to the same request twice, and that a run over more
+//! trials begins with the samples of a run over fewer.
 //!
-//! A diagnosis is based on differences between runs. A simulator that draws random numbers without a seed, or carries its state from one run
-//! to the next, makes differences of its own, which would be named as effects. So the first run that a source answers is asked for
-//! once more, in a call of its own: a worker then has made a run in between. Where there are several trials, it is asked for over the first
-//! one alone, or over all if that was the first question. A difference between runs of two lengths alone is a note: solvers that choose their steps make one.
+//! A diagnosis is based on differences between runs. A simulator that draws random numbers without
+//! a seed, or carries its state from one run to the next, adds differences that would be named as
+//! effects. So the first run that a source answers is requested once more, in a separate call, so
+//! that a worker has made a run in between. If there are several trials, the second request is over
+//! the first trial alone, or over all if the first request was over one. A difference that occurs
+//! only between runs of two lengths is reported as a note, because solvers with variable steps
+//! cause it.
 
 use std::time::Duration;
 
@@ -11,11 +15,12 @@ use crate::black_box::source::{RecordedSession, SourceError};
 
 /// Difference beyond rounding, as a share of the greatest value of the output.
 const ROUNDING: f64 = 1e-9;
-/// A run that takes longer is not made a second time.
+/// If the first runs take longer than this, none is repeated.
 pub(super) const LONG: Duration = Duration::from_secs(60);
 
-/// Refuses two answers to the same question, over so many trials each, that differ by more than rounding. Answers hold stages one behind the
-/// other, the first of them `stage`.
+/// Refuses two answers to the same request that differ by more than rounding. `runs` holds the
+/// number of trials and the values of each answer. The values hold the stages one after the other,
+/// beginning with `stage`.
 pub(super) fn alike(
     session: &RecordedSession,
     stage: usize,

@@ -62,7 +62,8 @@ struct Made {
     kept: LruCache<Key, (usize, Answer)>,
     under_way: HashSet<Key>,
     count: usize,
-    /// Whether a run has been asked for twice, and in what a longer run differs from a shorter one.
+    /// Whether a run has been requested twice; `note` then describes a difference between a longer
+    /// and a shorter run.
     is_repeated: bool,
     note: Option<String>,
 }
@@ -74,7 +75,7 @@ pub(crate) struct Runs {
     made: Mutex<Made>,
     done: Condvar,
     answers_all: bool,
-    /// By stage, the turn by which its recorded output wrapped.
+    /// For each stage, the period at which its recorded output wrapped (a full turn), if it did.
     turns: Vec<Option<f64>>,
 }
 
@@ -119,7 +120,7 @@ impl Runs {
     }
 
     fn lock(&self) -> MutexGuard<'_, Made> {
-        // A poisoned list only holds what can be made again.
+        // The cache can be used after a panic, because its entries can be computed again.
         self.made.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -133,7 +134,7 @@ impl Runs {
         }
     }
 
-    /// The output of a run that was made; `None` if it was not, or is not kept.
+    /// The cached output of a run; `None` if it is not in the cache.
     pub(crate) fn kept(&self, session: &RecordedSession, run: &Inner) -> Option<Arc<Vec<f64>>> {
         let made = self.lock();
         let kept = made.kept.peek(&self.key(run))?;
@@ -166,8 +167,9 @@ impl Runs {
 
     /// Outputs of some runs; new runs are made in one batch.
     ///
-    /// A run that another thread is making is waited for. The source is asked from a separate thread, so that no parallel iterator of the
-    /// source can take up work that waits for that same source.
+    /// If another thread is making a run, this call waits for it. The source is called from a
+    /// separate thread, so that a parallel iterator in the source cannot steal work that waits for
+    /// that same source.
     pub(crate) fn outputs(&self, session: &RecordedSession, wanted: &[Inner]) -> Vec<Answer> {
         let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
         let mut out: Vec<Option<Answer>> = vec![None; wanted.len()];
@@ -234,7 +236,7 @@ impl Runs {
         self.done.notify_all();
     }
 
-    /// What the source answers, asked from a separate thread.
+    /// Calls the source from a separate thread and returns its answers.
     fn asked(&self, runs: &[&Inner]) -> Vec<Result<Vec<f64>, SourceError>> {
         let others: Vec<Vec<AlteredColumn<'_>>> = runs.iter().map(|run| others(run)).collect();
         let asks: Vec<Ask<'_>> = runs.iter().zip(&others).map(|(run, o)| ask(run, o)).collect();
@@ -245,8 +247,9 @@ impl Runs {
         })
     }
 
-    /// Asks for the first run that was ever answered once more, over fewer or more trials where there are several; where the source answers
-    /// the same question differently, that is the answer.
+    /// Requests the first run that was ever answered once more, over fewer or more trials if there
+    /// are several. If the source answers the same request differently, an error replaces the
+    /// answer.
     fn repeat(
         &self,
         session: &RecordedSession,
@@ -282,7 +285,7 @@ impl Runs {
             if let (Err(why), true) = (&alike, other != run.trials) {
                 let is_changed = matches!(why, SourceError::Changed { .. });
                 let note = is_changed.then(|| why.to_string());
-                // where this is answered alike it is the length that makes the difference
+                // if this answer is the same, the difference comes from the number of trials
                 alike = again(&first, run.trials);
                 let mut made = self.lock();
                 made.count += 1;
@@ -321,7 +324,8 @@ impl Runs {
         })
     }
 
-    /// An answer without its jumps by a turn where the recorded output has had such jumps; each trial begins in the turn of the record.
+    /// Unwraps the outputs whose recorded columns wrapped. Each trial begins in the same turn as
+    /// the recording.
     fn followed(&self, session: &RecordedSession, run: &Inner, mut values: Vec<f64>) -> Vec<f64> {
         let samples = session.samples(run.trials).max(1);
         for (at, answer) in values.chunks_mut(samples).enumerate() {
@@ -338,12 +342,13 @@ impl Runs {
     }
 }
 
-/// The altered stage that a run is asked for: its own, else the first; `None` if every input is as measured.
+/// The altered stage that an ask names: the run's own stage if it is altered, otherwise the first
+/// altered one; `None` if every input is as measured.
 fn asked_for(run: &Inner) -> Option<&Altered> {
     run.altered.iter().find(|a| a.stage == run.stage).or(run.altered.first())
 }
 
-/// Altered columns of the stages other than the one that a run is asked for.
+/// Altered columns of all stages except the one that the ask names.
 fn others(run: &Inner) -> Vec<AlteredColumn<'_>> {
     let own = asked_for(run).map(|a| a.stage);
     let all = run.altered.iter().flat_map(|a| a.which.iter().map(move |&input| (a, input)));

@@ -15,7 +15,8 @@ pub struct RecordedSession {
     pub stages: Vec<SessionStage>,
     /// Names of the nominal parameters, in the order of [`Ask::parameters`].
     pub parameters: Vec<String>,
-    /// Names of the user's own effects, in the order of [`Ask::effects`]; `effect.argument` where an effect has several arguments.
+    /// Names of the user's own effects, in the order of [`Ask::effects`]; `effect.argument` if an
+    /// effect has several arguments.
     pub effects: Vec<String>,
     /// The recorded columns that are used, as measured.
     pub columns: Vec<SessionColumn>,
@@ -48,7 +49,7 @@ pub struct SessionStage {
 pub struct SessionColumn {
     /// Its name.
     pub name: String,
-    /// Unit, empty where none is known.
+    /// Unit, empty if none is known.
     pub unit: String,
     /// Values, all trials end to end.
     pub values: Vec<f64>,
@@ -73,9 +74,11 @@ pub struct Ask<'a> {
     pub stage: usize,
     /// Every nominal parameter, in the problem's order.
     pub parameters: &'a [f64],
-    /// Every value of the user's own effects, in the problem's order; the `off` value where an effect is off.
+    /// Every value of the user's own effects, in the problem's order; the `off` value if an effect
+    /// is off.
     pub effects: &'a [f64],
-    /// Columns that drive the stage, in the stage's order, each over the trials asked for; `None` if the columns are as measured.
+    /// Columns that drive the stage, in the stage's order, each over the trials asked for; `None`
+    /// if the columns are as measured.
     pub inputs: Option<&'a [Vec<f64>]>,
     /// Columns that drive other stages and are altered as well; empty unless the source [takes inputs of several
     /// stages](Source::takes_inputs_of_several).
@@ -99,7 +102,8 @@ pub struct AlteredColumn<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// These values cannot be simulated, and the fit turns back. The text is what the simulator says.
+    /// These values cannot be simulated, and the fit steps back. The text is the simulator's
+    /// message.
     #[error("{0}")]
     Refused(String),
     /// The simulator is gone for good, and the diagnosis ends.
@@ -131,7 +135,8 @@ pub enum SourceError {
         /// Time since the trial began, s.
         time_s: f64,
     },
-    /// The same run was asked for twice and answered differently: no difference between two models could be believed.
+    /// The same run was requested twice and answered differently, so that no difference between two
+    /// models can be trusted.
     #[error(
         "stage {stage}: the simulator answers {}, {first} and then {second} in row {row} of trial {trial}; {}",
         question(.over),
@@ -144,9 +149,9 @@ pub enum SourceError {
         trial: String,
         /// The sample of the trial, from 0.
         row: usize,
-        /// What was answered first.
+        /// First answer.
         first: f64,
-        /// What was answered then.
+        /// Second answer.
         second: f64,
         /// How many trials each of the two runs was over.
         over: [usize; 2],
@@ -159,7 +164,7 @@ pub enum SourceError {
     },
 }
 
-/// What was asked twice, over so many trials, and answered differently.
+/// Describes the request that was answered differently, from the numbers of trials of the two runs.
 fn question([first, second]: &[usize; 2]) -> String {
     match first == second {
         true => "the same question differently".to_owned(),
@@ -169,8 +174,9 @@ fn question([first, second]: &[usize; 2]) -> String {
 
 /// A user's simulator as a black box.
 ///
-/// The same ask has the same answer, and a run over more trials begins with the samples of a run over fewer. Asks come from several
-/// threads at once, but never from a thread that a parallel iterator of the source could hold up.
+/// The same ask must always have the same answer, and a run over more trials must begin with the
+/// samples of a run over fewer. Several threads may call a source at once. No call comes from a
+/// thread of a rayon pool, so that a source may use parallel iterators.
 ///
 /// A closure is a source:
 ///
@@ -186,10 +192,12 @@ pub trait Source: Send + Sync {
     /// The output of the stage over the trials of each ask, in the order of the asks.
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>>;
 
-    /// Whether an answer holds the outputs of all stages, one after the other, whatever stage is asked for: a simulator that runs as a
-    /// whole is then run once for all stages. The inputs of an ask are those of the stage asked for.
+    /// Whether an answer holds the outputs of all stages, one after the other, whichever stage the
+    /// ask names. A simulator that runs as a whole is then run once for all stages. The inputs of
+    /// an ask are those of the stage that it names.
     ///
-    /// Where the inputs of one stage are altered, such a source is asked for that stage, whichever output is looked at.
+    /// If the inputs of one stage are altered, the ask names that stage, whichever output is
+    /// needed.
     fn answers_all(&self) -> bool {
         false
     }
@@ -205,7 +213,8 @@ pub trait Source: Send + Sync {
         false
     }
 
-    /// Number of asks at once that makes the source fast; more than one where a batch costs little more than a run.
+    /// Number of asks per call at which the source is efficient; more than one if a batch costs
+    /// little more than a run.
     fn batch(&self) -> usize {
         1
     }

@@ -109,12 +109,12 @@ pub struct ProblemSpec {
     pub trials: Vec<SessionTrial>,
 }
 
-/// Says that the catalogue was narrowed for a simulator that takes no altered inputs.
+/// Note for a simulator that takes no altered inputs, for which fewer effects are looked for.
 pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side: the simulator takes no altered inputs (inputs = false in a worker's hello)";
 
 impl ProblemSpec {
-    /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` means the effects that can be behind the
-    /// simulator, and noise of its inputs is not drawn. `None` where the problem asks for nothing else anyway.
+    /// The problem for a simulator that can run only on the recorded inputs: `all` becomes
+    /// `output.all`, and the noise of inputs becomes 0. `None` if the problem contains neither.
     pub fn only_behind(&self) -> Option<Self> {
         let is_noisy = |input: &Input| input.noise > 0.0;
         if !self.wrap.iter().any(|name| name == "all") && !self.inputs.iter().any(is_noisy) {

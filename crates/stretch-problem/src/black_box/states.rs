@@ -1,11 +1,13 @@
-//! States that a simulator lets be held or drained: what no operator outside of it can do.
+//! Effects that limit or drain a state inside a simulator. The simulator applies them itself,
+//! because no operator outside of it can.
 
 use serde::Deserialize;
 
 use super::spec::{Argument, OwnEffect, ProblemSpec};
 use crate::error::ProblemError;
 
-/// A state of a simulator that may spill, stop or leak, and the range in which it moves.
+/// A state of a simulator that may spill (at an upper limit), stop (at a lower limit) or leak, and
+/// the range in which it moves.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct State {
     /// Name of the state.
@@ -15,18 +17,20 @@ pub struct State {
     pub unit: String,
     /// Least value that the state takes in the recorded session.
     pub least: f64,
-    /// Greatest value that the state takes there.
+    /// Greatest value that the state takes in the recorded session.
     pub greatest: f64,
 }
 
-/// What begins the names of effects on states.
+/// Prefix of the names of effects on states.
 const PREFIX: &str = "state.";
-/// Leaks that are looked for: a time constant between so many sample times and so many sessions.
+/// Range of the time constant of a leak: the least in sample times, the greatest in session
+/// lengths.
 const LEAKS: [f64; 2] = [10.0, 10.0];
 
 impl ProblemSpec {
-    /// The problem with effects on declared states in addition to its own, as far as `wrap` asks for them: `all`, `state.all`, or names such as
-    /// `state.level.spill`. The patterns are taken out of `wrap`. Each state has three effects, which the simulator makes:
+    /// The problem with the effects on declared states that `wrap` requests by `all`, `state.all`,
+    /// or names such as `state.level.spill`. Names that begin with `state.` are removed from
+    /// `wrap`. Each state has three effects, which the simulator applies:
     ///
     /// | effect | its value v, after every step of the simulator | off at |
     /// | --- | --- | --- |
@@ -34,7 +38,7 @@ impl ProblemSpec {
     /// | `state.NAME.floor` | it cannot fall below v: x = max(x, v) | `least` |
     /// | `state.NAME.leak` | it loses v of itself a second: x = x exp(-v dt) | 0 |
     ///
-    /// Effects that the problem has already are left as they are: a fix holds their values.
+    /// Effects that the problem already has stay unchanged, because a fix may hold their values.
     ///
     /// # Errors
     /// A pattern that matches no declared state, a state whose range is empty.

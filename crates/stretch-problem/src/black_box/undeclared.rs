@@ -1,7 +1,9 @@
-//! Parameters that move the output of a stage in which they are not said to act, and stages that none of their parameters moves.
+//! Finds parameters that move the output of a stage that their `stages` do not name, and stages
+//! whose output none of their parameters moves.
 //!
-//! A diagnosis re-tunes a parameter by the stages that its `stages` name alone. Where a simulator answers all stages at once, the runs of its
-//! sensitivities hold the other outputs as well; the change of output t for one tolerance sd of a parameter, in multiples of the noise, is
+//! A diagnosis re-tunes a parameter only by the stages that its `stages` name. If a simulator
+//! answers all stages at once, the runs for the sensitivities hold the other outputs as well. The
+//! change of output t for one tolerance sd of a parameter, in multiples of the noise, is
 //!
 //! ```text
 //! sqrt(mean of (y_t(p + d) - y_t(p))^2) sd/(|d| sd_t)
@@ -21,22 +23,25 @@ use super::{
     runs::{Inner, Runs},
 };
 
-/// Multiples of its noise by which an output moves at least.
+/// Least change of an output that is reported, in multiples of its noise.
 const LEAST: f64 = 1.0;
-/// Names that a sentence lists.
+/// Greatest number of names that a sentence lists.
 const LISTED: usize = 3;
 
 #[derive(Debug, Default)]
 pub(super) struct Undeclared {
-    /// By parameter and by stage in which it is not said to act: the change of the output for one tolerance, in multiples of its noise.
+    /// By parameter and by stage that its `stages` do not name: the change of the output for one
+    /// tolerance, in multiples of its noise.
     others: Mutex<BTreeMap<(usize, usize), f64>>,
-    /// By stage with parameters to be re-tuned: whether none of them has moved its output by a bit.
+    /// By stage with parameters that can be re-tuned: whether its output is identical to the bit
+    /// for all of their values so far.
     unmoved: Mutex<BTreeMap<usize, bool>>,
 }
 
 impl Undeclared {
-    /// Learns from the runs of a linearisation, whose outputs these are, which parameters move its stage and the other stages. Of these
-    /// stages the first look at a parameter counts.
+    /// Finds from the runs of a linearisation and their `outputs` which parameters move its stage
+    /// and the other stages. For the other stages, only the first linearisation of a parameter
+    /// counts.
     pub(super) fn look(
         &self,
         problem: &Checked,
@@ -72,7 +77,8 @@ impl Undeclared {
         }
     }
 
-    /// What is ignored and what is to be declared, in sentences: one for all parameters that act in the same stages and move the same other one.
+    /// Sentences on ignored and on undeclared parameters. One sentence covers all parameters that
+    /// name the same stages and move the same other stage.
     pub(super) fn notes(&self, problem: &Checked) -> Vec<String> {
         let about = problem.description();
         let known = self.others.lock().unwrap_or_else(PoisonError::into_inner);
@@ -102,11 +108,11 @@ impl Undeclared {
     }
 }
 
-/// Parameters that are said to act in the same stages, and move the same other one.
+/// Parameters that name the same stages and move the same other stage.
 struct Alike<'a> {
     said: Vec<&'a str>,
     moves: &'a str,
-    /// By how many multiples of the noise, and names.
+    /// For each parameter, the change in multiples of the noise, and the name.
     own: Vec<(f64, &'a str)>,
 }
 

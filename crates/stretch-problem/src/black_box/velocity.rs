@@ -1,4 +1,5 @@
-//! The velocity of the rubbing parts of a stage: recorded, or the derivative of a recorded position.
+//! The velocity of the parts of a stage that have friction: recorded, or the derivative of a
+//! recorded position.
 
 use std::ops::Range;
 
@@ -7,9 +8,10 @@ const LONGEST_S: f64 = 0.05;
 /// Greatest noise of a velocity, a share of the greatest velocity.
 const NOISY: f64 = 0.01;
 
-/// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, all trials end to end, with the smallest k (doubled from 1) for
-/// which the noise of the position makes at most a hundredth of the greatest velocity, and 2 k dt at most a twentieth of a second. The
-/// noise of the position is estimated from second differences. At the ends of a trial the difference is one-sided.
+/// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, all trials end to end. k is
+/// doubled from 1 until the noise of the velocity is at most a hundredth of the greatest velocity,
+/// or 2 k dt reaches a twentieth of a second. The noise of the position is estimated from second
+/// differences. At the ends of a trial the difference is one-sided.
 pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) -> Vec<f64> {
     let parts = || trials.iter().map(|r| &position[r.clone()]);
     let noise = stretch_gap::noise_variance(parts(), dt_s).sqrt();

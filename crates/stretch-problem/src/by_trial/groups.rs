@@ -1,38 +1,43 @@
-//! Which samples are a run: those of a trial, or those in which a column has one value.
+//! Divides samples into runs: one run for each trial, or one for each value of a column.
 
 use std::ops::Range;
 
 use stretch_gap::TrialSpec;
 
-/// Samples that are fitted together, by the index of each in all trials end to end.
+/// Samples that are fitted together, as indices into all trials end to end.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
     pub(super) name: String,
     pub(super) samples: Vec<usize>,
 }
 
-/// Most values of a column that is set; one with more is measured.
+/// Greatest number of distinct values of a column that is set, such as a supply voltage. A column
+/// with more values counts as measured.
 const MOST_LEVELS: usize = 12;
-/// Share of its samples at which a column that is set has the value of the sample before.
+/// Least share of the samples at which a column that is set repeats the value of the sample before.
 const HELD: f64 = 0.9;
-/// How far two values of a column are apart that are two set-ups, as a share of its range; those of a trial are nearer.
+/// Least distance between the medians of two set-ups, as a share of the range of all medians. The
+/// distance must also exceed the spread within every trial.
 const APART: f64 = 0.1;
-/// Parts of the samples by a column that moves within trials.
+/// Number of runs into which a column that moves within trials divides the samples.
 const PARTS: usize = 4;
-/// Least samples of a group.
+/// Least number of samples of a group; smaller groups are dropped.
 const FEWEST: usize = 20;
 
-/// A group a trial.
+/// Returns one group for each trial.
 pub(super) fn by_trial(trials: &[TrialSpec]) -> Vec<Group> {
     let each = ranges(trials).into_iter().zip(trials);
     each.map(|(samples, trial)| Group { name: trial.name.clone(), samples: samples.collect() })
         .collect()
 }
 
-/// A group a value of a column.
+/// Returns one group for each value or set-up of a column.
 ///
-/// A column that is set (held nine samples of ten, with twelve values at most) has a group for each value. One that is measured, and moves less
-/// within trials than from trial to trial, has a group for the trials of each set-up. Any other is cut into four parts of as many samples.
+/// - A column that is set (it repeats nine samples of ten and has at most twelve values) gives one
+///   group for each value.
+/// - A measured column that changes less within trials than between trials gives one group for the
+///   trials of each set-up.
+/// - Any other column is divided at its quartiles into four groups of equal size.
 pub(super) fn by_column(name: &str, values: &[f64], trials: &[TrialSpec]) -> Vec<Group> {
     let bounds =
         levels(values).or_else(|| set_ups(values, trials)).unwrap_or_else(|| parts(values));
@@ -76,7 +81,8 @@ fn levels(values: &[f64]) -> Option<Vec<f64>> {
     (bounds.len() < MOST_LEVELS).then_some(bounds)
 }
 
-/// Bounds between set-ups of a column that is measured: where the medians of trials lie further apart than trials are wide.
+/// Bounds between set-ups of a measured column. A bound lies between two neighbouring trial medians
+/// whose distance exceeds the spread (5 to 95 %) within every trial.
 fn set_ups(values: &[f64], trials: &[TrialSpec]) -> Option<Vec<f64>> {
     let mut medians = Vec::new();
     let mut widest = 0.0_f64;
@@ -96,7 +102,7 @@ fn set_ups(values: &[f64], trials: &[TrialSpec]) -> Option<Vec<f64>> {
     (!bounds.is_empty()).then_some(bounds)
 }
 
-/// Bounds between parts of as many samples.
+/// Bounds between parts of equal size.
 fn parts(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -120,7 +126,8 @@ mod tests {
 
     #[test]
     fn a_column_that_is_set_has_a_group_for_each_value() {
-        // Two values a trial, and one between them where a recording was brought to an even grid.
+        // Each trial has two values, and one sample between them that comes from interpolation onto
+        // an even grid.
         let one = [vec![0.5; 50], vec![1.0], vec![2.0; 49]].concat();
         let groups = by_column("voltage_v", &[one.clone(), one].concat(), &trials(2, 100));
         assert_eq!(sizes(&groups), [("voltage_v 0.5 to 1", 102), ("voltage_v 2", 98)]);

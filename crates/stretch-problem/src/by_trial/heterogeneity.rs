@@ -1,4 +1,4 @@
-//! Whether values are the same in all runs.
+//! Tests whether fitted values are the same in all runs.
 //!
 //! Cochran's Q of the values x_i with variances v_i, weights w_i = 1/v_i:
 //!
@@ -6,8 +6,8 @@
 //! Q = sum w_i (x_i - m)^2,     m = sum w_i x_i/sum w_i,     chi-square with n - 1 degrees of freedom where all are the same
 //! ```
 //!
-//! Probabilities are corrected for the number of questions by the false discovery rate (Benjamini and Hochberg 1995,
-//! doi 10.1111/j.2517-6161.1995.tb02031.x), at 5 %.
+//! Probabilities are corrected for the number of tests so that the false discovery rate is at most
+//! 5 % (Benjamini and Hochberg 1995, doi 10.1111/j.2517-6161.1995.tb02031.x).
 
 use serde::Serialize;
 use statrs::function::{erf::erfc, gamma::checked_gamma_ur};
@@ -16,26 +16,27 @@ use stretch_gap::{SampleFit, SampleValue};
 /// False discovery rate.
 const RATE: f64 = 0.05;
 
-/// Whether a value is the same in all runs that tell it.
+/// Test of whether a value is the same in all runs that determine it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heterogeneity {
     /// Name of the value.
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Mean of the runs, weighted by what each says.
+    /// Mean of the runs, weighted by the inverse variance of each.
     pub mean: f64,
-    /// Least and greatest value of a run that tells it.
+    /// Least and greatest value over the runs that determine it.
     pub range: [f64; 2],
-    /// Runs that tell it.
+    /// Number of runs that determine it.
     pub runs: usize,
     /// Cochran's Q.
     pub q: f64,
-    /// Share of the scatter that is not the intervals': max(0, 1 - (n - 1)/Q).
+    /// Share of the scatter that the uncertainties of the runs do not explain: max(0, 1 - (n -
+    /// 1)/Q).
     pub i_squared: f64,
-    /// Probability of a greater Q where all runs are the same.
+    /// Probability of a greater Q if all runs have the same value.
     pub p: f64,
-    /// The same, corrected for the number of values.
+    /// `p`, corrected for the number of values.
     pub p_corrected: f64,
     /// Whether the runs disagree.
     pub differs: bool,
@@ -54,16 +55,17 @@ impl Heterogeneity {
     }
 }
 
-/// A run that differs from the others, which agree without it.
+/// A run that differs from the others, which agree with one another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Apart {
     /// Name of the run.
     pub run: String,
     /// Names of the values in which it differs.
     pub values: Vec<String>,
-    /// By how many standard deviations, for each.
+    /// For each value, its distance from the mean of the other runs, in standard deviations.
     pub deviations: Vec<f64>,
-    /// Whether the other runs agree in these values without it: it is then another set-up, or was recorded in one.
+    /// Whether the other runs agree with one another in at least one of these values. The run then
+    /// has another set-up.
     pub is_set_up: bool,
 }
 
@@ -83,7 +85,7 @@ impl Apart {
 /// A run that was fitted by itself, with its name.
 type Run = (String, SampleFit);
 
-/// What the data of a run say of a value: index of the run, place on the scale of the fit, variance.
+/// Estimate of a value from one run: index of the run, value on the scale of the fit, variance.
 type Estimate = (usize, f64, f64);
 
 fn estimates(runs: &[Run], value: usize) -> Vec<Estimate> {
@@ -91,7 +93,7 @@ fn estimates(runs: &[Run], value: usize) -> Vec<Estimate> {
     runs.iter().enumerate().filter_map(one).collect()
 }
 
-/// The values that were fitted, which are the same in all runs.
+/// Returns the fitted quantities, which have the same order in all runs.
 fn fitted(runs: &[Run]) -> &[SampleValue] {
     runs.first().map_or(&[], |(_, fit)| &fit.values)
 }
@@ -109,7 +111,7 @@ fn beyond(q: f64, degrees: usize) -> f64 {
     checked_gamma_ur(0.5 * degrees as f64, 0.5 * q).unwrap_or(1.0)
 }
 
-/// By value: whether the runs agree.
+/// Tests for each value whether the runs agree.
 pub(super) fn values(runs: &[Run]) -> Vec<Heterogeneity> {
     let mut out = Vec::new();
     for (i, value) in fitted(runs).iter().enumerate() {
@@ -176,7 +178,8 @@ pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     (0..runs.len()).filter_map(of_run).collect()
 }
 
-/// Probabilities corrected for their number: the least false discovery rate at which each would be found.
+/// Corrects probabilities for their number. Returns for each the least false discovery rate at
+/// which it would count as a discovery.
 fn corrected(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
@@ -195,7 +198,7 @@ mod tests {
 
     #[test]
     fn corrected_probabilities_are_those_of_benjamini_and_hochberg() {
-        // The example of their table, the first five of fifteen.
+        // The example of Benjamini and Hochberg: 4 of the 15 hypotheses are rejected.
         let p = [0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240];
         let p = [&p[..], &[0.4262, 0.5719, 0.6528, 0.7590, 1.0]].concat();
         let found = corrected(&p).iter().filter(|p| **p < 0.05).count();

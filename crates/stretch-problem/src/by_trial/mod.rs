@@ -1,4 +1,5 @@
-//! Do the runs agree: every run fitted by itself, a trial or all samples in which a column has one value, and what differs from run to run.
+//! Fits every run separately and tests which values differ from run to run. A run is a trial, or
+//! all samples in which a column has one value.
 
 mod groups;
 mod heterogeneity;
@@ -11,14 +12,14 @@ use groups::Group;
 
 pub use heterogeneity::{Apart, Heterogeneity};
 
-/// What some runs say when they are fitted without the others.
+/// Fit to one run, or to all runs together.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunFit {
-    /// Name of the run; of all runs together `all`.
+    /// Name of the run; `all` for all runs together.
     pub run: String,
     /// Root mean square error in multiples of the noise with these values.
     pub times_noise: f64,
-    /// The same with the values of all runs together.
+    /// The same error with the values from the fit to all runs together.
     pub times_noise_of_all: f64,
     /// The values: parameters stage by stage, then the numbers of the effects.
     pub values: Vec<SampleValue>,
@@ -27,20 +28,21 @@ pub struct RunFit {
 /// Whether runs agree, by value and by run. Its serde form is the key `by_trial` of a diagnosis' JSON.
 #[derive(Debug, Clone, Serialize)]
 pub struct ByTrial {
-    /// What a run is: `trial`, or the column of which each run has another value.
+    /// `trial` if each run is a trial, or the column that defines the runs.
     pub by: String,
     /// All runs fitted together.
     pub all: RunFit,
     /// Every run by itself.
     pub runs: Vec<RunFit>,
-    /// By value: whether it is the same in all runs that tell it.
+    /// For each value, the test of whether it is the same in all runs that determine it.
     pub values: Vec<Heterogeneity>,
     /// Runs that differ from the others.
     pub apart: Vec<Apart>,
 }
 
 impl ByTrial {
-    /// What is found, in sentences: which values differ, and which run is another set-up.
+    /// The findings in sentences: which values differ, which run has another set-up, and which
+    /// values are poorly determined.
     pub fn sentences(&self) -> Vec<String> {
         let differ = self.values.iter().filter(|v| v.differs);
         let mut out: Vec<String> = differ.map(Heterogeneity::sentence).collect();
@@ -57,8 +59,9 @@ impl ByTrial {
 }
 
 impl Problem {
-    /// Fits every run of an examined problem by itself: nominal parameters within their tolerances, and the parameters of the named effects;
-    /// and says which runs disagree, in what.
+    /// Fits every run of an examined problem separately, and tests which runs disagree in which
+    /// values. The fit has the nominal parameters within their tolerances, and the parameters of
+    /// the named effects.
     ///
     /// Values are maximum a posteriori (Levenberg-Marquardt), their covariance is that of the linearised fit times
     ///
@@ -66,11 +69,13 @@ impl Problem {
     /// max(1, X tau),     X = mean (r/noise)^2,     tau = 1 + 2 sum of the residual's autocorrelations while they are positive
     /// ```
     ///
-    /// so that an error that lasts counts as fewer observations. The effects are those that the diagnosis names; their forms stay as they were
-    /// found. Test trials are fitted as well, because the verdict is already given.
+    /// so that a correlated error counts as fewer observations. The effects are those that the
+    /// diagnosis names; their forms keep the values of the diagnosis. Test trials are fitted as
+    /// well, because the verdict is already given.
     ///
     /// # Errors
-    /// A simulator whose nuisances cannot be fitted by run (the built-in rig), a single run, and what the simulator says.
+    /// A simulator whose nuisance parameters cannot be fitted for each run (the built-in rig), a
+    /// single run, and errors of the simulator.
     pub fn by_trial(
         &self,
         examined: &Examined,
@@ -84,12 +89,17 @@ impl Problem {
         compared(self.simulator(), ("trial", &groups::by_trial(trials)), examined, progress, stop)
     }
 
-    /// As [`Problem::by_trial`], where a run is all samples in which a column has one value, from whatever trials these are: a load that was set, a
-    /// voltage, a tension that was measured.
+    /// As [`Problem::by_trial`], but a run is all samples in which a column has one value, from any
+    /// trial. The column may be a load or a voltage that was set, or a tension that was measured.
     ///
-    /// A column that is set (held from sample to sample, with twelve values at most) has a run for each value; one that is measured, and
-    /// differs from trial to trial, has one for the trials of each set-up; one that moves within trials has four, with as many samples each.
-    /// Samples of a run that do not follow one another count as if they did, which shortens what an error that lasts is seen to last.
+    /// - A column that is set (held from sample to sample, with twelve values at most) gives one
+    ///   run for each value.
+    /// - A measured column that differs from trial to trial gives one run for the trials of each
+    ///   set-up.
+    /// - A column that moves within trials gives four runs of equal size.
+    ///
+    /// Samples of a run that are not adjacent are treated as if they were, which underestimates how
+    /// long an error is correlated.
     ///
     /// # Errors
     /// As [`Problem::by_trial`]; a column that was not recorded, or never changes.
@@ -157,5 +167,5 @@ fn compared(
     Ok(ByTrial { by: by.to_owned(), all, runs, values, apart })
 }
 
-/// What to do if runs cannot be compared.
+/// Advice if runs cannot be compared.
 const HINT: &str = "runs are compared of a simulator of your own, or of a gauge alone, with two recordings or more, or by a column that was recorded and changes";

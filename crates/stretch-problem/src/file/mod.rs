@@ -36,8 +36,8 @@ impl ProblemSpec {
         Ok(Self { folder, ..spec })
     }
 
-    /// Reads the problem's file that a path names: the path itself if it ends in `.toml`, or the `problem.toml` of a folder that is
-    /// no data set. `None` if the path names no problem's file.
+    /// Reads the problem's file that a path names: the path itself if it ends in `.toml`, or the
+    /// `problem.toml` of a folder that is no data set. `None` if the path names no problem's file.
     ///
     /// # Errors
     /// As [`ProblemSpec::read`].
@@ -88,15 +88,16 @@ impl ProblemSpec {
         Ok(spec)
     }
 
-    /// The text of the file in its own folder; the text reads back to the same problem.
+    /// The text of the file in its own folder. Parsing the text gives the same problem.
     pub fn to_toml(&self) -> String {
         self.to_toml_with(&self.folder.join(IN_FOLDER), &Remarks::default())
     }
 
-    /// The text of the file at `path`, with comments on its entries; the text reads back to the same problem. Where its files are relative
-    /// to another folder than that of `path`, the text names that folder.
+    /// The text of the file at `path`, with comments on its entries. Parsing the text gives the
+    /// same problem. If the problem's files are not relative to the folder of `path`, the text
+    /// names their folder.
     ///
-    /// Comments on parameters are under the table `parameter`.
+    /// `remarks` holds comments on parameters under the table `parameter`.
     pub fn to_toml_with(&self, path: &Path, remarks: &Remarks) -> String {
         let mut remarks = remarks.clone();
         if self.simulator.is_none() {
@@ -105,7 +106,8 @@ impl ProblemSpec {
         remarks.write(&Self { folder: self.folder_from(path).unwrap_or_default(), ..self.clone() })
     }
 
-    /// The folder that the files of the problem are relative to, where it is another one than that of `path`.
+    /// The folder to which the problem's file names are relative; `None` if it is the folder of
+    /// `path`.
     fn folder_from(&self, path: &Path) -> Option<PathBuf> {
         let real = |folder: &Path| match folder.as_os_str().is_empty() {
             true => Path::new(HERE).canonicalize(),
@@ -121,10 +123,11 @@ impl ProblemSpec {
         self.name.as_deref().unwrap_or("problem")
     }
 
-    /// The workers of the problem's simulator, `jobs` at once where the file gives no number; none for a simulator that is built in.
+    /// The workers of the problem's simulator, `jobs` at once if the file gives no number; `None`
+    /// for a simulator that is built in.
     ///
     /// # Errors
-    /// There is no program that runs FMUs, and the simulator is one.
+    /// The simulator is an FMU, and the program that runs FMUs is missing.
     pub fn workers(&self, jobs: usize) -> Result<Option<WorkersSpec>, ProblemError> {
         self.simulator.as_ref().map_or(Ok(None), |own| own.workers(jobs, self))
     }
@@ -138,7 +141,7 @@ impl ProblemSpec {
         }
     }
 
-    /// Reads the recordings; the problem with its recordings.
+    /// Reads the recordings and returns the problem with them.
     ///
     /// # Errors
     /// Recordings that cannot be read.
@@ -146,7 +149,7 @@ impl ProblemSpec {
         self.load_as(&self.reading())
     }
 
-    /// The same, the recordings read in another way.
+    /// As `load`, with other options for reading the recordings.
     pub(crate) fn load_as(&self, options: &ReadOptions) -> Result<Self, ProblemError> {
         let mut spec = self.clone();
         for entry in &self.files {

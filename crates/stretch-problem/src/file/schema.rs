@@ -1,4 +1,5 @@
-//! The keys of a problem's file as a schema for editors and as a reference for people, both derived from [`ProblemSpec`].
+//! The keys of a problem's file as a schema for editors and as a reference for people, both derived
+//! from [`ProblemSpec`].
 
 use std::fmt::Write;
 
@@ -110,7 +111,7 @@ fn table(out: &mut String, root: &Value, schema: &Value, path: &str) {
     }
 }
 
-/// What a key holds; tables of the file are added to `tables`.
+/// Describes the value of a key in words; adds the schemas of tables in it to `tables`.
 fn holds<'a>(root: &'a Value, schema: &'a Value, tables: &mut Vec<&'a Value>) -> String {
     if let Some(name) = schema["$ref"].as_str().and_then(|path| path.strip_prefix('#')) {
         return holds(root, root.pointer(name).unwrap_or(&Value::Null), tables);

@@ -55,14 +55,16 @@ pub enum BuiltIn {
     Gauge,
 }
 
-/// Most workers at once: each is a process, and has a thread that waits for it.
+/// Greatest number of workers at once, because each is a process and has a thread that waits for
+/// it.
 const MOST_JOBS: usize = 256;
 
 /// Keys of every simulator that runs as workers.
 const WORKERS: [&str; 3] = ["jobs", "deadline_s", "start_s"];
 
 impl SimulatorEntry {
-    /// Checks that it is one simulator, and that every key is one of that simulator's.
+    /// Checks that the entry names exactly one simulator, and that every other key belongs to that
+    /// simulator.
     ///
     /// # Errors
     /// The key, and what is wrong with it.

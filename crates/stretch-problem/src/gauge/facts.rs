@@ -1,4 +1,4 @@
-//! What is known of the recording of a gauge alone.
+//! Facts about the recording of a gauge alone.
 
 use std::borrow::Cow;
 
@@ -8,10 +8,12 @@ use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUs
 use super::session::GaugeSession;
 use crate::{bench::specs::skew_of, rig::smooth::Smoothed};
 
-/// Delays of two recorders that were not started together, without a catalogue, s.
+/// Range of the delays between two recorders that were not started together, s; used if the
+/// catalogue has no skew.
 const SKEW_S: [f64; 2] = [-1.0, 1.0];
 
-/// The facts of a session with the column `reference`; `inputs` are the references of its trials as they drive the gauge.
+/// The facts about a session with the column `reference`; `inputs` are the smoothed references that
+/// drive the gauge, one for each trial.
 pub(super) fn facts(
     about: &Description,
     reference: &str,
@@ -25,14 +27,14 @@ pub(super) fn facts(
         signals: signals(reference, session, inputs),
         columns: columns(about, reference, session),
         sensor: Some(0),
-        // A straight line follows most signals that it is fitted to; where the line leaves half of the signal, reference and signal have
-        // little to do with each other.
+        // A straight line fits most signals of a gauge. If the line leaves half of the signal
+        // unexplained, reference and signal are hardly related.
         gross_misfit_share: 0.5,
         ..RecordFacts::default()
     }
 }
 
-/// The reference as it drives the gauge, and the pressure where it was recorded.
+/// The smoothed reference that drives the gauge, and the pressure if it was recorded.
 fn signals(reference: &str, session: &GaugeSession, inputs: &[Smoothed]) -> Vec<Recorded> {
     let driving = inputs.iter().flat_map(|s| &s.values).copied().collect();
     let mut out = vec![Recorded::measured(reference, unit_of(reference), driving)];
@@ -60,7 +62,7 @@ fn columns(about: &Description, name: &str, session: &GaugeSession) -> Vec<Colum
     vec![signal, reference]
 }
 
-/// Unit of a column, empty where the column's name gives none.
+/// Unit of a column, empty if the column's name gives none.
 pub(super) fn unit_of(column: &str) -> &str {
     unit(column).map_or("", written_unit)
 }

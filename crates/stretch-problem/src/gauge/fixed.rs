@@ -1,4 +1,5 @@
-//! A gauge without a rig, together with the effects that a diagnosis found.
+//! Results of a diagnosis of a gauge alone: notes, the next experiment, code for effects, and the
+//! fixed file.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
@@ -11,7 +12,7 @@ use crate::{
     problem::Diagnosable,
 };
 
-/// Table of the file.
+/// Table of the file that holds offset and gain.
 const TABLE: &str = "sensing";
 
 impl Diagnosable for GaugeSimulator {
@@ -27,9 +28,10 @@ impl Diagnosable for GaugeSimulator {
         next_experiment(self, diagnosis, evidence)
     }
 
-    /// The effects that a diagnosis of this gauge names, as code to type with the fitted numbers, in units of e.
+    /// Code for the effects that a diagnosis of this gauge names, with the fitted numbers, in units
+    /// of e.
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        // A sample time with which a diagnosis ran makes a grid.
+        // The sample time is valid, because a diagnosis ran with it.
         let Ok(grid) = Grid::samples(self.session.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
         let around = Gauge::surroundings(&self.nominal.spec, &grid);
@@ -40,11 +42,11 @@ impl Diagnosable for GaugeSimulator {
         })
     }
 
-    /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. The initial hysteresis state belongs to the
-    /// recording and stays out.
+    /// A gauge file (`kind = "gauge"`) with the findings of a diagnosis of this gauge: see [`Fix`].
+    /// The file omits the initial hysteresis state, because it belongs to the recording.
     ///
     /// # Errors
-    /// [`NoFix`] where the diagnosis names nothing to fix, or a gauge that no file may hold.
+    /// [`NoFix`] if the diagnosis names nothing to fix, or if a file cannot hold the fixed gauge.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };

@@ -31,20 +31,21 @@ use crate::{
 const OFFSET: usize = 0;
 /// Index of the gain.
 const GAIN: usize = 1;
-/// Index of the initial hysteresis state: how the memories of the gauge begin the session, after a motion from below (1), from above
-/// (-1), or settled (0).
+/// Index of the initial hysteresis state: how the memories of the gauge begin the session, after a
+/// motion from below (1), from above (-1), or settled (0).
 const INITIAL_STATE: usize = 2;
 
-/// What a [`GaugeSimulator`] is made of.
+/// The data from which a [`GaugeSimulator`] is built.
 #[derive(Debug, Clone, Copy)]
 pub struct GaugeSetup<'a> {
-    /// Trials, each with both columns; a column `pressure_kpa` is used where every trial has one.
+    /// Trials, each with both columns; a column `pressure_kpa` is used if every trial has one.
     pub trials: &'a [SessionTrial],
-    /// Column of the reference: what the gauge measures.
+    /// Column of the reference: the quantity that the gauge measures.
     pub reference: &'a str,
-    /// Column of the signal: what the gauge says.
+    /// Column of the signal: the output of the gauge.
     pub signal: &'a str,
-    /// The gauge as it should be; without a rig, zero, span, offset and gain are those of the recording.
+    /// The nominal gauge; without a rig, zero, span, offset and gain are estimated from the
+    /// recording.
     pub rig: Option<&'a GaugeRig>,
     /// Effects that are looked for; effects that the gauge already has are left out.
     pub catalogue: &'a Catalogue,
@@ -52,10 +53,12 @@ pub struct GaugeSetup<'a> {
 
 /// Any stretch sensor with a reference: y = offset + gain e, where e is the reference over its range in the fit trials.
 ///
-/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; the rig file's effects act in every run. Effects of the catalogue
-/// act on e in place of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
-/// noise allows; the part of that noise that arrives at the signal belongs to the noise of the signal. Noise is estimated from second
-/// differences: the noise is what changes from sample to sample, and errors that last longer count as gap.
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; the rig file's effects
+/// act in every run. Effects of the catalogue act on e in place of the strain and on (y -
+/// offset)/gain in place of resistance and voltage. The reference is smoothed according to its
+/// noise. The part of that noise that reaches the signal counts as noise of the signal. Noise is
+/// estimated from second differences, so that only changes from sample to sample count as noise.
+/// Errors that last longer count as gap.
 ///
 /// ```
 /// use stretch_data::{Channel, SessionTrial, Trial};
@@ -91,7 +94,7 @@ pub struct GaugeSimulator {
     nominal: GaugeRig,
     rows: Vec<&'static Effect>,
     session: GaugeSession,
-    /// The reference of each trial as it drives the gauge.
+    /// The smoothed reference of each trial, which drives the gauge.
     inputs: Vec<Smoothed>,
     draws: Draws,
     /// Column of the reference.
@@ -101,14 +104,14 @@ pub struct GaugeSimulator {
     noise: f64,
     /// Range of the signal.
     spread: f64,
-    /// The signal that effects may be found in.
+    /// The measured signal from which effects may be estimated.
     found_in: FitRecord,
     notes: Vec<String>,
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials and two of their columns. Effects of the catalogue that can act in a gauge and that this gauge does not
-    /// have are looked for.
+    /// Binds a gauge to trials and two of their columns. Effects of the catalogue that can act in a
+    /// gauge and that this gauge does not have are looked for.
     ///
     /// # Errors
     /// Columns that are missing, dead, hold too few numbers or look swapped.
@@ -158,7 +161,7 @@ impl GaugeSimulator {
         })
     }
 
-    /// What was noticed while the recordings were read, in sentences.
+    /// Notes from reading the recordings, in sentences.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -234,7 +237,8 @@ fn parts<'a>(
     })
 }
 
-/// The gauge of a rig file; without a rig file the gauge that the recording gives, with offset and gain free.
+/// The gauge of a rig file; without a rig file a gauge that is estimated from the recording, with
+/// offset and gain free.
 fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
     let (low, high) = session.range(&session.reference);
     let (least, greatest) = session.range(&session.signal);

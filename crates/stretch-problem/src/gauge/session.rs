@@ -1,4 +1,4 @@
-//! The measured trials of a gauge alone: two columns, evenly sampled, and what was noticed of the trials.
+//! The measured trials of a gauge alone: two columns, evenly sampled, and notes on the trials.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::{
     error::{ProblemError, check_rate},
 };
 
-/// Least samples that may be fitted.
+/// Least number of samples to fit.
 const LEAST: usize = 300;
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
@@ -32,10 +32,11 @@ pub(super) struct GaugeSession {
 }
 
 impl GaugeSession {
-    /// Reads two columns of some trials, and the pressure where every trial has one.
+    /// Reads two columns of some trials, and the pressure if every trial has one.
     ///
     /// # Errors
-    /// Columns that are missing, dead or hold what is no number, rates that differ, too little to fit.
+    /// Columns that are missing, dead or hold values that are not numbers, rates that differ, too
+    /// little to fit.
     pub(super) fn read(
         trials: &[SessionTrial],
         reference: &str,
@@ -77,7 +78,7 @@ impl GaugeSession {
         Ok(own)
     }
 
-    /// Samples that are not tested on.
+    /// Ranges of the samples outside the test samples.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
         let mut begin = 0;
         self.trials.iter().zip(SampleRoles::not_tested(&self.trials)).filter_map(move |(t, fit)| {
@@ -142,7 +143,7 @@ impl GaugeSession {
         Ok(())
     }
 
-    /// Share of the samples at a value, in rows of at least five.
+    /// Share of the samples that have the value `end`, in sequences of at least five such samples.
     fn standing(&self, values: &[f64], end: f64) -> f64 {
         let (mut count, mut all) = (0, 0);
         for range in self.fitted() {

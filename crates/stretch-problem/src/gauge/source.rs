@@ -1,4 +1,4 @@
-//! Which columns of which trials: a gauge alone as it lies on a disk.
+//! Reads a gauge alone from files: its trials, and which columns are reference and signal.
 
 use std::path::Path;
 
@@ -9,15 +9,17 @@ use stretch_sim::Catalogue;
 use super::{GaugeSetup, GaugeSimulator};
 use crate::{bench::rig_file, error::ProblemError};
 
-/// Columns that are taken where none are named.
+/// Reference and signal if no columns are named.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
 
 impl GaugeSimulator {
-    /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and signal; without them
-    /// `length_mm` and `bridge_v` are taken. `None` if the path holds no gauge alone: nothing says that it does, and the trials have openings.
+    /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and
+    /// signal; without them `length_mm` and `bridge_v` are taken. `None` if the path holds no gauge
+    /// alone: neither columns nor a rig file identify it as one, and the trials have valve openings
+    /// (a column `inlet` or `outlet`).
     ///
-    /// A gauge alone is recognised by its columns, by a rig file of `kind = "gauge"` (given, or named by the data set), or by trials
-    /// without openings.
+    /// A gauge alone is recognised by its columns, by a rig file of `kind = "gauge"` (given, or
+    /// named by the data set), or by trials without openings.
     ///
     /// # Errors
     /// Files that cannot be read, columns that have to be named, and as [`GaugeSimulator::new`].

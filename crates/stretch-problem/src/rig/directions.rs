@@ -1,4 +1,5 @@
-//! The columns that are wrong where the muscle moves against its valves: each possible error is weighed.
+//! Finds the wrong columns of a recording in which the muscle moves against its valves, by a
+//! comparison of possible errors.
 
 use stretch_data::ends;
 
@@ -20,9 +21,11 @@ const LEAST: f64 = 0.1;
 
 /// The wrong column and a hint, for measurements in which the muscle lengthens while the inlet is open.
 ///
-/// The model `dx/dt = a u_in (1 - x) - b u_out x` (`x` from empty to full, `u` the openings) is fitted to the pressure where one was
-/// recorded, else to the length: with the valves' columns exchanged, with time reversed, and with the commands shifted. The error with the
-/// least sum of squares is named; a shift pays for the gain that a search of so many shifts has by chance.
+/// A swapped, negative or inverted length is recognised first. Otherwise the model
+/// `dx/dt = a u_in (1 - x) - b u_out x` (`x` from empty to full, `u` the openings) is fitted to the
+/// pressure if one was recorded, else to the length: with the valves' columns exchanged, with time
+/// reversed, and with the commands shifted. The error with the least sum of squares is named.
+/// Shifts are penalised, because a search over many shifts reduces the sum of squares by chance.
 pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String) {
     let (mut with, mut seen) = (0.0, false);
     for trial in trials {
@@ -129,9 +132,10 @@ fn blocks(trials: &[Motion<'_>], dt_s: f64) -> Vec<Blocks> {
     trials.iter().zip(&all).map(one).collect()
 }
 
-/// Sum of squares that an error leaves of the steps of the filling, with the best factors a and b.
+/// Residual sum of squares of the steps of the filling for one error, with the best factors a and
+/// b.
 fn squares(trials: &[Blocks], wrong: Wrong, shift: isize) -> f64 {
-    // These are the normal equations of y = a p + b q; the two unknowns are of one size.
+    // These are the normal equations of y = a p + b q; the two unknowns have similar sizes.
     let (mut pp, mut pq, mut qq, mut py, mut qy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for trial in trials {
         let last = trial.full.len().saturating_sub(1) as isize;

@@ -1,4 +1,4 @@
-//! Candidate experiments on the rig, and what a model predicts of each.
+//! Candidate experiments on the rig, and the channels that a model predicts for each.
 
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
@@ -301,7 +301,7 @@ impl Laboratory for RigSimulator {
         all.into_iter().map(|x| (x.plan(), x)).collect()
     }
 
-    /// An arbitrary trial.
+    /// Returns an arbitrary trial, which represents the recorded session.
     fn done(&self) -> Experiment {
         Experiment::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
     }

@@ -68,8 +68,9 @@ fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize,
     tuned.iter().enumerate().filter_map(timing).collect()
 }
 
-/// The clocks of parameters that drift. The supply reaches the chamber through the inlet alone: while the inlet is shut, the clock of the
-/// supply stops. The clock of the lead of commands advances with every switch.
+/// Returns for each parameter that drifts the clock by which its drift advances. The supply reaches
+/// the chamber only through the inlet, so its clock stops while the inlet is shut. The clock of a
+/// command lead advances with every switch of the valves.
 fn drift_clocks(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
     let trials = &session.trials;
     let switches = || trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet)).collect();

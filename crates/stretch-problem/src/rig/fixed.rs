@@ -1,4 +1,5 @@
-//! The rig with what a diagnosis found.
+//! Results of a diagnosis of the rig: notes, the next experiment, code for effects, and the fixed
+//! rig file.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
@@ -31,9 +32,10 @@ impl Diagnosable for RigSimulator {
         next_experiment(self, diagnosis, evidence)
     }
 
-    /// The effects that a diagnosis of this rig names, as code to type with the fitted numbers, in the re-tuned rig.
+    /// Code for the effects that a diagnosis of this rig names, with the fitted numbers, in the
+    /// re-tuned rig.
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        // A sample time with which a diagnosis ran makes a grid.
+        // The sample time is valid, because a diagnosis ran with it.
         let Ok(grid) = Grid::samples(self.about.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
         let around = TunedRig::of(&self.base, &self.tuned, model).params.surroundings(&grid);
@@ -44,13 +46,16 @@ impl Diagnosable for RigSimulator {
         })
     }
 
-    /// A rig file with what a diagnosis of this rig found: see [`Fix`]. A diagnosis of the same recording with this file says `no_gap`.
+    /// A rig file with the findings of a diagnosis of this rig: see [`Fix`]. A diagnosis of the
+    /// same recording with this file gives `no_gap`.
     ///
-    /// Parameters of the recording (the pressure at a trial's start, the timing of commands, the initial hysteresis states) stay out. A
-    /// diagnosis does not fit a hum's amplitude and phase: the file has those that the fit trials show on the session's clock.
+    /// The file omits parameters of the recording (the pressure at a trial's start, the timing of
+    /// commands, the initial hysteresis states). A diagnosis does not fit a hum's amplitude and
+    /// phase, so the file has values that are estimated from the fit trials, on the session's
+    /// clock.
     ///
     /// # Errors
-    /// [`NoFix`] where the diagnosis names nothing to fix, or a rig that no file may hold.
+    /// [`NoFix`] if the diagnosis names nothing to fix, or if a file cannot hold the fixed rig.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
@@ -73,7 +78,7 @@ impl Diagnosable for RigSimulator {
         let stage = self.about.record().sensor.unwrap_or(0);
         for (index, values) in chosen.effects(&self.about.effects) {
             let effect = self.rows[index];
-            // Rounding may put the end of a fit in equal ratios beyond its range.
+            // Rounding may put a value at the end of a logarithmic range outside of that range.
             let allowed = effect.parameters.iter().map(EffectParameter::allowed);
             let within = allowed.zip(values).map(|(ends, x)| x.clamp(*ends.start(), *ends.end()));
             let found = (effect, within.collect());

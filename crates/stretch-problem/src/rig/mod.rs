@@ -1,4 +1,5 @@
-//! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
+//! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation)
+//! and sensing, each on measured inputs.
 
 mod cache;
 mod directions;
@@ -43,7 +44,7 @@ use crate::{
     error::ProblemError,
 };
 
-/// What a [`RigSimulator`] is made of.
+/// The data from which a [`RigSimulator`] is built.
 #[derive(Debug, Clone)]
 pub struct RigSetup<'a> {
     /// The measured session.
@@ -70,7 +71,7 @@ pub struct RigSimulator {
     tuned: Vec<TunedParameter>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
-    /// The samples of the bridge voltage in which effects may be found.
+    /// The samples of the bridge voltage from which effects may be estimated.
     bridge: FitRecord,
     found: RigCache,
     notes: Vec<String>,
@@ -97,7 +98,7 @@ impl RigSimulator {
     /// Binds a rig to a session. The effects of the rig act in every run and are not looked for.
     ///
     /// # Errors
-    /// A rig beyond its limits.
+    /// A rig with a value outside of its limits.
     pub fn new(setup: RigSetup<'_>) -> Result<Self, ProblemError> {
         let RigSetup { session, rig, catalogue } = setup;
         rig.check()?;
@@ -195,7 +196,7 @@ fn measured(session: &RigSession, stage: RigStage) -> Vec<f64> {
 /// Share of the samples at either end of the voltage that are left out as noise.
 const OUTERMOST: f64 = 0.002;
 
-/// Ranges of voltage and strain over the trials that are fitted.
+/// Range of the voltage over the fit samples, and range of the strain over all trials.
 struct Extents {
     volts: Extent,
     strain: Extent,

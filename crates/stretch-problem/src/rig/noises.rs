@@ -5,17 +5,21 @@ use stretch_sim::{Key, RigParams};
 
 use super::session::{RigSession, RigTrial};
 
-/// Share of the quiet windows that the noise is estimated from, taken from the end of the longest rests, and the least number of such windows.
+/// Share of the quiet windows that the noise is estimated from, taken from the end of the longest
+/// rests, and the least number of such windows.
 const USED: (f64, usize) = (0.5, 24);
 
-/// Time after a command from which a parabola follows the rest of the muscle's motion, s: a few time constants of the muscle.
+/// Time after a command from which a parabola describes the remaining motion of the muscle, s: a
+/// few time constants of the muscle.
 const SETTLED_S: f64 = 2.0;
 
-/// Slow noise of a recorder (1 sd), in multiples of its noise: amplifiers flicker, and references drift with the room.
+/// Slow noise of a recorder (1 sd), in multiples of its noise: amplifiers have flicker noise, and
+/// references drift with the room temperature.
 const DRIFT: f64 = 0.3;
 /// Correlation time of that drift, s.
 const DRIFT_CORRELATION_S: f64 = 2.0;
-/// Most noise of a recorder, in multiples of what the rig file says: noise beyond it is not the recorder's.
+/// Greatest noise of a recorder, in multiples of the noise that the rig file states. Noise beyond
+/// it does not come from the recorder.
 const MOST_NOISE: f64 = 2.0;
 
 /// Noise of every channel, with the quantisation noise of the converters.
@@ -29,8 +33,8 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// Noise from the windows of the fit trials in which nothing was commanded; where there are too few such windows, the noise of the rig
-    /// file.
+    /// Noise from the windows of the fit trials in which nothing was commanded; if there are too
+    /// few such windows, the noise of the rig file.
     pub(super) fn of(params: &RigParams, session: &RigSession) -> Self {
         // The step of a converter adds a uniform error of variance step^2/12.
         let with_step = |sigma: Key, full_scale: Key| {

@@ -1,4 +1,4 @@
-//! What may be re-tuned of a rig, and the stages that the parameters act in.
+//! The parameters of a rig that may be re-tuned, and the stages in which they act.
 
 use stretch_gap::{Model, ParameterSpec, SlowDrift, StageSpec};
 use stretch_sim::{Key, PARAMETERS, Rig, RigParams, RigStage};
@@ -8,10 +8,11 @@ use super::{
     timing::{self, Leads},
 };
 
-/// Slow drift of the supply (Ornstein-Uhlenbeck) as laboratories have it, a share of the supply (1 sd): regulators hold a tenth of a per cent
-/// to half of one.
+/// Usual slow drift of a laboratory's supply (Ornstein-Uhlenbeck), as a share of the supply (1 sd).
+/// Regulators hold the supply to a tenth of a per cent to half a per cent.
 const SUPPLY_DRIFT: f64 = 0.0025;
-/// Correlation time of that drift, s: a compressor's cycle at one end, a regulator's hunting at the other.
+/// Correlation time of that drift, s: between the cycle of a compressor, which is slower, and the
+/// oscillation of a regulator, which is faster.
 const SUPPLY_CORRELATION_S: f64 = 4.0;
 
 /// What a parameter of the diagnosis sets.
@@ -21,14 +22,17 @@ pub(super) enum TunedParameter {
     Rig(Key),
     /// The pressure at a trial's start.
     StartPressure,
-    /// How far ahead of their rows every other command acts.
+    /// How far ahead of its row every second switch of the commands acts: the even switches (0) or
+    /// the odd switches (1).
     CommandLead(usize),
-    /// The initial hysteresis state of a stage: between that after a motion from the other end of the stroke and a settled one.
+    /// The initial hysteresis state of a stage: between that after a motion from the other end of
+    /// the stroke and a settled one.
     InitialState(RigStage),
 }
 
-/// The parameters of a diagnosis, and what each sets: the rig's parameters with a tolerance in the stages, the pressure at a trial's
-/// start, the timing of commands, and the initial hysteresis states.
+/// The parameters of a diagnosis, and what each sets: the rig's parameters with a tolerance in the
+/// stages, the pressure at a trial's start, the timing of commands, and the initial hysteresis
+/// states.
 pub(super) fn parameters(
     rig: &Rig,
     kinds: &[RigStage],
@@ -64,11 +68,13 @@ pub(super) fn parameters(
         .unzip()
 }
 
-/// Share of the settled state in the initial state, 1 sd around 0: a rig that had settled before the session (1) is no great surprise.
+/// Prior of the share of the settled state in the initial state: one standard deviation around 0. A
+/// rig that had settled before the session (share 1) is not implausible.
 const INITIAL_STATE: f64 = 0.4;
 
-/// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the stroke, 1 as if it had settled where
-/// the session begins. The chamber has no such parameter, because its pressure is measured.
+/// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the
+/// stroke, 1 as if it had settled where the session begins. The chamber has no such parameter,
+/// because its pressure is measured.
 fn initial_state(kind: &RigStage) -> Option<(ParameterSpec, TunedParameter)> {
     let name = match kind {
         RigStage::Pneumatics | RigStage::Reference => return None,
@@ -109,7 +115,7 @@ pub(super) fn stages(
                 .filter(|&i| kind.holds(owner(&parameters[i])))
                 .collect(),
             noise: (noise.sd() > 0.0).then(|| noise.clone()),
-            // Where the supply acts, its drift takes slow noise as well.
+            // In a stage on which the supply acts, the drift of the supply also covers slow noise.
             recorder_drift: drift.filter(|_| !kind.holds(RigStage::Pneumatics)),
         }
     };

@@ -7,7 +7,8 @@ use super::{RigSession, RigSimulator, RigTrial};
 
 /// Share of the samples at one value that chance does not explain.
 const SHARE: f64 = 0.002;
-/// Least noise of a recording, a share of the stated noise: without noise a channel at rest repeats its value.
+/// Least noise of a recording that is judged, as a share of the stated noise, because a channel
+/// without noise repeats its value at rest.
 const NOISY: f64 = 0.3;
 
 impl RigSimulator {

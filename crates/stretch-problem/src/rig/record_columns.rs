@@ -16,7 +16,7 @@ pub(super) const LENGTH: &str = "length_mm";
 const VOLTAGE: &str = "bridge_v";
 pub(super) const COMMANDS: &str = "inlet, outlet";
 
-/// Range of the delays of the voltage where the catalogue has no skew, s.
+/// Range of the delays of the voltage if the catalogue has no skew, s.
 const SKEW_S: [f64; 2] = [-0.1, 0.2];
 
 /// The columns of a recording, and the stages that each column drives.
@@ -24,7 +24,7 @@ pub(super) fn record_columns(
     about: &Description,
     stage_kinds: &[RigStage],
 ) -> Vec<Column<'static>> {
-    // The start of a trial is read from the pressure, or from the length where there is no pressure.
+    // The start of a trial is read from the pressure, or from the length if there is no pressure.
     let reads = |stages: [RigStage; 2]| -> Vec<usize> {
         (0..stage_kinds.len()).filter(|&i| stages.contains(&stage_kinds[i])).collect()
     };
@@ -76,8 +76,8 @@ pub(super) fn record_columns(
 }
 
 impl RigSimulator {
-    /// The rig with a session in which one column is corrected; `None` if the column drives no stage. The measured outputs stay as they
-    /// are.
+    /// The rig with a session in which one column is corrected; `None` if the column drives no
+    /// stage. The measured outputs stay as they are.
     pub(super) fn with_corrected(&self, column: &str, error: Distortion) -> Option<Self> {
         let dt_s = self.about.dt_s;
         let mut rig = self.clone();

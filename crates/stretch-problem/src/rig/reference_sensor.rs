@@ -5,7 +5,7 @@ use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, RigStage, Start
 use super::run::set_initial_state;
 use crate::error::ProblemError;
 
-/// The reference sensor behind a stage, skipped where no effect acts in the reference.
+/// The reference sensor behind a stage, skipped if no effect acts in the reference.
 pub(super) struct ReferenceSensor {
     stage: Reference,
     memory: Memory,

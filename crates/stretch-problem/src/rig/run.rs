@@ -16,7 +16,8 @@ use crate::{bench::acting::Acting, error::ProblemError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
-/// Number of steps for each sample where an effect needs fine steps, because the length between samples is no straight line.
+/// Number of steps for each sample if an effect needs fine steps, because the length is not linear
+/// between samples.
 const PIECES: f64 = 4.0;
 /// Pressure of a vented chamber, kPa (mean, 1 sd): as a rule a little above the atmosphere.
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
@@ -25,7 +26,7 @@ const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
 
 /// Error of the pressure at a trial's start that is derived from a length at rest, kPa (1 sd).
 const LENGTH_KPA: f64 = 3.0;
-/// Error of that pressure amid a motion, kPa (1 sd).
+/// Error of that pressure during a motion, kPa (1 sd).
 const MOVING_KPA: f64 = 10.0;
 
 /// Everything that a run needs in addition to the rig.
@@ -33,7 +34,7 @@ pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
     pub(super) params: RigParams,
     pub(super) effects: EffectSet,
-    /// Step of integration where commands drive, s.
+    /// Step of integration of stages that commands drive, s.
     pub(super) step_s: f64,
     pub(super) grid: Grid,
     pub(super) offset: f64,
@@ -146,7 +147,8 @@ impl Setting<'_> {
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
-    /// Pressure before the session, kPa: a muscle that begins vented was filled before, and a muscle that begins filled was vented.
+    /// Pressure before the session, kPa: a muscle that begins vented was filled before, and a
+    /// muscle that begins filled was vented.
     pub(super) fn before_kpa(&self) -> f64 {
         if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 }
     }
@@ -186,7 +188,8 @@ impl Setting<'_> {
         timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
 
-    /// A measured input of the stage, smoothed, with a draw of its noise where the run asks for one.
+    /// A measured input of the stage, smoothed, with a random draw of its noise if the run requests
+    /// one.
     fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
         if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == RigStage::Muscle)) {
             let trials = &self.rig.about.trials;
@@ -373,7 +376,8 @@ impl Setting<'_> {
         })
     }
 
-    /// By trial, the sensing stage where the excitation of the bridge is not the usual one. All trials share the memory of the one gauge.
+    /// For each trial, the sensing stage if the excitation of the bridge is not the usual one,
+    /// otherwise `None`. All trials share the memory of the gauge.
     fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
         let one = |excitation: f64| -> Result<Option<Sensing>, ProblemError> {
             let mut params = self.params;
@@ -402,18 +406,19 @@ impl Setting<'_> {
     }
 }
 
-/// Sets what a stage remembers of the motion before the session.
+/// Sets the memory that a stage has of the motion before the session.
 ///
-/// As a rule a muscle that is vented at the session's start was filled before, so play and creep begin from the filled side. A rig that had
-/// settled (just switched on, or simulated) remembers no such motion. The initial state lies between the two, where the share is a parameter
-/// of the recording:
+/// As a rule a muscle that is vented at the session's start was filled before, so play and creep
+/// begin from the filled side. A rig that had settled (just switched on, or simulated) remembers no
+/// such motion. The initial state lies between the two. The share is a parameter of the recording:
 ///
 /// ```text
 /// cells = moved + share (settled - moved)
 /// ```
 ///
-/// Moves a memory that was left at the other end of the stroke towards the memory of a stage that settled where the session begins.
-/// `begin` begins a trial with a memory at the session's first sample; the trial then follows without a pause.
+/// Moves a memory that was left at the other end of the stroke towards the memory of a stage that
+/// settled where the session begins. `begin` runs a stage with a memory at the session's first
+/// sample, so that the first trial follows without a pause.
 pub(super) fn set_initial_state(
     share: f64,
     after_pause: Start,

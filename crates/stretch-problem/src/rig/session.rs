@@ -23,13 +23,14 @@ const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
 const PRESSURE: &str = "pressure_kpa";
 /// Simulated outputs: pressure, length and voltage.
 const OUTPUTS: usize = 3;
-/// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 where it is missing.
+/// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 if
+/// it is missing.
 const EXCITATION: &str = "excitation_share";
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
 /// Range that noise alone hardly ever reaches, standard deviations.
 const NOISE_SPAN: f64 = 15.0;
-/// Least samples that may be fitted.
+/// Least number of samples to fit.
 const LEAST: usize = 300;
 
 /// A measured trial of the rig, on the session's even grid; all channels have the same length.
@@ -45,14 +46,15 @@ pub struct RigTrial {
     pub(super) bridge_v: Vec<f64>,
     /// Marks samples that were lost, and samples that a gap before them leaves undetermined.
     pub(super) is_lost: Vec<bool>,
-    /// Whether the trial is the next part of the trial before it.
+    /// Whether the trial continues the trial before it after a gap.
     goes_on: bool,
     /// Excitation of the bridge, a share of the nominal one.
     pub(super) excitation: f64,
 }
 
 impl RigTrial {
-    /// The trial of a session whose columns are [`NEEDED`] and then, where there is one, the pressure; `before` is the trial before it.
+    /// The trial of a session whose columns are [`NEEDED`] and then, if there is one, the pressure;
+    /// `before` is the trial before it.
     fn of(trial: &EvenTrial, before: Option<&EvenTrial>, excitation: f64, dt_s: f64) -> Self {
         let goes_on = before.is_some_and(|before| before.source() == trial.source());
         let column = |i: usize| trial.columns().get(i).cloned();
@@ -75,7 +77,7 @@ impl RigTrial {
         }
     }
 
-    /// Gauge pressure, kPa, where every trial of the session has one.
+    /// Gauge pressure, kPa, if every trial of the session has one.
     pub fn pressure_kpa(&self) -> Option<&[f64]> {
         self.pressure_kpa.as_deref()
     }
@@ -110,13 +112,15 @@ impl RigSession {
         Self::new(&Recording::session(set, folder, &options)?)
     }
 
-    /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, where it was recorded,
-    /// `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`]): lost samples are bridged, a long gap in
-    /// time splits a trial into two, and the notes name both. Without a test trial nothing is held back here: the
-    /// diagnosis then tests on the last part of each trial.
+    /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, if it
+    /// was recorded, `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`]):
+    /// lost samples are bridged, a long gap in time splits a trial into two, and the notes name
+    /// both. Without a test trial nothing is held back here: the diagnosis then tests on the last
+    /// part of each trial.
     ///
     /// # Errors
-    /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
+    /// Columns that are missing or whose values do not fit their names, trials of different rates,
+    /// too few samples to fit.
     pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
         let (trials, cut) = shortened(trials, OUTPUTS)?;
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
@@ -129,7 +133,8 @@ impl RigSession {
             return Err(ProblemError::too_little("no trial may be fitted", hint));
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
-        // Outliers are replaced before anything is resampled: an outlier between two rows would spread.
+        // Outliers are replaced before resampling, because resampling would spread an outlier over
+        // its neighbours.
         let (trials, outlier_notes) = without_isolated_outliers(trials.into_owned());
         let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
@@ -184,7 +189,8 @@ impl RigSession {
         ends(self.trials.iter().flat_map(column))
     }
 
-    /// Whether the voltage is a copy of another column: the diagnosis reports a copy, and no unit is questioned.
+    /// Whether the voltage is a copy of another column. The diagnosis reports a copy, so its unit
+    /// is not checked.
     fn is_copied(&self) -> bool {
         let all = |of: fn(&RigTrial) -> &[f64]| -> Vec<f64> {
             self.trials.iter().flat_map(of).copied().collect()
@@ -237,7 +243,7 @@ impl RigSession {
                 let hint = "the channel is dead: check the sensor, or take the column out";
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
             }
-            // No unit can be read from noise alone: the diagnosis says that the channel is dead.
+            // Noise alone does not show a unit; the diagnosis reports that the channel is dead.
             let pressures = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
             if self.is_noise(pressures, pressure.1 - pressure.0) {
                 return self.check_directions();
@@ -268,11 +274,13 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     })
 }
 
-/// Motion against the valves from which the recording is refused, in strokes at the widest opening.
+/// Least motion against the valves for which a recording is refused, in strokes at the widest
+/// opening.
 const AGAINST: f64 = 0.5;
 
 impl RigSession {
-    /// Checks that an open inlet shortens the muscle and an open outlet lengthens it, and that no channel stays constant while the muscle moves.
+    /// Checks that an open inlet shortens the muscle and an open outlet lengthens it, and that no
+    /// channel stays constant while the muscle moves.
     fn check_directions(&self) -> Result<(), ProblemError> {
         let span = |values: &[f64]| {
             let (low, high) = ends(values);
@@ -299,7 +307,7 @@ impl RigSession {
                 }
             }
         }
-        // No direction can be read from noise alone: the diagnosis says that the channel is dead.
+        // Noise alone does not show a direction; the diagnosis reports that the channel is dead.
         let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
         if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
             let motions = self.trials.iter().map(|t| Motion {
@@ -327,7 +335,7 @@ pub(crate) enum Begin {
     Pressure(f64, f64),
     /// The pressure is the one at which the muscle rests at a measured length, mm.
     Length(f64),
-    /// The muscle is amid a motion, at a measured length (mm) and rate (mm/s).
+    /// The muscle is moving, at a measured length (mm) and rate (mm/s).
     Moving(f64, f64),
 }
 
@@ -413,7 +421,7 @@ impl Inputs {
     }
 }
 
-/// Number of samples at the beginning of a part that its motion is estimated from.
+/// Number of samples at the beginning of a part from which its motion is estimated.
 const LINE: usize = 9;
 
 /// First value and slope (for each sample) of the straight line through values, by least squares.

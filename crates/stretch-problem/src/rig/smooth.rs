@@ -10,25 +10,30 @@ use super::cache::LastResults;
 const WIDEST: usize = 15;
 /// Narrowest half-width, in samples.
 const NARROWEST: usize = 2;
-/// Longest time that the widest and the narrowest half-width may take, s: fewer samples where the rate is low, because what a valve does is as
-/// quick there. A window of less than [`NARROWEST`] samples on either side is none.
+/// Longest time of the widest and of the narrowest half-width, s. At a low rate they have fewer
+/// samples, because a valve acts just as fast there. A window of less than [`NARROWEST`] samples on
+/// either side is not smoothed.
 const LONGEST_S: [f64; 2] = [0.15, 0.02];
-/// Greatest half-width of a window, a share of the time since the last command without [`WAKE_S`].
+/// Greatest half-width of a window, as a share of the time since the last command minus [`WAKE_S`].
 const SHARE: f64 = 0.125;
 /// Time for which the response to a command lasts at least, s.
 const WAKE_S: f64 = 0.1;
-/// Greatest excess of a residual sum of squares over its mean, in standard deviations of that sum: noise alone hardly ever exceeds it.
+/// Greatest excess of a residual sum of squares over its mean, in standard deviations of that sum:
+/// noise alone hardly ever exceeds it.
 const PATIENCE: f64 = 4.0;
 
-/// A measured input, smoothed for a stage: for every sample the half-width of the least-squares parabola that replaces the sample; 0 leaves the sample as it is.
+/// A measured input, smoothed for a stage: for every sample the half-width of the least-squares
+/// parabola that replaces the sample; 0 leaves the sample as it is.
 ///
-/// Windows are chosen by the commands and not by the recording: a choice by the recording would favour noise that happens
-/// to look smooth, and the noise that is left would look like a gap. A window is narrowed only where the parabola is far off.
+/// Windows are chosen by the commands and not by the recording: a choice by the recording would
+/// favour noise that happens to look smooth, and the noise that is left would look like a gap. A
+/// window is narrowed only if the parabola fits badly.
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
     halves: Vec<u8>,
     pub(crate) values: Vec<f64>,
-    /// Samples before which the slope changed somewhere between two rows, and by how much a sample.
+    /// Samples before which the slope changed somewhere between two rows, and the change of the
+    /// slope per sample.
     corners: Vec<(usize, f64)>,
 }
 
@@ -74,10 +79,11 @@ fn left_by_parabola(record: &[f64], i: usize, h: usize) -> f64 {
     (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0)
 }
 
-/// Half-widths that the commands allow: narrow behind a change of the commands, wider with the time since that change, never beyond the
-/// next change. A signal with corners (`sharp`) is not smoothed across a change at all.
+/// Half-widths that the commands allow: narrow after a change of the commands, wider with the time
+/// since that change, and never beyond the next change. A signal with corners (`sharp`) is not
+/// smoothed across a change at all.
 pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
-    // Rounding must not take a sample from a whole number of them.
+    // Rounding must not reduce a whole number of samples by one.
     let [widest, narrowest] = LONGEST_S.map(|time_s| (time_s / dt_s + 1e-6) as usize);
     let (widest, narrowest) = (WIDEST.min(widest), NARROWEST.min(narrowest));
     let changes = |i: usize| i > 0 && (inlet[i] != inlet[i - 1] || outlet[i] != outlet[i - 1]);
@@ -125,7 +131,8 @@ impl Smoothed {
         Self { values: smoothed(record, &halves), halves, corners: Vec::new() }
     }
 
-    /// The same, where commands may have switched anywhere in the sample before each of some rows: the input then has a corner there that no row shows.
+    /// Adds corners before rows in which commands switched. A command may have switched anywhere in
+    /// the sample before such a row, and the input then has a corner there that no row shows.
     pub(crate) fn cornered(self, switches: impl Iterator<Item = usize>) -> Self {
         let change = |i: usize| {
             let at = |i: usize| self.values.get(i).copied();
@@ -135,10 +142,13 @@ impl Smoothed {
         Self { corners: switches.filter_map(change).collect(), ..self }
     }
 
-    /// A draw of the noise, smoothed like the recording, and of the corners between two rows.
+    /// A random draw of the noise, smoothed like the recording, and of the corners between two
+    /// rows.
     ///
-    /// A corner a share a of a sample before row i, at which the slope changes by d a sample, lies a (1 - a) d below the straight line from row i - 1
-    /// to row i. What acts on a stage that is slower than a row is the area: both rows are lowered by a quarter of that.
+    /// A corner a share a of a sample before row i, at which the slope changes by d a sample, lies
+    /// a (1 - a) d below the straight line from row i - 1 to row i. A stage that is slow compared
+    /// with a row responds only to the area under the input. A quarter of that distance is
+    /// subtracted from both rows, which removes the same area.
     fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {
         let mut drawn = smoothed(&noise.samples(self.values.len(), random), &self.halves);
         for &(i, change) in &self.corners {
@@ -160,10 +170,12 @@ fn smoothed(record: &[f64], halves: &[u8]) -> Vec<f64> {
     .collect()
 }
 
-/// Sums that the middle of a parabola is made of side by side: one alone would wait for itself.
+/// Number of independent partial sums for the middle of a parabola, because each addition to a
+/// single sum would wait for the addition before it.
 const LANES: usize = 4;
 
-/// Value of the least-squares parabola in the middle of a window of 2 h + 1 samples: sum over k of (s4 - s2 k^2)/(n s4 - s2^2) y_k, k from -h to h.
+/// Value of the least-squares parabola in the middle of a window of 2 h + 1 samples: sum over k of
+/// (s4 - s2 k^2)/(n s4 - s2^2) y_k, k from -h to h.
 fn middle_of(window: &[f64], h: usize) -> f64 {
     let (s2, s4, n) = MOMENTS[h];
     let (middle, scale) = (window[h], 1.0 / (n * s4 - s2 * s2));
@@ -183,7 +195,8 @@ fn middle_of(window: &[f64], h: usize) -> f64 {
     middle + scale * (sums.iter().sum::<f64>() + rest)
 }
 
-/// Number of draws of a channel's noise that are kept: those for the noise of the outputs and those for the transmitted noise.
+/// Number of draws of a channel's noise that are kept: those for the noise of the outputs and those
+/// for the transmitted noise.
 const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
 
 /// Draws of the noise of a measured input; every model gets the same draws.
@@ -212,7 +225,7 @@ impl Draws {
     }
 }
 
-/// Half-widths where nothing is commanded: the recording alone limits the width.
+/// Half-widths for an input without commands: only the recording limits the width.
 pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
     vec![WIDEST as u8; samples]
 }
@@ -254,7 +267,8 @@ mod tests {
         assert!(power(&out) < 0.1 * power(&noise));
     }
 
-    /// Where a switch may lie between two rows the two rows around it are less certain, by an eighth of a quarter of the change of slope at most.
+    /// If a switch may lie between two rows, both rows are lowered by at most a sixteenth of the
+    /// change of slope.
     #[test]
     fn corners_between_rows_are_drawn() {
         let line: Vec<f64> = (0..50).map(|i| 10.0 * f64::from((i - 25).max(0))).collect();
@@ -278,7 +292,8 @@ mod tests {
         assert_eq!(usize::from(halves[130]), WIDEST.min(20));
         assert!(halves[145..165].iter().all(|h| *h <= 5));
         assert_eq!(usize::from(halves[299]), WIDEST);
-        // Half the rate: as long in time, and behind a command no window is short enough.
+        // At half the rate, windows are as long in time, and after a command they have too few
+        // samples.
         let slower: Vec<f64> = inlet.iter().step_by(2).copied().collect();
         let halves = schedule(&slower, &[0.0; 150], 0.02, false);
         assert!(halves[74..78].iter().all(|h| usize::from(*h) < NARROWEST), "{halves:?}");

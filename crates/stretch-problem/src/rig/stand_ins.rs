@@ -1,4 +1,5 @@
-//! Simulated channels that replace channels without a measurement; a result is kept for runs with the same causes.
+//! Simulated channels that replace channels without a measurement; a result is cached for runs with
+//! the same causes.
 
 use std::sync::Arc;
 
@@ -11,7 +12,8 @@ use super::{
 use crate::error::ProblemError;
 
 impl Setting<'_> {
-    /// By trial, the chamber's pressure at every node, where the pressure does not depend on the muscle: runs that differ in the muscle alone share it.
+    /// For each trial, the chamber's pressure at every node, if it does not depend on the muscle.
+    /// Runs that differ only in the muscle share it.
     pub(super) fn chamber_kpa(
         &self,
         stage: &Actuation,
@@ -36,8 +38,8 @@ impl Setting<'_> {
         })
     }
 
-    /// The part of the length that play in the reference hides: the model of the motion gives the flank on which the play lies, the
-    /// recording gives the length of the muscle.
+    /// The part of the length that play in the reference hides. The simulated motion shows which
+    /// side of the play is in contact; the recording gives the length of the muscle.
     pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
         let alone = self.effects.only(|e| e.hides_input());
         if alone.acting_in(RigStage::Reference).next().is_none() {
@@ -56,7 +58,7 @@ impl Setting<'_> {
         Ok(Some(free))
     }
 
-    /// Length, mm, of the model of the motion without play in the reference.
+    /// Simulated length without play in the reference, mm.
     fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
         let effects = self.effects.only(|e| !e.hides_input());
         let has_pressure = !self.rig.inputs.pressure.is_empty();
@@ -76,7 +78,8 @@ impl Setting<'_> {
             }
             Ok(all)
         };
-        // A length with a draw of the noise, or on a given input, is asked for only once.
+        // A length with a draw of the noise, or on a given input, is needed only once and not
+        // cached.
         if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }
@@ -86,7 +89,8 @@ impl Setting<'_> {
         self.rig.found.lengths.or_make(key, make)
     }
 
-    /// The numbers that a run depends on in addition to parameters and effects: leads of the commands, and pressures at the start of the first trials.
+    /// The numbers that a run depends on in addition to parameters and effects: leads of the
+    /// commands, and pressures at the start of the first trials.
     fn begun(&self, count: usize) -> impl Iterator<Item = f64> {
         self.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
     }
@@ -111,7 +115,8 @@ impl Setting<'_> {
             })?;
             Ok(own)
         };
-        // A chamber that depends on the length depends on its noise and on a given length.
+        // If the chamber depends on the length, it depends on the draw of its noise and on a given
+        // length.
         if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }

@@ -1,24 +1,28 @@
 //! The times at which commands switch: at the rows of the log, or anywhere between two rows.
 //!
-//! A log as fast as the controller shows every switch in the row where the switch acts. A slower log, or a log with dropped rows, shows a
-//! switch up to one row late. In the row before, the new opening then acts for a share of the sample, and the flow of that sample is the
-//! flow of the mean opening:
+//! A log as fast as the controller shows every switch in the row where the switch acts. A slower
+//! log, or a log with dropped rows, shows a switch up to one row late. In the row before, the new
+//! opening then acts for a share of the sample, and the flow of that sample is the flow of the mean
+//! opening:
 //!
 //! ```text
 //! u_i -> u_i + lead (u_(i+1) - u_i),     0 <= lead <= 1
 //! ```
 //!
-//! The mean lead is a parameter, which is 0 where commands switch at rows. The lead of each switch differs from the mean lead by an independent
-//! error: the error of the pressure that a switch leaves in the chamber dies away or stays, as any error of the pressure does, and the next
-//! switch adds its own error. There are two such parameters, one for the odd and one for the even switches: an inlet that opens and shuts
-//! equally early lets the same air in, so that a lead common to all switches has almost no effect where the lead of each switch has a large one.
+//! The mean lead is a parameter, which is 0 if commands switch at rows. The lead of each switch
+//! differs from the mean lead by an independent error. The error of the pressure that this leaves
+//! decays or stays like any error of the pressure, and the next switch adds its own error. There
+//! are two such parameters, one for the odd and one for the even switches, because an inlet that
+//! opens and shuts equally early lets the same air in. A lead common to all switches therefore has
+//! almost no effect, although the lead of a single switch has a large one.
 
 use std::borrow::Cow;
 
 use stretch_gap::ParameterSpec;
 
-/// Mean lead and its standard deviation. The mean lead is 1/2 for switches anywhere in a sample, 1/4 where every second row was dropped, and
-/// 0 for a log as fast as the controller; three standard deviations end at a whole sample.
+/// Mean lead and its standard deviation. The mean lead is 1/2 for switches anywhere in a sample,
+/// 1/4 if every second row was dropped, and 0 for a log as fast as the controller; three standard
+/// deviations end at a whole sample.
 const MEAN: (f64, f64) = (0.25, 0.25);
 
 /// Period of the rig's controller, s.
@@ -31,17 +35,18 @@ pub(super) fn is_slow(dt_s: f64) -> bool {
     dt_s > SLOWER * CONTROL_S
 }
 
-/// Leads of the odd and of the even switches of a trial.
+/// Leads of the even and of the odd switches of a trial, in this order; the first switch is odd.
 pub(super) type Leads = [f64; 2];
 /// Names of the two leads.
 const NAMES: [&str; 2] = ["command_lead_1", "command_lead_2"];
 
-/// The parameter of a lead where commands switch exactly at rows.
+/// The parameter of a lead if commands switch exactly at rows.
 pub(super) fn at_rows(which: usize) -> ParameterSpec {
     ParameterSpec { least: 0.0, is_evidence: false, ..ParameterSpec::new(NAMES[which], "1", 0.0) }
 }
 
-/// The parameter of a lead where commands switch anywhere: the time of each switch is uniform in its sample, with variance 1/12.
+/// The parameter of a lead if commands switch anywhere: the time of each switch is uniform in its
+/// sample, with variance 1/12.
 pub(super) fn anywhere(which: usize) -> ParameterSpec {
     let per_tick_sd = Some((1.0_f64 / 12.0).sqrt());
     ParameterSpec { nominal: MEAN.0, sd: MEAN.1, per_tick_sd, ..at_rows(which) }
@@ -57,7 +62,7 @@ pub(super) fn switches(inlet: &[f64], outlet: &[f64]) -> impl Iterator<Item = u3
     })
 }
 
-/// Samples at which the commands are other than in the sample before.
+/// Samples at which the commands differ from those of the sample before.
 pub(super) fn switched(inlet: &[f64], outlet: &[f64]) -> impl Iterator<Item = usize> {
     let counts: Vec<u32> = switches(inlet, outlet).collect();
     (1..counts.len()).filter(move |&i| counts[i] != counts[i - 1])

@@ -1,4 +1,4 @@
-//! The worker for FMUs: a separate program, because an FMU is native code.
+//! Worker for functional mock-up units (FMUs): a separate program, because an FMU is native code.
 
 use std::{
     collections::BTreeMap,
@@ -15,11 +15,11 @@ const VARIABLE: &str = "STRETCH_FMU";
 const PROGRAM: &str = "stretch-fmu";
 
 impl WorkersSpec {
-    /// An FMU in a folder, run by the program `stretch-fmu`: the one of the variable `STRETCH_FMU`, else one next to this program, else one
-    /// on the path.
+    /// An FMU in a folder, run by the program `stretch-fmu`: the one of the variable `STRETCH_FMU`,
+    /// else one next to this program, else one on the path.
     ///
-    /// `variables` holds the FMU's names of parameters, effects and columns where these differ from the problem's names; `units` holds the
-    /// problem's units of parameters and effects.
+    /// `variables` holds the FMU's names of parameters, effects and columns where these differ from
+    /// the problem's names; `units` holds the problem's units of parameters and effects.
     ///
     /// # Errors
     /// There is no such program.

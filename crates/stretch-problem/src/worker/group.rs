@@ -1,18 +1,21 @@
-//! A process and all that it starts, which end when this program ends, however it ends.
+//! A process and all processes that it starts, which end when this program ends, even if it is
+//! killed.
 //!
-//! On Unix the processes form a group. The group's leader is a shell that waits for the end of a pipe which this program alone holds
-//! open, and then kills the group. The kernel closes the pipe when this program ends, after SIGKILL too. A parent-death signal would
-//! reach the first process only, and needs unsafe code between fork and exec.
+//! On Unix the processes form a group. The group's leader is a shell that waits for the end of a
+//! pipe which this program alone holds open, and then kills the group. The kernel closes the pipe
+//! when this program ends, after SIGKILL too. A parent-death signal would reach the first process
+//! only, and needs unsafe code between fork and exec.
 
 use std::{
     io,
     process::{Child, Command},
 };
 
-/// A process with its group. What is still running of the group is killed where this value is dropped.
+/// A process with its group. Processes of the group that still run are killed when this value is
+/// dropped.
 #[derive(Debug)]
 pub(super) struct Group {
-    /// The first process of those that are at work.
+    /// The process that was started, which may start others.
     pub(super) child: Child,
     #[cfg(unix)]
     guard: guard::Guard,
@@ -28,7 +31,8 @@ impl Group {
         Ok(Self { child, guard })
     }
 
-    /// Starts a command; where there are no groups its children are not followed.
+    /// Starts a command; without process groups, the processes that it starts are not killed with
+    /// it.
     #[cfg(not(unix))]
     pub(super) fn spawn(command: &mut Command) -> io::Result<Self> {
         Ok(Self { child: command.spawn()? })
@@ -57,7 +61,8 @@ mod guard {
         process::{Child, Command, Stdio},
     };
 
-    /// What the shell does: signals that a worker sends to its own group must not end the guard; nothing is ever written to the pipe.
+    /// Script of the shell. It ignores signals that a worker sends to its own group. `read` waits
+    /// until the pipe is closed, because nothing is ever written to it.
     const WAITS: &str = "trap '' HUP INT QUIT TERM; read -r _; kill -KILL 0";
 
     /// The leader of a group.

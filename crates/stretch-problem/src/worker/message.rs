@@ -30,9 +30,9 @@ pub(super) struct Hello {
     pub(super) all: bool,
     /// Whether one model may have altered inputs of several stages.
     pub(super) several: bool,
-    /// Parameters that the worker knows; all parameters where the list is missing.
+    /// Parameters that the worker knows; all parameters if the list is missing.
     pub(super) parameters: Option<Vec<String>>,
-    /// Effects that the worker knows; all effects where the list is missing.
+    /// Effects that the worker knows; all effects if the list is missing.
     pub(super) effects: Option<Vec<String>>,
     /// Units in which the worker takes and gives columns.
     pub(super) units: BTreeMap<String, String>,
@@ -133,7 +133,8 @@ pub(super) fn read_ready(frame: &WorkerFrame) -> Result<Vec<String>, Wrong> {
     Ok(notes.filter_map(|note| note.as_str().map(str::to_owned)).collect())
 }
 
-/// The message that asks for models. A model with altered columns of other stages has their places, `[stage, input]`, under `others`.
+/// The message that requests runs of models. A model with altered columns of other stages lists
+/// their places, `[stage, input]`, under `others`.
 pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
     let one = |ask: &Ask<'_>| {
         let mut model =

@@ -26,7 +26,8 @@ use crate::{
     error::ProblemError,
 };
 
-/// The worker for Python objects: the code that calls a simulator, shared with the Python package, and the code that exchanges frames.
+/// The worker for Python objects: the code that calls a simulator, shared with the Python package,
+/// and the code that exchanges frames.
 const SHIM: &str = concat!(include_str!("calling.py"), include_str!("serving.py"));
 
 /// How workers are started and run.
@@ -56,13 +57,15 @@ impl WorkersSpec {
         }
     }
 
-    /// An object of a Python module, `module:object`, behind the worker that comes with this crate: a function that takes parameters and
-    /// effects as dicts by name, or an object with `simulate(parameters[n, p], effects[n, e])`. The worker needs python3 with NumPy.
+    /// An object of a Python module, `module:object`, that is served by the worker of this crate: a
+    /// function that takes parameters and effects as dicts by name, or an object with
+    /// `simulate(parameters[n, p], effects[n, e])`. The worker needs python3 with NumPy.
     pub fn python(object: &str, folder: impl Into<PathBuf>) -> Self {
         Self::new(&["python3", "-c", SHIM, object], folder)
     }
 
-    /// Guards the files that it names: the program, its arguments, a module.
+    /// Registers the files that the command names (program, arguments, module) as inputs, which no
+    /// output may overwrite.
     fn guard(&self) -> Result<(), String> {
         let module = |part: &str| part.split(':').next().unwrap_or(part).replace('.', "/") + ".py";
         let named = self.command.iter().filter(|part| *part != SHIM);
@@ -72,8 +75,9 @@ impl WorkersSpec {
         })
     }
 
-    /// The command for messages, in one line: a part that holds white space or what is not printed is put in quotation marks, and the
-    /// text of the worker for Python objects is left out.
+    /// The command for messages, in one line: a part that is empty or holds white space or control
+    /// characters is put in quotation marks, and the text of the worker for Python objects is left
+    /// out.
     pub(crate) fn shown(&self) -> String {
         let part = |part: &String| match part.as_str() {
             SHIM => "(worker of stretch)".to_owned(),
@@ -90,8 +94,9 @@ impl WorkersSpec {
 
 /// Workers that answer asks.
 ///
-/// A worker that dies, hangs or does not keep to the protocol is started anew, and its batch is repeated once. If the batch fails again, the
-/// source is [gone](SourceError::Gone), and the error holds what the worker printed last.
+/// A worker that dies, hangs or does not keep to the protocol is started anew, and its batch is
+/// repeated once. If the batch fails again, the source is [gone](SourceError::Gone), and the error
+/// holds what the worker printed last.
 #[derive(Debug)]
 pub struct Workers {
     spec: WorkersSpec,
@@ -112,11 +117,12 @@ struct Crew {
 }
 
 impl Workers {
-    /// Checks a problem, starts the workers of its simulator, and fits the problem to what they say of themselves: effects on the states
-    /// that they declare are looked for, and nothing in front of a stage where they take no altered inputs.
+    /// Checks a problem, starts the workers of its simulator, and adapts the problem to the
+    /// abilities that they declare. Effects on the states that they declare are looked for. If they
+    /// take no altered inputs, `all` contains no effect in front of a stage.
     ///
     /// # Errors
-    /// A problem that does not do, workers that cannot be started, effects on states that are not declared.
+    /// An invalid problem, workers that cannot be started, effects on states that are not declared.
     pub fn bound(spec: ProblemSpec, workers: WorkersSpec) -> Result<(Checked, Self), ProblemError> {
         let mut bare = spec.clone();
         bare.wrap.retain(|name| !name.starts_with("state."));
@@ -124,7 +130,7 @@ impl Workers {
         let mut source = Self::start(workers.clone(), checked.session())?;
         let mut spec = spec.with_states(source.states())?;
         if spec.effects.len() > checked.session().effects.len() {
-            // the session of the first worker knows nothing of its states' effects
+            // the session that the first worker received lacks the effects on its states
             drop(source);
             checked = Checked::new(spec.clone())?;
             source = Self::start(workers, checked.session())?;
@@ -158,7 +164,7 @@ impl Workers {
         &self.hello.states
     }
 
-    /// An idle worker, or a new worker where there may be more.
+    /// Takes an idle worker, or starts a worker if fewer than `jobs` are busy.
     fn take(&self) -> Result<Process, String> {
         let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -190,7 +196,7 @@ impl Workers {
     fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
         let mut process = self.take()?;
         let most = seconds(self.spec.deadline_s * asks.len() as f64);
-        // a worker that answers all stages gives each of them
+        // a worker that answers all stages returns the samples of each of them
         let samples: usize = asks.iter().map(|ask| self.session.samples(ask.trials)).sum();
         let bytes = (samples * self.session.stages.len() * size_of::<f64>()) as u64;
         let answer = process.exchange(message::simulate(asks), most, bytes.max(NO_BODY));
@@ -223,7 +229,7 @@ impl Workers {
     }
 }
 
-/// A deadline; one that no clock reaches is thirty years.
+/// A deadline from a number of seconds, limited to 1e9 s (about thirty years).
 fn seconds(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds.clamp(0.001, 1e9)).unwrap_or_default()
 }

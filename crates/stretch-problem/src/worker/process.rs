@@ -58,13 +58,13 @@ impl Process {
         let (to, asked) = channel::<Vec<u8>>();
         thread::spawn(move || {
             for bytes in asked {
-                // The end of the worker is noticed where its answer is waited for.
+                // `exchange` notices the end of the worker while it waits for the answer.
                 if stdin.write_all(&bytes).and_then(|()| stdin.flush()).is_err() {
                     break;
                 }
             }
         });
-        // An answer without a question waits in the pipe.
+        // The channel holds one answer, so that answers without a request wait in the pipe.
         let (answered, from) = sync_channel(1);
         let most_bytes = Arc::new(AtomicU64::new(NO_BODY));
         let most = Arc::clone(&most_bytes);
@@ -83,8 +83,8 @@ impl Process {
         Ok(Self { group, to: Some(to), from, last, most_bytes })
     }
 
-    /// Sends a frame and waits for the answer, whose body has at most so many bytes. The error says how the worker died, hung, or did
-    /// not keep to the protocol.
+    /// Sends a frame and waits for the answer, whose body has at most `most_bytes` bytes. The error
+    /// states how the worker died, hung, or did not keep to the protocol.
     pub(super) fn exchange(
         &mut self,
         bytes: Vec<u8>,
@@ -139,7 +139,8 @@ impl Process {
 impl Drop for Process {
     fn drop(&mut self) {
         if let Some(to) = self.to.take() {
-            // A worker that is gone needs no farewell; without the sender its standard input ends.
+            // A failure is ignored, because a worker that has ended needs no message. Without the
+            // sender, the worker's standard input is closed.
             let _ = to.send(super::message::bye());
         }
         let until = Instant::now() + LEAVES;
@@ -149,7 +150,7 @@ impl Drop for Process {
                 _ => break,
             }
         }
-        // The group is killed as it is dropped, with whatever the worker left behind.
+        // Dropping the group kills it, with all processes that the worker left behind.
     }
 }
 
@@ -160,7 +161,8 @@ fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
     while have < PREFIX {
         match from.read(&mut prefix[have..]) {
             Ok(0) if have == 0 => return Err("it closed its standard output".into()),
-            // The bytes that came are no frame, and the parser says more about them than their number does.
+            // The bytes so far are no frame. The parser's error describes them better than their
+            // number.
             Ok(0) => {
                 return Err(Prefix::parse(&prefix).map_or_else(
                     |e| e.to_string(),
@@ -179,7 +181,7 @@ fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
             "a frame says that its body is {body} bytes long; the answer that is due has at most {most}"
         ));
     }
-    // The lengths are the worker's claim: memory is taken only for bytes that arrive.
+    // The worker may state wrong lengths, so memory is allocated only for bytes that arrive.
     let mut part = |bytes: usize| {
         let mut out = Vec::new();
         let read = from.by_ref().take(bytes as u64).read_to_end(&mut out);

@@ -23,7 +23,7 @@ pub(crate) struct Site {
     pub(crate) input: usize,
     pub(crate) column: String,
     pub(crate) unit: String,
-    /// What the column measures, where its unit or its name say.
+    /// The quantity that the column measures, if its unit or its name states it.
     pub(crate) quantity: Option<Measured>,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Placed {
     pub(crate) site: Site,
     pub(crate) name: String,
     extent: Extent,
-    /// Its parameters, without those that are found in the recording.
+    /// Its parameters, without those that are estimated from the recording.
     parameters: Vec<EffectParameter>,
     /// Values at which the search begins.
     starts: Vec<Vec<f64>>,
@@ -58,23 +58,24 @@ pub(crate) struct Among<'a> {
     pub(crate) before: &'a [Before],
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
-    /// By stage, the velocity of its rubbing parts.
+    /// By stage, the velocity of its parts with friction.
     pub(crate) velocities: &'a [Option<Vec<f64>>],
-    /// By stage, the position of its rubbing parts.
+    /// By stage, the position of its parts with friction.
     pub(crate) positions: &'a [Option<Vec<f64>>],
-    /// By stage, whether it names the velocity or the position of its rubbing parts; else its output is taken.
+    /// By stage, whether it names the velocity or the position of its parts with friction.
+    /// Otherwise its output is used.
     pub(crate) names_motion: Vec<bool>,
-    /// Columns of velocities and positions, which load nothing.
+    /// Columns of velocities and positions, which are not loads of a contact.
     pub(crate) moving: Vec<&'a str>,
     /// By stage, the number of its inputs.
     pub(crate) inputs: Vec<usize>,
-    /// Columns that may talk across to a channel.
+    /// Columns that may cause crosstalk in a channel or load a contact.
     pub(crate) others: Vec<String>,
-    /// Kinds of the user's own, which act behind the kinds of the catalogue.
+    /// The user's own kinds, which act after the kinds of the catalogue.
     pub(crate) kinds: &'a [&'static Kind],
 }
 
-/// The wrappers that some patterns ask for, in the order in which the wrappers act.
+/// The wrappers that match some patterns, in the order in which the wrappers act.
 pub(crate) fn placed(
     sites: &[Site],
     among: &Among<'_>,
@@ -153,7 +154,7 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let column = &site.column;
     let values = among.columns.of(column).unwrap_or(&[]);
     let trials = among.columns.ranges();
-    // a step at the first sample is a change as any other
+    // a step at the first sample counts as a change
     let begun = |range: Range<usize>| {
         let trial = trials.iter().position(|all| all.start == range.start);
         let before = trial.filter(|_| site.side == Side::Input);
@@ -213,7 +214,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
         Beside::Another => {
             let each = others().filter_map(|name| Some((among.columns.of(name)?, name.as_str())));
             let each = each.filter(|(x, _)| moves(x));
-            // what talks across is what the wrapper looks at
+            // the other column causes the crosstalk, and also distinguishes the wrappers by name
             return each.map(|(x, name)| with(Some(x), Some((x, name)))).collect();
         }
         Beside::Velocity | Beside::VelocityAndLoad => &among.velocities[site.stage],
@@ -273,7 +274,8 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
     })
 }
 
-/// The name of a channel's side: `output`, or `input`, or the column where the stage has several inputs.
+/// The name of a channel's side: `output`, or `input`, or the column if the stage has several
+/// inputs.
 fn side(site: &Site, among: &Among<'_>) -> String {
     match site.side {
         Side::Output => "output".to_owned(),
@@ -290,14 +292,15 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
     }
 }
 
-/// Whether a kind is among all that is looked for on a channel. A drag by the speed of the output is what a lag of the output is, so that
-/// nothing distinguishes them unless the stage names what rubs.
+/// Whether `all` contains a kind on a channel. Viscous friction by the speed of the output acts
+/// like a lag of the output. It is included only if the stage names the motion of its parts with
+/// friction.
 fn is_usual(kind: &Kind, site: &Site, among: &Among<'_>) -> bool {
     let is_lag = kind.name == VISCOUS_FRICTION.name && !among.names_motion[site.stage];
     kind.usual.contains(&site.side) && !is_lag
 }
 
-/// All names by which a user may ask for a wrapper of a kind; `all` names a usual one.
+/// All names by which a user may request a wrapper of a kind; `all` only for a usual one.
 fn aliases(
     (kind, is_usual): (&Kind, bool),
     site: &Site,
@@ -362,12 +365,14 @@ impl Placed {
         spec
     }
 
-    /// Whether the effect is subtracted from the channel: friction is subtracted in front of a stage and added behind it.
+    /// Whether the effect is subtracted from the channel: friction is subtracted in front of a
+    /// stage and added behind it.
     fn is_taken(&self) -> bool {
         self.kind.opposes && self.site.side == Side::Input
     }
 
-    /// Leaves out the starts at which the wrapper does not show at a sample rate, Hz; gives the least sufficient rate where no start is left.
+    /// Removes the starts at which the wrapper cannot be recognised at a sample rate, Hz. Returns
+    /// the least sufficient rate if no start is left.
     fn shown_at(&mut self, rate_hz: f64) -> Option<f64> {
         let mut search = Search { ranges: Vec::new(), starts: std::mem::take(&mut self.starts) };
         let needed = search.at_rate(|values| self.kind.least_rate_hz(values), rate_hz);
@@ -408,8 +413,9 @@ impl Placed {
 
     /// Applies the wrapper to a channel, one trial after the other.
     ///
-    /// A trial of which `before` holds a value begins as if the channel had been there from long ago, one sample before its first; the value
-    /// is then that of the altered channel. Any other begins settled at its first value.
+    /// If `before` holds a value for a trial, the wrapper begins one sample before the trial,
+    /// settled at that value; the value is then replaced by that of the altered channel. Any other
+    /// trial begins settled at its first value.
     pub(crate) fn act(
         &self,
         values: &[f64],
@@ -429,7 +435,7 @@ impl Placed {
         for ((range, start_s), before) in parts.zip(before) {
             let before = before.and_then(Option::as_mut);
             let lead = usize::from(before.is_some());
-            // the second signal was at its first value before
+            // before the trial, the second signal is assumed to have its first value
             let led = |x: &[f64]| [&x[..lead.min(x.len())], x].concat();
             let mut signal = led(&channel[range.clone()]);
             if let (Some(first), Some(before)) = (signal.first_mut(), &before) {
@@ -448,7 +454,7 @@ impl Placed {
                 None => Start::Settled,
             };
             let is_driven = matches!(self.kind.beside, Beside::Position | Beside::PositionAndLoad);
-            // what is driven by a position begins where the position does
+            // an operator that is driven by a position begins at the first position
             let first = beside.first().copied().filter(|_| is_driven).unwrap_or(first);
             operator.begin(start, first, &mut cells);
             let load = self.load.as_ref().map_or(Vec::new(), |(load, _)| led(&load[range.clone()]));
@@ -477,7 +483,7 @@ pub(crate) struct Trials<'a> {
     pub(crate) parts: &'a [(Range<usize>, f64)],
 }
 
-/// Starts with every form: a form that was left out has its usual value, and each value lies within its range.
+/// Completes starts: a missing form gets its usual value, and each value is limited to its range.
 fn within(parameters: &[EffectParameter], starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let held = |start| {
         let start = EffectParameter::complete(parameters, start);

@@ -1,12 +1,14 @@
-//! Answers on generated rigs and on measured machines. The generators are programs of their own, so that these tests are ignored.
+//! Answers on generated rigs and on measured machines. These tests are ignored, because the
+//! generators are separate programs.
 //!
 //! ```sh
 //! cargo run --release -p stretch-challenge -- make --cases 30 --seed 5252 --out CASES/own
 //! STRETCH_CASES=CASES cargo test --release -p stretch-problem --test it golden -- --ignored
 //! ```
 //!
-//! `CASES/independent` holds the cases of another simulator of the same rig (form 3, seed 4101, 30 cases, causes of the set `dev`),
-//! and `CASES/machines` the folders that `examples/machines/machines.py` prepares from measured recordings.
+//! `CASES/independent` holds the cases of another simulator of the same rig (form 3, seed 4101, 30
+//! cases, causes of the set `dev`), and `CASES/machines` the folders that
+//! `examples/machines/machines.py` prepares from measured recordings.
 
 use std::{env, fs, path::PathBuf};
 

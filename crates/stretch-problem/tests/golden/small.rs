@@ -1,5 +1,5 @@
-//! Ten small simulators with known defects, each a closure that takes microseconds. The defects are written here, not taken from the
-//! catalogue.
+//! Ten small simulators with known defects, each a closure that takes microseconds. The defects are
+//! written here, not taken from the catalogue.
 
 use std::{fmt::Write as _, sync::Arc};
 
@@ -15,7 +15,7 @@ const DT_S: f64 = 0.01;
 const SAMPLES: usize = 1000;
 const NOISE_MM: f64 = 0.02;
 
-/// Force of a trial, N: three sines that share no period.
+/// Force of a trial, N: three sines without a common period.
 fn force_n(trial: usize) -> Vec<f64> {
     let at = |t: f64| {
         20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t + trial as f64).sin() + 4.0 * (7.7 * t).cos()
@@ -33,7 +33,7 @@ fn spring([compliance, lag_s]: [f64; 2], u: &[f64]) -> Vec<f64> {
     u.iter().map(step).collect()
 }
 
-/// What the machine has and the simulator lacks.
+/// Defect that the machine has and the simulator lacks.
 #[derive(Debug, Clone, Copy)]
 enum Defect {
     Nothing,
@@ -98,7 +98,7 @@ fn machine(defect: Defect, u: &[f64], random: &mut Random) -> Vec<f64> {
     driven.into_iter().map(after).collect()
 }
 
-/// The spring with a brake that holds 3 mm.
+/// The spring with a brake: a distance of up to 3 mm to the target moves nothing.
 fn braked([compliance, lag_s]: [f64; 2], u: &[f64]) -> Vec<f64> {
     let mut y = compliance * u[0];
     let step = |u: &f64| {

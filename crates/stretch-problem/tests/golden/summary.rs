@@ -49,7 +49,7 @@ fn lines(name: &str, answer: &Value) -> String {
     text
 }
 
-/// Compares with the golden file, or writes the file where `STRETCH_BLESS` is set.
+/// Compares with the golden file. If `STRETCH_BLESS` is set, the file is written first.
 ///
 /// # Panics
 /// When an answer differs: both texts are shown, case by case.

@@ -1,8 +1,9 @@
-//! Plants that do what the servo of the simulator leaves out, each written from its equation, with no operator of the project.
+//! Plants with effects that the servo of the simulator lacks, each written from its equation,
+//! without any operator of the project.
 
 use super::{DT_S, plain};
 
-/// Something hidden behind or in front of the servo: its name, and the plant.
+/// A hidden effect: its name, and the plant that has it.
 pub(crate) type Hidden = (&'static str, Box<dyn Fn(&[f64], f64) -> Vec<f64>>);
 
 pub(crate) fn hidden() -> Vec<Hidden> {
@@ -97,7 +98,8 @@ pub(crate) fn hidden() -> Vec<Hidden> {
         (
             "input.offset",
             Box::new(|u, _| {
-                // The servo rests until it is commanded, so that an offset of the command is none of the angle.
+                // The servo rests before the first command, so that an offset of the command
+                // differs from an offset of the angle.
                 plain(&u.iter().map(|u| u + 0.5).collect::<Vec<_>>(), 0.0)
             }),
         ),
@@ -171,7 +173,7 @@ pub(crate) fn hidden() -> Vec<Hidden> {
         (
             "output.softening",
             Box::new({
-                // It goes on from trial to trial.
+                // The travel accumulates from trial to trial.
                 let worked = std::cell::Cell::new((0.0, 0.2));
                 move |u, _| {
                     let soften = |y: f64| {
@@ -257,7 +259,7 @@ fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
         let shown = y;
         for _ in 0..50 {
             let apart = u - y;
-            // Away from where it would stop if it braked now.
+            // Distance that is left if it brakes now.
             let past = apart - v * v.abs() / (2.0 * acceleration);
             v = (v + past.signum() * acceleration * h).clamp(-rate, rate);
             if apart.abs() < acceleration * h * h && v.abs() < 2.0 * acceleration * h {
@@ -270,8 +272,9 @@ fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// A command followed as quickly as jerk, acceleration and rate allow (Haschke, Weitnauer and Ritter, doi 10.1109/IROS.2008.4650924): at every
-/// moment with full jerk towards the greatest rate, unless braking now ends beyond the command, in steps of 1/50 of a sample.
+/// A command followed as quickly as jerk, acceleration and rate allow (Haschke, Weitnauer and
+/// Ritter, doi 10.1109/IROS.2008.4650924): at every moment with full jerk towards the greatest
+/// rate, unless braking now ends beyond the command, in steps of 1/50 of a sample.
 pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
     let [jerk, acceleration, rate] = limits;
     let h = DT_S / 50.0;
@@ -281,7 +284,7 @@ pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
         for _ in 0..50 {
             let side = (u - y - way_to_rest(v, a, limits)).signum();
             let wanted = if side * v < 0.0 { 0.0 } else { side * rate };
-            // The speed at which the acceleration could be gone.
+            // The speed that is reached if the acceleration is reduced to 0 now.
             let comes_to = v + 0.5 * a * a.abs() / jerk;
             let push = if side * (wanted - comes_to) > 0.0 { side } else { -side };
             a = (a + push * jerk * h).clamp(-acceleration, acceleration);
@@ -293,7 +296,7 @@ pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// How far it goes until it rests, braking as hard as jerk and acceleration allow.
+/// Distance until it rests, if it brakes as hard as jerk and acceleration allow.
 fn way_to_rest(v: f64, a: f64, [jerk, acceleration, _]: [f64; 3]) -> f64 {
     let side = (v + 0.5 * a * a.abs() / jerk).signum();
     let (mut v, mut a) = (side * v, side * a);

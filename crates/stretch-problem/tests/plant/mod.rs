@@ -20,7 +20,7 @@ use stretch_problem::{
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 3000;
 
-/// Command of a trial: steps, ramps and waves.
+/// Command of a trial: steps and waves in turn.
 fn command(trial: usize) -> Vec<f64> {
     let mut random = RandomGenerator::new(40 + trial as u64, 0);
     let (mut held, mut out) = (0.0, Vec::with_capacity(SAMPLES));
@@ -35,7 +35,8 @@ fn command(trial: usize) -> Vec<f64> {
     out
 }
 
-/// Angle of the servo: angle' = (gain u - angle)/tau, exact for a held command; brake takes from the command against its change.
+/// Angle of the servo: angle' = (gain u - angle)/tau, exact for a held command. The brake reduces
+/// the distance gain u - angle by up to `brake`.
 fn servo(gain: f64, tau: f64, brake: f64, u: &[f64]) -> Vec<f64> {
     let decay = (-DT_S / tau).exp();
     let mut angle = 0.0;
@@ -59,7 +60,7 @@ fn servo_of(ask: &Ask<'_>, measured: &[f64]) -> Vec<f64> {
     angles.map(|y| offset + y).collect()
 }
 
-/// Trials recorded of a plant that makes an angle of a command.
+/// Trials of a plant, which returns the angle for a command and the trial's start time.
 fn recorded(plant: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let (u, start_s) = (command(trial), 60.0 * trial as f64);
@@ -110,7 +111,7 @@ fn problem(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
     }
 }
 
-/// Diagnoses; hands back how often the servo was run, too.
+/// Diagnoses; also returns how often the servo was run.
 fn diagnosed(spec: ProblemSpec, budget: Option<usize>) -> (Diagnosis, usize) {
     let problem = Checked::new(spec).unwrap();
     let measured = problem.session().column("command_V").unwrap().to_vec();
@@ -127,7 +128,7 @@ fn diagnosed(spec: ProblemSpec, budget: Option<usize>) -> (Diagnosis, usize) {
     (diagnosis, calls)
 }
 
-/// The true servo with something that the simulator leaves out.
+/// The true servo, with a brake.
 fn plain(u: &[f64], brake: f64) -> Vec<f64> {
     servo(10.4, 0.095, brake, u).into_iter().map(|y| 0.2 + y).collect()
 }
@@ -143,7 +144,8 @@ const MANY: [&str; 8] = [
     "output.saturation",
 ];
 
-/// Effects of a servo's drive and of its recorder, in addition to which a servo without any of them still agrees.
+/// Effects of a servo's drive and of its recorder, none of which may be named for a servo without
+/// them.
 const DRIVE: [&str; 4] =
     ["input.profile", "input.firmware_dead_band", "output.flexible_joint", "output.clock_drift"];
 
@@ -169,7 +171,8 @@ fn each_hidden_effect_is_named_within_four_hundred_runs() {
             "{name}: {:?} {runs} runs of {} simulations, {}",
             diagnosis.named, diagnosis.simulations, diagnosis.sentence
         );
-        // To the angle a brake that holds some degrees of the push is a play of the command: which comes first is a coin's toss.
+        // A brake that holds some degrees of the push has the same effect on the angle as a play of
+        // the command, so that either may rank first.
         let is_same = name == "input.backlash" && diagnosis.named == ["brake"];
         let is_family = is_same
             || diagnosis.named.iter().any(|n| n == name)
@@ -183,7 +186,8 @@ fn each_hidden_effect_is_named_within_four_hundred_runs() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A black box of which the engine knows no more than that it simulates: every simulation is a run, as of any simulator.
+/// A black box of which the engine uses only the basic methods, so that every simulation is a run,
+/// as for any simulator.
 struct Plain<'a>(&'a BlackBox);
 
 impl Simulator for Plain<'_> {
@@ -223,7 +227,8 @@ fn a_black_box_is_run_less_than_half_as_often_as_it_is_simulated() {
     }
 }
 
-/// A mass on a rail that rubs: its force from its recorded motion, the inverse form.
+/// A mass on a rail with friction. The output is the force, which follows from the recorded motion
+/// (the inverse form).
 fn rail(trials: usize) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let mut random = RandomGenerator::new(90, trial as u64);
@@ -291,7 +296,7 @@ fn friction_is_found_from_the_inverse_form_at_a_difference_of_positions() {
         let all = &diagnosis.candidates[0].parameters;
         all.iter().find(|p| p.name == name).map(|p| p.value).unwrap()
     };
-    // The width of the reversal is a form: a few per cent of the force.
+    // The width of the reversal is a form, which changes the force by a few per cent.
     assert!((value("f") - 20.4).abs() < 1.0, "{}", value("f"));
     assert!((value("b") - 200.0).abs() < 10.0, "{}", value("b"));
 }
@@ -315,7 +320,7 @@ fn a_budget_is_kept_and_what_was_cut_short_is_said() {
 fn parameters_that_do_nothing_do_the_same_or_stand_at_a_bound_are_said() {
     let mut spec = problem(recorded(|u, _| servo(13.5, 0.1, 0.0, u)), &[]);
     spec.effects.clear();
-    // Nothing reads the inertia; the gear acts as the gain does.
+    // The simulator ignores the inertia; the gear acts like the gain.
     spec.parameters.push(parameter("gear", "1", 1.0, Tolerance::Relative(0.1)));
     spec.parameters.push(parameter("inertia", "kg m2", 3.0, Tolerance::Relative(0.1)));
     let problem = Checked::new(spec).unwrap();

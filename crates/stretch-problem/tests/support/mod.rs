@@ -1,4 +1,5 @@
-//! What the tests share: seeded noise, effects by name, a rig that is not as shipped, lost rows, small sessions.
+//! Helpers that the tests share: seeded noise, effects by name, a rig that is not as shipped, lost
+//! rows, small sessions.
 
 pub(crate) mod effects;
 pub(crate) mod rigs;

@@ -2,8 +2,8 @@
 
 use crate::support::Noise;
 
-/// Trials as a recorder leaves them that loses rows: each row but the first with a probability of `share`, or one row of
-/// every trial when it is zero.
+/// Removes rows of trials, as a recorder that loses rows does: each row except the first with the
+/// probability `share`, or one row of every trial if `share` is 0.
 pub(crate) fn with_lost_rows(
     trials: &[stretch_data::SessionTrial],
     share: f64,
@@ -29,5 +29,6 @@ pub(crate) fn with_lost_rows(
     trials.iter().map(lose).collect()
 }
 
-/// The best candidate's probability may move so far when rows are lost: as far as between two seeds of the noise.
+/// Allowed change of the best candidate's probability if rows are lost: as much as between two
+/// seeds of the noise.
 pub(crate) const PROBABILITY: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! Small sessions simulated by the catalogue's own rig.
+//! Small sessions simulated by the built-in rig.
 
 use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
 use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Openings, Recorded, RigParams, Start};
@@ -31,7 +31,7 @@ fn openings(trial: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     (inlet, outlet)
 }
 
-/// A session of four trials, the last to test on.
+/// A session of four trials; the last one is a test trial.
 pub(crate) fn session(
     params: &RigParams,
     effects: &EffectSet,

@@ -1,4 +1,4 @@
-//! Reasons why there is no calibration.
+//! Errors of calibrations.
 
 use stretch_core::{DesignError, Label};
 use stretch_filter::FilterError;
@@ -7,24 +7,24 @@ use stretch_receptor::ReceptorError;
 
 use crate::FIXED_STEP;
 
-/// Why trials could not be calibrated on, or a calibration could not be used.
+/// Error of a fit to trials, or of the use of a calibration.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateError {
-    /// No trial at all.
+    /// There is no trial.
     #[error("there is no trial to calibrate on; name at least one file")]
     NoTrials,
-    /// No model can be judged on samples that were left out of its fit.
+    /// No model can be evaluated on samples that were left out of its fit.
     #[error(
         "no model can be judged on samples that are left out of its fit: these are too few; record more, or choose one model with --model"
     )]
     TooFewToJudge,
-    /// The time stamps give no sample rate.
+    /// The trial has too few samples.
     #[error("{trial}: {samples} samples are too few to calibrate on; record more")]
     TooShort {
         /// The trial.
         trial: String,
-        /// How many samples it has.
+        /// Number of samples of the trial.
         samples: usize,
     },
     /// Trials at different rates cannot share an estimator.
@@ -51,22 +51,22 @@ pub enum CalibrateError {
         /// The constant value.
         value: f64,
     },
-    /// The trials do not contain one of the directions.
+    /// One of the two branches (directions of motion) has too few samples.
     #[error(
         "the {branch} branch has {samples} samples and the model has {terms} terms; add trials that move that way, or fit --model curve or --model linear, which have no branches"
     )]
     OneBranch {
         /// The branch that is missing.
         branch: &'static str,
-        /// How many samples it has.
+        /// Number of samples in the branch.
         samples: u64,
-        /// How many terms the model has.
+        /// Number of terms of the model.
         terms: usize,
     },
     /// The data do not determine a fit.
     #[error("{branch}: {cause}")]
     Fit {
-        /// Which fit.
+        /// Name of the fit.
         branch: &'static str,
         /// The error of the fit.
         #[source]
@@ -85,12 +85,12 @@ pub enum CalibrateError {
         "no effect of the gauge or its reference was named: diagnose first (stretch diagnose) and give its answer with --from, or fit --model observer"
     )]
     NotDiagnosed,
-    /// A cause acts elsewhere, or is unknown.
+    /// A cause is no effect of the gauge or of its reference.
     #[error("{effect} is no effect of the gauge or its reference; a calibration can use {known}")]
     UnknownCause {
         /// The name that was given.
         effect: String,
-        /// The names that are known.
+        /// The names that are accepted.
         known: String,
     },
     /// A cause needs a pressure, and a trial has none.
@@ -102,10 +102,10 @@ pub enum CalibrateError {
         effect: String,
         /// The trial.
         trial: String,
-        /// The column that was looked for.
+        /// The missing column.
         column: String,
     },
-    /// A signal is an angle that wraps. A calibration reads it sample by sample, and cannot know the turn.
+    /// The signal is an angle that wraps. A calibration reads it sample by sample and therefore cannot know the turn.
     #[error(
         "{trial}: the signal {column} jumps by {turn} between neighbours: it is an angle that wraps; unwrap it before you calibrate \
          and before you apply, or move its zero so that the motion stays within one turn"
@@ -121,13 +121,13 @@ pub enum CalibrateError {
     /// An estimator cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),
-    /// The calibration gives no receptor.
+    /// The receptor cannot be built from the calibration.
     #[error(transparent)]
     Receptor(#[from] ReceptorError),
-    /// A number is outside its possible range.
+    /// A number is outside its valid range.
     #[error("the calibration is not possible: {0}")]
     Design(#[from] DesignError),
-    /// The model has no form in integers.
+    /// The model has no integer form.
     #[error(
         "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: calibrate with one of them"
     )]
@@ -135,7 +135,7 @@ pub enum CalibrateError {
         /// The model.
         model: String,
     },
-    /// The converter has too many bits for arithmetic in integers of 32 bits.
+    /// The converter has too many bits for 32-bit integer arithmetic.
     #[error(
         "a converter of {bits} bits has no form in integers of 32 bits: write it in float (stretch export --c DIR --form float), or \
          give the board the upper 16 bits of each code (--adc 16,ZERO_V,FULL_SCALE_V)"
@@ -144,7 +144,7 @@ pub enum CalibrateError {
         /// Bits of the converter.
         bits: u8,
     },
-    /// The rate estimator has no form in integers in this program.
+    /// The rate estimator has no integer form in this program.
     #[error(
         "the rate is {rate}; in integers for a board it can be --rate savgol:WINDOW,DEGREE of degree 1 or 2, window {windows}, without delay"
     )]
@@ -154,7 +154,7 @@ pub enum CalibrateError {
         /// The windows that are compiled in.
         windows: String,
     },
-    /// An estimate in integers would have steps that are larger than the calibration's error, or coarse for its range.
+    /// The steps of an integer estimate would be larger than the calibration's error, or coarse for its range.
     #[error(
         "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a calibration that is off by {error:.2e}: \
          give {reference} in a smaller unit, such as mm in place of m, and calibrate again"
@@ -179,7 +179,7 @@ pub enum CalibrateError {
         /// The signal at the last code.
         full_scale_v: f64,
     },
-    /// Integers over the converter cannot hold the calibration's numbers.
+    /// The numbers of the calibration do not fit integers with this converter.
     #[error(
         "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
     )]
@@ -189,7 +189,7 @@ pub enum CalibrateError {
     Record {
         /// The file.
         file: String,
-        /// The fault of the file, and its place.
+        /// The fault and its place in the file.
         problem: String,
     },
     /// A trial is inconsistent, or lacks a column.
@@ -198,23 +198,24 @@ pub enum CalibrateError {
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] stretch_data::files::FileError),
-    /// There is nothing to compare, because every sample was withheld.
+    /// There are no estimates to compare, because every sample was withheld.
     #[error("{trial}: no sample has an estimate; {}", why_withheld(*.rate_hz, *.expected_hz))]
     NothingEstimated {
         /// The trial.
         trial: String,
-        /// Samples a second of the trial.
+        /// Sample rate of the trial, Hz.
         rate_hz: f64,
-        /// Samples a second that the calibration is made for.
+        /// Sample rate of the calibration, Hz.
         expected_hz: f64,
     },
 }
 
-/// Share of a calibration's interval by which the usual interval of a log may differ: as much as counts as on time.
+/// Largest relative difference between the median sample interval of a log and that of the calibration that counts as
+/// equal.
 pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 
-/// Why no sample of a trial has an estimate. Samples that come more slowly than a calibration expects have lost samples between them, and the
-/// rate estimator begins anew at each.
+/// Explains why no sample of a trial has an estimate. If samples come more slowly than a calibration expects, samples
+/// are missing between them, and the rate estimator restarts at each sample.
 fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
     if (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         format!(

@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
 
-// prepare <- fit <- judge; records depends on none of them
+// Dependencies: `judge` uses `fit`, and `fit` uses `prepare`. `record` uses none of them.
 mod error;
 mod fit;
 mod judge;
@@ -27,7 +27,7 @@ pub use record::{
     digest, fit_error, fixed_record, is_postcard, parse_adc, read_calibration, write_calibration,
 };
 
-/// What other crates build calibrations of their own from.
+/// Parts from which other crates build their own calibrations.
 pub mod toolkit {
     pub use crate::{
         fit::{

@@ -1,4 +1,4 @@
-//! Choices of the user about a calibration, and their spellings.
+//! Options of a calibration, and their spellings.
 
 use std::{fmt, str::FromStr};
 
@@ -25,12 +25,13 @@ pub enum ModelKind {
     Remembering {
         /// The form of the memory.
         kind: Memory,
-        /// Whether the resting baseline is followed as it drifts.
+        /// Whether a drifting baseline of the resting signal is tracked.
         rest: bool,
     },
 }
 
-/// The form of a model's memory. Every time constant, radius and weight is chosen on data left out of the fit.
+/// The form of a model's memory. The history model chooses time constants, radii and ridge by cross-validation. The
+/// other models fit their numbers to the trials.
 ///
 /// ```
 /// use stretch_calibrate::{Memory, ModelKind};
@@ -63,19 +64,19 @@ impl fmt::Display for Memory {
     }
 }
 
-/// The weights of residuals.
+/// Robust weighting of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Robust {
     /// Least squares.
     #[default]
     Off,
-    /// Bisquare weights: gross outliers count nothing.
+    /// Bisquare weights: gross outliers have no weight.
     Bisquare,
     /// Least absolute residuals.
     Lar,
 }
 
-/// The assignment of samples to the two branches.
+/// Assignment of samples to the two branches (directions of motion).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SplitBy {
     /// Sample by sample, by the sign of the rate outside the dead band, as in the live receptor.
@@ -86,7 +87,7 @@ pub enum SplitBy {
     Trial,
 }
 
-/// A spelling that is not understood, and the spellings that are understood.
+/// An unknown spelling, with the spellings that are accepted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{given}\" is not understood; use {use_instead}")]
 pub struct SpellingError {
@@ -95,14 +96,15 @@ pub struct SpellingError {
 }
 
 impl SpellingError {
-    /// An error with the given spelling and the spellings that are understood.
+    /// An error with the given spelling and the accepted spellings.
     pub fn new(given: &str, use_instead: &'static str) -> Self {
         Self { given: given.to_owned(), use_instead }
     }
 }
 
 impl ModelKind {
-    /// The names that `--model` takes for trials with a time, simplest first; poly13 represents all surfaces.
+    /// Returns the names that `--model` accepts for trials with time stamps, simplest first. poly13 represents all
+    /// surfaces.
     ///
     /// ```
     /// use stretch_calibrate::ModelKind;
@@ -162,11 +164,10 @@ impl fmt::Display for ModelKind {
 const RATES: &str = "savgol:WINDOW,DEGREE[,DELAY] in samples, difference:CUTOFF_HZ, \
                      tracker:INDEX, or central (a log only)";
 
-/// A rate estimator from its spelling: `savgol:11,2`, `savgol:11,2,5`,
-/// `difference:8`, `tracker:0.1`, `central`.
+/// Parses a rate estimator: `savgol:11,2`, `savgol:11,2,5`, `difference:8`, `tracker:0.1`, `central`.
 ///
 /// # Errors
-/// [`SpellingError`] with the spellings that are understood.
+/// [`SpellingError`] with the accepted spellings.
 ///
 /// ```
 /// use stretch_calibrate::parse_rate;
@@ -196,8 +197,7 @@ pub fn parse_rate(text: &str) -> Result<RateEstimator, SpellingError> {
     estimator.validate().map_err(|_: DesignError| unknown())
 }
 
-/// Options of a calibration. [`Options::default`] is the crate's own choice, [`Options::paper`] the method of the
-/// paper.
+/// Options of a calibration. [`Options::default`] is recommended; [`Options::paper`] gives the published method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Column of the signal.
@@ -210,30 +210,30 @@ pub struct Options {
     pub normalisation: Normalisation,
     /// The estimator of the signal's rate in the live receptor.
     pub rate: RateEstimator,
-    /// The rate that the surfaces are fitted on.
+    /// The rate to which the surfaces are fitted.
     pub rate_source: RateSource,
     /// The assignment of samples to the branches.
     pub split: SplitBy,
-    /// The weights of residuals.
+    /// Robust weighting of the residuals.
     pub robust: Robust,
-    /// The signal's zero in [`Normalisation::Range`]. When not given it is 1.24 V for a `bridge_v` that runs near
-    /// 1.24 V, else the middle of the signal's range, because powers of a signal with a large offset cancel.
+    /// The signal's zero in [`Normalisation::Range`]. If `None`, it is 1.24 V for a `bridge_v` with values near 1.24 V.
+    /// For other signals it is the middle of the signal's range, because powers of a signal with a large offset lose
+    /// digits by cancellation.
     pub signal_zero: Option<f64>,
-    /// Resting length: the target is then the contraction. When not given, a
-    /// reference whose name begins with `length` rests at its greatest value,
-    /// and any other is the target itself.
+    /// Resting length; the target is then the contraction. If `None`, the resting length of a reference whose name
+    /// begins with `length` is its greatest value, and any other reference is the target itself.
     pub rest_length: Option<f64>,
-    /// Dead band of the branch decision in signal units per second; three
-    /// standard deviations of the rate's noise when not given.
+    /// Dead band of the branch decision, in signal units per second. If `None`, three standard deviations of the rate's
+    /// noise.
     pub dead_band: Option<f64>,
-    /// Whether the rows are weights and readings in any order, without a time: no model with a rate or a memory can be
-    /// fitted to such a table.
+    /// Whether the rows are pairs of weight and reading in any order, without time stamps. Models with a rate or a
+    /// memory cannot be fitted to such a table.
     pub is_table: bool,
-    /// Date of the calibration, as free text for the record.
+    /// Date of the calibration, as free text for the calibration file.
     pub date: String,
     /// The effects that a diagnosis named, for [`Memory::Diagnosed`].
     pub causes: Vec<Cause>,
-    /// Column of the pressure, where a cause needs a pressure.
+    /// Column of the pressure, which some causes need.
     pub pressure: String,
 }
 
@@ -260,9 +260,8 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The method as published (paper section 2.5): central differences of the
-    /// strain at calibration, of the voltage at use, a surface for the inflation
-    /// trials and one for the deflation trials, no dead band.
+    /// The method as published (paper section 2.5). It uses central differences of the strain for the fit and of the
+    /// voltage afterwards, a surface for the inflation trials and one for the deflation trials, and no dead band.
     pub fn paper() -> Self {
         Self {
             rate: RateEstimator::CentralDifference,
@@ -277,10 +276,10 @@ impl Options {
         self.causes.iter().any(|cause| cause.effect == "pressure_crosstalk")
     }
 
-    /// The zero of a signal that was seen in `seen`.
+    /// Returns the zero of a signal with the range `seen`.
     pub(crate) fn zero(&self, seen: Interval) -> f64 {
         let span = seen.max - seen.min;
-        // near: no further from the signal than the signal's own range
+        // Near means no further from the range than the width of the range.
         let is_near = (seen.min - span..=seen.max + span).contains(&BRIDGE_ZERO_V);
         let usual = match self.signal == "bridge_v" && is_near {
             true => BRIDGE_ZERO_V,
@@ -295,8 +294,8 @@ const BRIDGE_ZERO_V: f64 = 1.24;
 
 /// An effect of the gauge or of its reference, with the parameter values that a diagnosis found.
 ///
-/// Names are those of the catalogue (`stretch effects`). Strains, lengths and voltages are in shares of the reference's range over the
-/// calibrated trials, times in seconds. A fit begins at these values.
+/// Names are those of the catalogue (`stretch effects`). Strains, lengths and voltages are shares of the reference's
+/// range over the calibrated trials; times are in seconds. A fit starts at these values.
 ///
 /// ```
 /// use stretch_calibrate::Cause;
@@ -318,13 +317,13 @@ impl Cause {
         Self { effect: effect.to_owned(), values }
     }
 
-    /// The value of a parameter, if it was found.
+    /// Returns the value of a parameter, if it was found.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.values.iter().find(|(name, _)| name == parameter).map(|(_, value)| *value)
     }
 }
 
-/// One sentence about the models of a choice, for users who see their names for the first time.
+/// One sentence that explains the candidate models to new users.
 ///
 /// ```
 /// use stretch_calibrate::{MODELS_IN_WORDS, Memory};

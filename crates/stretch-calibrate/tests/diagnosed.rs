@@ -1,4 +1,4 @@
-//! Calibrations built on what a diagnosis named: better where it was right, not chosen where it was wrong.
+//! Calibrations built on a diagnosis: a right diagnosis lowers the error, and a wrong one is not chosen.
 
 use approx::assert_relative_eq;
 use stretch_calibrate::{
@@ -14,7 +14,7 @@ const DIAGNOSED: ModelKind = ModelKind::Remembering { kind: Memory::Diagnosed, r
 /// A gauge on a muscle of 180 mm that shortens by 30.
 #[derive(Clone, Copy)]
 struct Gauge {
-    /// Overshoot over 0.25 s.
+    /// Overshoot with a time constant of 0.25 s.
     overshoot: f64,
     /// Half-width of the sleeve's slip, in strokes.
     slip: f64,
@@ -27,7 +27,7 @@ const PLAIN: Gauge = Gauge { overshoot: 0.0, slip: 0.0, crosstalk: 0.0 };
 impl Gauge {
     fn trial(self, name: &str, phase: f64) -> Trial {
         let time_s: Vec<f64> = (0..4000).map(|n| f64::from(n) * 0.01).collect();
-        // sums of sines that no two trials share, from the longest muscle on
+        // Sums of sines that differ between trials, starting at the longest muscle.
         let target = |t: f64| {
             let rise = (0.5 * t).min(1.0);
             let sum = 0.25 * (2.1 * t + phase).sin() + 0.2 * (5.3 * t + 2.0 * phase).sin();
@@ -67,7 +67,7 @@ fn options(causes: Vec<Cause>) -> Options {
     Options { model: DIAGNOSED, causes, ..Options::default() }
 }
 
-/// Root mean square errors of some models on a trial that no fit has seen, mm.
+/// Root mean square errors of some models on a trial that was not fitted, mm.
 fn errors<const N: usize>(gauge: Gauge, models: [&Options; N]) -> [f64; N] {
     let (trials, unseen) = (gauge.trials(), [gauge.trial("unseen.csv", 4.0)]);
     models.map(|options| {
@@ -106,7 +106,8 @@ fn what_was_named_is_fitted_and_pays() {
     assert!(own < 0.7 * observer && own < 0.3 * poly13, "{own} {observer} {poly13}");
 }
 
-/// A name that is not there takes a part of the data with it; on trials left out that shows, and another model is taken.
+/// An effect that is not present explains a part of the data by mistake. Cross-validation shows this, and another model
+/// is chosen.
 #[test]
 #[ignore = "cross-validation with every wrong name; ./ci.sh runs it"]
 fn a_wrong_diagnosis_loses_in_cross_validation() {
@@ -117,7 +118,7 @@ fn a_wrong_diagnosis_loses_in_cross_validation() {
     let choice = choose_model(&gauge.trials(), &options).unwrap();
     assert!(choice.rows.iter().any(|row| row.model == "diagnosed" && row.rmse.is_some()));
     assert_ne!(choice.model, DIAGNOSED, "{:?}", choice.rows);
-    // Right, it is the best.
+    // The right diagnosis gives the best model, or nearly so.
     let right = vec![Cause::new("gauge_relaxation", &[("c", 0.2), ("tau", 0.4)])];
     let choice =
         choose_model(&gauge.trials(), &Options { causes: right, ..Options::default() }).unwrap();
@@ -141,7 +142,7 @@ fn without_a_diagnosis_it_is_no_candidate() {
     assert!(error.contains("wander_0") && error.contains("pressure_kpa"), "{error}");
 }
 
-/// A bend is in the curve, and a drift in the baseline: neither has a separate number.
+/// A non-linearity is part of the curve, and a drift of the baseline. Neither has a separate number.
 #[test]
 fn causes_without_numbers_are_calibrated() {
     for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {

@@ -1,4 +1,4 @@
-//! A trial that is not like the others is reported, each mistake once. No other trial is.
+//! Each mistake in a trial is reported once, and no other trial is reported.
 
 use stretch_calibrate::{LiveReceptor, ModelKind, Options, Seen, calibrate};
 use stretch_data::{Channel, Trial};
@@ -26,7 +26,7 @@ fn trial(number: u32) -> Trial {
 }
 
 fn notes(trials: &[Trial]) -> Vec<String> {
-    // a line has no order to prefer
+    // A linear model gives no note about a preferred order.
     let options = Options { model: ModelKind::Linear, ..Options::default() };
     calibrate(trials, &options).expect("a calibration").notes
 }
@@ -107,7 +107,7 @@ fn times_of_milliseconds_are_asked_about() {
 
 #[test]
 fn trials_of_one_gauge_are_not_doubted() {
-    // other ends, a shift of the zero, coarse digits, a small movement after drift, a rest
+    // Other ends, a shift of the zero, coarse digits, a small movement after drift, a rest.
     let members: [Spoil; 5] = [
         |t| {
             change(t, LENGTH, |x| x + 12.0);
@@ -132,7 +132,7 @@ fn trials_of_one_gauge_are_not_doubted() {
         spoil(&mut trials[1]);
         assert_eq!(notes(&trials), Vec::<String>::new());
     }
-    // a run that a robot repeats to a thousandth, and a signal of something else that is at its floor most of the time
+    // A robot repeats a motion to a thousandth; another quantity is at its lower limit most of the time.
     let mut trials: Vec<Trial> = (0..3).map(trial).collect();
     trials.push(Trial { name: "repeated.csv".into(), ..trials[1].clone() });
     change(&mut trials[3], SIGNAL, |v| v + 1e-4 * (1e4 * v).sin());
@@ -144,8 +144,8 @@ fn trials_of_one_gauge_are_not_doubted() {
     assert_eq!(notes(&[torque]), Vec::<String>::new());
 }
 
-/// Of a stream at 400 Hz, the rate that is told is the rate of the rows that stay if those that go back in time are left out, as files
-/// leave them out.
+/// The reported rate of a stream at 400 Hz is computed without rows that go back in time, because files leave such rows
+/// out.
 #[test]
 fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
     const LATE: f64 = 1.4;

@@ -1,4 +1,4 @@
-//! The tests of stretch-calibrate from outside, one program: linking takes longer than most of them.
+//! Tests of the public interface of stretch-calibrate, in one program because linking takes longer than most tests.
 
 mod diagnosed;
 mod doubts;
@@ -9,7 +9,7 @@ mod wrapped;
 
 use stretch_core::Calibration;
 
-/// A calibration as its record holds it: only JSON holds the checksums of trials.
+/// Returns a calibration as its file stores it: only JSON stores the checksums of trials.
 fn as_held(calibration: &Calibration, name: &str) -> Calibration {
     assert_eq!(
         calibration.spec().provenance.checksums().len(),

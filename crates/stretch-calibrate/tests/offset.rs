@@ -1,4 +1,4 @@
-//! A calibration does not change where its signal has an offset, in 64 bits and in 32; and calibrations of tables.
+//! An offset of the signal does not change a calibration, in 64 bits and in 32. Also tests of calibrations of tables.
 
 use stretch_calibrate::{
     ModelKind, Options, apply, calibrate, choose_model, fixed_record, parse_adc,
@@ -13,7 +13,7 @@ fn trial(name: &str, time_s: Vec<f64>, load_n: Vec<f64>, cell: Vec<f64>) -> Tria
     Trial { name: name.into(), time_s, channels }
 }
 
-/// Forty seconds of a load cell whose reading is `offset` and a range of 1, bent a little and noisy.
+/// Forty seconds of a load cell with the given offset and a range of 1, slightly non-linear and noisy.
 fn cell(offset: f64) -> Trial {
     let time_s: Vec<f64> = (0..4000).map(|n| 0.01 * f64::from(n)).collect();
     let load = |t: f64| 0.5 + 0.32 * (0.9 * t).sin() + 0.15 * (2.3 * t + 1.0).sin();
@@ -74,23 +74,23 @@ fn an_offset_of_the_signal_changes_nothing() {
             assert!((rmse / least - 1.0).abs() < 1e-3, "{model} {offset}: {least} {rmse}");
             let furthest = estimates.iter().zip(&found).map(|(a, b)| (a - b).abs());
             let furthest = furthest.filter(|d| !d.is_nan()).fold(0.0, f64::max);
-            // the last digit of a reading of 4200, on a range of 1, over a rate of a hundredth of a second
+            // The last digit of a reading of 4200, relative to a range of 1, in a rate over a hundredth of a second.
             assert!(model == "observer" || furthest < 1e-6, "{model} {offset}: {furthest:e}");
-            // 24 bits of digits, of which 4200 takes 12
+            // An `f32` has 24 bits, of which 4200 takes 12.
             let (rmse, _) = in_32_bits(&calibrated.calibration, &there);
             assert!((rmse / least - 1.0).abs() < 0.02, "{model} {offset}: {least} {rmse} in f32");
         }
     }
 }
 
-/// Weights and readings in the order of `order`.
+/// A table of weights and readings in the given order.
 fn table(readings: &[(f64, f64)]) -> Trial {
     let time_s = (0..readings.len()).map(|i| i as f64).collect();
     let (load_n, cell) = readings.iter().copied().unzip();
     trial("table.csv", time_s, load_n, cell)
 }
 
-/// The degree of the curve that a table gives.
+/// Returns the degree of the curve that a table gives.
 fn degree_of(readings: &[(f64, f64)], right: f64) -> u8 {
     let (table, options) = (table(readings), Options { is_table: true, ..options("curve") });
     let calibrated = calibrate(std::slice::from_ref(&table), &options).unwrap();
@@ -111,7 +111,7 @@ fn degree_of(readings: &[(f64, f64)], right: f64) -> u8 {
 const COUNTS: [f64; 8] =
     [49_600.0, 0.0, 198_300.0, 9_900.0, 99_200.0, 19_800.0, 148_700.0, 5_000.0];
 
-/// Weights of which each was noted with an error of up to 0.04, and their readings.
+/// Weights that were noted with errors of up to 0.04, and their readings.
 fn weights(bent: f64, draw: u32) -> Vec<(f64, f64)> {
     let mut noise = draw;
     let mut error = || {
@@ -129,7 +129,8 @@ fn a_table_gives_a_line_or_a_curve_of_the_right_degree() {
             .map(|k| degree_of(&weights(bent, k.wrapping_mul(2_654_435_769)), 0.1))
             .collect();
         assert!(found.iter().all(|&found| found >= degree), "{degree}: {found:?}");
-        // one standard error takes one table in six for more than it is: 10 of 60, and two standard deviations of 2.9
+        // One standard error accepts a higher degree in one table of six: 10 of 60, plus two standard deviations of
+        // 2.9.
         let higher = found.iter().filter(|&&found| found > degree).count();
         assert!(higher <= 16, "{degree}: {found:?}");
     }
@@ -162,7 +163,7 @@ fn a_line_answers_at_once_at_any_rate_and_on_one_row() {
             let reading = reading.as_ref().unwrap();
             let held = (0.5 * k as f64).min(5.0);
             approx::assert_abs_diff_eq!(reading.estimate, held, epsilon = 1e-9);
-            // ten samples of 0.1 s give a rate: half a newton each
+            // Ten samples of 0.1 s determine a rate of half a newton a sample.
             let is_known = (k >= 10).then(|| (reading.rate - 5.0).abs() < 1e-6);
             assert_eq!(is_known.unwrap_or(true), k >= 10 || reading.rate.is_nan(), "{reading:?}");
         }

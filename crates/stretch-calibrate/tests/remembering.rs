@@ -1,4 +1,4 @@
-//! Models that remember, from trials to readings.
+//! Models with memory, from trials to readings.
 
 use approx::assert_relative_eq;
 use stretch_calibrate::{
@@ -9,7 +9,8 @@ use stretch_core::Model;
 use stretch_data::{Channel, Trial};
 use testkit::tolerance as tol;
 
-/// A gauge that overshoots by 0.4 over 0.25 s, on a muscle that moves by `target`.
+/// A gauge that overshoots by 0.4 with a time constant of 0.25 s, on a muscle that moves by
+/// `target`.
 fn trial(name: &str, seconds: f64, target: impl Fn(f64) -> f64) -> Trial {
     let time_s: Vec<f64> = (0..(100.0 * seconds) as usize).map(|n| n as f64 * 0.01).collect();
     let share = -(-0.01f64 / 0.25).exp_m1();
@@ -33,7 +34,7 @@ fn trial(name: &str, seconds: f64, target: impl Fn(f64) -> f64) -> Trial {
     }
 }
 
-/// Sums of sines that no two trials share.
+/// Sums of sines that differ between trials.
 fn irregular(phase: f64) -> impl Fn(f64) -> f64 {
     move |t| 0.5 + 0.25 * (2.1 * t + phase).sin() + 0.2 * (5.3 * t + 2.0 * phase).sin()
 }
@@ -75,7 +76,8 @@ fn memory_lowers_the_error_and_survives_its_record() {
     for kind in [Memory::History, Memory::Observer] {
         let Calibrated { calibration, fits, .. } =
             calibrate(&wandering(), &options(kind, true)).unwrap();
-        // at least 1 by its definition; beyond 1e8 a ridge would have let half the digits go
+        // The condition number is at least 1 by definition. Beyond 1e8 half the digits would be
+        // lost.
         assert!((1.0..1e8).contains(&fits[0].condition), "{kind}: {:e}", fits[0].condition);
         let own = evaluate(&[("x", &calibration)], &test).unwrap().pooled[1].rmse;
         assert!(own < 0.6 * plain, "{kind}: {own} mm, poly13 {plain} mm");
@@ -92,7 +94,7 @@ fn memory_lowers_the_error_and_survives_its_record() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// The fit's rows and the receptor's steps are one arithmetic.
+/// The fit and the receptor use the same arithmetic.
 #[test]
 fn what_was_fitted_is_what_runs() {
     let trials = wandering();
@@ -113,7 +115,7 @@ fn auto_takes_a_model_that_remembers_where_that_shows() {
     assert_eq!(choice.rows.len(), 6);
     let chosen = choice.rows.iter().find(|row| row.model == choice.model.to_string()).unwrap();
     let best = choice.rows[0].rmse.unwrap();
-    // a followed baseline is three numbers of insurance
+    // A tracked baseline adds three parameters.
     let simpler = chosen.parameters <= choice.rows[0].parameters + 3;
     assert!(chosen.rmse.unwrap() < 1.1 * best && simpler, "{chosen:?}");
 }

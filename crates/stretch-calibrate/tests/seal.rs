@@ -1,4 +1,4 @@
-//! A record of which a bit flipped is refused: every bit, every kind, every form.
+//! A calibration file with one flipped bit is refused, for every bit, every model and every format.
 
 use std::{collections::BTreeMap, fs};
 
@@ -19,7 +19,7 @@ use stretch_receptor::{
     example_calibration, example_observer,
 };
 
-/// One calibration of every kind that a model can be.
+/// One calibration with each kind of model.
 fn kinds() -> Vec<Calibration> {
     let mut runner = TestRunner::deterministic();
     let mut found = BTreeMap::new();
@@ -42,7 +42,7 @@ fn linear() -> Calibration {
     Calibration::new(CalibrationSpec { model, ..spec }).unwrap()
 }
 
-/// How many of all single flipped bits are accepted, and of how many.
+/// Returns how many single flipped bits are accepted, and the number of bits.
 fn accepted(bytes: &[u8], mut accepts: impl FnMut(&[u8]) -> bool) -> (usize, usize) {
     assert!(accepts(bytes), "the record itself");
     let mut flipped = bytes.to_vec();
@@ -116,11 +116,11 @@ fn bytes_behind_a_record_or_missing_from_it_are_refused() {
     for more in ["x", "{}", "\u{b}", "\0"] {
         assert!(calibration_from_json(&format!("{text}{more}"), "").is_err(), "{more:?}");
     }
-    // white space is no change
+    // White space does not change the content.
     assert!(calibration_from_json(&format!(" {}\n\n", text.replace('\n', "\r\n")), "").is_ok());
 }
 
-/// A record as the release before wrote it: schema 1, no seal.
+/// A calibration file as the previous release wrote it: schema 1, without a seal.
 fn of_schema_1(calibration: &Calibration) -> (String, Vec<u8>) {
     let mut value = serde_json::to_value(calibration).unwrap();
     value["schema"] = 1.into();
@@ -135,7 +135,7 @@ fn records_of_schema_1_are_read() {
     let folder = tempfile::tempdir().unwrap();
     for calibration in kinds() {
         let (json, bytes) = of_schema_1(&calibration);
-        // whichever way a record comes in
+        // Every loader accepts it.
         assert_eq!(serde_json::from_str::<Calibration>(&json).unwrap(), calibration);
         assert_eq!(record::load::<Calibration>(&bytes).unwrap(), calibration);
         for (name, content) in [("cal.json", json.as_bytes()), ("cal.postcard", &bytes)] {
@@ -143,12 +143,12 @@ fn records_of_schema_1_are_read() {
             fs::write(&path, content).unwrap();
             assert_eq!(read_calibration(&path).unwrap(), calibration, "{name}");
         }
-        // what has no seal has at least no bytes too many
+        // A file without a seal is still refused if it has too many bytes.
         let path = folder.path().join("cal.postcard");
         fs::write(&path, [&bytes[..], b"x"].concat()).unwrap();
         assert!(read_calibration(&path).is_err());
     }
-    // and of a board
+    // The same for the file of a board.
     let adc = parse_adc("12,0,3.3").unwrap();
     let mut bytes = fixed_record(&example_calibration(), &adc).unwrap().bytes;
     bytes.truncate(bytes.len() - 4);
@@ -169,7 +169,7 @@ fn a_hand_edit_is_told_and_read_where_its_digest_is_not_checked() {
         "{message}"
     );
     assert_eq!(calibration_from_edited_json(&edited, "cal.json").unwrap().spec().dead_band, 0.125);
-    // a digest that went with the edit
+    // The digest was lost in the edit.
     let without = edited.replacen("\"digest\"", "\"digesd\"", 1);
     let message = calibration_from_json(&without, "cal.json").unwrap_err().to_string();
     assert!(message.contains("digesd"), "{message}");
@@ -211,7 +211,7 @@ fn a_field_of_a_newer_program_is_refused_wherever_it_stands() {
             match calibration_from_edited_json(&newer.to_string(), "cal.json") {
                 Ok(_) => kept.push(format!("{} {place}", calibration.spec().model.name())),
                 Err(error) => {
-                    // an object that says which of several it is holds one field
+                    // An object that names a variant has a single field.
                     let (error, at) =
                         (error.to_string(), place.trim_start_matches('/').replace('/', "."));
                     assert!(
@@ -229,7 +229,7 @@ fn a_field_of_a_newer_program_is_refused_wherever_it_stands() {
 fn a_record_with_sorted_fields_is_told_as_one_and_sealed_again() {
     for calibration in kinds() {
         let text = calibration_to_json(&calibration).unwrap();
-        // as jq -S writes it
+        // The format of `jq -S`.
         let sorted = serde_json::from_str::<Value>(&text).unwrap().to_string();
         let message = calibration_from_json(&sorted, "cal.json").unwrap_err().to_string();
         let says = "its fields were sorted; check every number, then renew it with: stretch export";
@@ -274,7 +274,7 @@ fn damage_in_postcard_says_what_to_do() {
         );
     };
     schema(99);
-    // what release 0.1.0 wrote for a calibration with turns
+    // Release 0.1.0 wrote schema 3 for a calibration with turning points.
     schema(3);
     let old = DesignError::Schema { found: 3, newest: 2 }.to_string();
     assert!(old.contains("release 0.1.0 reads"), "{old}");

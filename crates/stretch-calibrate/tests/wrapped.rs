@@ -1,4 +1,4 @@
-//! An angle that wraps calibrates, and is judged, as if it did not.
+//! An angle that wraps is calibrated and evaluated like an unwrapped one.
 
 use stretch_calibrate::{Calibrated, Options, calibrate, evaluate};
 use stretch_data::{Channel, Trial};
@@ -44,7 +44,7 @@ fn a_reference_that_wraps_is_calibrated_and_judged_unwrapped() {
 fn trials_on_both_sides_of_the_seam_are_calibrated_as_one_motion() {
     let names = ["angle_deg", "bridge_v"];
     let (whole, plain) = (trial(1.0, 360.0, names), trial(1.0, 1e6, names));
-    // neither part wraps by itself: the second lies wholly beyond the seam, between -170 and -130 deg
+    // Neither b.csv nor c.csv wraps by itself. c.csv lies wholly beyond the seam, between -170 and -130 deg.
     let part = |of: &Trial, name: &str, low: f64| {
         let is_in = |n: &usize| (low..low + 40.0).contains(&plain.channels[0].values[*n]);
         let kept: Vec<usize> = (0..of.time_s.len()).filter(is_in).take(100).collect();

@@ -1,4 +1,4 @@
-//! Curves that are not quite lines.
+//! Scales and gains that deviate from a straight line by a parabola.
 
 use alloc::{boxed::Box, vec};
 
@@ -11,7 +11,8 @@ use crate::{
     sketch::Sketch,
 };
 
-/// c 4 x (1 - x)(1 + skew (2 x - 1)): zero at 0 and 1, c in the middle, its top off the middle where skewed.
+/// Returns c 4 x (1 - x)(1 + skew (2 x - 1)). The curve is zero at 0 and 1 and equals c in the middle. A skew moves its
+/// extremum off the middle.
 ///
 /// ```
 /// use stretch_effects::bow;
@@ -24,10 +25,10 @@ pub fn bow(c: f64, x: f64, skew: f64) -> f64 {
     c * 4.0 * x * (1.0 - x) * (1.0 + skew * (2.0 * x - 1.0))
 }
 
-/// A scale that bends: y = x + [`bow`]`(c, (x - zero)/span, skew)`.
+/// A non-linear scale: y = x + [`bow`]`(c, (x - zero)/span, skew)`.
 ///
-/// [`Operator::undo`] is exact without a skew; with one it is solved by substitution, whose error shrinks in each of eight
-/// rounds by the slope of the bow, 4 c/span.
+/// [`Operator::undo`] is exact without a skew. With a skew it solves the equation by eight rounds of substitution. Each
+/// round multiplies the error by the slope of the bow, which is about 4 c/span.
 ///
 /// ```
 /// use stretch_effects::{Bow, Grid, Operator, Span};
@@ -43,11 +44,11 @@ pub fn bow(c: f64, x: f64, skew: f64) -> f64 {
 pub struct Bow {
     /// Height in the middle, in the unit of the signal.
     pub c: f64,
-    /// How far the top lies off the middle.
+    /// How far the extremum lies off the middle.
     pub skew: f64,
-    /// Where the curve begins.
+    /// Value at which the curve begins.
     pub zero: f64,
-    /// From there to where it ends, with its sign.
+    /// Signed distance from there to the end of the curve.
     pub span: f64,
 }
 
@@ -62,7 +63,7 @@ impl Operator for Bow {
         let b = 4.0 * self.c / self.span;
         for x in signal {
             if self.skew == 0.0 {
-                // z = y + b y (1 - y), solved for y; the form that stays exact as b goes to 0.
+                // z = y + b y (1 - y), solved for y in the form that remains exact as b goes to 0.
                 let z = (*x - self.zero) / self.span;
                 let sum = 1.0 + b;
                 let root = libm::sqrt((sum * sum - 4.0 * b * z).max(0.0));
@@ -77,7 +78,7 @@ impl Operator for Bow {
     }
 }
 
-/// A gain that bends with the strain e: y = x (1 + [`bow`]`(c, e/scale, skew))`.
+/// A gain that varies with the strain e: y = x (1 + [`bow`]`(c, e/scale, skew))`.
 ///
 /// ```
 /// use stretch_effects::{BowedGain, Grid, Operator, Span};
@@ -90,9 +91,9 @@ impl Operator for Bow {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BowedGain {
-    /// Share by which the gain is larger in the middle.
+    /// Relative increase of the gain in the middle.
     pub c: f64,
-    /// How far the top lies off the middle.
+    /// How far the extremum lies off the middle.
     pub skew: f64,
     /// Strain at which the curve ends.
     pub scale: f64,
@@ -106,7 +107,7 @@ impl Operator for BowedGain {
     }
 }
 
-/// A scale that bends.
+/// A non-linear scale.
 pub static CURVE: Kind = Kind {
     name: "curve",
     title: "a bent scale",
@@ -130,7 +131,7 @@ pub static CURVE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A gain that bends with a second signal.
+/// A gain that varies with a second signal.
 pub static GAIN_CURVE: Kind = Kind {
     name: "gain_curve",
     title: "a bent gain",
@@ -153,7 +154,7 @@ pub static GAIN_CURVE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The gauge is not quite linear.
+/// Non-linearity of the gauge.
 pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
     name: "gauge_nonlinearity",
     title: "the gauge's non-linearity",
@@ -165,14 +166,14 @@ pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
     ],
     acts: Acts::at(&GAIN_CURVE, Place::Resistance),
     twins: &["pot_nonlinearity", "pressure_crosstalk"],
-    // At half of the range, where e + 1 is 1.5, it bends by half as much again; further, it would not rise any more.
+    // At this limit the resistance in the middle of the range is 1.5 times that of the linear gauge.
     alone: |_, search| search.reach_from(0.5),
     starts: Some(|_| each([0.005])),
     live: Some(Live::BY_CURVE),
     ..Effect::PLAIN
 };
 
-/// The potentiometer is not quite linear.
+/// Non-linearity of the potentiometer.
 pub(crate) static POT_NONLINEARITY: Effect = Effect {
     name: "pot_nonlinearity",
     title: "the potentiometer's non-linearity",

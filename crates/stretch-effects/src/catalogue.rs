@@ -2,15 +2,15 @@
 
 use crate::{effect::Effect, kind::Kind};
 
-/// Lists the kinds once: by their own names, and in their order.
+/// Lists the kinds once; the macro creates a module with their names and an ordered table.
 macro_rules! kinds {
     ($($file:ident::$kind:ident,)*) => {
-        /// Every kind by its own name.
+        /// Every kind under its own name.
         pub mod kinds {
             $(pub use crate::$file::$kind;)*
         }
 
-        /// Every kind, in the order in which they act where several are on one channel.
+        /// Every kind, in the order in which several kinds act on one channel.
         pub static KINDS: &[&Kind] = &[$(&kinds::$kind,)*];
     };
 }
@@ -51,7 +51,7 @@ kinds! {
     dead_zone::QUANTISATION,
 }
 
-/// The kind of that name.
+/// Returns the kind of that name.
 ///
 /// ```
 /// use stretch_effects::{Extent, Grid, Operator, Span, kind_named};
@@ -85,7 +85,7 @@ pub static GAUGE: &[&Effect] = &[
     &crate::play::POT_BACKLASH,
 ];
 
-/// The effect of a gauge or its reference called `name`.
+/// Returns the effect of a gauge or of its reference that is called `name`.
 pub fn gauge_effect(name: &str) -> Option<&'static Effect> {
     GAUGE.iter().copied().find(|effect| effect.name == name)
 }

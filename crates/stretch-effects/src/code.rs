@@ -1,4 +1,4 @@
-//! The notation of a sketch, spelt in three languages.
+//! Generation of C, Python and MATLAB code from a sketch.
 
 use alloc::{
     borrow::ToOwned,
@@ -12,7 +12,7 @@ use stretch_core::is_hidden;
 
 use crate::sketch::{Cell, Quantity, Sketch};
 
-/// A language that a sketch is spelt in.
+/// A language in which the code of a sketch is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
     /// C99, with `math.h`.
@@ -24,10 +24,10 @@ pub enum Language {
 }
 
 impl Language {
-    /// All of them.
+    /// All languages.
     pub const ALL: [Self; 3] = [Self::C, Self::Python, Self::Matlab];
 
-    /// What it is called.
+    /// Returns the name for display.
     pub fn name(self) -> &'static str {
         match self {
             Self::C => "C",
@@ -36,7 +36,7 @@ impl Language {
         }
     }
 
-    /// The ending of its files.
+    /// Returns the file extension.
     pub fn ending(self) -> &'static str {
         match self {
             Self::C => "c",
@@ -45,8 +45,8 @@ impl Language {
         }
     }
 
-    /// A text as a line of comment. Names of columns of any origin, and their units, are in it: none ends the comment or its line, or is a
-    /// coding that Python would read the file in.
+    /// Returns a text as a one-line comment. The text may contain column names and units from untrusted files. It can
+    /// therefore neither end the comment or the line nor declare a source encoding that Python would apply.
     ///
     /// ```
     /// use stretch_effects::Language;
@@ -64,7 +64,8 @@ impl Language {
         }
     }
 
-    /// A text as the name of a function or a file: ASCII letters, digits and underscores, a letter first.
+    /// Converts a text to the name of a function or a file: ASCII letters, digits and underscores, beginning with a
+    /// letter.
     ///
     /// ```
     /// use stretch_effects::Language;
@@ -76,7 +77,7 @@ impl Language {
         if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("f_{name}") }
     }
 
-    /// A function that all three have, as it is called here.
+    /// Returns this language's name of a function that all three languages have.
     fn function(self, name: &str) -> String {
         match (self, name) {
             (Self::C, "min" | "max") => format!("f{name}"),
@@ -87,7 +88,7 @@ impl Language {
         }
     }
 
-    /// An expression.
+    /// Translates an expression.
     fn expression(self, text: &str) -> String {
         let mut out = String::new();
         let mut rest = text;
@@ -116,7 +117,7 @@ impl Language {
                 (Self::Python, '[') => out.push_str("[int("),
                 (Self::Matlab, '[') => out.push('('),
                 (Self::C | Self::Python, ']') => out.push_str(")]"),
-                // Samples count from 1 there.
+                // MATLAB indices begin at 1.
                 (Self::Matlab, ']') => out.push_str(" + 1)"),
                 _ => out.push(c),
             }
@@ -125,7 +126,7 @@ impl Language {
         out
     }
 
-    /// The body, indented by `depth` steps.
+    /// Translates the body, indented by `depth` steps.
     fn body(self, body: &str, depth: usize) -> String {
         let mut out = String::new();
         let mut depth = depth;
@@ -162,13 +163,13 @@ impl Language {
     }
 }
 
-/// A number with all its digits, as all three read it.
+/// Formats a number with all its digits, in a form that all three languages read.
 fn literal(x: f64) -> String {
     format!("{x:?}")
 }
 
 impl Sketch {
-    /// The code of a function `name` that takes a sample and hands back the next one, below lines of comment.
+    /// Writes the code of a function `name` that processes one sample per call, below the comments.
     ///
     /// | language | begin | a sample |
     /// | --- | --- | --- |
@@ -176,7 +177,7 @@ impl Sketch {
     /// | Python | `s = name_start(x)` | `y = name(s, x)` |
     /// | MATLAB | `s = []` | `[y, s] = name(s, x)` |
     ///
-    /// Without a state there is neither `s` nor a beginning.
+    /// Without a state there is no `s` and no start function.
     pub fn code(&self, language: Language, name: &str, comments: &[String]) -> String {
         let mut out = String::new();
         for line in comments {
@@ -196,7 +197,7 @@ impl Sketch {
         self.inputs.iter().map(|input| input.name).collect()
     }
 
-    /// The input that the state begins at, if it begins at one.
+    /// Returns the input at which the state begins, if there is one.
     fn begins_at(&self) -> Option<&'static str> {
         self.state.iter().map(|cell| cell.begins).find(|begins| self.names().contains(begins))
     }

@@ -1,4 +1,4 @@
-//! Another channel that talks across.
+//! Crosstalk from another channel.
 
 use alloc::{boxed::Box, vec};
 
@@ -11,7 +11,8 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// y = x + c z (1 + bend z), z = (other - middle)/span, the other channel where the [`Span`] holds the strain.
+/// y = x + c z (1 + bend z), z = (other - middle)/span. The [`Span`] passes the other channel in the field of the
+/// strain.
 ///
 /// ```
 /// use stretch_effects::{Crosstalk, Grid, Operator, Span};
@@ -23,13 +24,13 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crosstalk {
-    /// What one span of the other channel does, in the unit of the signal.
+    /// Effect of one span of the other channel, in the unit of the signal.
     pub c: f64,
-    /// How much it bends.
+    /// Relative curvature of the effect.
     pub bend: f64,
-    /// Value of the other channel that does nothing.
+    /// Value of the other channel that has no effect.
     pub middle: f64,
-    /// From its least to its greatest value.
+    /// Difference between the other channel's greatest and least value.
     pub span: f64,
 }
 
@@ -42,7 +43,7 @@ impl Operator for Crosstalk {
     }
 }
 
-/// Another channel.
+/// Crosstalk from another channel.
 pub static CROSSTALK: Kind = Kind {
     name: "crosstalk",
     title: "crosstalk",
@@ -73,7 +74,8 @@ pub static CROSSTALK: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The pressure inside the muscle stretches the gauge: with a zero that is the pressure's own, a term that no [`CROSSTALK`] is.
+/// Crosstalk from the pressure inside the muscle, which stretches the gauge. It is a term separate from [`CROSSTALK`]
+/// because its zero is zero pressure, not the middle of the pressure's range.
 pub(crate) static PRESSURE_CROSSTALK: Effect = Effect {
     name: "pressure_crosstalk",
     title: "crosstalk from pressure to gauge",

@@ -1,4 +1,4 @@
-//! Friction that builds up over a way, whatever the speed.
+//! Friction that builds up over a distance, independent of the speed.
 
 use alloc::{boxed::Box, format, vec, vec::Vec};
 
@@ -13,15 +13,15 @@ use crate::{
     sketch::Sketch,
 };
 
-/// A force that a rubbing contact builds up along its way: y = x + f u, with a state u between -1 and 1 that follows the position z where
-/// the [`Span`] holds the strain,
+/// Friction of a contact that builds up with the distance moved: y = x + f u. The state u lies between -1 and 1 and
+/// follows the position, which the [`Span`] passes in the field of the strain:
 ///
 /// ```text
 /// du = dz/s (1 - u sign(dz)) where u and dz have one sign, else dz/s (1 - back u sign(dz)),     z = play(position, w)
 /// ```
 ///
-/// solved exactly for each move. A `back` of 1 is Dahl's model, 0 that of Bouc and Wen. With a load the force is f u |load|/`load_size`,
-/// with the load where the span holds one. Remembers u and z.
+/// Each move is solved exactly. A `back` of 1 gives Dahl's model, 0 that of Bouc and Wen. With a load the force is f u
+/// |load|/`load_size`, with the `load` of the span. The memory is u and z.
 ///
 /// Source: Dahl 1968, "A solid friction model", The Aerospace Corporation TOR-0158(3107-18)-1.
 ///
@@ -39,26 +39,27 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dahl {
-    /// Force after a long way, in the unit of the signal.
+    /// Force after a long move, in the unit of the signal.
     pub f: f64,
-    /// Presliding length: way after which 1 - 1/e of the force is there, in the unit of the position, above 0.
+    /// Presliding length: distance over which the force rises from 0 to 1 - 1/e of `f`, in the unit of the position,
+    /// above 0.
     pub s: f64,
-    /// By how much steeper it is after a turn: from 0 (as at rest) to 1 (twice that at full force).
+    /// Steepness after a reversal, from 0 to 1: at full opposing force the slope is (1 + back)/s, against 1/s at rest.
     pub back: f64,
-    /// Half of the play between the position and the contact, in the unit of the position.
+    /// Half-width of the play between the position and the contact, in the unit of the position.
     pub w: f64,
-    /// The load at which the force is `f`; `None` if the load does not matter.
+    /// Load at which the force is `f`; `None` if the force does not depend on a load.
     pub load_size: Option<f64>,
 }
 
 impl Dahl {
-    /// The state after a move.
+    /// Returns the state u after a move.
     fn moved(&self, u: f64, dz: f64) -> f64 {
         let mut way = dz.abs() / self.s;
         let mut along = if dz < 0.0 { -u } else { u };
         if along < 0.0 {
             let back = self.back;
-            // The way to where the force is gone.
+            // Distance until the force is zero.
             let home = if back > 0.0 { libm::log1p(-back * along) / back } else { -along };
             if way < home {
                 along = match back > 0.0 {
@@ -108,7 +109,7 @@ impl Operator for Dahl {
     }
 }
 
-/// Friction driven by position.
+/// Friction that depends on the position.
 pub static DAHL_FRICTION: Kind = Kind {
     name: "dahl_friction",
     title: "friction that builds up over a way",
@@ -123,7 +124,7 @@ pub static DAHL_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Friction driven by position that another channel scales.
+/// Friction that depends on the position and is proportional to another channel.
 pub static LOAD_DAHL_FRICTION: Kind = Kind {
     name: "load_dahl_friction",
     title: "friction over a way that a load scales",
@@ -138,7 +139,7 @@ pub static LOAD_DAHL_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Play, and friction behind it.
+/// Friction behind a play.
 pub static PLAY_FRICTION: Kind = Kind {
     name: "play_friction",
     title: "friction behind a play",
@@ -166,7 +167,7 @@ fn force(e: &Extent, unit: &str) -> EffectParameter {
     EffectParameter::sized("f", unit, 0.0..=0.5 * e.span())
 }
 
-/// Presliding length.
+/// Returns the parameter of the presliding length.
 fn shape(e: &Extent) -> EffectParameter {
     let size = (e.beside[1] - e.beside[0]).max(f64::MIN_POSITIVE);
     EffectParameter::shaped("s", "position", 1e-3 * size..=0.5 * size)

@@ -1,4 +1,4 @@
-//! Small values, small changes and small commands that do nothing, and steps.
+//! Dead zones, dead bands and quantisation.
 
 use alloc::{boxed::Box, vec};
 
@@ -9,8 +9,8 @@ use crate::{
     sketch::Sketch,
 };
 
-/// A dead zone on both sides of zero: y = x - clamp(x, -w, w); with a softness s the edge is left gradually,
-/// y = sign(x) softplus(|x| - w) of width s w, less its value at zero.
+/// A dead zone on both sides of zero: y = x - clamp(x, -w, w). With a softness s the edge is gradual: y = sign(x)
+/// (softplus(|x| - w) - softplus(-w)), with a softplus of width s w.
 ///
 /// ```
 /// use stretch_effects::{DeadZone, Grid, Operator, Span};
@@ -26,7 +26,7 @@ use crate::{
 pub struct DeadZone {
     /// Half-width, in the unit of the signal, at least 0.
     pub w: f64,
-    /// How gradually it is left, in units of the half-width; 0 for at once.
+    /// Width of the edge, in units of the half-width; 0 is an abrupt edge.
     pub softness: f64,
 }
 
@@ -46,7 +46,7 @@ impl Operator for DeadZone {
     }
 }
 
-/// Small values that do nothing.
+/// Small values have no effect.
 pub static DEAD_ZONE: Kind = Kind {
     name: "dead_zone",
     title: "a dead zone",
@@ -84,8 +84,8 @@ pub static DEAD_ZONE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The dead band of a servo's firmware: y stays where it is while |x - y| <= w; beyond it moves, and stops `short` w before x. A `short` of
-/// 0 goes all the way, 1 is a play. Remembers y.
+/// The dead band of a servo's firmware. The output y is held while |x - y| <= w. Otherwise it moves and stops `short` w
+/// before x. A `short` of 0 goes all the way to x; 1 gives a play. The memory is y.
 ///
 /// ```
 /// use stretch_effects::{Grid, HoldBand, Operator, Span, Start};
@@ -100,7 +100,7 @@ pub static DEAD_ZONE: Kind = Kind {
 pub struct HoldBand {
     /// Greatest change that is not followed, in the unit of the signal, at least 0.
     pub w: f64,
-    /// How far before its target it stops, in units of the band, at most 1.
+    /// Distance from the target at which the output stops, in units of `w`, at most 1.
     pub short: f64,
 }
 
@@ -122,7 +122,7 @@ impl Operator for HoldBand {
     }
 }
 
-/// A dead band of firmware.
+/// A dead band of the firmware.
 pub static FIRMWARE_DEAD_BAND: Kind = Kind {
     name: "firmware_dead_band",
     title: "a dead band of the firmware",
@@ -154,14 +154,15 @@ pub static FIRMWARE_DEAD_BAND: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Share of an opening at which a valve is barely open.
+/// Opening, as a share, that represents a barely open valve.
 const BARELY: f64 = 1e-12;
 
-/// A valve that stays shut up to a least command.
+/// A valve that stays closed below a least command.
 ///
-/// u -> max(0, (u - d(u))/(1 - d(1))), d(u) = u_db (1 - exp(-u/(u_db softness))), which is u_db at a softness of 0. The
-/// conductance that comes of it, least + (1 - least) u, is multiplied by 1 - exp(-u/(u_db gate)), by 1 at a gate of 0; less
-/// than the least conductance passes as pulses of it, a share of the samples, evenly spread. Remembers the pulses owed.
+/// u -> max(0, (u - d(u))/(1 - d(1))), d(u) = u_db (1 - exp(-u/(u_db softness))). At a softness of 0, d is u_db. The
+/// resulting conductance, least + (1 - least) u, is multiplied by 1 - exp(-u/(u_db gate)); at a gate of 0 this factor
+/// is 1. A conductance below the least one is produced by evenly spaced pulses: a share of the samples passes the least
+/// conductance. The memory is the accumulated share that has not been passed yet.
 ///
 /// ```
 /// use stretch_effects::{DeadBand, Grid, Operator, Span, Start};
@@ -182,18 +183,18 @@ const BARELY: f64 = 1e-12;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadBand {
-    /// Command that opens nothing yet.
+    /// Greatest command at which the valve is still closed.
     pub u_db: f64,
     /// Width of the transition at the edge of the band, as a share of the band; 0 is an abrupt edge.
     pub softness: f64,
-    /// How gradually the conductance rises above the band, in units of it; 0 for at once.
+    /// Width of the gradual rise of the conductance above the band, in units of the band; 0 is an abrupt rise.
     pub gate: f64,
-    /// Share of the conductance of a barely open valve.
+    /// Conductance of a barely open valve, as a share of the full conductance.
     pub least: f64,
 }
 
 impl DeadBand {
-    /// The command less the band.
+    /// Returns the opening that remains after the band is subtracted.
     fn shifted(&self, u: f64) -> f64 {
         if self.softness == 0.0 {
             return ((u - self.u_db) / (1.0 - self.u_db)).max(0.0);
@@ -237,7 +238,7 @@ impl Operator for DeadBand {
     }
 }
 
-/// Rounds to steps: y = step round(x/step), halves away from zero.
+/// Rounding to multiples of a step: y = step round(x/step); halves are rounded away from zero.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Quantiser, Span};
@@ -248,7 +249,7 @@ impl Operator for DeadBand {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiser {
-    /// A step, in the unit of the signal.
+    /// Step, in the unit of the signal.
     pub step: f64,
 }
 
@@ -260,7 +261,7 @@ impl Operator for Quantiser {
     }
 }
 
-/// Steps.
+/// Quantisation.
 pub static QUANTISATION: Kind = Kind {
     name: "quantisation",
     title: "quantisation",

@@ -1,4 +1,4 @@
-//! Zeros and gains that are off, or drift with session time.
+//! Constant offsets, and zeros and gains that drift with session time.
 
 use alloc::{boxed::Box, vec};
 
@@ -11,7 +11,7 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// An offset with session time t: y = x + at_start + per_s t.
+/// An offset that changes linearly with session time t: y = x + at_start + per_s t.
 ///
 /// ```
 /// use stretch_effects::{Grid, Offset, Operator, Span};
@@ -23,7 +23,7 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Offset {
-    /// At the session's start, in the unit of the signal.
+    /// Offset at the session's start, in the unit of the signal.
     pub at_start: f64,
     /// Rate of the drift, units/s.
     pub per_s: f64,
@@ -37,7 +37,7 @@ impl Operator for Offset {
     }
 }
 
-/// A zero that is off.
+/// A constant offset.
 pub static OFFSET: Kind = Kind {
     name: "offset",
     title: "an offset",
@@ -84,7 +84,8 @@ pub static DRIFT: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Drift of a gain with session time t: y = x (1 + d (1 - exp(-settle t))/settle), or x (1 + d t) where it never settles.
+/// Drift of a gain with session time t: y = x (1 + d (1 - exp(-settle t))/settle), or x (1 + d t) if `settle_per_s` is
+/// 0.
 ///
 /// ```
 /// use stretch_effects::{Drift, Grid, Operator, Span};
@@ -100,9 +101,9 @@ pub static DRIFT: Kind = Kind {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// Drift at the session's start, d, 1/s.
+    /// Rate of the drift at the session's start, d, 1/s.
     pub per_s: f64,
-    /// How fast it settles, 1/s; 0 for a straight line.
+    /// Rate at which the drift settles, 1/s; 0 gives a straight line.
     pub settle_per_s: f64,
 }
 
@@ -161,7 +162,7 @@ pub static GAIN_DRIFT: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The gauge drifts while the session lasts.
+/// Thermal drift of the gauge during the session.
 pub(crate) static THERMAL_DRIFT: Effect = Effect {
     name: "thermal_drift",
     title: "the gauge's thermal drift",
@@ -179,7 +180,7 @@ pub(crate) static THERMAL_DRIFT: Effect = Effect {
         .log(),
     ],
     acts: Acts::at(&GAIN_DRIFT, Place::Resistance),
-    // It takes at most half of the signal's span away over the session.
+    // The gain changes by at most half over the session.
     alone: |alone, search| search.reach_from(0.5 / alone.session_s.max(1.0)),
     starts: Some(|_| each([2e-5])),
     live: Some(Live { drifts: true, ..Live::BY_CURVE }),

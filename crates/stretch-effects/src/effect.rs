@@ -1,4 +1,4 @@
-//! An effect of the rig or of any stretch sensor: a kind at a place, where it is searched, and how it is inverted live.
+//! Effects of the rig or of any stretch sensor: a kind at a place, the starts of its search, and its live inverse.
 
 use alloc::{vec, vec::Vec};
 
@@ -12,7 +12,7 @@ use crate::{
     sketch::Sketch,
 };
 
-/// What an effect needs in addition to the input of its stage.
+/// Something that an effect needs in addition to the input of its stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// The pressure inside the muscle.
@@ -22,7 +22,7 @@ pub enum Need {
 }
 
 impl Need {
-    /// In words.
+    /// Returns the need as a noun phrase.
     pub fn words(self) -> &'static str {
         match self {
             Self::Pressure => "a pressure",
@@ -31,26 +31,26 @@ impl Need {
     }
 }
 
-/// The values of a kind from those of an effect, where they are not the same.
+/// Computes the values of a kind from those of an effect, if the two differ.
 pub type Values = fn(&[f64], &Surroundings<'_>) -> Vec<f64>;
 
-/// How an effect acts.
+/// How an effect acts on the rig.
 #[derive(Debug, Clone, Copy)]
 pub enum Acts {
     /// As a kind at a place.
     At {
-        /// What acts.
+        /// The kind that acts.
         kind: &'static Kind,
-        /// Where.
+        /// The place at which the kind acts.
         place: Place,
-        /// The kind's values; `None` if they are the effect's.
+        /// Computes the kind's values; `None` if they equal the effect's values.
         values: Option<Values>,
     },
-    /// A separate term, which belongs to no kind.
+    /// A separate term that belongs to no kind.
     Own {
-        /// Where the effect acts and how, for values other than those that turn it off.
+        /// Place and operation of the effect, for values that do not turn it off.
         action: fn(&[f64], &Surroundings<'_>) -> Action,
-        /// How a user would type it.
+        /// The code that a user can type into a simulator.
         sketch: Option<fn(&[f64], &Surroundings<'_>) -> Sketch>,
     },
 }
@@ -61,16 +61,17 @@ impl Acts {
         Self::At { kind, place, values: None }
     }
 
-    /// A kind at a place, with values that are made from the effect's.
+    /// A kind at a place, with values computed from the effect's values.
     pub const fn with(kind: &'static Kind, place: Place, values: Values) -> Self {
         Self::At { kind, place, values: Some(values) }
     }
 }
 
-/// An effect that the nominal rig leaves out: a [`Kind`] at a place, what it is called there, and how it is looked for.
+/// An effect that the nominal rig lacks: a [`Kind`] at a place, with its name there and the starts of its search.
 ///
-/// One `static` holds all of it: the simulator runs it, the diagnosis fits it, reports speak of it, a diagnosed calibration inverts it.
-/// The simulator takes an effect of one's own as it takes those of the catalogue.
+/// One `static` serves four purposes: the simulator runs the effect, the diagnosis fits it, reports describe it, and a
+/// calibration built on a diagnosis inverts it. The simulator accepts user-defined effects in the same way as those of
+/// the catalogue.
 ///
 /// ```
 /// use stretch_effects::{Acts, Effect, EffectParameter, Place, kinds::BACKLASH};
@@ -87,35 +88,36 @@ impl Acts {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
-    /// Name: the vocabulary of every file and report.
+    /// Name in every file and report.
     pub name: &'static str,
-    /// What it is called in headlines and tables: a noun with its owner.
+    /// Noun for headlines and tables, with the part to which the effect belongs.
     pub title: &'static str,
-    /// What it is, for someone who does not know its name, in one line.
+    /// Explanation in one line, for readers who do not know the name.
     pub words: &'static str,
-    /// Stage it acts in.
+    /// Stage in which the effect acts.
     pub stage: RigStage,
-    /// Its equation, in plain text.
+    /// Equation, in plain text.
     pub equation: &'static str,
-    /// Its parameters: the strengths first, then shapes, then forms; what is found in the record last.
+    /// Parameters: the strengths first, then shapes, then forms, then numbers that are found in a recording.
     pub parameters: &'static [EffectParameter],
-    /// Where and how it acts.
+    /// Where and how the effect acts.
     pub acts: Acts,
-    /// What it needs in addition to the stage's own input.
+    /// A need in addition to the stage's own input.
     pub needs: Option<Need>,
-    /// Names of effects that are hard to tell from it.
+    /// Names of effects that are hard to distinguish from this one.
     pub twins: &'static [&'static str],
-    /// Points to look for it at; values of forms at their end may be left out and are then the usual ones. Without any,
-    /// those of [`EffectParameter::starts`] are taken.
+    /// Points at which the search starts. Values of forms at the end of a point may be left out; their usual values are
+    /// then used. If `None`, the points of [`EffectParameter::starts`] are used.
     pub starts: Option<Starts>,
-    /// What a gauge alone changes of ranges and starts, in its units.
+    /// Changes ranges and starts if only a gauge and its reference were measured. All values are then in the units of
+    /// that gauge.
     pub alone: fn(&Alone, &mut Search),
-    /// How a diagnosed calibration inverts it; `None` if it cannot.
+    /// How a calibration built on a diagnosis inverts the effect; `None` if it cannot.
     pub live: Option<Live>,
 }
 
 impl Effect {
-    /// An effect that does nothing, to be filled in.
+    /// An effect that does nothing; a base for struct updates.
     pub const PLAIN: Self = Self {
         name: "",
         title: "",
@@ -131,7 +133,7 @@ impl Effect {
         live: None,
     };
 
-    /// Its kind and place; `None` if it is a separate term.
+    /// Returns the kind and place; `None` if the effect is a separate term.
     pub fn at(&self) -> Option<(&'static Kind, Place)> {
         match self.acts {
             Acts::At { kind, place, .. } => Some((kind, place)),
@@ -143,7 +145,7 @@ impl Effect {
         self.at().is_some_and(|(kind, _)| has(kind))
     }
 
-    /// How it acts with these values, which are not off.
+    /// Returns the effect's action with these values, which must not turn the effect off.
     pub fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
         match self.acts {
             Acts::At { kind, place, values: of } => {
@@ -154,7 +156,7 @@ impl Effect {
         }
     }
 
-    /// How a user would type it with these values; `None` if the kind has no such text.
+    /// Returns the code that a user can type into a simulator, with these values; `None` if the kind has no such code.
     pub fn sketch(&self, values: &[f64], around: &Surroundings<'_>) -> Option<Sketch> {
         match self.acts {
             Acts::At { kind, place, values: of } => {
@@ -166,37 +168,39 @@ impl Effect {
         }
     }
 
-    /// Whether it counts everything from the session's start: nothing may move before it.
+    /// Whether the memory accumulates over the whole session. The gauge must then not have moved before the session
+    /// started.
     pub fn counts_session(&self) -> bool {
         self.is_kind(|kind| kind.counts_session)
     }
 
-    /// Whether it is a law of session time.
+    /// Whether the effect depends on session time.
     pub fn drifts(&self) -> bool {
         self.is_kind(|kind| kind.drifts)
     }
 
-    /// Whether the true length does not follow from what the reference shows (play in the reference).
+    /// Whether the true length cannot be computed from the reading of the reference (play in the reference).
     pub fn hides_input(&self) -> bool {
         self.stage == RigStage::Reference && self.is_kind(|kind| kind.hides_input)
     }
 
-    /// Whether it asks for steps shorter than a sample where a measured input drives its stage.
+    /// Whether the effect needs integration steps shorter than a sample if a measured input drives its stage.
     pub fn needs_fine_steps(&self) -> bool {
         self.is_kind(|kind| kind.needs_fine_steps)
     }
 
-    /// How its [`Role::Found`](crate::Role::Found) numbers are found in a record.
+    /// Returns the function that estimates the [`Role::Found`](crate::Role::Found) numbers from a recording.
     pub fn find(&self) -> Option<Find> {
         self.at().and_then(|(kind, _)| kind.find)
     }
 
-    /// The line that it leaves with these values where its numbers may not be found in a record.
+    /// Returns the spectral line that remains with these values if its numbers must not be estimated from a recording.
     pub fn line(&self, values: &[f64]) -> Option<Line> {
         self.at().and_then(|(kind, _)| kind.line).map(|line| line(values))
     }
 
-    /// Least sample rate, Hz, at which the effect with these values shows as itself; 0 where any will do.
+    /// Returns the lowest sample rate, Hz, at which the effect with these values is recognisable; 0 if any rate will
+    /// do.
     ///
     /// ```
     /// use stretch_effects::gauge_effect;
@@ -207,17 +211,17 @@ impl Effect {
         self.at().map_or(0.0, |(kind, _)| kind.least_rate_hz(values))
     }
 
-    /// Whether these values leave the rig as if the effect were absent: every strength is at its off value.
+    /// Whether every strength is at its off value, so that the effect does nothing.
     pub fn is_off(&self, values: &[f64]) -> bool {
         EffectParameter::are_off(self.parameters, values)
     }
 
-    /// Parameters that a model has values of: all but what is found in the record.
+    /// Returns the parameters whose values are part of a model: all except those found in a recording.
     pub fn fitted(&self) -> impl Iterator<Item = &'static EffectParameter> {
         self.parameters.iter().filter(|p| !p.is_found())
     }
 
-    /// Values of a model with a guess of what would be found in a record.
+    /// Appends to the values of a model a stand-in for each number that would be found in a recording.
     pub fn with_stand_ins(&self, values: &[f64]) -> Vec<f64> {
         let guesses = self.parameters.iter().filter_map(|p| match p.role {
             crate::Role::Found { stand_in } => Some(stand_in),
@@ -227,19 +231,19 @@ impl Effect {
     }
 }
 
-/// Starts of one number each.
+/// Returns starting points of one number each.
 pub fn each<const N: usize>(values: [f64; N]) -> Vec<Vec<f64>> {
     values.map(|x| vec![x]).into()
 }
 
-/// Starts of the same first number and several second ones.
+/// Returns starting points with the same first number and different second numbers.
 pub fn pairs<const N: usize>(first: f64, seconds: [f64; N]) -> Vec<Vec<f64>> {
     seconds.map(|x| vec![first, x]).into()
 }
 
-/// Where the search for an effect begins when `extent` is that of its channel.
+/// Creation of the search points from an effect.
 impl Search {
-    /// In the catalogue's units.
+    /// Returns the ranges and starts in the catalogue's units, for a channel of this extent.
     ///
     /// ```
     /// use stretch_effects::{Extent, Search, gauge_effect};
@@ -259,26 +263,27 @@ impl Search {
     }
 }
 
-/// What the search needs to know of the measurement of a gauge alone.
+/// Properties of the measurement that the search needs if only a gauge and its reference were measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alone {
     /// From the first to the last sample, s.
     pub session_s: f64,
-    /// Time by which the signal seems to trail the reference, s.
+    /// Estimated delay of the signal behind the reference, s.
     pub lag_s: f64,
 }
 
-/// Ranges and starting points of the search for an effect, one number each of its [fitted](crate::Effect::fitted) parameters.
+/// Ranges and starting points of the search for an effect, with one number for each of its
+/// [fitted](crate::Effect::fitted) parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search {
     /// Least and greatest value of each parameter.
     pub ranges: Vec<[f64; 2]>,
-    /// Points at which it is screened.
+    /// Points at which the effect is screened.
     pub starts: Vec<Vec<f64>>,
 }
 
 impl Search {
-    /// The same in other units, one factor a parameter.
+    /// Converts to other units, with one factor for each parameter.
     pub fn times(mut self, units: &[f64]) -> Self {
         for (range, unit) in self.ranges.iter_mut().zip(units) {
             *range = range.map(|x| x * unit);
@@ -289,19 +294,19 @@ impl Search {
         self
     }
 
-    /// Lets the first strength go as far as `most`, either way.
+    /// Sets the range of the first strength to `-most..=most`.
     pub fn reach(&mut self, most: f64) {
         self.ranges[0] = [-most, most];
     }
 
-    /// Lets the first strength go as far as `most`, either way, and begins at a fifth of it.
+    /// Sets the range of the first strength to `-most..=most` and its starting values to a fifth of `most`.
     pub fn reach_from(&mut self, most: f64) {
         self.reach(most);
         self.starts.iter_mut().for_each(|start| start[0] = 0.2 * most);
     }
 
-    /// Leaves out the points at which an effect does not show at a sample rate, Hz; says which rate would do where none is left.
-    /// `least` tells the rate that it needs with some values.
+    /// Removes the points at which an effect is not recognisable at a sample rate, Hz. `least` returns the rate that
+    /// the effect needs at given values. If no point remains, returns the lowest rate that would be sufficient.
     pub fn at_rate(&mut self, least: impl Fn(&[f64]) -> f64, rate_hz: f64) -> Option<f64> {
         let needed = self.starts.iter().map(|s| least(s)).fold(f64::INFINITY, f64::min);
         // A rate that was computed from rounded time stamps has a small error.
@@ -310,24 +315,24 @@ impl Search {
     }
 }
 
-/// What the live map of an effect depends on in addition to its numbers.
+/// Properties of the target quantity that the live map of an effect needs in addition to the effect's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
-    /// Whether the target falls while the strain rises, as a contraction does.
+    /// Whether the target falls while the strain rises, as with a contraction.
     pub falls: bool,
-    /// Greatest pressure of the trials, in its own unit.
+    /// Greatest pressure of the trials, in its unit.
     pub pressure: f64,
 }
 
 impl Target {
-    /// The target at a strain, both in shares of their range.
+    /// Returns the target at a strain, both as shares of their ranges.
     pub fn at(&self, strain: f64) -> f64 {
         if self.falls { 1.0 - strain } else { strain }
     }
 }
 
-/// How a diagnosed calibration carries an effect of a gauge or of its reference: the numbers that it fits, and what they are in the map
-/// that is inverted live.
+/// How a calibration built on a diagnosis represents an effect of a gauge or of its reference: the numbers that it
+/// fits, and their meaning in the map that is inverted live.
 ///
 /// ```
 /// use stretch_effects::{GAUGE, Target, gauge_effect};
@@ -340,16 +345,16 @@ impl Target {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Live {
-    /// Its numbers in shares of the range of target and signal, with ranges; `typical` is where a fit begins when nothing was found. Empty
-    /// where the curve of the map carries the effect.
+    /// Fitted numbers with their ranges, as shares of the ranges of target and signal. `typical` is where a fit begins
+    /// if nothing was found. Empty if the curve of the map represents the effect.
     pub parameters: &'static [EffectParameter],
     /// Writes the effect with these numbers into a map.
     pub set: fn(&[f64], &Target, &mut DiagnosedMap),
-    /// Whether it lets the resting signal drift, so that the baseline has to be followed.
+    /// Whether the effect makes the resting signal drift, so that the baseline must be tracked.
     pub drifts: bool,
 }
 
 impl Live {
-    /// An effect that the curve of the map carries.
+    /// An effect that the curve of the map represents.
     pub const BY_CURVE: Self = Self { parameters: &[], set: |_, _, _| (), drifts: false };
 }

@@ -1,35 +1,36 @@
-//! How far a channel goes: what the ranges of an effect's parameters are made of.
+//! The range and rates of a channel, from which the ranges of an effect's parameters are derived.
 
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// What was measured of a channel, without the samples that are tested on.
+/// Properties of a measured channel, computed without the test samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// Least value.
     pub low: f64,
     /// Greatest value.
     pub high: f64,
-    /// The quickest hundredth of its changes begins at this rate, units/s. A sample like the one before is no change: a command that is
-    /// held for more than a hundred samples changes all the same.
+    /// 99th percentile of the absolute rate of change, units/s. Changes of zero are not counted, so that a command that
+    /// is held for more than a hundred samples still has a rate.
     pub quickest: f64,
     /// Sample time, s.
     pub dt_s: f64,
     /// Longest trial, s.
     pub trial_s: f64,
-    /// From the first to the last sample of the session, s.
+    /// Time from the first to the last sample of the session, s.
     pub session_s: f64,
-    /// Step of which the values are most nearly multiples.
+    /// Quantisation step: the step of which the values are most nearly multiples.
     pub lattice: f64,
-    /// Least and greatest value of the second signal that the effect looks at.
+    /// Least and greatest value of the second signal that the effect reads.
     pub beside: [f64; 2],
-    /// Least and greatest value of what loads a contact.
+    /// Least and greatest value of the signal that loads a contact.
     pub load: [f64; 2],
 }
 
 impl Extent {
-    /// Of a channel of which nothing but its least and its greatest value is known: at 100 Hz, a minute a trial and ten a session, from
-    /// one end to the other in a second, with itself as the second signal.
+    /// An extent with defaults, for a channel of which only the least and the greatest value are known. The sample rate
+    /// is 100 Hz, a trial lasts a minute and a session ten. The channel crosses its range in a second. Its range is
+    /// also that of the second signal and of the load.
     pub const fn between(low: f64, high: f64) -> Self {
         let (quickest, lattice) = (high - low, 0.01 * (high - low));
         let (beside, load) = ([low, high], [low, high]);
@@ -37,7 +38,8 @@ impl Extent {
         Self { low, high, quickest, dt_s, trial_s, session_s, lattice, beside, load }
     }
 
-    /// Of the parts of a channel that may be looked at.
+    /// Computes the extent of a channel from the parts that may be used. The session is set to the length of the
+    /// longest part; the ranges of the second signal and of the load are set to zero.
     ///
     /// ```
     /// use stretch_effects::Extent;
@@ -62,36 +64,38 @@ impl Extent {
         Self { low, high, quickest, dt_s, trial_s, session_s, lattice, beside, load }
     }
 
-    /// From the least to the greatest value.
+    /// Returns the difference between the greatest and the least value.
     pub fn span(&self) -> f64 {
         self.high - self.low
     }
 
-    /// Longest delay or lag that is looked for, s: a fifth of a second or twenty samples, and no more than a tenth of a trial.
+    /// Returns the longest delay or lag that is searched, s. It is the longer of 0.2 s and twenty samples, but at most
+    /// a tenth of a trial and at least one sample.
     pub fn late_s(&self) -> f64 {
         (20.0 * self.dt_s).max(0.2).min(0.1 * self.trial_s).max(self.dt_s)
     }
 
-    /// Largest absolute value of the load, above 0.
+    /// Returns the largest absolute value of the load; always above 0.
     pub fn load_size(&self) -> f64 {
         self.load[0].abs().max(self.load[1].abs()).max(f64::MIN_POSITIVE)
     }
 
-    /// Largest absolute value of the second signal.
+    /// Returns the largest absolute value of the second signal.
     pub fn beside_size(&self) -> f64 {
         self.beside[0].abs().max(self.beside[1].abs())
     }
 }
 
-/// Steps that a span may have on a lattice, and values that are looked at.
+/// Least and greatest number of quantisation steps in a span that are searched, and the number of values that are used.
 const STEPS: [f64; 2] = [10.0, 400.0];
 const LOOKED: usize = 2000;
-/// Distance from zero, in spans, from which on the lattice is searched from the least value. The phase at zero takes steps of 1/d that become
-/// finer with that distance.
+/// Distance from zero, in spans, beyond which the phase is counted from the least value. Otherwise the steps in 1/d
+/// would have to become finer with that distance.
 const FAR: f64 = 20.0;
 
-/// The step d for which the values are most nearly multiples of it: the greatest |mean of exp(2 pi i x/d)| (Rayleigh's test), over
-/// 1/d in steps of a tenth of a turn at the value that is farthest from the origin.
+/// Finds the step d for which the values are most nearly multiples of d (Rayleigh's test). It maximises the sum of
+/// cos(2 pi x/d), if this sum exceeds the absolute value of the sum of sin(2 pi x/d). The search runs over 1/d in steps
+/// of a tenth of a turn at the value that is farthest from the origin.
 fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64; 2]) -> f64 {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
@@ -115,23 +119,23 @@ fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64;
             sin += *im;
             (*re, *im) = (*re * *turn_re - *im * *turn_im, *re * *turn_im + *im * *turn_re);
         }
-        // Multiples have phase 0.
+        // Multiples of d have phase 0, so only the cosine counts.
         if cos > most && cos > sin.abs() {
             (best, most) = (per_unit, cos);
         }
         per_unit += by;
     }
-    // The least value is on the lattice, which turns 1/d by less than a step of the search.
+    // The least value must be on the lattice. Rounding to it changes 1/d by less than a step of the search.
     if is_far { low / libm::round(low * best) } else { 1.0 / best }
 }
 
-/// The point of the unit circle at a number of turns, as [cos, sin].
+/// Returns `[cos, sin]` of an angle in turns.
 fn unit_phasor(turns: f64) -> [f64; 2] {
     let (sin, cos) = libm::sincos(TAU * turns);
     [cos, sin]
 }
 
-/// Least and greatest.
+/// Returns the least and the greatest value.
 fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)])
 }

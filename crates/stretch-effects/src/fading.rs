@@ -1,4 +1,4 @@
-//! Memory that fades, with one time constant or several: relaxation, and gains that warm up.
+//! Fading memory with one time constant or several: relaxation, and gains that warm up.
 
 use alloc::{boxed::Box, format, vec, vec::Vec};
 
@@ -19,14 +19,14 @@ use crate::{
 /// One time constant, or three of equal weight around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Times {
-    /// The middle one, s.
+    /// The middle time constant, s.
     pub tau_s: f64,
-    /// Ratio of each to the next shorter one; 1 makes all of them one.
+    /// Ratio of each time constant to the next shorter one; 1 gives a single time constant.
     pub spread: f64,
 }
 
 impl Times {
-    /// The time constants: tau, or tau {1/spread, 1, spread}.
+    /// Returns the time constants: tau, or tau {1/spread, 1, spread}.
     ///
     /// ```
     /// use stretch_effects::Times;
@@ -42,9 +42,9 @@ impl Times {
     }
 }
 
-/// Relaxation, or creep where the share is negative: y = x + share (x - mean of mean_rev(x, tau)).
+/// Relaxation (creep if the share is negative): y = x + share (x - mean of mean_rev(x, tau)).
 ///
-/// A step of the input comes through as 1 + share and fades to 1.
+/// A step of the input appears in the output as 1 + share and fades to 1.
 ///
 /// ```
 /// use stretch_effects::{FadingMemory, Grid, Operator, Span, Start, Times};
@@ -64,7 +64,8 @@ pub struct FadingMemory {
 }
 
 impl FadingMemory {
-    /// Of a share and time constants on a grid; `reach` is the stroke of the input, for the hysteresis state that a motion leaves.
+    /// A memory with a share and time constants on a grid. `reach` is the stroke of the input, which scales the state
+    /// that an unrecorded motion leaves.
     pub fn new(share: f64, times: Times, reach: f64, grid: &Grid) -> Self {
         let lags = times.all().into_iter().map(|tau| MeanReversion::new(tau, reach, grid));
         Self { share, lags: lags.collect() }
@@ -96,7 +97,7 @@ impl Operator for FadingMemory {
     }
 }
 
-/// Memory that fades with a time constant, or three.
+/// Relaxation with one time constant, or three.
 pub static RELAXATION: Kind = Kind {
     name: "relaxation",
     title: "relaxation",
@@ -119,8 +120,8 @@ pub static RELAXATION: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A lag is taken exactly for an input that is a straight line from sample to sample: with k = exp(-DT/tau) and m = (1 - k) tau/DT
-/// it is z = k z + (m - k) last + (1 - m) x.
+/// Writes the code. Each lag is exact for an input that is linear between samples: with k = exp(-DT/tau) and m = (1 -
+/// k) tau/DT the update is z = k z + (m - k) last + (1 - m) x.
 fn sketch(v: &[f64], _: &Extent, signals: &Signals) -> Sketch {
     let one = |z: &str, t: &str| {
         format!(
@@ -144,7 +145,7 @@ fn sketch(v: &[f64], _: &Extent, signals: &Signals) -> Sketch {
     sketch.with("DT", signals.dt_s, "s")
 }
 
-/// The gauge overshoots a quick strain and relaxes.
+/// Relaxation of the gauge after a quick change of strain.
 pub(crate) static GAUGE_RELAXATION: Effect = Effect {
     name: "gauge_relaxation",
     title: "the gauge's relaxation",
@@ -157,7 +158,7 @@ pub(crate) static GAUGE_RELAXATION: Effect = Effect {
     ],
     acts: Acts::at(&RELAXATION, Place::Strain),
     twins: &["amplifier_lowpass"],
-    // A gauge that is no foil gives way by more of a step, and more slowly.
+    // Gauges that are not metal foils relax by more of a step, and more slowly.
     alone: |_, search| {
         search.reach(0.6);
         search.ranges[1][1] = 20.0;
@@ -181,8 +182,8 @@ pub(crate) static GAUGE_RELAXATION: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Warming after switching on: y = x (1 + h (1 - mean of exp(-t/tau))), t since the trial's start.
-/// Remembers what is still to warm up, one number a time constant.
+/// Warming after switching on: y = x (1 + h (1 - mean of exp(-t/tau))), t since the trial's start. The memory is the
+/// remaining part exp(-t/tau), one value for each time constant.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Span, Start, Times, Warming};
@@ -198,14 +199,14 @@ pub(crate) static GAUGE_RELAXATION: Effect = Effect {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warming {
     h: f64,
-    /// Time constants.
+    /// Number of time constants.
     count: usize,
-    /// What a piece of time leaves, one time constant after the other.
+    /// Decay factors over each grid step, one time constant after the other.
     decays: Vec<f64>,
 }
 
 impl Warming {
-    /// By a share `h` in the end, with these time constants, on a grid.
+    /// A warming by a final share `h` with these time constants, on a grid.
     pub fn new(h: f64, times: Times, grid: &Grid) -> Self {
         let taus = times.all();
         let left = |step: &f64| taus.iter().map(|tau| libm::exp(-step / tau)).collect::<Vec<_>>();
@@ -234,7 +235,7 @@ impl Operator for Warming {
     }
 }
 
-/// A gain that warms up from a trial's start.
+/// A gain that warms up from the trial's start.
 pub static WARMING: Kind = Kind {
     name: "warming",
     title: "warming up",
@@ -270,7 +271,7 @@ pub static WARMING: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The excitation warms the gauge.
+/// Warming of the gauge by its excitation current.
 pub(crate) static SELF_HEATING: Effect = Effect {
     name: "self_heating",
     title: "the gauge's self-heating",

@@ -1,4 +1,4 @@
-//! Forces by the velocity: friction by direction, speed and load, and a greatest torque that falls with the speed.
+//! Forces that depend on the velocity: friction by direction, speed and load, and a torque limit that falls with speed.
 
 use alloc::{boxed::Box, format, vec};
 
@@ -9,7 +9,7 @@ use crate::{
     sketch::Sketch,
 };
 
-/// A force that rubs: y = x + F(v), with the velocity v where the [`Span`] holds the strain,
+/// A friction force: y = x + F(v). The [`Span`] passes the velocity v in the field of the strain.
 ///
 /// ```text
 /// F(v) = tanh(v/width) (coulomb + more exp(-(v/slow)^2)) (1 + lopsided sign(v)) + viscous v
@@ -27,22 +27,22 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Friction {
-    /// Force against any motion.
+    /// Force against any motion, independent of the speed.
     pub coulomb: f64,
-    /// Force per velocity.
+    /// Force per unit of velocity.
     pub viscous: f64,
-    /// Force that comes on top while it is slow (Stribeck).
+    /// Additional force at low speed (Stribeck).
     pub more: f64,
-    /// Velocity up to which that lasts.
+    /// Velocity scale at which the additional force decays.
     pub slow: f64,
-    /// Velocity at which the direction counts as known; 0 for any velocity.
+    /// Velocity scale of the smooth sign change; 0 gives an abrupt sign change.
     pub width: f64,
-    /// By which share more it rubs forward than backward, halved.
+    /// Asymmetry: the force is multiplied by 1 + lopsided forward and by 1 - lopsided backward.
     pub lopsided: f64,
 }
 
 impl Friction {
-    /// F(v).
+    /// Returns F(v).
     #[inline]
     pub fn force(&self, v: f64) -> f64 {
         let side = match self.width {
@@ -66,7 +66,8 @@ impl Operator for Friction {
     }
 }
 
-/// What acts on forces and torques by the velocity: whichever side they are on, it is looked for, and it opposes the motion.
+/// Common fields of kinds that act on forces and torques and read the velocity. They are searched on inputs and
+/// outputs, and they oppose the motion.
 pub(crate) const FRICTION: Kind = Kind {
     usual: &[Side::Input, Side::Output],
     beside: Beside::Velocity,
@@ -74,7 +75,7 @@ pub(crate) const FRICTION: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Friction by direction.
+/// Friction that depends on the direction only.
 pub static COULOMB_FRICTION: Kind = Kind {
     name: "coulomb_friction",
     title: "dry friction",
@@ -93,7 +94,7 @@ pub static COULOMB_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Friction by speed.
+/// Friction in proportion to the speed.
 pub static VISCOUS_FRICTION: Kind = Kind {
     name: "viscous_friction",
     title: "viscous friction",
@@ -109,7 +110,7 @@ pub static VISCOUS_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Friction that is larger while it is slow.
+/// Friction that is larger at low speed.
 pub static STRIBECK_FRICTION: Kind = Kind {
     name: "stribeck_friction",
     title: "stick-slip friction",
@@ -129,7 +130,7 @@ pub static STRIBECK_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// Velocity at which the direction counts as known.
+/// Returns the parameter of the velocity scale of the sign change; `v` is the largest speed.
 pub(crate) fn width(v: f64) -> EffectParameter {
     EffectParameter::formed("width", "velocity", 1e-4 * v..=0.1 * v, 0.01 * v).log()
 }
@@ -143,7 +144,7 @@ fn stribeck(v: &[f64]) -> Friction {
 }
 
 impl Friction {
-    /// With the velocity as the second signal.
+    /// Writes the code, with the velocity as the second signal.
     fn sketch(&self, signals: &Signals) -> Sketch {
         let [x, v] = [&signals.x, &signals.beside].map(|q| &*q.unit);
         let viscous = ("B", self.viscous, "force/velocity");
@@ -169,8 +170,8 @@ impl Friction {
     }
 }
 
-/// A force against the motion in proportion to a load: y = x + mu |load| tanh(v/width), with the velocity v where the [`Span`] holds the
-/// strain, and the load where it holds one.
+/// A force against the motion in proportion to a load: y = x + mu |load| tanh(v/width). The [`Span`] passes the
+/// velocity v in the field of the strain, and the load in its own field.
 ///
 /// ```
 /// use stretch_effects::{Grid, LoadFriction, Operator, Span};
@@ -183,9 +184,9 @@ impl Friction {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadFriction {
-    /// Force per load.
+    /// Force per unit of load.
     pub mu: f64,
-    /// Velocity at which the direction counts as known, above 0.
+    /// Velocity scale of the smooth sign change, above 0.
     pub width: f64,
 }
 
@@ -225,8 +226,9 @@ pub static LOAD_FRICTION: Kind = Kind {
     ..FRICTION
 };
 
-/// The limit of a motor: y = x within -l(-v) and l(v), with l(v) = max(0, min(stall, stall - slope v)) and the velocity v where the
-/// [`Span`] holds the strain. Driving gets weaker with the speed, braking does not.
+/// The torque limit of a motor: y = x, limited to -l(-v) and l(v), with l(v) = max(0, min(stall, stall - slope v)). The
+/// [`Span`] passes the velocity v in the field of the strain. The limit falls with speed if the torque drives the
+/// motion, not if it brakes.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Span, TorqueSpeed};
@@ -240,12 +242,12 @@ pub static LOAD_FRICTION: Kind = Kind {
 pub struct TorqueSpeed {
     /// Greatest torque at rest.
     pub stall: f64,
-    /// What it loses per speed.
+    /// Loss of torque per unit of speed.
     pub slope: f64,
 }
 
 impl TorqueSpeed {
-    /// The greatest torque in the direction of a velocity.
+    /// Returns the greatest torque in the positive direction at the velocity `v`.
     fn limit(&self, v: f64) -> f64 {
         (self.stall - self.slope * v).min(self.stall).max(0.0)
     }
@@ -259,7 +261,7 @@ impl Operator for TorqueSpeed {
     }
 }
 
-/// A limit of the torque that falls with the speed.
+/// A torque limit that falls with speed.
 pub static TORQUE_SPEED_LIMIT: Kind = Kind {
     name: "torque_speed_limit",
     title: "a limit of the torque that falls with the speed",
@@ -268,7 +270,7 @@ pub static TORQUE_SPEED_LIMIT: Kind = Kind {
     opposes: false,
     parameters: |e, unit| {
         let (size, fastest) = (e.low.abs().max(e.high.abs()), e.beside_size().max(1e-300));
-        // At rest it reaches what was asked for: a limit below that is a saturation.
+        // The stall torque is at least the largest value seen, because a lower limit would be a saturation.
         let most = LARGEST * size;
         vec![
             EffectParameter::sized("slope", &format!("{unit}/velocity"), 0.0..=most / fastest),
@@ -295,5 +297,5 @@ pub static TORQUE_SPEED_LIMIT: Kind = Kind {
     ..FRICTION
 };
 
-/// Greatest torque at rest, in what was seen of it.
+/// Greatest stall torque that is searched, as a multiple of the largest value seen.
 const LARGEST: f64 = 4.0;

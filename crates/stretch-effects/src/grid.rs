@@ -1,13 +1,13 @@
-//! The grid of time: equal pieces inside a sample, split where a delayed switch falls.
+//! The time grid: equal steps inside a sample, split where a delayed command switches.
 
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Why a grid was refused; carries the number.
+/// An invalid time, which a grid refuses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct GridError {
-    /// Which time.
+    /// Which time is invalid.
     pub name: &'static str,
     /// Its value, s.
     pub value: f64,
@@ -46,31 +46,36 @@ pub struct Grid {
     steps: Vec<f64>,
     /// Time of each piece's start within the sample, s.
     offsets: Vec<f64>,
-    /// Pieces at a sample's start in which the openings of `shift + 1` samples ago still act.
+    /// Number of pieces at a sample's start in which the command of `shift + 1` samples ago still
+    /// acts.
     late: usize,
-    /// Whole samples by which openings are late.
+    /// Delay of the commands in whole samples, rounded down.
     shift: usize,
     delay_s: f64,
 }
 
 impl Grid {
-    /// One step a sample: what a stage driven by a measured, linearly interpolated input needs.
+    /// A grid with one step a sample, for a stage driven by a measured, linearly interpolated
+    /// input.
     ///
     /// # Errors
-    /// When the sample time is not finite and positive.
+    /// Fails if the sample time is not finite and positive.
     pub fn samples(dt_s: f64) -> Result<Self, GridError> {
         Self::new(dt_s, f64::INFINITY, 0.0)
     }
 
-    /// Pieces no longer than `max_step_s`, split where openings that act `delay_s` later switch.
+    /// A grid of pieces no longer than `max_step_s`, split where commands that act `delay_s` later
+    /// switch.
     ///
     /// # Errors
-    /// When a time is not positive (or, for the delay, negative or not finite).
+    /// Fails if the sample time is not finite and positive, if `max_step_s` is NaN or below 1e-6 of
+    /// the sample time, or if the delay is negative or not finite.
     pub fn new(dt_s: f64, max_step_s: f64, delay_s: f64) -> Result<Self, GridError> {
         if !(dt_s.is_finite() && dt_s > 0.0) {
             return Err(GridError { name: "sample time", value: dt_s });
         }
-        // Below 1e-6 of a sample time a step resolves nothing and a sample would take for ever.
+        // Below 1e-6 of a sample time a step resolves nothing, and the number of steps would be
+        // excessive.
         if max_step_s.is_nan() || max_step_s < 1e-6 * dt_s {
             return Err(GridError { name: "step of integration", value: max_step_s });
         }
@@ -80,7 +85,8 @@ impl Grid {
         let samples = delay_s / dt_s;
         let mut shift = libm::floor(samples);
         let mut part = samples - shift;
-        // A switch within a billionth of a border falls on it.
+        // A switch closer than a billionth of a sample to a sample's border is placed on the
+        // border.
         if part > 1.0 - 1e-9 {
             shift += 1.0;
             part = 0.0;
@@ -105,7 +111,7 @@ impl Grid {
                 t
             })
             .collect();
-        // A delay beyond any trial keeps the valves shut throughout; the cast saturates.
+        // If the delay is longer than any trial, no command ever acts; the cast saturates.
         Ok(Self { dt_s, steps, offsets, late, shift: shift as usize, delay_s })
     }
 
@@ -114,7 +120,7 @@ impl Grid {
         self.dt_s
     }
 
-    /// By how much openings act late, s.
+    /// Delay of the commands, s.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
     }
@@ -124,23 +130,24 @@ impl Grid {
         &self.steps
     }
 
-    /// How many pieces a sample has.
+    /// Number of pieces in a sample.
     pub fn pieces(&self) -> usize {
         self.steps.len()
     }
 
-    /// How many nodes a trial of so many samples has; 0 for none.
+    /// Number of nodes of a trial with that many samples; 0 without samples.
     pub fn nodes(&self, samples: usize) -> usize {
         if samples == 0 { 0 } else { (samples - 1) * self.pieces() + 1 }
     }
 
-    /// Time of a node after the trial's start, s.
+    /// Time of a node since the trial's start, s.
     pub fn time_s(&self, node: usize) -> f64 {
         let pieces = self.pieces();
         (node / pieces) as f64 * self.dt_s + self.offsets[node % pieces]
     }
 
-    /// Which sample's command acts in a piece after a sample; none before the trial's first.
+    /// Returns the sample whose command acts in a piece after `sample`; `None` before the trial's
+    /// first command acts.
     pub fn command(&self, sample: usize, piece: usize) -> Option<usize> {
         sample.checked_sub(self.shift.saturating_add(usize::from(piece < self.late)))
     }

@@ -12,7 +12,7 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// A sine on samples: y = x + a sin(2 pi f t + phase), t session time.
+/// A sine added to samples: y = x + a sin(2 pi f t + phase), with the session time t.
 ///
 /// ```
 /// use stretch_effects::{Grid, Hum, Operator, Span};
@@ -35,13 +35,14 @@ pub struct Hum {
 
 impl Operator for Hum {
     fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
-        // Samples, not nodes: a rotation by the same angle each, exact again every 256 samples.
+        // The signal consists of samples, not nodes. The wave is rotated by one angle per sample, and is computed
+        // exactly every 256 samples.
         let turn = TAU * self.f_hz * span.grid.dt_s();
         let (sin_turn, cos_turn) = (libm::sin(turn), libm::cos(turn));
         for (block, samples) in signal.chunks_mut(256).enumerate() {
             let sample = span.first_node / span.grid.pieces() + 256 * block;
             let t = span.start_s + sample as f64 * span.grid.dt_s();
-            // Whole turns are taken off before the angle grows large.
+            // Whole turns are subtracted so that the angle stays small.
             let turns = self.f_hz * t;
             let angle = TAU * (turns - libm::floor(turns)) + self.phase;
             let (mut sin, mut cos) = (libm::sin(angle), libm::cos(angle));
@@ -83,8 +84,8 @@ pub static HUM: Kind = Kind {
     }),
     find: Some(find),
     line: Some(|values| Line { hertz: values[1], amplitude: values[0] }),
-    // At fs the hum shows at |f - k fs|. From 1.5 f on that is a third of fs at least and f/2 = 25 Hz at least, where no muscle
-    // moves; a slower record shows it anywhere, down to a slow wave that passes for motion or drift.
+    // A sample rate fs shows the hum at |f - k fs|. From fs = 1.5 f on that is at least f/2 = 25 Hz, where no muscle
+    // moves. A slower recording shows the hum anywhere, down to a slow wave that resembles motion or drift.
     shown_from_hz: Some(|values| 1.5 * values[1]),
     ..Kind::PLAIN
 };
@@ -92,7 +93,8 @@ pub static HUM: Kind = Kind {
 /// Frequency of the mains.
 const MAINS: EffectParameter =
     EffectParameter::shape("f", "Hz", 50.0, 60.0, 50.0).linear().with_role(Role::Choice);
-/// On samples at twice the mains' frequency a hum is as large as the sine of its phase, so one phase represents all.
+/// At a sample rate of twice the mains frequency a hum appears with the amplitude a |sin(phase)|. The stand-in pi/4
+/// gives the root mean square of this amplitude over all phases.
 const PHASE: EffectParameter = EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0)
     .linear()
     .with_role(Role::Found { stand_in: FRAC_PI_4 });
@@ -104,7 +106,7 @@ fn find(values: &[f64], record: &Measured<'_>, simulated: &mut [f64]) {
     }
 }
 
-/// The mains couple into the bridge.
+/// Mains hum that couples into the bridge.
 pub(crate) static MAINS_HUM: Effect = Effect {
     name: "mains_hum",
     title: "the gauge's mains hum",
@@ -119,7 +121,7 @@ pub(crate) static MAINS_HUM: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Window in which the phase is taken as steady, s.
+/// Window in which the phase is assumed constant, s.
 const WINDOW_S: f64 = 1.0;
 
 /// A hum of known amplitude and frequency whose phase cannot be predicted.
@@ -141,9 +143,10 @@ pub struct WanderingLine {
 }
 
 impl WanderingLine {
-    /// Adds to samples that may be fitted the hum whose phase in each second is the one that the measured record shows: as much of
-    /// the residual at the line's frequency as the amplitude allows; noise shrinks what it hides. Each sample is predicted from
-    /// the others of its second. `noise` is one standard deviation of the measured samples, which are as many as the simulated ones or more.
+    /// Adds the hum to simulated samples that may be used for fitting. In each window of a second, amplitude and phase
+    /// are estimated from the residual at the line's frequency; the amplitude is limited to 1.5 a, and noise shrinks
+    /// the estimate. Each sample is predicted from the other samples of its window. `noise` is one standard deviation
+    /// of the measured samples; there must be at least as many measured as simulated samples.
     pub fn follow(&self, measured: &[f64], noise: f64, dt_s: f64, simulated: &mut [f64]) {
         let (a, f) = (self.a, self.f_hz);
         let window = ((WINDOW_S / dt_s) as usize).max(8);
@@ -165,7 +168,7 @@ impl WanderingLine {
                 rc += r * c;
                 rs += r * s;
             }
-            // Both quadratures are normal with variance a^2/2 before the record is seen.
+            // The prior of both quadratures is normal with variance a^2/2.
             let ridge = noise * noise / (0.5 * a * a + 1e-18);
             let (cc, ss) = (cc + ridge, ss + ridge);
             let determinant = cc * ss - cs * cs;
@@ -178,7 +181,8 @@ impl WanderingLine {
             for (i, (m, v)) in measured.iter().zip(values.iter_mut()).enumerate() {
                 let (c, s) = wave(i);
                 let hum = p * c + q * s;
-                // As if the sample itself had not been used to find the phase: no noise is explained away.
+                // Leave-one-out prediction: the sample is predicted without itself, so that the fit does not explain
+                // its noise.
                 let leverage = (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
                 *v = m - (m - (*v + hum)) / (1.0 - leverage.min(0.5));
             }

@@ -1,4 +1,4 @@
-//! Hysteresis: Prandtl and Ishlinskii's loops, and the smooth one of Bouc and Wen.
+//! Hysteresis: the loops of Prandtl and Ishlinskii, and the smooth loop of Bouc and Wen.
 
 use alloc::{boxed::Box, vec};
 
@@ -24,7 +24,7 @@ pub struct Loops {
     pub spread: f64,
 }
 
-/// Hysteresis without a rate: y = x - h mean of (x - play(x, r)), r = s {spread^2, spread, 1}.
+/// Rate-independent hysteresis: y = x - h mean of (x - play(x, r)), r = s {spread^2, spread, 1}.
 ///
 /// Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
 ///
@@ -45,7 +45,7 @@ pub struct PrandtlIshlinskii {
 }
 
 impl PrandtlIshlinskii {
-    /// Of a share, a largest half-width and a spread.
+    /// An operator with a share, a largest half-width and a spread.
     pub fn new(loops: Loops) -> Self {
         let Loops { h, s, spread } = loops;
         Self::of_radii(h, [s * spread * spread, s * spread, s])
@@ -80,7 +80,7 @@ impl Operator for PrandtlIshlinskii {
     }
 }
 
-/// Hysteresis by plays: a share, the largest half-width, and the ratio of each to the next larger one.
+/// Hysteresis of three plays.
 pub static HYSTERESIS: Kind = Kind {
     name: "hysteresis",
     title: "hysteresis",
@@ -112,7 +112,7 @@ pub static HYSTERESIS: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The gauge remembers its strain.
+/// Hysteresis of the gauge.
 pub(crate) static GAUGE_HYSTERESIS: Effect = Effect {
     name: "gauge_hysteresis",
     title: "the gauge's hysteresis",
@@ -141,13 +141,14 @@ pub(crate) static GAUGE_HYSTERESIS: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// A smooth loop without a rate: y = x - c u, with a state u between -1 and 1 that follows the moves of the signal,
+/// A smooth rate-independent loop: y = x - c u. The state u lies between -1 and 1 and follows the moves of the signal:
 ///
 /// ```text
 /// du = dx/s (1 - |u|) where u and dx have one sign, else dx/s
 /// ```
 ///
-/// which is the model of Bouc and Wen with an exponent of 1 and beta = gamma, solved exactly for each move. Remembers u and x.
+/// This is the model of Bouc and Wen with an exponent of 1 and beta = gamma. Each move is solved exactly. The memory is
+/// u and x.
 ///
 /// Source: Wen 1976, Journal of the Engineering Mechanics Division 102(2), 249-263.
 ///
@@ -164,9 +165,9 @@ pub(crate) static GAUGE_HYSTERESIS: Effect = Effect {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {
-    /// How far it stays behind, in the unit of the signal.
+    /// Lag of the output after a long move, in the unit of the signal.
     pub c: f64,
-    /// Way after which most of that is reached, in the unit of the signal, above 0.
+    /// Distance over which 1 - 1/e of that lag builds up, in the unit of the signal, above 0.
     pub s: f64,
 }
 
@@ -196,7 +197,7 @@ impl Operator for BoucWen {
 }
 
 impl BoucWen {
-    /// The state after a move: back to zero on a straight line, from there on towards 1 as an exponential.
+    /// Returns the state after a move: linear back to zero, and from there exponential towards 1.
     fn moved(&self, u: f64, dx: f64) -> f64 {
         let way = dx.abs() / self.s;
         let along = if dx < 0.0 { -u } else { u };
@@ -209,7 +210,7 @@ impl BoucWen {
     }
 }
 
-/// Hysteresis that turns smoothly.
+/// Hysteresis with smooth reversals.
 pub static BOUC_WEN: Kind = Kind {
     name: "bouc_wen",
     title: "smooth hysteresis",

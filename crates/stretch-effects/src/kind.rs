@@ -1,4 +1,4 @@
-//! What a kind of effect is.
+//! Kinds of effect: an operator with its name, parameters, search points and code.
 
 use alloc::{boxed::Box, vec::Vec};
 
@@ -16,61 +16,65 @@ use crate::{
 pub enum Side {
     /// In front of the stage, on one of its inputs.
     Input,
-    /// Behind it, on its output.
+    /// Behind the stage, on its output.
     Output,
 }
 
-/// The second signal that a kind looks at, in addition to the channel that it changes.
+/// The second signal that a kind reads, in addition to the channel that it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beside {
     /// Nothing.
     Nothing,
-    /// The channel itself, before the kind changes it; in a gauge the strain that makes the resistance.
+    /// The channel itself, before the kind changes it. In a gauge, the strain that determines the resistance.
     Itself,
-    /// Another channel: one effect for each.
+    /// Another channel. Each other channel gives a separate effect.
     Another,
-    /// The velocity at which the stage rubs.
+    /// The velocity of the rubbing contact in the stage.
     Velocity,
-    /// The position at which the stage rubs.
+    /// The position of the rubbing contact in the stage.
     Position,
-    /// That velocity and another channel that loads the contact: one effect for each.
+    /// The velocity of the contact and another channel that loads it. Each other channel gives a separate effect.
     VelocityAndLoad,
-    /// That position and another channel that loads the contact: one effect for each.
+    /// The position of the contact and another channel that loads it. Each other channel gives a separate effect.
     PositionAndLoad,
 }
 
-/// How much of what its family shares the values of an effect make.
+/// Computes from an effect's values the size of the property that its `Family` shares.
 pub type Measure = fn(&[f64]) -> f64;
 
-/// What kinds of one family agree on where data do not tell them apart.
+/// A property that kinds of one family share. Data may determine this property without distinguishing the kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
-    /// They are late, by so many seconds.
+    /// A delay, in seconds.
     Late,
-    /// They lag behind a turn by half of a loop, in the unit of the channel.
+    /// A lag behind the input after a reversal: half of the loop's width, in the unit of the channel.
     Loop,
 }
 
-/// Points to look for an effect at, from the extent of its channel; forms at their end may be left out.
+/// Returns the points at which the search for an effect starts, from the extent of its channel. Form parameters at the
+/// end of a point may be left out.
 pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
 
-/// What was measured and may be fitted, for numbers that are found in the record. Samples to test on are never in one.
+/// Measured samples from which numbers may be estimated that only a recording contains. Test samples are never
+/// included.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured<'a> {
-    /// Samples of the trial, from its start, that may be fitted.
+    /// Samples of the trial, from its start, that may be used for fitting.
     pub samples: &'a [f64],
-    /// Their noise, one standard deviation.
+    /// Standard deviation of the samples' noise.
     pub noise: f64,
-    /// What a strength of one is in the unit of the samples.
+    /// Size of a strength of 1, in the unit of the samples.
     pub unit: f64,
     /// Sample time, s.
     pub dt_s: f64,
 }
 
-/// Finds what a record alone can tell, and acts with it: values, the record, the simulated samples.
+/// Estimates from a recording the numbers that only a recording contains, and applies the effect to the simulated
+/// samples. Arguments: values, recording, simulated samples.
 pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
 
-/// A line in the record whose phase cannot be predicted: what is known of a found effect where nothing may be fitted.
+/// A spectral line of unknown phase. If the phase must not be estimated (in test data), this is all that is known of
+/// the effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Frequency, Hz.
@@ -79,27 +83,28 @@ pub struct Line {
     pub amplitude: f64,
 }
 
-/// What goes into the code of a kind at a place.
+/// The signals in the code of a kind at a place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signals {
-    /// The channel.
+    /// The channel that the kind changes.
     pub x: Quantity,
-    /// The second signal that it looks at.
+    /// The second signal that the kind reads.
     pub beside: Quantity,
-    /// The channel that loads it, where it looks at one.
+    /// The channel that loads the contact, if the kind reads one.
     pub load: Quantity,
     /// Sample time, s.
     pub dt_s: f64,
 }
 
-/// How a user would type a kind with these values at a place.
+/// Writes a kind with these values at a place as code that a user can type into a simulator.
 pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
 
-/// A kind of effect: an operator and what it means. At a place (a side of a stage of a user's simulator, the strain of a gauge) it is
-/// an effect.
+/// A kind of effect: an operator and its description. A kind at a place is an effect. A place is a side of a stage of a
+/// user's simulator, or the strain of a gauge.
 ///
-/// One `static` holds all of it, in one file with its operator: its name, its parameters and their ranges, which follow from the
-/// [`Extent`] of the channel that it acts on; where it is looked for; what is hard to distinguish from it; how a user would type it.
+/// One `static`, in one file with the operator, holds the name, the parameters with their ranges (which follow from the
+/// [`Extent`] of the channel), the places and values at which a search starts, the kinds that are hard to distinguish
+/// from it, and its code.
 ///
 /// ```
 /// use stretch_effects::{Extent, Side, kind_named};
@@ -113,49 +118,50 @@ pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
 pub struct Kind {
     /// Name, as in `output.backlash`.
     pub name: &'static str,
-    /// What it is called in headlines and tables: a noun, as in "backlash" at the output.
+    /// Noun for headlines and tables, such as "backlash" at the output.
     pub title: &'static str,
-    /// What it is, for someone who does not know its name.
+    /// Explanation for readers who do not know the name.
     pub words: &'static str,
-    /// Its equation: x becomes y.
+    /// Equation that gives the output y from the input x.
     pub equation: &'static str,
-    /// Where `wrap = "all"` puts it.
+    /// Sides at which `wrap = "all"` places the kind.
     pub usual: &'static [Side],
-    /// The second signal that it looks at.
+    /// The second signal that the kind reads.
     pub beside: Beside,
-    /// Whether it opposes a motion: behind a stage it is added to the force, in front of one it is subtracted.
+    /// Whether the kind is a force that opposes a motion. Behind a stage the force is added to the signal; in front of
+    /// a stage it is subtracted.
     pub opposes: bool,
-    /// Its parameters on a channel of that extent and unit: strengths first, then shapes, choices and forms; what is found in the
-    /// record last.
+    /// The parameters on a channel of the given extent and unit: strengths first, then shapes, choices and forms, then
+    /// numbers that are found in a recording.
     pub parameters: fn(&Extent, &str) -> Vec<EffectParameter>,
-    /// Values to look for it at; without any those of [`EffectParameter::starts`].
+    /// Values at which the search starts. If `None`, those of [`EffectParameter::starts`] are used.
     pub starts: Option<Starts>,
     /// The operator with these values.
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
-    /// How a user would type it; `None` if that is not written down.
+    /// The code that a user can type into a simulator; `None` if it is not written down.
     pub sketch: Option<Sketched>,
-    /// Kinds that are hard to tell from it on the same channel.
+    /// Names of kinds that are hard to distinguish from this one on the same channel.
     pub twins: &'static [&'static str],
-    /// What it shares with others of its family that data may not tell apart, and how much of it its values make.
+    /// The property that data may not distinguish within the family, and its size at given values.
     pub family: Option<(Family, Measure)>,
-    /// Whether its memory goes on from trial to trial.
+    /// Whether the memory accumulates over the whole session.
     pub counts_session: bool,
-    /// Whether it is a law of session time, so that trials outside the time that was fitted are extrapolated.
+    /// Whether the effect depends on session time, so that trials outside the fitted time are extrapolated.
     pub drifts: bool,
-    /// Whether its input does not follow from its output.
+    /// Whether the input cannot be computed from the output.
     pub hides_input: bool,
-    /// Whether it asks for steps shorter than a sample where a measured input drives its stage.
+    /// Whether the kind needs integration steps shorter than a sample if a measured input drives its stage.
     pub needs_fine_steps: bool,
-    /// How its [`Role::Found`](crate::Role::Found) numbers are found in a record; none for all but hum.
+    /// Estimates the [`Role::Found`](crate::Role::Found) numbers from a recording; only hum has this.
     pub find: Option<Find>,
-    /// The line that it leaves where they may not be found; none for all but hum.
+    /// The spectral line that remains if those numbers must not be estimated; only hum has this.
     pub line: Option<fn(&[f64]) -> Line>,
-    /// Least sample rate, Hz, at which it shows as itself with these values; `None` if any rate will do. Below it the kind is
-    /// not looked for.
+    /// Lowest sample rate, Hz, at which the kind with these values is recognisable; `None` if any rate will do. At
+    /// lower rates the search leaves the kind out.
     pub shown_from_hz: Option<fn(&[f64]) -> f64>,
 }
 
-/// Kinds of one name are the same.
+/// Kinds are equal if their names are equal.
 impl PartialEq for Kind {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
@@ -163,7 +169,7 @@ impl PartialEq for Kind {
 }
 
 impl Kind {
-    /// A kind that does nothing, to be filled in.
+    /// A kind that does nothing; a base for struct updates.
     pub const PLAIN: Self = Self {
         name: "",
         title: "",
@@ -187,12 +193,12 @@ impl Kind {
         shown_from_hz: None,
     };
 
-    /// Least sample rate, Hz, at which it shows as itself with these values; 0 where any will do.
+    /// Returns the lowest sample rate, Hz, at which the kind with these values is recognisable; 0 if any rate will do.
     pub fn least_rate_hz(&self, values: &[f64]) -> f64 {
         self.shown_from_hz.map_or(0.0, |least| least(values))
     }
 
-    /// Parameters that a model has values of: all but what is found in the record.
+    /// Returns the parameters whose values are part of a model: all except those found in a recording.
     pub fn fitted(&self, extent: &Extent, unit: &str) -> Vec<EffectParameter> {
         let mut all = (self.parameters)(extent, unit);
         all.retain(|p| !p.is_found());

@@ -14,7 +14,8 @@ use crate::{
     sketch::Sketch,
 };
 
-/// A soft lower bound: low + w ln(1 + exp((x - low)/w)); within rounding of x or of `low` from 37 w on.
+/// Returns a soft lower bound: low + w ln(1 + exp((x - low)/w)). At 37 w or more from `low` it equals x or `low` to
+/// rounding.
 ///
 /// ```
 /// use stretch_effects::soft_floor;
@@ -45,7 +46,8 @@ pub fn soft_ceiling(x: f64, high: f64, w: f64) -> f64 {
     -soft_floor(-x, -high, w)
 }
 
-/// Bounds that a signal cannot leave: [`soft_floor`] at `low`, then [`soft_ceiling`] at `high`, where there is one.
+/// Bounds that a signal cannot exceed: [`soft_floor`] at `low`, then [`soft_ceiling`] at `high`. Each bound is
+/// optional.
 ///
 /// ```
 /// use stretch_effects::{Grid, Knees, Operator, Span};
@@ -76,7 +78,7 @@ impl Operator for Knees {
     }
 }
 
-/// An end at either side, or at both.
+/// A bound at either side, or at both.
 pub static SATURATION: Kind = Kind {
     name: "saturation",
     title: "saturation",
@@ -96,7 +98,7 @@ pub static SATURATION: Kind = Kind {
         let within = [0.003, 0.02, 0.08, 0.2, 0.35];
         let tops = within.map(|d| vec![low, e.high - d * s, 0.005 * s]);
         let bottoms = within.map(|d| vec![e.low + d * s, high, 0.005 * s]);
-        // An actuator's ends are most often both reached.
+        // Actuators most often reach both ends.
         let both = within.map(|d| vec![e.low + d * s, e.high - d * s, 0.005 * s]);
         [tops, bottoms, both].concat()
     }),
@@ -123,25 +125,26 @@ pub static SATURATION: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Ends that nothing reaches: what was commanded or measured goes no further, and a simulation rarely half as far again.
+/// Returns bounds that count as absent: one span beyond each end of the range. Commands and measurements stay within
+/// the range, and a simulation rarely exceeds it by half of its span.
 fn ends(e: &Extent) -> [f64; 2] {
     [e.low - e.span(), e.high + e.span()]
 }
 
-/// The ends that are there: one at infinity, or where nothing reaches it, is none.
+/// Returns the bounds that act. A bound at infinity, or at the value of `ends`, counts as absent.
 fn reached(values: &[f64], e: &Extent) -> [Option<f64>; 2] {
     let off = ends(e);
     [0, 1].map(|i| Some(values[i]).filter(|v| v.is_finite() && *v != off[i]))
 }
 
-/// The sleeve goes slack: the gauge cannot be compressed.
+/// Slack of the sleeve: the gauge cannot be compressed.
 pub(crate) static SLEEVE_SLACK: Effect = Effect {
     name: "sleeve_slack",
     title: "the sleeve's slack",
     words: "the sleeve goes slack when the muscle is short",
     equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee)): cannot fall below e_s",
     parameters: &[
-        // Where the pre-stretch is not known, neither is where the sleeve goes slack: below nothing by the nominal rig's count.
+        // If the pre-stretch is unknown, so is the slack strain. It may then be negative in the nominal rig's strain.
         EffectParameter::strength("e_s", "strain", -0.05, 0.2, 0.08).off_at(-0.05),
         EffectParameter::form(
             "knee",
@@ -154,7 +157,8 @@ pub(crate) static SLEEVE_SLACK: Effect = Effect {
     ],
     acts: Acts::with(&SATURATION, Place::Strain, |v, _| vec![v[0], f64::INFINITY, v[1]]),
     twins: &["amplifier_saturation"],
-    // A little above the least strain, with the usual knee and one as sharp as they come: from a soft one a fit does not find there.
+    // Starts slightly above the least strain, with the usual knee and with a very sharp one. A fit that starts from a
+    // soft knee does not find a sharp one.
     starts: Some(|strain| {
         let above = [0.001, 0.004, 0.01, 0.03, 0.07];
         let above = above.map(|above| (strain.low + above).max(-0.049));
@@ -176,10 +180,10 @@ pub(crate) static SLEEVE_SLACK: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Rails that no signal reaches, V.
+/// Amplifier limits that no signal reaches, V. They represent an absent limit.
 const RAILS_V: [f64; 2] = [0.5, 3.3];
 
-/// The amplifier's output is bounded.
+/// Saturation of the amplifier.
 pub(crate) static AMPLIFIER_SATURATION: Effect = Effect {
     name: "amplifier_saturation",
     title: "the amplifier's saturation",
@@ -197,7 +201,7 @@ pub(crate) static AMPLIFIER_SATURATION: Effect = Effect {
     }),
     twins: &["sleeve_slack"],
     needs: Some(Need::Amplifier),
-    // A little inside of either end, with the usual knee and one as sharp as they come.
+    // Starts slightly inside each end, with the usual knee and with a very sharp one.
     starts: Some(|volts| {
         let within = [0.004, 0.015, 0.05, 0.15, 0.4];
         let with = |knee: f64| {

@@ -14,7 +14,7 @@ use crate::{
     sketch::Sketch,
 };
 
-/// First-order lag (mean reversion) z' = (x - z)/tau, exact for an input that is linear between nodes.
+/// A first-order lag (mean reversion) z' = (x - z)/tau, exact for an input that is linear between nodes.
 ///
 /// ```
 /// use stretch_effects::{Grid, MeanReversion, Span, Start};
@@ -32,15 +32,16 @@ use crate::{
 pub struct MeanReversion {
     tau: f64,
     reach: f64,
-    /// For each piece of time: weights of z, the last x and the new x.
+    /// For each grid step: weights of z, of the last x and of the new x.
     weights: Vec<[f64; 3]>,
 }
 
 impl MeanReversion {
-    /// How many numbers it remembers: its state and its last input.
+    /// Number of remembered values: the state and the last input.
     pub const CELLS: usize = 2;
 
-    /// Of time constant `tau` (s, positive) on a grid; `reach` is the stroke of its input, in the input's unit.
+    /// A lag of time constant `tau` (s, positive) on a grid. `reach` is the stroke of the input, in the input's unit;
+    /// it scales the state of `Start::Hysteresis`.
     pub fn new(tau: f64, reach: f64, grid: &Grid) -> Self {
         Self { tau, reach, weights: grid.steps().iter().map(|h| lag_weights(*h, tau)).collect() }
     }
@@ -55,7 +56,8 @@ impl MeanReversion {
         cells[1] = first;
     }
 
-    /// State after the input `x`, `step` the piece of time that leads to it.
+    /// Advances by the grid step with index `step` to the input `x` and returns the state. Without a step the state is
+    /// unchanged.
     #[inline]
     pub(crate) fn step(&self, step: Option<usize>, cells: &mut [f64], x: f64) -> f64 {
         if let Some(step) = step {
@@ -87,15 +89,15 @@ impl MeanReversion {
 /// The numbers of a [`Lowpass`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Poles {
-    /// Sum of the time constants, s: how far a ramp is trailed.
+    /// Sum of the time constants, s: the lag behind a ramp.
     pub tau_s: f64,
-    /// Share of it that the second pole has; 0 leaves one pole.
+    /// Share of `tau_s` that the second pole has; 0 gives one pole.
     pub second: f64,
 }
 
-/// Low-pass of one or two real poles: y = mean_rev(mean_rev(x, tau (1 - second)), tau second).
+/// A low-pass with one or two real poles: y = mean_rev(mean_rev(x, tau (1 - second)), tau second).
 ///
-/// It is powered and settled before every trial, whatever came before.
+/// Every trial begins with a settled state, independent of its `Start`.
 ///
 /// ```
 /// use stretch_effects::{Grid, Lowpass, Operator, Poles, Span, Start};
@@ -117,10 +119,10 @@ pub struct Lowpass {
 }
 
 impl Lowpass {
-    /// Of one or two poles on a grid.
+    /// A low-pass with one or two poles on a grid.
     pub fn new(poles: Poles, grid: &Grid) -> Self {
         let Poles { tau_s, second } = poles;
-        // A low-pass has no hysteresis state: the reach does not matter.
+        // The reach scales only `Start::Hysteresis`, which a low-pass does not use.
         let pole = |tau: f64| MeanReversion::new(tau, 0.0, grid);
         let mut poles = Vec::from([pole(tau_s * (1.0 - second))]);
         if second != 0.0 {
@@ -148,7 +150,7 @@ impl Operator for Lowpass {
     }
 }
 
-/// One real pole or two.
+/// A low-pass with one or two real poles.
 pub static LAG: Kind = Kind {
     name: "lag",
     title: "a lag",
@@ -198,7 +200,7 @@ pub static LAG: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The amplifier is slow.
+/// Lag of the amplifier.
 pub(crate) static AMPLIFIER_LOWPASS: Effect = Effect {
     name: "amplifier_lowpass",
     title: "the amplifier's lag",

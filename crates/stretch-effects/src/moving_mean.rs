@@ -7,9 +7,10 @@ use crate::{
     operator::{Operator, Span},
 };
 
-/// The moving mean y(t) = (1/T) integral of x from t - T to t, of a signal that is linear between nodes: what drives call an S-curve or
-/// jerk filter when a trapezoid profile runs through it (Biagiotti and Melchiorri, doi 10.1016/j.conengprac.2012.08.005). Exact at every
-/// node; a signal at rest stays what it is to the last bit. Remembers the nodes of the time T.
+/// The moving mean y(t) = (1/T) integral of x from t - T to t, for a signal that is linear between nodes. Drives call
+/// it an S-curve or jerk filter if its input is a trapezoid profile (Biagiotti and Melchiorri, doi
+/// 10.1016/j.conengprac.2012.08.005). It is exact at every node, and a constant signal is unchanged to the last bit.
+/// The memory is the nodes of the last time T.
 ///
 /// ```
 /// use stretch_effects::{Grid, MovingMean, Operator, Span, Start};
@@ -24,13 +25,15 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovingMean {
-    /// For each piece that leads to a node: weights of the nodes before it, the latest first. That of the node itself is what is left to 1.
+    /// For each grid step that leads to a node: weights of the nodes before that node, the latest first. The node
+    /// itself has the weight 1 minus their sum.
     weights: Vec<Vec<f64>>,
     reach: usize,
 }
 
 impl MovingMean {
-    /// Over `window_s`; of no time at all it changes nothing, and of more than a hundred thousand nodes it is the mean over those.
+    /// A mean over `window_s`. A window of 0 changes nothing. A window of more than a hundred thousand nodes is cut to
+    /// that number.
     pub fn new(grid: &Grid, window_s: f64) -> Self {
         let weights: Vec<Vec<f64>> =
             (0..grid.pieces()).map(|piece| weights(grid.steps(), piece, window_s)).collect();
@@ -39,16 +42,17 @@ impl MovingMean {
     }
 }
 
-/// Most nodes that a mean remembers: no time is so long that it is summed up for ever.
+/// Greatest number of nodes that a mean remembers, so that a very long window costs a limited time.
 const MOST_NODES: usize = 100_000;
 
-/// Weights of the nodes before one that a piece leads to, from the integrals of the lines between them.
+/// Returns the weights of the nodes before the one to which a piece leads, from the integrals of the lines between
+/// nodes.
 fn weights(steps: &[f64], piece: usize, window_s: f64) -> Vec<f64> {
     let (mut found, mut left, mut at, mut whole) = (Vec::new(), window_s, piece, 0.0);
     while left > 0.0 && found.len() < MOST_NODES {
         let h = steps[at];
         let taken = h.min(left);
-        // Of the line back to the node before: integral of 1 - s/h and of s/h over the part that is taken.
+        // For the line back to the preceding node: the integrals of 1 - s/h and s/h over the part inside the window.
         let earlier = 0.5 * taken * taken / h;
         if let Some(last) = found.last_mut() {
             *last += taken - earlier;
@@ -68,7 +72,7 @@ impl Operator for MovingMean {
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        // What came before, the earliest first, and the signal behind it.
+        // The remembered values, the earliest first, followed by the signal.
         let mut all = vec![0.0; self.reach + signal.len()];
         all[..self.reach].copy_from_slice(cells);
         all[self.reach..].copy_from_slice(signal);
@@ -117,7 +121,7 @@ mod tests {
     }
 
     proptest! {
-        /// A line is late by half of the window on any grid, once the window is full of it.
+        /// A line is delayed by half of the window on any grid, once the window is full.
         #[test]
         fn a_line_is_half_a_window_late(window_s in 1e-4..0.05_f64, delay_s in 0.0..0.03_f64, slope in -9.0..9.0_f64) {
             let grid = Grid::new(0.01, 0.004, delay_s).unwrap();
@@ -130,7 +134,8 @@ mod tests {
             }
         }
 
-        /// Parts give what the whole gives, a constant stays, and nothing leaves the range of what went in.
+        /// Blocks give the same output as the whole signal, a constant is unchanged, and the output stays in the range
+        /// of the input.
         #[test]
         fn parts_give_the_whole(
             signal in proptest::collection::vec(-10.0..10.0_f64, 1..80), window_s in 0.0..0.3_f64, parts in 1..80_usize

@@ -1,4 +1,4 @@
-//! What an operator is, and what it acts on.
+//! The `Operator` trait, the signal segment that an operator acts on, and rows of operators in series.
 
 use alloc::{boxed::Box, vec::Vec};
 use core::fmt;
@@ -10,21 +10,23 @@ use crate::grid::Grid;
 /// How an operator's memory begins a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Start {
-    /// At rest at the first value, everything before forgotten.
+    /// At rest at the first value. Everything before the trial is forgotten.
     Settled,
-    /// As the last trial left it: the input went straight to this trial's first value and stayed there for `rest_s`.
+    /// Continued from the end of the last trial. Between the trials the input moved straight to this trial's first
+    /// value and stayed there for `rest_s`.
     Carried {
         /// Seconds of rest between the trials.
         rest_s: f64,
     },
-    /// With the hysteresis state that an unrecorded motion left: +1 as if the input had come up to its first value from far
-    /// below, -1 as if it had come from far above, 0 settled; any value between is a share of that reach. A memory that counts the whole
-    /// session (the travel of a gauge) goes on as in [`Start::Carried`].
+    /// With the hysteresis state that an unrecorded motion left. At +1 the input reached its first value from far
+    /// below, at -1 from far above. At 0 the state is settled; values in between scale the state. A memory that
+    /// accumulates over the whole session (the travel of a gauge) continues as in [`Start::Carried`].
     Hysteresis(f64),
 }
 
 impl Start {
-    /// Output at which a play of half-width `w` begins a trial at input `first`; `last` is its output before.
+    /// Returns the output at which a play of half-width `w` begins a trial at input `first`. `last` is the play's
+    /// previous output.
     pub(crate) fn of_play(self, last: f64, first: f64, w: f64) -> f64 {
         match self {
             Self::Settled => first,
@@ -34,32 +36,34 @@ impl Start {
     }
 }
 
-/// The stretch of signal that an operator acts on, and what else is known there.
+/// The time base of a signal segment that an operator acts on, and other signals at the same nodes.
 #[derive(Debug, Clone, Copy)]
 pub struct Span<'a> {
-    /// Steps of time.
+    /// Grid of integration steps.
     pub grid: &'a Grid,
-    /// Node of the signal's first value; node 0 is emitted without advancing time.
+    /// Node of the signal's first value. No time step precedes node 0.
     pub first_node: usize,
-    /// Session time of node 0, s: since the gauge was powered and the sleeve first stretched.
+    /// Session time of node 0, s. The session begins when the gauge is powered and the sleeve is first stretched.
     pub start_s: f64,
-    /// Gauge pressure at the same nodes, kPa; empty when there is none.
+    /// Gauge pressure (above the atmosphere) at the same nodes, kPa; empty if there is none.
     pub pressure_kpa: &'a [f64],
-    /// Gauge strain at the same nodes, after the effects on it; empty where it is not yet known.
+    /// Gauge strain at the same nodes, after the effects on it; empty if it is not yet known. Operators with another
+    /// second signal (a velocity, a position, another channel) read that signal from this field.
     pub strain: &'a [f64],
-    /// What loads a contact at the same nodes; empty when there is nothing.
+    /// Signal that loads a contact, at the same nodes; empty if there is none.
     pub load: &'a [f64],
 }
 
 impl<'a> Span<'a> {
-    /// From node 0 on, in a session that begins with it, without pressure or strain.
+    /// A span that starts at node 0 and at session time 0, without pressure, strain or load.
     pub fn whole(grid: &'a Grid) -> Self {
         Self { grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[], load: &[] }
     }
 }
 
 impl Span<'_> {
-    /// Calls `visit(step, i)` for every value: `step` is the index of the piece of time that leads to it, none at node 0.
+    /// Calls `visit(step, i)` for every value. `step` is the index of the grid step that leads to value `i`; it is
+    /// `None` at node 0.
     #[inline]
     pub fn each(&self, len: usize, mut visit: impl FnMut(Option<usize>, usize)) {
         let mut i = 0;
@@ -84,9 +88,9 @@ impl Span<'_> {
     }
 }
 
-/// Something that changes a signal in place, sample by sample, with a memory of `cells()` numbers.
+/// An operation that changes a signal in place, sample by sample, with a memory of `cells()` numbers.
 ///
-/// The memory is the caller's: the operator itself never changes, so one serves many channels.
+/// The caller owns the memory. The operator itself never changes, so one operator serves many channels.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Span, Start};
@@ -114,24 +118,25 @@ impl Span<'_> {
 /// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 pub trait Operator: fmt::Debug + Send + Sync {
-    /// How many numbers it remembers.
+    /// Number of values that the operator remembers.
     fn cells(&self) -> usize {
         0
     }
 
-    /// Prepares the memory for a trial whose first input is `first`; by default every number is that.
+    /// Prepares the memory for a trial whose first input is `first`. By default every value is set to `first`.
     fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
         cells.fill(first);
     }
 
-    /// Replaces every value of `signal` by what the operator makes of it.
+    /// Replaces every input value in `signal` by the operator's output.
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]);
 
-    /// Replaces a recorded output by the input that made it, as far as that is possible; by default it leaves it alone.
+    /// Replaces a recorded output by an input that produces it, as far as possible. By default the signal is left
+    /// unchanged.
     fn undo(&self, _signal: &mut [f64]) {}
 }
 
-/// Operators that act one after the other on one signal, and where each keeps its memory in a caller's cells.
+/// Operators that act in series on one signal, with the position of each operator's memory in the caller's cells.
 ///
 /// ```
 /// use stretch_effects::{Backlash, Drift, Grid, Row, Span, Start};
@@ -153,7 +158,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// A row whose memory begins at `offset` of the caller's cells.
+    /// A row whose memory begins at index `offset` of the caller's cells.
     pub fn new(row: Vec<Box<dyn Operator>>, offset: usize) -> Self {
         let mut cells = 0;
         let row = row
@@ -167,17 +172,18 @@ impl Row {
         Self { row, offset, cells }
     }
 
-    /// First cell behind this row's.
+    /// Index of the first cell after this row's memory.
     pub fn end(&self) -> usize {
         self.offset + self.cells
     }
 
-    /// Whether nothing acts.
+    /// Whether the row has no operators.
     pub fn is_empty(&self) -> bool {
         self.row.is_empty()
     }
 
-    /// Begins a trial at the input `first`; returns the row's output there. `span` describes node 0 and holds one value of each signal.
+    /// Begins a trial at the input `first` and returns the row's output there. `span` describes node 0 and holds one
+    /// value of each signal.
     pub fn begin(&self, span: &Span<'_>, start: Start, first: f64, cells: &mut [f64]) -> f64 {
         let mut x = [first];
         for (operator, at) in &self.row {
@@ -189,7 +195,8 @@ impl Row {
         x[0]
     }
 
-    /// As [`begin`](Self::begin) for an operator whose input at the start is the strain, not the signal.
+    /// Begins a trial like [`begin`](Self::begin), for operators whose memory follows the strain and not the signal.
+    /// Every operator begins at `state`; none is run.
     pub fn begin_at(&self, start: Start, state: f64, cells: &mut [f64]) {
         for (operator, at) in &self.row {
             let at = self.offset + at;
@@ -197,7 +204,7 @@ impl Row {
         }
     }
 
-    /// Acts on a stretch of the signal.
+    /// Runs the operators in order on a segment of the signal.
     pub fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
         for (operator, at) in &self.row {
             let at = self.offset + at;
@@ -205,7 +212,7 @@ impl Row {
         }
     }
 
-    /// Undoes the row, last first, on a whole record.
+    /// Undoes the operators in reverse order on a whole recording.
     pub fn undo(&self, signal: &mut [f64]) {
         for (operator, _) in self.row.iter().rev() {
             operator.undo(signal);

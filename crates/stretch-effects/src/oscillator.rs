@@ -13,20 +13,25 @@ use crate::{
 /// The numbers of an [`Oscillator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swing {
-    /// Time of a radian of the undamped swing, s: the natural frequency is 1/(2 pi m).
+    /// Inverse of the undamped angular natural frequency, s. The natural frequency is 1/(2 pi m).
     pub m: f64,
     /// Damping ratio, below 1.
     pub damping: f64,
-    /// Damping that grows with the speed, as a fluid's does: m y'' loses drag |y'| y', s over the signal's unit.
+    /// Damping that grows with the speed, as in a fluid: m y'' is reduced by drag |y'| y'; s over the signal's unit.
     pub drag: f64,
-    /// Dry friction, such as a guide's: how far off its rest the mass may stay, in the signal's unit.
+    /// Dry friction, as of a guide: the greatest distance from its rest position at which the mass may stay, in the
+    /// signal's unit.
     pub dry: f64,
 }
 
-/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.5 dry/m)^2), without drag
-/// and dry friction exact for an input that is linear between nodes; these two act for half a step before and after the rest (Strang, doi
-/// 10.1137/0705041). Friction that were dry at any speed would be no function that can be fitted: below half the speed at which the spring
-/// lets the mass go, dry/m, it gives way as a fluid does. Remembers position, velocity and the last input.
+/// A damped second-order oscillator whose foot is moved by the input:
+/// m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.5 dry/m)^2).
+///
+/// Without drag and dry friction the solution is exact for an input that is linear between nodes. Drag and dry friction
+/// each act for half a step before and half a step after the linear part (Strang splitting, doi 10.1137/0705041). A
+/// mass released from a deflection `dry` has the speed scale dry/m. Below half of this speed, dry friction is smoothed
+/// to a viscous force, because a fit needs a continuous function. The memory is the position, the velocity and the
+/// last input.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Oscillator, Span, Start, Swing};
@@ -49,14 +54,15 @@ pub struct Swing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Oscillator {
     swing: Swing,
-    /// Parts of a step: drag and dry friction ask for more than one.
+    /// Number of parts into which a grid step is divided; more than one with drag or dry friction.
     parts: usize,
-    /// For each piece of time: the length of a part, and how position and velocity about the steady response go on.
+    /// For each grid step: the length of a part, and the transition matrix of position and velocity about the steady
+    /// response.
     steps: Vec<(f64, [f64; 4])>,
 }
 
 impl Oscillator {
-    /// Of a natural frequency and a damping ratio on a grid.
+    /// An oscillator on a grid.
     pub fn new(swing: Swing, grid: &Grid) -> Self {
         let Swing { m, damping, .. } = swing;
         let one = |h: f64| (h, turn(m, damping, h));
@@ -66,7 +72,7 @@ impl Oscillator {
     }
 }
 
-/// How a free damped swing goes on over a time `h`: position and velocity from position and velocity.
+/// Returns the transition matrix of position and velocity of a free damped oscillation over a time `h`, row by row.
 pub(crate) fn turn(m: f64, damping: f64, h: f64) -> [f64; 4] {
     let omega = libm::sqrt(1.0 - damping * damping) / m;
     let decay = libm::exp(-damping * h / m);
@@ -74,9 +80,9 @@ pub(crate) fn turn(m: f64, damping: f64, h: f64) -> [f64; 4] {
     [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin].map(|x| decay * x)
 }
 
-/// Position, velocity and last input at the begin of a trial: at rest, or still swinging.
+/// Sets position, velocity and last input at the beginning of a trial: at rest, or still swinging after a short rest.
 fn begin_swing(m: f64, start: Start, first: f64, cells: &mut [f64]) {
-    // A rest of 20 m leaves less than 1 % of a swing of damping 0.25; trials are further apart than that.
+    // A rest of 20 m leaves less than 1 % of an oscillation with damping 0.25. Trials are further apart than that.
     if !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * m) {
         cells[..2].copy_from_slice(&[first, 0.0]);
     }
@@ -106,7 +112,7 @@ impl Operator for Oscillator {
                     slow: SLOW * dry / m,
                 };
                 let slope = rise / h;
-                // The steady response to a ramp trails it by 2 damping m slope.
+                // The steady response to a ramp lags behind the ramp by 2 damping m slope.
                 let trail = 2.0 * damping * m * slope;
                 for part in 0..self.parts {
                     let from = last + part as f64 * rise;
@@ -122,21 +128,22 @@ impl Operator for Oscillator {
     }
 }
 
-/// Parts of a step where there is drag or dry friction.
+/// Number of parts of a grid step with drag or dry friction.
 const PARTS: usize = 2;
 
-/// What drag and dry friction take of a speed in a while.
+/// Reduction of a speed by drag and dry friction over a time t.
 struct Slowed {
-    /// v' = -k |v| v is v/(1 + k |v| t): k t.
+    /// k t, where v' = -k |v| v has the solution v/(1 + k |v| t).
     drag: f64,
-    /// v' = -f v/sqrt(v^2 + slow^2) is v/(1 + f t/sqrt(v^2 + slow^2)), the root that of the beginning: f t.
+    /// f t, where v' = -f v/sqrt(v^2 + slow^2) has the solution v/(1 + f t/sqrt(v^2 + slow^2)), with the square root of
+    /// the start.
     dry: f64,
     slow: f64,
 }
 
 impl Slowed {
     fn speed(&self, speed: f64) -> f64 {
-        // Without both the same bits.
+        // If both are zero, the speed is unchanged to the last bit.
         let dragged =
             if self.drag == 0.0 { speed } else { speed / (1.0 + self.drag * speed.abs()) };
         match self.dry {
@@ -149,9 +156,9 @@ impl Slowed {
     }
 }
 
-/// Greatest dry friction that is looked for, a share of the signal's span.
+/// Greatest dry friction that is searched, as a share of the signal's span.
 const DRY: f64 = 0.1;
-/// Speed below which dry friction gives way, a share of dry/m.
+/// Speed below which dry friction is smoothed, as a share of dry/m.
 const SLOW: f64 = 0.5;
 
 /// A mass on a spring.
@@ -165,7 +172,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
         vec![
             EffectParameter::sized("m_s", "s", 0.0..=e.late_s()),
             EffectParameter::formed("damping", "1", 0.02..=0.95, 0.3).log(),
-            // As much damping at the quickest motion as the ratio can be.
+            // The greatest drag damps the quickest motion like a damping ratio of 1.
             EffectParameter::formed(
                 "drag",
                 "s",
@@ -181,7 +188,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
         Box::new(Oscillator::new(swing, grid))
     },
     sketch: Some(|v, _, signals| {
-        // Two parts of a step, as where there is drag or dry friction.
+        // The step has two parts, as in `Oscillator` with drag or dry friction.
         let part = |from: &str, to: &str, k: usize| {
             format!(
                 "let d{k} = s.speed / (1 + half * abs(s.speed))
@@ -215,7 +222,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             ("DRAG", v[2], "s"),
             ("DRY", v[3], &*signals.x.unit),
             ("W", libm::sqrt(1.0 - v[1] * v[1]) / v[0].max(1e-9), "1/s"),
-            // Not 0 where nothing is dry, because it divides.
+            // Without dry friction this is not 0, because it is a divisor.
             ("SLOW", (SLOW * v[3] / v[0].max(1e-9)).max(1e-150), &*speed),
             ("DT", signals.dt_s, "s"),
         ];
@@ -226,15 +233,16 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// A link behind a flexible joint: a spring and a damper are between the motor's side x and the link's side y,
+/// A link behind a flexible joint. A spring and a damper connect the motor side x and the link side y:
 ///
 /// ```text
 /// m^2 y'' = x - y + 2 damping m (x' - y')
 /// ```
 ///
-/// exact for an input that is linear between nodes: about a ramp the link swings freely. It differs from an
-/// [`Oscillator`](crate::Oscillator), whose damper is between the mass and the ground, by following a ramp without trailing it, and by
-/// passing on more of what is quick. Remembers position, velocity and the last input.
+/// The solution is exact for an input that is linear between nodes, because the deviation from a ramp is a free
+/// oscillation. In an [`Oscillator`](crate::Oscillator) the damper connects the mass to the ground. In contrast, the
+/// link follows a ramp without a lag and passes more of the high frequencies. The memory is the position, the velocity
+/// and the last input.
 ///
 /// Source: Spong 1987, doi:10.1115/1.3143860.
 ///
@@ -252,12 +260,12 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexibleJoint {
     m: f64,
-    /// For each piece of time its length, and how deflection and its rate go on.
+    /// For each grid step: its length, and the transition matrix of the deflection and its rate.
     steps: Vec<(f64, [f64; 4])>,
 }
 
 impl FlexibleJoint {
-    /// Of the time of a radian of the undamped swing, s (the natural frequency is 1/(2 pi m)), and a damping ratio below 1.
+    /// A joint with the time m (s; the natural frequency is 1/(2 pi m)) and a damping ratio below 1.
     pub fn new(m: f64, damping: f64, grid: &Grid) -> Self {
         let steps = grid.steps().iter().map(|&h| (h, turn(m, damping, h))).collect();
         Self { m, steps }

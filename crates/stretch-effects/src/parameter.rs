@@ -1,47 +1,47 @@
-//! A parameter of an effect, and what it is for.
+//! Parameters of an effect and their roles.
 
 use alloc::{borrow::Cow, borrow::ToOwned, vec, vec::Vec};
 use core::ops::RangeInclusive;
 
-/// How a parameter's range is best walked.
+/// Spacing with which a parameter's range is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Scale {
-    /// In equal differences.
+    /// Equal differences.
     Linear,
-    /// In equal ratios.
+    /// Equal ratios.
     Log,
 }
 
-/// What a parameter of an effect is for.
+/// The role of a parameter in an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Role {
-    /// How strong the effect is.
+    /// Strength of the effect.
     Strength {
-        /// Value at which it does nothing.
+        /// Value at which the effect does nothing.
         off: f64,
     },
-    /// A scale or a time constant: what the effect is like at any strength.
+    /// A scale or a time constant, which describes the effect at any strength.
     Shape,
-    /// A freedom of form that measured rigs ask for (a knee's width, a spread of time constants). A simulation takes its
-    /// neutral value, [`EffectParameter::typical`], at which the effect is the plain one; a diagnosis fits it around its usual value and
-    /// does not count it as a parameter of the effect.
+    /// A detail of form that varies between real rigs (a knee's width, a spread of time constants). A simulation uses
+    /// the neutral value, [`EffectParameter::typical`], which gives the plain effect. A diagnosis fits the form around
+    /// its usual value and does not count it as a parameter of the effect.
     Form {
-        /// Value of a usual rig: where the diagnosis starts, and what it has to pay for leaving.
+        /// Value of a usual rig. The diagnosis starts there and penalises deviations from it.
         usual: f64,
     },
-    /// One of a few values (50 or 60 Hz): the diagnosis tries those of the starts.
+    /// One of a few values (50 or 60 Hz). The diagnosis tries the values of the starts and does not fit between them.
     Choice,
-    /// What a record alone can tell (the phase of a hum): no part of a diagnosis' answer.
+    /// A number that only a recording contains (the phase of a hum). It is not part of the result of a diagnosis.
     Found {
-        /// Replaces it if there is no record.
+        /// Value that is used if there is no recording.
         stand_in: f64,
     },
 }
 
 impl Role {
-    /// Its name in listings.
+    /// Returns the name in listings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Strength { .. } => "strength",
@@ -55,8 +55,8 @@ impl Role {
 
 /// A parameter of an effect.
 ///
-/// `strength`, `shape` and `form` make one in a `static`; [`sized`](Self::sized), [`shaped`](Self::shaped) and
-/// [`formed`](Self::formed) from names and units that are known at run time.
+/// `strength`, `shape` and `form` make a parameter in a `static`. [`sized`](Self::sized), [`shaped`](Self::shaped) and
+/// [`formed`](Self::formed) make one from names and units that are known only at run time.
 ///
 /// ```
 /// use stretch_effects::{Form, EffectParameter, Role};
@@ -72,24 +72,25 @@ impl Role {
 pub struct EffectParameter {
     /// Name in files, in reports and on the command line.
     pub name: Cow<'static, str>,
-    /// Unit; `1` when it has none. In the rig's catalogue `strain`, `mm` and `V` are what scales with the stroke.
+    /// Unit; `1` if it has none. In the rig's catalogue, quantities in `strain`, `mm` and `V` scale with the stroke.
     pub unit: Cow<'static, str>,
-    /// Least plausible value: where the search ends.
+    /// Least plausible value: the lower end of the search.
     pub min: f64,
-    /// Greatest plausible value.
+    /// Greatest plausible value: the upper end of the search.
     pub max: f64,
-    /// What it is when it is not given; of a form the neutral value.
+    /// Default value. Of a form made by `form` the neutral value, of one made by `formed`
+    /// the usual value.
     pub typical: f64,
-    /// What it is for.
+    /// Role of the parameter.
     pub role: Role,
-    /// How its range is best walked.
+    /// Spacing with which its range is searched.
     pub scale: Scale,
 }
 
-/// Where a form is neutral, and where a usual rig has it.
+/// The neutral value of a form, and its value in a usual rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Form {
-    /// Value at which the effect is the plain one.
+    /// Value that gives the plain effect.
     pub neutral: f64,
     /// Value of a usual rig.
     pub usual: f64,
@@ -120,7 +121,7 @@ impl EffectParameter {
         Self::strength(name, unit, min, max, typical).with_role(Role::Shape).log()
     }
 
-    /// A form, searched in equal differences from `min` to `max`; its neutral value may lie outside, as a limit.
+    /// A form, searched in equal differences from `min` to `max`. Its neutral value may lie outside this range.
     pub const fn form(
         name: &'static str,
         unit: &'static str,
@@ -132,7 +133,7 @@ impl EffectParameter {
         Self::strength(name, unit, min, max, form.neutral).with_role(role)
     }
 
-    /// A strength that does nothing at 0, searched in equal differences; typically a fifth of its greatest value.
+    /// A strength that is off at 0, searched in equal differences. Its typical value is a fifth of its greatest value.
     pub fn sized(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
         let (min, max) = range.into_inner();
         let role = Role::Strength { off: 0.0 };
@@ -140,42 +141,43 @@ impl EffectParameter {
         Self { name, unit, min, max, typical: 0.2 * max, role, scale: Scale::Linear }
     }
 
-    /// A shape (a time constant, a spread) above 0, searched in equal ratios; typically in their middle.
+    /// A shape (a time constant, a spread) above 0, searched in equal ratios. Its typical value is the geometric mean
+    /// of the ends.
     pub fn shaped(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
         let typical = libm::sqrt(range.start() * range.end());
         Self { typical, ..Self::sized(name, unit, range).with_role(Role::Shape).log() }
     }
 
-    /// A form around its usual value, searched in equal differences.
+    /// A form whose typical value is its usual value, searched in equal differences.
     pub fn formed(name: &str, unit: &str, range: RangeInclusive<f64>, usual: f64) -> Self {
         let role = Role::Form { usual };
         Self { typical: usual, ..Self::sized(name, unit, range).with_role(role) }
     }
 
-    /// The same, off at another value.
+    /// Returns the same parameter as a strength that is off at another value.
     pub const fn off_at(self, off: f64) -> Self {
         self.with_role(Role::Strength { off })
     }
 
-    /// The same in another role.
+    /// Returns the same parameter in another role.
     pub const fn with_role(mut self, role: Role) -> Self {
         self.role = role;
         self
     }
 
-    /// The same, searched in equal ratios.
+    /// Returns the same parameter, searched in equal ratios.
     pub const fn log(mut self) -> Self {
         self.scale = Scale::Log;
         self
     }
 
-    /// The same, searched in equal differences.
+    /// Returns the same parameter, searched in equal differences.
     pub const fn linear(mut self) -> Self {
         self.scale = Scale::Linear;
         self
     }
 
-    /// The same with every value times `unit`, in the unit of that name.
+    /// Returns the same parameter with every value multiplied by `unit`, in the unit of that name.
     pub fn times(&self, unit: f64, name: &str) -> Self {
         let role = match self.role {
             Role::Strength { off } => Role::Strength { off: unit * off },
@@ -186,7 +188,7 @@ impl EffectParameter {
         Self { unit: Cow::Owned(name.to_owned()), min, max, typical, role, ..self.clone() }
     }
 
-    /// Value at which it does nothing; none for what only shapes the effect.
+    /// Returns the value at which the effect does nothing; `None` if the parameter is not a strength.
     pub const fn off(&self) -> Option<f64> {
         match self.role {
             Role::Strength { off } => Some(off),
@@ -194,7 +196,7 @@ impl EffectParameter {
         }
     }
 
-    /// Usual value of what only gives the effect its form (a knee's width, a spread); none of anything else.
+    /// Returns the usual value of a form (a knee's width, a spread); `None` for other roles.
     pub const fn usual_form(&self) -> Option<f64> {
         match self.role {
             Role::Form { usual } => Some(usual),
@@ -202,27 +204,27 @@ impl EffectParameter {
         }
     }
 
-    /// Whether it only gives the effect its form.
+    /// Whether the parameter is a form.
     pub const fn is_form(&self) -> bool {
         matches!(self.role, Role::Form { .. })
     }
 
-    /// Whether it is searched in equal ratios.
+    /// Whether the parameter is searched in equal ratios.
     pub const fn is_log(&self) -> bool {
         matches!(self.scale, Scale::Log)
     }
 
-    /// Whether a fit moves it; otherwise it keeps the value of the start.
+    /// Whether a fit changes the parameter; otherwise it keeps its starting value.
     pub const fn is_fitted(&self) -> bool {
         !matches!(self.role, Role::Choice | Role::Found { .. })
     }
 
-    /// Whether only a record tells it.
+    /// Whether only a recording contains the parameter's value.
     pub const fn is_found(&self) -> bool {
         matches!(self.role, Role::Found { .. })
     }
 
-    /// Where a diagnosis begins: the usual value of a form, else the typical one.
+    /// Returns the value at which a diagnosis begins: the usual value of a form, otherwise the typical value.
     pub const fn usual(&self) -> f64 {
         match self.role {
             Role::Form { usual } => usual,
@@ -230,7 +232,7 @@ impl EffectParameter {
         }
     }
 
-    /// Values that make sense: the range, as far as to the neutral value of a form.
+    /// Returns the range of valid values: from `min` to `max`, extended to the typical value of a form.
     pub fn allowed(&self) -> RangeInclusive<f64> {
         match self.role {
             Role::Form { .. } => self.min.min(self.typical)..=self.max.max(self.typical),
@@ -238,12 +240,14 @@ impl EffectParameter {
         }
     }
 
-    /// Values to screen at:
+    /// Returns the values to screen at:
     ///
-    /// - a strength: a fiftieth and a fifth of its range, of both signs if it has both;
-    /// - a threshold, which is off elsewhere than at 0: a twentieth, a fifth, three fifths and nine tenths of the way from there, because it
-    ///   may reach the signal only near the other end;
-    /// - a shape, and a strength that is searched in equal ratios: a sixth, a half and five sixths of its range;
+    /// - a strength that is off at 0: 2 % and 20 % of each end of its range that is not 0;
+    /// - a strength that is off at another value (a threshold): 5 %, 20 %, 60 % and 90 % of the way from there to each
+    ///   end, because a threshold may reach the signal only near the other end;
+    /// - a shape, and a positive strength that is searched in equal ratios and is off at 0: 1/6, 1/2 and 5/6 of its
+    ///   range;
+    /// - a choice or a found number: 1/6, 1/2 and 5/6 of its range;
     /// - a form: its usual value.
     ///
     /// ```
@@ -260,7 +264,7 @@ impl EffectParameter {
         };
         let off = match self.role {
             Role::Form { usual } => return vec![usual],
-            // What is searched in equal ratios never gets to 0.
+            // A search in equal ratios never reaches 0.
             Role::Strength { off } if off != 0.0 || !self.is_log() || self.min <= 0.0 => off,
             _ => return [1.0, 3.0, 5.0].map(between).into(),
         };
@@ -269,7 +273,7 @@ impl EffectParameter {
         ends.flat_map(|end| shares.iter().map(move |s| off + s * (end - off))).collect()
     }
 
-    /// Every combination of the parameters' [`points`](Self::points).
+    /// Returns every combination of the parameters' [`points`](Self::points).
     ///
     /// ```
     /// use stretch_effects::EffectParameter;
@@ -286,14 +290,15 @@ impl EffectParameter {
         })
     }
 
-    /// A start whose last values were left out, filled up: forms with their usual value, strengths off.
+    /// Completes a starting point whose last values were left out: strengths are off, other parameters have their usual
+    /// values.
     pub fn complete(parameters: &[Self], mut start: Vec<f64>) -> Vec<f64> {
         let rest = parameters.iter().skip(start.len());
         start.extend(rest.map(|p| p.off().unwrap_or(p.usual())));
         start
     }
 
-    /// Whether these values do nothing: every strength is at its off value.
+    /// Whether every strength is at its off value, so that the effect does nothing.
     pub fn are_off(parameters: &[Self], values: &[f64]) -> bool {
         parameters.iter().zip(values).all(|(p, v)| p.off().is_none_or(|off| *v == off))
     }

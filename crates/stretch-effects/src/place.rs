@@ -1,4 +1,4 @@
-//! Where an effect acts in a rig, and what it may need to know of its surroundings.
+//! Places in a rig at which effects act, and the properties of the rig that effects need.
 
 use alloc::boxed::Box;
 use core::fmt;
@@ -12,14 +12,14 @@ use crate::{
     skew::SkewSpec,
 };
 
-/// A stage of the rig: what is simulated alone on a measured input.
+/// A stage of the rig: a part that is simulated alone on a measured input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum RigStage {
-    /// Openings to pressure.
+    /// Valve openings to pressure.
     Pneumatics,
     /// Pressure to length.
     Muscle,
-    /// Openings to length, both of the above as one.
+    /// Valve openings to length: both stages above as one.
     Actuation,
     /// Length (and pressure, for cross-talk) to bridge voltage.
     Sensing,
@@ -28,11 +28,11 @@ pub enum RigStage {
 }
 
 impl RigStage {
-    /// All of them.
+    /// All stages.
     pub const ALL: [Self; 5] =
         [Self::Pneumatics, Self::Muscle, Self::Actuation, Self::Sensing, Self::Reference];
 
-    /// Its name in files and reports.
+    /// Name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pneumatics => "pneumatics",
@@ -43,7 +43,8 @@ impl RigStage {
         }
     }
 
-    /// Whether an effect or a parameter of the stage `other` acts in it: `actuation` holds `pneumatics` and `muscle`.
+    /// Whether an effect or a parameter of the stage `other` acts in this stage: `actuation` holds `pneumatics` and
+    /// `muscle`.
     pub fn holds(self, other: Self) -> bool {
         self == other
             || (self == Self::Actuation && matches!(other, Self::Pneumatics | Self::Muscle))
@@ -59,9 +60,9 @@ impl fmt::Display for RigStage {
 /// The place in a rig at which a kind acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Static contraction of the muscle, before its lag.
+    /// Static contraction of the muscle, before the muscle's lag.
     StaticContraction,
-    /// Moving contraction, behind the lag.
+    /// Contraction of the muscle, after the muscle's lag.
     MovingContraction,
     /// Gauge strain.
     Strain,
@@ -69,19 +70,19 @@ pub enum Place {
     Resistance,
     /// Amplified voltage.
     Volts,
-    /// When the bridge is sampled: a skew in seconds and its rate.
+    /// Sampling times of the bridge: a skew in seconds and its rate.
     Sampling,
     /// Recorded samples of the bridge, after a skew.
     Record,
-    /// Length as the reference sees it.
+    /// Length before the reference measures it.
     Length,
 }
 
-/// Strain of the stroke of the catalogue's rig.
+/// Strain over the full stroke of the catalogue's rig.
 const STROKE: f64 = 0.2;
 
 impl Place {
-    /// A kind that acts here.
+    /// Returns the action of a kind at this place.
     pub(crate) fn action(self, kind: &Kind, values: &[f64], around: &Surroundings<'_>) -> Action {
         if self == Self::Sampling {
             return Action::Skew(SkewSpec { skew_s: values[0], rate: values[1], empty: 0.0 });
@@ -90,7 +91,7 @@ impl Place {
         Action::At(self, operator)
     }
 
-    /// How far the signal goes here.
+    /// Returns the range of the signal at this place.
     pub(crate) fn extent(self, around: &Surroundings<'_>) -> Extent {
         let strain = around.strain_scale;
         match self {
@@ -102,7 +103,7 @@ impl Place {
                 beside: [strain - STROKE * around.strain_unit, strain],
                 ..Extent::between(around.resistance_zero, 2.0 * around.resistance_zero)
             },
-            // Where a voltage ends only an effect on it says.
+            // A voltage has no bounds here; only an effect on it (saturation) sets them.
             Self::Volts | Self::Sampling | Self::Record => {
                 Extent::between(f64::NEG_INFINITY, f64::INFINITY)
             }
@@ -112,7 +113,7 @@ impl Place {
         }
     }
 
-    /// What goes into the code of a kind here.
+    /// Returns the signals in the code of a kind at this place.
     pub(crate) fn signals(self, around: &Surroundings<'_>) -> Signals {
         let x = match self {
             Self::StaticContraction => STATIC,
@@ -135,40 +136,42 @@ impl Place {
 /// Contraction before the lag of the muscle.
 const STATIC: Quantity =
     Quantity::new("x", "1", "static contraction k_s, before the lag of the muscle");
-/// Contraction behind it.
+/// Contraction after the lag.
 const MOVING: Quantity = Quantity::new("x", "1", "contraction k, behind the lag of the muscle");
 
-/// What an effect may need to know of the rig it acts in.
+/// Properties of the rig that effects in it need.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
-    /// Steps of time.
+    /// Grid of integration steps.
     pub grid: &'a Grid,
-    /// Strain that is used as e0: the pre-stretch, 1 for a gauge alone.
+    /// Strain that is used as e0: the pre-stretch; 1 for a gauge without its rig.
     pub strain_scale: f64,
-    /// Stroke of the strain, for what begins as a move left it: (1 + e0) k_max, 1 for a gauge alone.
+    /// Stroke of the strain, which scales the state that an unrecorded motion leaves: (1 + e0) k_max; 1 for a gauge
+    /// without its rig.
     pub strain_stroke: f64,
     /// Stroke of the contraction: k_max.
     pub contraction_stroke: f64,
-    /// Resistance at zero strain: R0, 1 for a gauge alone.
+    /// Resistance at zero strain: R0; 1 for a gauge without its rig.
     pub resistance_zero: f64,
-    /// Length (or reference) at which y = 0.
+    /// Length (or reference) at which the normalised length y is 0.
     pub length_zero: f64,
     /// Change of the length (or reference) from y = 0 to y = 1, with its sign.
     pub length_span: f64,
     /// Reference pressure, kPa.
     pub pressure_scale_kpa: f64,
-    /// What one unit of strain of the catalogue is in the signal: 1, or its share of the range for a gauge alone.
+    /// One unit of strain of the catalogue, in the unit of the signal: 1 in a rig. For a gauge without its rig, 1 over
+    /// the strain of the stroke.
     pub strain_unit: f64,
-    /// Share of the conductance of a barely open valve.
+    /// Conductance of a barely open valve, as a share of the full conductance.
     pub least_opening: f64,
 }
 
 impl<'a> Surroundings<'a> {
-    /// Strokes of the rig in its own units, which the ranges of its catalogue are divided by for a gauge alone: strain, mm and V for the
-    /// whole stroke.
+    /// Full strokes of the rig in strain, mm and V. For a gauge without its rig, the ranges of the rig's catalogue are
+    /// divided by these strokes.
     pub const STROKES: [(&'static str, f64); 3] = [("strain", STROKE), ("mm", 30.0), ("V", 1.07)];
 
-    /// Those of a gauge alone, in units of its range and its span.
+    /// Properties of a gauge without its rig, in units of its range and its span.
     pub fn of_gauge(pressure_scale: Option<f64>, grid: &'a Grid) -> Self {
         Self {
             grid,
@@ -184,7 +187,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// A signal of the rig, or the signal that replaces it in a gauge alone.
+    /// Returns a signal of the rig, or the signal that replaces it for a gauge without its rig.
     fn signal(&self, rig: (&'static str, &'static str), alone: &'static str) -> Quantity {
         match self.strain_unit == 1.0 {
             true => Quantity::new("x", rig.0, rig.1),
@@ -192,74 +195,75 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// What effects on the strain act on.
+    /// The signal on which effects on the strain act.
     pub(crate) fn strain(&self) -> Quantity {
         let rig = ("strain", "gauge strain e, before the resistance");
         self.signal(rig, "e = (reference - zero)/span")
     }
 
-    /// The strain where an effect on the resistance needs it.
+    /// The strain as the second signal of effects on the resistance.
     fn strain_beside(&self) -> Quantity {
         let meaning = "gauge strain e, as the effects on it leave it".into();
         Quantity { name: "e", meaning, ..self.strain() }
     }
 
-    /// What effects on the resistance act on.
+    /// The signal on which effects on the resistance act.
     fn resistance(&self) -> Quantity {
         let rig = ("ohm", "resistance R of the gauge, before the bridge");
         self.signal(rig, "1 + e, where the signal is offset + gain e")
     }
 
-    /// What effects on the voltage act on.
+    /// The signal on which effects on the voltage act.
     fn volts(&self) -> Quantity {
         self.signal(("V", "amplified voltage v"), "(signal - offset)/gain")
     }
 
-    /// What effects on recorded samples act on.
+    /// The signal on which effects on recorded samples act.
     fn record(&self) -> Quantity {
         let rig = ("V", "amplified voltage, sample by sample, before it is recorded");
         self.signal(rig, "(signal - offset)/gain, sample by sample, before it is recorded")
     }
 
-    /// What effects on the reference act on.
+    /// The signal on which effects on the reference act.
     fn length(&self) -> Quantity {
         let rig = ("mm", "true length, before the reference shows it");
         self.signal(rig, "e as it is, before the reference shows it")
     }
 }
 
-/// Where and how an effect acts, once its values are known.
+/// Place and operation of an effect with known values.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Action {
-    /// Nowhere.
+    /// No action.
     Nothing,
-    /// Openings act later, s.
+    /// Delay of the valve openings, s.
     Delay(f64),
-    /// Commanded openings of inlet and outlet, sample by sample, before the least conductance.
+    /// Operators on the commanded openings of inlet and outlet, sample by sample, before the least conductance is
+    /// applied.
     Commands([Box<dyn Operator>; 2]),
-    /// The supply gives way to the flow.
+    /// Drop of the supply pressure under flow.
     Droop(Box<dyn Droop>),
-    /// Gauge pressure (Pa) to a mass flow out of the chamber (kg/s).
+    /// Leak: gauge pressure (Pa) to a mass flow out of the chamber (kg/s).
     Leak(Box<dyn Law>),
-    /// k/k_max to V/V0.
+    /// Volume of the chamber: k/k_max to V/V0.
     Volume(Box<dyn Law>),
-    /// On the signal at a place: of a resistance the span holds the strain.
+    /// Operator on the signal at a place. For a resistance, the span holds the strain.
     At(Place, Box<dyn Operator>),
-    /// Samples of the bridge show the voltage of some time earlier.
+    /// Sampling of the bridge: samples show the voltage of an earlier time.
     Skew(SkewSpec),
 }
 
 /// A memoryless law y = f(x).
 pub trait Law: fmt::Debug + Send + Sync {
-    /// Its value at `x`.
+    /// Returns the value at `x`.
     fn at(&self, x: f64) -> f64;
 }
 
-/// A pressure that the supply loses to the flow drawn from it: y' = rate(y, flow).
+/// A pressure drop of the supply under the flow drawn from it: y' = rate(y, flow).
 pub trait Droop: fmt::Debug + Send + Sync {
-    /// Rate of the droop, Pa/s, at the droop y (Pa) and the flow through the inlet (kg/s).
+    /// Returns the rate of the droop, Pa/s, at the droop y (Pa) and the flow through the inlet (kg/s).
     fn rate(&self, droop_pa: f64, flow_kg_s: f64) -> f64;
-    /// What is left of it after `rest_s` seconds without flow.
+    /// Returns the droop that remains after `rest_s` seconds without flow.
     fn relaxed(&self, droop_pa: f64, rest_s: f64) -> f64;
 }

@@ -1,4 +1,4 @@
-//! Play: a part that follows once its backlash is used up.
+//! Play (backlash): the output follows only after the input has crossed a gap.
 
 use alloc::{boxed::Box, vec, vec::Vec};
 
@@ -14,10 +14,10 @@ use crate::{
     sketch::Sketch,
 };
 
-/// Backlash as an operator: y = play(x, w), or the mean of play(x, w {1 - spread, 1, 1 + spread}), which turns softly.
+/// Backlash: y = play(x, w), or the mean of play(x, w {1 - spread, 1, 1 + spread}), which has soft reversals.
 ///
-/// [`Operator::undo`] hands back an input that would have made a recorded output: exact while the output moves, led over
-/// linearly while it dwells (of a soft one, as if it were hard).
+/// [`Operator::undo`] returns an input that would have produced a recorded output. It is exact while the output moves.
+/// While the output dwells, the input is interpolated linearly. A soft backlash is treated as a hard one.
 ///
 /// ```
 /// use stretch_effects::{Backlash, Grid, Operator, Span, Start};
@@ -32,7 +32,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backlash {
     w: f64,
-    /// A mean of plays is a Prandtl-Ishlinskii operator of share 1.
+    /// A mean of plays is a Prandtl-Ishlinskii operator with a share of 1.
     soft: Option<PrandtlIshlinskii>,
 }
 
@@ -42,7 +42,7 @@ impl Backlash {
         Self { w, soft: None }
     }
 
-    /// Three plays around the half-width `w`, from `1 - spread` to `1 + spread` of it; hard at a spread of 0.
+    /// Three plays with half-widths from `w (1 - spread)` to `w (1 + spread)`; a spread of 0 gives one play.
     pub fn soft(w: f64, spread: f64) -> Self {
         let radii = [w * (1.0 - spread), w, w * (1.0 + spread)];
         Self { w, soft: (spread != 0.0).then(|| PrandtlIshlinskii::of_radii(1.0, radii)) }
@@ -78,7 +78,7 @@ impl Operator for Backlash {
     }
 }
 
-/// Play of a half-width, or three around it.
+/// A play of one half-width, or three plays around it.
 pub static BACKLASH: Kind = Kind {
     name: "backlash",
     title: "backlash",
@@ -111,7 +111,7 @@ pub static BACKLASH: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The sleeve slips on the muscle.
+/// Slip of the sleeve on the muscle.
 pub(crate) static SLEEVE_SLIP: Effect = Effect {
     name: "sleeve_slip",
     title: "the sleeve's slip",
@@ -138,7 +138,7 @@ pub(crate) static SLEEVE_SLIP: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// The potentiometer has backlash. A diagnosed calibration undoes it in the reference that it is fitted to.
+/// Backlash of the potentiometer. A calibration built on a diagnosis undoes it in the reference to which it is fitted.
 pub(crate) static POT_BACKLASH: Effect = Effect {
     name: "pot_backlash",
     title: "the potentiometer's backlash",
@@ -159,11 +159,12 @@ pub(crate) static POT_BACKLASH: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Replaces the output of a backlash of half-width `w` by an input that would have made it.
+/// Replaces the output of a backlash of half-width `w` by an input that would have produced it.
 ///
-/// While the output moves, the input is w ahead of it. After each turn the output dwells at its extreme while
-/// the input crosses the play; there the input is unknown and is led over linearly. Turns and dwells are detected with a
-/// band of w/10 (at least a millionth of the record's range): the record has to be smoother than that.
+/// While the output moves, the input is ahead of it by w. After each reversal the output dwells at its extreme while
+/// the input crosses the gap. The input is unknown there and is interpolated linearly. Reversals and dwells are
+/// detected with a band of w/10 (at least a millionth of the signal's range), so the noise of the signal must be
+/// smaller than this band.
 pub(crate) fn unplay(w: f64, signal: &mut [f64]) {
     let (low, high) = signal.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let band = (0.1 * w).max(1e-6 * (high - low));
@@ -171,7 +172,7 @@ pub(crate) fn unplay(w: f64, signal: &mut [f64]) {
         return;
     }
     let turns = turns(signal, band);
-    // Ahead of the output by how much, at the last turn.
+    // Distance by which the input is ahead of the output at the last reversal.
     let mut ahead = 0.0;
     for (n, turn) in turns.iter().enumerate() {
         let end = turns.get(n + 1).map_or(signal.len(), |next| next.at);
@@ -186,13 +187,13 @@ pub(crate) fn unplay(w: f64, signal: &mut [f64]) {
     }
 }
 
-/// A sample at which a move begins, and its direction: +1 up, -1 down, 0 for a record that never moves.
+/// A sample at which a move begins, and its direction: +1 up, -1 down, 0 if the signal never moves.
 struct Turn {
     at: usize,
     direction: f64,
 }
 
-/// Extremes between moves of more than `band`; the first is at the record's start.
+/// Finds the extremes between moves of more than `band`; the first entry is the signal's start.
 fn turns(signal: &[f64], band: f64) -> Vec<Turn> {
     let mut turns = alloc::vec![Turn { at: 0, direction: 0.0 }];
     let mut extreme = 0;
@@ -240,7 +241,7 @@ mod tests {
             libm::sqrt(sum / 2e3)
         };
         assert!(rms(&found) < 0.2 * rms(&output), "{} of {}", rms(&found), rms(&output));
-        // Away from the turns it is exact.
+        // Away from the reversals the result is exact.
         assert_relative_eq!(found[1000], input[1000], epsilon = 0.0, max_relative = F64_ROUNDING);
         let mut still = [3.0; 10];
         unplay(w, &mut still);

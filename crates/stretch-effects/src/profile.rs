@@ -1,4 +1,4 @@
-//! Limits of the rate, of the acceleration and of the jerk with which a command is followed.
+//! Limits of the rate, the acceleration and the jerk with which a servo follows a command.
 
 use alloc::{boxed::Box, format, string::String, vec};
 
@@ -11,7 +11,7 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// Bounds the rate: y goes towards x by at most rate h in a step of length h. Remembers y.
+/// A limit of the rate: y moves towards x by at most rate h in a step of length h. The memory is y.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, SlewLimit, Span, Start};
@@ -38,7 +38,7 @@ impl Operator for SlewLimit {
         span.each(signal.len(), |step, i| {
             let most = step.map_or(f64::INFINITY, |step| self.rate * span.grid.steps()[step]);
             let apart = signal[i] - y;
-            // Within reach it is the value itself, to the last bit.
+            // Within reach the output equals the input to the last bit.
             y = if apart.abs() <= most { signal[i] } else { y + most.copysign(apart) };
             signal[i] = y;
         });
@@ -46,14 +46,14 @@ impl Operator for SlewLimit {
     }
 }
 
-/// A greatest rate.
+/// A limit of the rate.
 pub static SLEW_LIMIT: Kind = Kind {
     name: "slew_limit",
     title: "a limit of the rate",
     words: "it cannot change faster than a rate",
     equation: "|y'| <= rate, y follows x",
     usual: &[Side::Input, Side::Output],
-    // At twice the quickest change that was seen nothing is limited.
+    // A rate of twice the quickest change seen limits nothing.
     parameters: |e, unit| {
         let off = 2.0 * e.quickest.max(1e-9 * e.span() / e.dt_s);
         vec![EffectParameter::sized("rate", &format!("{unit}/s"), 0.01 * off..=off).off_at(off)]
@@ -75,14 +75,14 @@ pub static SLEW_LIMIT: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The trapezoid profile of a servo: y goes to x as quickly as |y'| <= rate and |y''| <= acceleration allow, and brakes in time to stop
-/// there. In steps of length h the greatest speed from which it stops within d is
+/// The trapezoid profile of a servo: y moves to x as quickly as |y'| <= rate and |y''| <= acceleration allow, and
+/// brakes in time to stop there. In steps of length h, the greatest speed from which it can stop within a distance d is
 ///
 /// ```text
 /// v = a h/2 (sqrt(1 + 8 d/(a h^2)) - 1)
 /// ```
 ///
-/// so that it arrives without a rest. Remembers y and its speed.
+/// With this speed it reaches the target exactly. The memory is y and its speed.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Profile, Span, Start};
@@ -123,7 +123,7 @@ impl Operator for Profile {
                 let wanted = stops.min(d / h).min(self.rate).copysign(apart);
                 let (low, high) = (v - a * h, v + a * h);
                 v = wanted.max(low).min(high);
-                // Where it arrives it is the value itself, to the last bit.
+                // On arrival the output equals the command to the last bit.
                 y = if v == apart / h { signal[i] } else { y + v * h };
             }
             signal[i] = y;
@@ -132,9 +132,10 @@ impl Operator for Profile {
     }
 }
 
-/// The S profile of a servo: the [`MovingMean`] of a [`Profile`] over a time T. A move from rest to rest of a way d has seven segments and
-/// takes d/rate + rate/acceleration + T where it reaches the rate, 2 sqrt(d/acceleration) + T where it does not. Rate and acceleration have the
-/// limits of the profile; the jerk has the limit acceleration/T, twice that where the acceleration turns within T.
+/// The S profile of a servo: the [`MovingMean`] of a [`Profile`] over a time T. A move over a distance d from rest to
+/// rest has seven segments. It takes d/rate + rate/acceleration + T if it reaches the rate, otherwise 2
+/// sqrt(d/acceleration) + T. Rate and acceleration have the limits of the profile. The jerk is limited to
+/// acceleration/T, or to twice that if the acceleration changes sign within T.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Profile, SProfile, Span, Start};
@@ -154,7 +155,8 @@ pub struct SProfile {
 }
 
 impl SProfile {
-    /// Of a trapezoid and the time over which its corners are rounded, s; at 0 it is the trapezoid to the last bit.
+    /// An S profile from a trapezoid and the time over which its corners are rounded, s. A time of 0 gives the
+    /// trapezoid to the last bit.
     pub fn new(grid: &Grid, profile: Profile, round_s: f64) -> Self {
         Self { profile, mean: MovingMean::new(grid, round_s) }
     }
@@ -178,7 +180,7 @@ impl Operator for SProfile {
     }
 }
 
-/// A step of a trapezoid profile towards a command, with the names of its place and its speed.
+/// Returns the code of one step of a trapezoid profile towards a command, with the given names of position and speed.
 fn follows(command: &str, at: &str, speed: &str, k: &str) -> String {
     format!(
         "let apart{k} = {command} - s.{at}
@@ -203,7 +205,8 @@ fn trapezoid(v: &[f64], signals: &Signals) -> Sketch {
     )
 }
 
-/// With a second trapezoid that follows the command of a time T ago, so that the mean over T goes on by what comes in less what leaves.
+/// Writes the code with a second trapezoid that follows the command of a time T ago. The mean over T is then updated by
+/// the value that enters minus the value that leaves.
 fn rounded(v: &[f64], signals: &Signals) -> Sketch {
     let (samples, unit) = (v[2] / signals.dt_s, &signals.x.unit);
     let whole = libm::floor(samples);
@@ -233,7 +236,7 @@ fn rounded(v: &[f64], signals: &Signals) -> Sketch {
     limits(sketch, v, signals).with_all(&[("WHOLE", whole, "1"), ("SHARE", samples - whole, "1")])
 }
 
-/// The same with the limits and the sample time.
+/// Adds the limits and the sample time.
 fn limits(sketch: Sketch, v: &[f64], signals: &Signals) -> Sketch {
     let unit = &signals.x.unit;
     let units = [format!("{unit}/s^2"), format!("{unit}/s")];
@@ -251,7 +254,7 @@ pub static PROFILE: Kind = Kind {
     words: "a servo follows its command with a greatest rate and a greatest acceleration (trapezoid profile, S profile where corners are rounded)",
     equation: "y = mean of p over the last round_s; |p''| <= acceleration, |p'| <= rate, p goes to x and stops there",
     usual: &[Side::Input],
-    // At an acceleration that turns the quickest possible change within a sample nothing is limited.
+    // The acceleration that makes and stops the quickest possible change within a sample limits nothing.
     parameters: |e, unit| {
         let (slow, dt) = (SLOWEST * e.late_s(), e.dt_s);
         let span = e.span().max(f64::MIN_POSITIVE);
@@ -261,12 +264,13 @@ pub static PROFILE: Kind = Kind {
                 .off_at(off)
                 .log(),
             EffectParameter::shaped("rate", &format!("{unit}/s"), span / slow..=span / dt),
-            // The jerk's limit is acceleration/round_s.
+            // The limit of the jerk is acceleration/round_s.
             EffectParameter::formed("round_s", "s", 0.0..=e.late_s(), 0.0),
         ]
     },
     starts: Some(|e| {
-        // So long a way from end to end takes, with and without a stretch at the greatest rate.
+        // `takes` is the time of a move over the whole range, without (share 1) and with (share 0.5) a segment at the
+        // greatest rate.
         let of = |takes: f64, share: f64| {
             let (a, v) = (4.0 * e.span() / (takes * takes), 2.0 * e.span() / takes);
             vec![a / share, v * share, 0.0]
@@ -290,7 +294,7 @@ pub static PROFILE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Longest way from end to end, in longest delays.
+/// Longest time of a move over the whole range, as a multiple of the longest delay that is searched.
 const SLOWEST: f64 = 10.0;
 
 #[cfg(test)]

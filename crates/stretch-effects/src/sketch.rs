@@ -1,18 +1,19 @@
-//! An operator as users would type it into their own simulator: in C, Python or MATLAB, a dozen lines with the state in sight.
+//! Sketches: operators as code that users can type into their own simulator in C, Python or MATLAB, with explicit
+//! state.
 
 use alloc::{borrow::Cow, format, string::String, vec, vec::Vec};
 use core::fmt;
 
-/// What goes into an operator, or comes out of it.
+/// An input or output of an operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     /// Name in the code.
     pub name: &'static str,
     /// Unit.
     pub unit: Cow<'static, str>,
-    /// What it is.
+    /// Meaning.
     pub meaning: Cow<'static, str>,
-    /// Whether it is a whole record, one value a sample.
+    /// Whether the quantity is a whole recording with one value a sample.
     pub is_record: bool,
 }
 
@@ -26,23 +27,23 @@ impl Quantity {
     /// Time since the session began.
     pub const SESSION_TIME: Self = Self::new("t", "s", "time since the session began");
 
-    /// What loads a contact.
+    /// The signal that loads a contact.
     pub const LOAD: Self = Self::new("load", "1", "what loads the contact");
 
-    /// How many samples a record has.
+    /// The number of samples of a recording.
     pub const COUNT: Self = Self::new("n", "1", "how many samples it has");
 
-    /// The same by another name.
+    /// Returns the same quantity under another name.
     pub fn named(self, name: &'static str) -> Self {
         Self { name, ..self }
     }
 
-    /// The same as a whole record.
+    /// Returns the same quantity as a whole recording.
     pub fn record(self) -> Self {
         Self { is_record: true, ..self }
     }
 
-    /// What comes out where it went in.
+    /// Returns the output that replaces this input.
     fn behind(&self) -> Self {
         let meaning = Cow::Borrowed("what goes on in its place");
         Self { name: "y", unit: self.unit.clone(), meaning, is_record: false }
@@ -58,7 +59,7 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// A number of an operator.
+/// A constant of an operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
     /// Name in the code.
@@ -69,21 +70,22 @@ pub struct Constant {
     pub unit: String,
 }
 
-/// A number that an operator remembers.
+/// A value that an operator remembers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// Name in the code.
     pub name: &'static str,
     /// Unit.
     pub unit: Cow<'static, str>,
-    /// What it begins at: a number, or an input.
+    /// Initial value: a number, or the name of an input.
     pub begins: &'static str,
 }
 
-/// An operator, written in the one notation from which its code is written.
+/// An operator in a notation from which code in three languages is generated.
 ///
-/// A line of `body` is `let n = ...`, `var n = ...`, `n = ...`, `if ...`, `else` or `end`; functions are those that C, Python and
-/// MATLAB share, `s.n` is a state and `v[i]` the sample i, from 0, of a record. The output is called `y`.
+/// A line of `body` is `let n = ...`, `var n = ...`, `n = ...`, `if ...`, `else` or `end`. Functions are those that C,
+/// Python and MATLAB share. `s.n` is a state, and `v[i]` is sample i of a recording, counted from 0. The output is
+/// called `y`.
 ///
 /// ```
 /// use stretch_effects::{Language, Quantity, Sketch};
@@ -94,54 +96,54 @@ pub struct Cell {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sketch {
-    /// What goes in, the signal first.
+    /// Inputs, the signal first.
     pub inputs: Vec<Quantity>,
-    /// What comes out.
+    /// Output.
     pub output: Quantity,
-    /// Its numbers.
+    /// Constants.
     pub constants: Vec<Constant>,
-    /// What it remembers; empty where it remembers nothing.
+    /// State; empty if the operator remembers nothing.
     pub state: Vec<Cell>,
-    /// What it does with a sample.
+    /// Statements that process one sample.
     pub body: String,
 }
 
 impl Sketch {
-    /// What changes a signal, so far without numbers and memory.
+    /// A sketch that changes a signal, without constants and state.
     pub fn of(signal: Quantity, body: impl Into<String>) -> Self {
         let (output, inputs) = (signal.behind(), vec![signal]);
         Self { inputs, output, constants: Vec::new(), state: Vec::new(), body: body.into() }
     }
 
-    /// The same with an input more.
+    /// Adds an input.
     pub fn beside(mut self, input: Quantity) -> Self {
         self.inputs.push(input);
         self
     }
 
-    /// The same with another output than the signal's successor.
+    /// Replaces the output.
     pub fn giving(self, output: Quantity) -> Self {
         Self { output, ..self }
     }
 
-    /// The same with a number more.
+    /// Adds a constant.
     pub fn with(mut self, name: &'static str, value: f64, unit: &str) -> Self {
         self.constants.push(Constant { name, value, unit: unit.into() });
         self
     }
 
-    /// The same with numbers more.
+    /// Adds several constants.
     pub fn with_all(self, all: &[(&'static str, f64, &str)]) -> Self {
         all.iter().fold(self, |sketch, &(name, value, unit)| sketch.with(name, value, unit))
     }
 
-    /// The same with cells of its signal's unit that begin at the first sample.
+    /// Adds state values in the unit of the signal that begin at the first sample.
     pub fn remembering<const N: usize>(self, names: [&'static str; N]) -> Self {
         let (unit, begins) = (self.inputs[0].unit.clone(), self.inputs[0].name);
         self.cells(names, unit, begins)
     }
 
-    /// The same with cells of one unit and one beginning.
+    /// Adds state values with the same unit and initial value.
     pub fn cells<const N: usize>(
         mut self,
         names: [&'static str; N],
@@ -153,7 +155,7 @@ impl Sketch {
         self
     }
 
-    /// The same where the input called `name` is the signal itself.
+    /// Replaces the input called `name` by the signal itself.
     pub fn beside_itself(mut self, name: &str) -> Self {
         let signal = self.inputs[0].name;
         self.inputs.retain(|q| q.name != name);
@@ -162,13 +164,13 @@ impl Sketch {
         self
     }
 
-    /// The same with a line more, behind which `y` has to be a `var`.
+    /// Appends a line to the body. If the line changes `y`, the body must declare `y` as a `var`.
     pub fn then(mut self, line: &str) -> Self {
         self.body = format!("{}\n{line}", self.body);
         self
     }
 
-    /// The initial state in words; `None` if there is no state.
+    /// Describes the initial state in words; `None` if there is no state.
     ///
     /// ```
     /// use stretch_effects::{Extent, Quantity, Signals, kind_named};

@@ -1,4 +1,4 @@
-//! Samples that show a signal of some time earlier or later, and clocks that drift.
+//! Delays, time offsets between channels, and clocks that drift.
 
 use alloc::{boxed::Box, format, vec};
 
@@ -12,19 +12,21 @@ use crate::{
     sketch::{Quantity, Sketch},
 };
 
-/// By how much samples are late.
+/// The time by which samples are late.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SkewSpec {
-    /// At the trial's start, s.
+    /// Delay at the trial's start, s.
     pub skew_s: f64,
-    /// How much later they get, s/s: two clocks that part.
+    /// Growth of the delay, s/s, as between two clocks of different rates.
     pub rate: f64,
-    /// Share of the first value that is not there yet before it arrives: 0 where it is held from before, 1 where a line is empty.
+    /// Initial condition: before the first value arrives, the output is `1 - empty` times that value. At 0 the first
+    /// value is held; at 1 the output is zero.
     pub empty: f64,
 }
 
-/// Reads a signal `skew_s + rate t` before every sample, t since the trial began, by cubics through four nodes (Lagrange). The last value
-/// is held beyond the end, the share `1 - empty` of the first value before the beginning. Next to an end the cubic becomes a line.
+/// Reads a signal at the time `skew_s + rate t` before every sample, with t since the trial began. It interpolates with
+/// cubics through four nodes (Lagrange), and linearly next to an end. After the end the last value is held. Before the
+/// start the output is `1 - empty` times the first value.
 ///
 /// ```
 /// use stretch_effects::{Grid, Skew, SkewSpec};
@@ -41,24 +43,24 @@ pub struct Skew {
     at_start: Reading,
 }
 
-/// How one sample is read from the nodes.
+/// How the value of one sample is interpolated from the nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Reading {
-    /// Node before the moment, relative to the sample's own.
+    /// Node before the reading time, relative to the sample's own node.
     offset: isize,
-    /// Weights of that node's predecessor, the node, and the two after it.
+    /// Weights of the node before that one, the node itself, and the two nodes after it.
     weights: [f64; 4],
-    /// Share of the way from the node to the next.
+    /// Position of the reading time between the node and the next one, from 0 to 1.
     share: f64,
 }
 
 impl Skew {
-    /// Of samples of a grid.
+    /// A skew for the samples of a grid.
     pub fn new(grid: &Grid, spec: SkewSpec) -> Self {
         Self { grid: grid.clone(), spec, at_start: Reading::new(grid, spec.skew_s) }
     }
 
-    /// Fills the samples from a value at every node.
+    /// Computes the samples from a value at every node.
     pub fn sample(&self, nodes: &[f64], samples: &mut [f64]) {
         let pieces = self.grid.pieces();
         if nodes.is_empty() {
@@ -77,7 +79,7 @@ impl Skew {
     }
 }
 
-/// On samples of a whole trial.
+/// Expects the samples of a whole trial.
 impl Operator for Skew {
     fn run(&self, _span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
         let nodes = signal.to_vec();
@@ -89,7 +91,7 @@ impl Reading {
     fn new(grid: &Grid, skew_s: f64) -> Self {
         let pieces = grid.pieces();
         let samples = libm::floor(-skew_s / grid.dt_s());
-        // Time after that sample, within one sample.
+        // Time after that sample, less than one sample time.
         let mut after = (-skew_s - samples * grid.dt_s()).clamp(0.0, grid.dt_s());
         let mut piece = 0;
         while piece + 1 < pieces && after >= grid.steps()[piece] {
@@ -104,13 +106,13 @@ impl Reading {
         let weights = core::array::from_fn(|i| {
             (0..4).filter(|j| *j != i).map(|j| (t - nodes[j]) / (nodes[i] - nodes[j])).product()
         });
-        // The cast saturates: a skew longer than any trial holds an end throughout.
+        // The cast saturates: with a skew longer than any trial, an end value is held throughout.
         let offset =
             (samples as isize).saturating_mul(pieces as isize).saturating_add(piece as isize);
         Self { offset, weights, share }
     }
 
-    /// The value that the sample at a node shows.
+    /// Returns the value of the sample whose own node is `own`.
     #[inline]
     fn of(&self, nodes: &[f64], own: usize, empty: f64) -> f64 {
         let last = nodes.len() as isize - 1;
@@ -130,7 +132,7 @@ impl Reading {
     }
 }
 
-/// A dead time.
+/// A delay (dead time).
 pub static DELAY: Kind = Kind {
     name: "delay",
     title: "a delay",
@@ -138,7 +140,8 @@ pub static DELAY: Kind = Kind {
     equation: "y(t) = x(t - delay_s), and (1 - empty) x(0) before x(0) arrives",
     usual: &[Side::Input],
     parameters: |e, _| {
-        // What was commanded before the record began is not in it: the first value as well, or nothing, or something between.
+        // The recording does not contain the command before its start. That command may have been the first value,
+        // zero, or between.
         let empty = EffectParameter::formed("empty", "1", 0.0..=1.0, 0.0);
         vec![EffectParameter::sized("delay_s", "s", 0.0..=e.late_s()), empty]
     },
@@ -157,7 +160,7 @@ pub static DELAY: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Samples of another time, by a clock of their own.
+/// A time offset of samples that are taken with a separate clock.
 pub static SKEW: Kind = Kind {
     name: "skew",
     title: "a time offset",
@@ -181,14 +184,14 @@ pub static SKEW: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Acts on a record as a whole.
+/// Writes the code, which needs the whole recording.
 fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sketch {
     read_at("SKEW + RATE * i * DT", signals)
         .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("EMPTY", empty, "1")])
         .with("DT", signals.dt_s, "s")
 }
 
-/// Reads a record some time before each of its samples, so far without numbers.
+/// Writes the code that reads a recording at some time before each of its samples, without constants.
 pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
     let body = format!(
         "let early = -({late}) / DT
@@ -214,7 +217,7 @@ pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
         .beside(Quantity::new("i", "1", "which sample is shown, from 0"))
 }
 
-/// The channels are not sampled at the same time.
+/// Time offset between the bridge and the length.
 pub(crate) static CHANNEL_SKEW: Effect = Effect {
     name: "channel_skew",
     title: "the time offset between bridge and length",
@@ -226,13 +229,13 @@ pub(crate) static CHANNEL_SKEW: Effect = Effect {
     ],
     acts: Acts::at(&SKEW, Place::Sampling),
     twins: &["amplifier_lowpass"],
-    // Two recorders may be started by two hands.
+    // If two recorders are started by hand, the offset may be large.
     alone: |alone, search| {
         search.reach(1.0);
         let more = [alone.lag_s, 0.9 * alone.lag_s, -0.15, 0.2];
         search.starts.extend(more.map(|skew_s| vec![skew_s, 0.0]));
     },
-    // Late or early by as much throughout, and two clocks that part.
+    // A constant delay of either sign, and two clocks of different rates.
     starts: Some(|_| {
         let mut all = each([-0.02, -0.004, 0.004, 0.02, 0.08]);
         all.extend([-1e-4, 1e-4].map(|rate| vec![0.002, rate]));
@@ -246,8 +249,8 @@ pub(crate) static CHANNEL_SKEW: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Samples by a clock of another pace: y(t) = x(t - skew - rate t), t since the session began, so that trials go on where the last one
-/// ended.
+/// Samples taken with a clock of another rate: y(t) = x(t - skew - rate t), with t since the session began, so that the
+/// delay continues from trial to trial.
 ///
 /// ```
 /// use stretch_effects::{ClockDrift, Grid, Operator, Span};
@@ -267,13 +270,13 @@ pub struct ClockDrift {
 }
 
 impl ClockDrift {
-    /// Late by `skew_s` when the session begins, and by `rate` more for every second of it.
+    /// A clock that is late by `skew_s` when the session begins, and by `rate` more in every second.
     pub fn new(skew_s: f64, rate: f64, grid: &Grid) -> Self {
         Self { skew_s, rate, grid: grid.clone() }
     }
 }
 
-/// On samples of a whole trial.
+/// Expects the samples of a whole trial.
 impl Operator for ClockDrift {
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
         let skew_s = self.skew_s + self.rate * span.start_s;
@@ -291,7 +294,8 @@ pub static CLOCK_DRIFT: Kind = Kind {
     usual: &[Side::Output],
     parameters: |e, _| {
         let late = e.late_s();
-        // What a trial may be late the whole session may, or what a bad quartz gives.
+        // The greatest rate is derived from the longest delay and the session's duration, within the errors of real
+        // clocks.
         let most = (REACH * late / e.session_s.max(e.dt_s)).clamp(LEAST, MOST);
         let skew = EffectParameter::sized("skew_s", "s", -late..=late);
         vec![EffectParameter::sized("rate", "s/s", -most..=most), skew]
@@ -312,8 +316,8 @@ pub static CLOCK_DRIFT: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Greatest delay at the end of a session, as a multiple of the longest constant delay.
+/// Greatest delay at the end of a session, as a multiple of the longest constant delay that is searched.
 const REACH: f64 = 5.0;
-/// Least and greatest error of a clock that is looked for, s/s.
+/// Bounds of the greatest clock error that is searched, s/s.
 const LEAST: f64 = 1e-4;
 const MOST: f64 = 0.05;

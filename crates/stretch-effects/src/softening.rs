@@ -1,4 +1,4 @@
-//! A response that weakens as it is worked.
+//! A response that weakens with use.
 
 use alloc::{boxed::Box, format, vec};
 
@@ -14,11 +14,11 @@ use crate::{
     sketch::Sketch,
 };
 
-/// Softening with travel: y = zero + (x - zero)(1 - m (1 - left)), left = (1 + tail travel/n)^(-1/tail), which is
-/// exp(-travel/n) at a tail of 0. Travel is the summed absolute change of strain since the session began.
+/// Softening with travel: y = zero + (x - zero)(1 - m (1 - left)), with left = (1 + tail travel/n)^(-1/tail). At a tail
+/// of 0, left is exp(-travel/n). Travel is the summed absolute change of strain since the session began.
 ///
-/// Remembers the travel, the strain reached, and the direction: +1, -1, or 0 before the first move. Source of the long
-/// tail: stretched forms of the Mullins effect, Diani 2009, doi:10.1016/j.eurpolymj.2008.11.017.
+/// The memory is the travel, the last counted strain, and the direction: +1, -1, or 0 before the first move. Source of
+/// the long tail: stretched forms of the Mullins effect, Diani 2009, doi:10.1016/j.eurpolymj.2008.11.017.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Softening, Span, Start};
@@ -33,20 +33,20 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Softening {
-    /// Share that is lost in the end.
+    /// Share that is lost after a long travel.
     pub m: f64,
-    /// Travel that takes the first of it, in strain.
+    /// Travel scale of the loss, in strain.
     pub n: f64,
-    /// How long its tail is; 0 for an exponential.
+    /// Length of the tail; 0 gives an exponential.
     pub tail: f64,
-    /// Value of the signal at no strain, which stays.
+    /// Value of the signal at zero strain, which does not change.
     pub zero: f64,
-    /// Reversals smaller than this strain do not travel: noise alone would go a long way.
+    /// Reversals smaller than this strain are not counted, because noise alone would accumulate a long travel.
     pub reversal: f64,
 }
 
 impl Softening {
-    /// Counts a move to the strain `e`; whether it travelled.
+    /// Counts a move to the strain `e`. Returns whether the travel changed.
     #[inline]
     fn go(&self, cells: &mut [f64; 3], e: f64) -> bool {
         let [travel, reached, direction] = cells;
@@ -64,7 +64,7 @@ impl Softening {
         false
     }
 
-    /// 1 - m (1 - left).
+    /// Returns 1 - m (1 - left).
     #[inline]
     fn factor(&self, travel: f64) -> f64 {
         let exponent = match self.tail {
@@ -114,7 +114,7 @@ pub static SOFTENING: Kind = Kind {
     beside: Beside::Itself,
     parameters: |e, unit| {
         let s = e.span();
-        // The value that does not soften: 0 where the channel passes it, else its end nearest to 0.
+        // The value that does not soften: 0 if the channel crosses it, otherwise the end of its range nearest to 0.
         let zero = 0.0_f64.clamp(e.low, e.high);
         vec![
             EffectParameter::sized("m", "1", 0.0..=0.5),
@@ -133,7 +133,7 @@ pub static SOFTENING: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// Turns that do not travel, in shares of the range of what travels: noise alone would go a long way.
+/// Smallest counted reversal, as a share of the range of the strain: noise alone would accumulate a long travel.
 const REVERSAL: f64 = 2.5e-3;
 
 fn reversal(e: &Extent) -> f64 {
@@ -167,7 +167,7 @@ fn sketch(v: &[f64], extent: &Extent, signals: &Signals) -> Sketch {
         .cells(["direction"], "1", "0")
 }
 
-/// The gauge softens as it is worked.
+/// Softening of the gauge with use.
 pub(crate) static GAUGE_SOFTENING: Effect = Effect {
     name: "gauge_softening",
     title: "the gauge's softening",

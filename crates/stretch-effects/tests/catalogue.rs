@@ -1,4 +1,4 @@
-//! What holds of every kind of the catalogue, anywhere in its ranges.
+//! Properties of every kind of the catalogue, anywhere in its parameter ranges.
 
 use proptest::prelude::*;
 use stretch_effects::{
@@ -8,11 +8,11 @@ use stretch_effects::{
 
 use crate::support::{apart, cases, quickest, run};
 
-/// A channel with what is measured next to it, and a place in the ranges of any kind's parameters.
+/// A channel with the other signals that are measured with it, and a point in the parameter ranges of any kind.
 #[derive(Debug, Clone)]
 struct Data {
     extent: Extent,
-    /// Where in its range each parameter is, from 0 to 1.
+    /// Position of each parameter in its range, from 0 to 1.
     shares: [f64; 4],
     signal: Vec<f64>,
     beside: Vec<f64>,
@@ -27,7 +27,8 @@ impl Data {
         parameters.iter().zip(self.shares).map(|(p, share)| at(p, share)).collect()
     }
 
-    /// Output of a kind in blocks of some length, after a trial from which it carries on where the start says so.
+    /// Output of a kind in blocks of a given length. A first trial precedes this one, so that `Start::Carried` has a
+    /// state.
     fn output(&self, kind: &Kind, values: &[f64], grid: &Grid, block: usize) -> Vec<f64> {
         let operator = (kind.operator)(values, &self.extent, grid);
         let mut cells = vec![0.0; operator.cells()];
@@ -43,7 +44,7 @@ impl Data {
     }
 }
 
-/// A share of a parameter's range, as it is best walked.
+/// Returns the value at a share of a parameter's range, with the spacing of its search.
 fn at(p: &EffectParameter, share: f64) -> f64 {
     let (low, high) = p.allowed().into_inner();
     match p.is_log() && low > 0.0 {
@@ -79,12 +80,12 @@ fn data() -> impl Strategy<Value = Data> {
     )
 }
 
-/// Values at which a kind is off: each strength, and everything else at its usual value.
+/// Values that turn a kind off: each strength at its off value, each form at its usual value.
 fn off(kind: &Kind, data: &Data) -> Vec<f64> {
     let parameters = (kind.parameters)(&data.extent, "mm");
     let one = |(p, share): (&EffectParameter, f64)| match p.role {
         Role::Strength { off } => off,
-        // A servo without a limit of its acceleration still has one of its rate.
+        // A servo without a limit of its acceleration still has a limit of its rate.
         Role::Shape if kind.name == "profile" => p.max,
         Role::Shape | Role::Choice | Role::Found { .. } => at(p, share),
         Role::Form { usual } => usual,
@@ -92,14 +93,16 @@ fn off(kind: &Kind, data: &Data) -> Vec<f64> {
     parameters.iter().zip(data.shares).map(one).collect()
 }
 
-/// Kinds that act on a record as a whole, sample by sample.
+/// Kinds that act on a whole recording, sample by sample.
 fn is_of_records(kind: &Kind) -> bool {
     ["delay", "skew", "clock_drift", "hum"].contains(&kind.name)
 }
 
-/// A time constant of 0 is one of 1e-9 s, which trails by up to 2e-9 s times the quickest change, the whole span in a step of 5e-3 s.
+/// A time constant of 0 is replaced by 1e-9 s. The lag is then up to 2e-9 s times the quickest change: the whole span
+/// in a step of 5e-3 s.
 const NO_TIME: f64 = 1e-6;
-/// A hum rotates its wave from sample to sample and begins anew with every block, at an angle of up to 600 s times 60 Hz.
+/// A hum rotates its wave from sample to sample and is computed anew for every block, at an angle of up to 600 s times
+/// 60 Hz.
 const ROTATED: f64 = 1e-9;
 
 proptest! {
@@ -111,7 +114,7 @@ proptest! {
             let values = off(kind, &data);
             let parameters = (kind.parameters)(&data.extent, "mm");
             prop_assert!(EffectParameter::are_off(&parameters, &values), "{}", kind.name);
-            // From rest: a strength that goes to 0 does not bring a mass to rest that swings already.
+            // The trial starts at rest, because a strength of 0 does not stop a mass that already swings.
             let data = Data { start: Start::Settled, ..data.clone() };
             let out = data.output(kind, &values, &Grid::samples(0.01).unwrap(), data.signal.len());
             let off_by = apart(&out, &data.signal);
@@ -132,7 +135,7 @@ proptest! {
     fn blocks_do_not_matter(data in data(), block in 1..80_usize) {
         let (record, steps) = (Grid::samples(0.01).unwrap(), Grid::new(0.01, 0.004, 0.0035).unwrap());
         for kind in KINDS {
-            // What reads a record at other times needs all of it.
+            // Kinds that read a recording at other times need the whole recording.
             if is_of_records(kind) && kind.name != "hum" {
                 continue;
             }
@@ -146,7 +149,7 @@ proptest! {
         }
     }
 
-    /// Values at which a kind is looked for are within its ranges, do something, and can be typed.
+    /// Starting values of the search are within the ranges, have an effect, and can be written as code.
     #[test]
     fn a_kind_is_looked_for_where_it_may_be(data in data()) {
         let x = Quantity::new("x", "mm", "a channel");
@@ -194,7 +197,7 @@ fn kinds_are_described_and_in_order() {
             kind.name
         );
         assert_eq!(kind.find.is_some(), parameters.iter().any(EffectParameter::is_found));
-        // Friction has a sign on either side of a stage, so that it has to be looked for on both.
+        // Friction is added behind a stage and subtracted in front of it, so the search covers both sides.
         assert!(!kind.opposes || kind.usual == [Side::Input, Side::Output], "{}", kind.name);
         assert!(!kind.opposes || kind.beside != Beside::Nothing, "{}", kind.name);
     }

@@ -1,4 +1,4 @@
-//! Bounds of values, of rates and of accelerations, steps, dead zones, and forces that resist.
+//! Limits of value, rate and acceleration, quantisation, dead zones, and friction.
 
 use proptest::prelude::*;
 use stretch_effects::{
@@ -13,7 +13,7 @@ use crate::support::{
 /// A few hundred roundings of values up to 10.
 const ROUNDING: f64 = 1e-12;
 
-/// Output of a curve without memory at values in rising order.
+/// Input in rising order, and output, of an operator without memory.
 fn curve(operator: &dyn Operator, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut x = values.to_vec();
     x.sort_by(f64::total_cmp);
@@ -39,7 +39,7 @@ proptest! {
         prop_assert!(rises_at_most_as_much(&found));
         for (x, y) in found.0.iter().zip(&found.1) {
             prop_assert!((..=high + ROUNDING).contains(y));
-            // The upper knee lowers what the lower one left.
+            // The upper knee lowers the output of the lower knee.
             prop_assert!(*y >= low - width * 2.0_f64.ln() - ROUNDING);
             if *x > low + 40.0 * width && *x < high - 40.0 * width {
                 prop_assert_eq!(x, y, "far from both ends it is the value itself");
@@ -64,7 +64,7 @@ proptest! {
         let mirrored = respond(&zone, &x.iter().map(|x| -x).collect::<Vec<_>>());
         prop_assert!(y.iter().zip(&mirrored).all(|(y, m)| *y == -m));
         prop_assert!(x.iter().zip(&y).all(|(x, y)| y.abs() <= x.abs() + ROUNDING && x * y >= 0.0));
-        // A soft edge differs from a hard one by its width times ln 2 at most, and a hard one lets nothing through.
+        // A soft edge differs from a hard one by at most its width times ln 2. Below a hard edge the output is zero.
         let hard = respond(&DeadZone { w, softness: 0.0 }, &x);
         prop_assert!(apart(&y, &hard) <= softness * w * 2.0_f64.ln() + ROUNDING);
         prop_assert!(x.iter().zip(&hard).all(|(x, y)| x.abs() > w || *y == 0.0));
@@ -93,7 +93,7 @@ proptest! {
         prop_assert!(u.iter().zip(&open).all(|(u, open)| *open <= u + ROUNDING), "never further than commanded");
         let hard = respond(&DeadBand { softness: 0.0, ..valve }, &u);
         prop_assert!(u.iter().zip(&hard).all(|(u, open)| *u > u_db || *open == 0.0 || u_db == 0.0));
-        // A gate closes it further.
+        // A gate closes the valve further.
         let gated = respond(&DeadBand { gate, ..valve }, &u);
         prop_assert!(gated.iter().zip(&open).all(|(gated, open)| (0.0..=open.max(1e-12) + ROUNDING).contains(gated)));
     }
@@ -104,9 +104,10 @@ proptest! {
         let y = respond(&limit, &x);
         prop_assert!(quickest(&y) <= rate * DT_S * (1.0 + 1e-9));
         prop_assert!(largest(&y) <= largest(&x));
-        // Towards the input, and no further.
+        // The output moves towards the input, and never beyond.
         prop_assert!(x[1..].iter().zip(y.windows(2)).all(|(x, y)| (x - y[1]) * (x - y[0]) >= 0.0));
-        // What is slower passes to the last bit, and a constant command is reached in its time.
+        // A slower signal passes unchanged to the last bit. A constant command is reached in the time that the rate
+        // allows.
         let slow: Vec<f64> = x.iter().map(|x| x * rate * DT_S / 6.0).collect();
         prop_assert_eq!(respond(&limit, &slow), slow);
         let steps = (1.0 / (rate * DT_S)).ceil() as usize;
@@ -116,7 +117,8 @@ proptest! {
         prop_assert!(reached[steps + 1] == 1.0 && (steps < 2 || reached[steps - 1] < 1.0));
     }
 
-    /// A trapezoid goes straight to a constant command. Its speed changes in steps of a h, so it may pass the command by one.
+    /// A trapezoid moves straight to a constant command. Its speed changes in steps of a h, so it may overshoot by one
+    /// such step.
     #[test]
     fn a_profile_stops_at_its_command(acceleration in 5.0..80.0_f64, rate in 0.5..4.0_f64, to in -3.0..3.0_f64) {
         let seconds = to.abs() / rate + rate / acceleration + 2.0 * (to.abs() / acceleration).sqrt();
@@ -153,7 +155,7 @@ proptest! {
         prop_assert!(torque.iter().zip(&still).all(|(x, y)| *y == x.clamp(-stall, stall)));
         for ((still, driving), backwards) in still.iter().zip(&driving).zip(&backwards) {
             match *still > 0.0 {
-                // Braking is as strong as at rest.
+                // The braking torque is the same as at rest.
                 true => prop_assert!(driving <= still && backwards == still && *driving >= 0.0),
                 false => prop_assert!(backwards >= still && driving == still && *backwards <= 0.0),
             }
@@ -161,7 +163,7 @@ proptest! {
         prop_assert!(largest(&driving) <= stall);
     }
 
-    /// Friction takes energy from every motion, and none at rest.
+    /// Friction takes energy from every motion, and is zero at rest.
     #[test]
     fn friction_opposes(
         speeds in signal(), coulomb in 0.0..5.0_f64, viscous in 0.0..5.0_f64, more in 0.0..5.0_f64, slow in 0.01..1.0_f64,
@@ -173,14 +175,14 @@ proptest! {
         let most = |v: &f64| (coulomb + more) * (1.0 + lopsided.abs()) + viscous * v.abs() + ROUNDING;
         prop_assert!(speeds.iter().zip(&found).all(|(v, f)| f.abs() <= most(v)));
         prop_assert_eq!(rail.force(0.0), 0.0);
-        // Fast enough, the direction and the speed are all that is left.
+        // At high speed, only the parts that depend on the direction and on the speed remain.
         for side in [-1.0, 1.0] {
             let wanted = side * (coulomb * (1.0 + side * lopsided) + 20.0 * viscous);
             prop_assert!((rail.force(side * 20.0) - wanted).abs() <= 1e-9, "{wanted}");
         }
         let even = Friction { lopsided: 0.0, ..rail };
         prop_assert!(speeds.iter().all(|v| even.force(*v) == -even.force(-v)));
-        // In proportion to a load, whatever its sign.
+        // The force is proportional to the load's absolute value.
         let n = speeds.len().min(load.len());
         let bearing = LoadFriction { mu: coulomb, width: width.max(1e-3) };
         let (speeds, load) = (&speeds[..n], &load[..n]);
@@ -191,21 +193,21 @@ proptest! {
         prop_assert!(apart(&force(&bearing, speeds, &doubled), &twice) <= ROUNDING);
     }
 
-    /// Along a motion no limit lets an output go where the input never was.
+    /// No limit moves the output outside the range of the input's motion.
     #[test]
     fn limits_stay_within_the_motion(turns in turns(), rate in 0.5..20.0_f64, acceleration in 5.0..80.0_f64) {
         let path = motion(&turns, 20);
         let [low, high] = [f64::min, f64::max].map(|f| path.iter().copied().fold(path[0], f));
         let y = respond(&SlewLimit { rate }, &path);
         prop_assert!(y.iter().all(|y| (low..=high).contains(y)));
-        // A profile has to brake: it may pass a turn by the distance that this takes.
+        // A profile has to brake, so it may pass a turning point by its braking distance.
         let y = respond(&Profile { acceleration, rate }, &path);
         let brakes = 0.5 * rate * rate / acceleration + rate * DT_S;
         prop_assert!(y.iter().all(|y| (low - brakes..=high + brakes).contains(y)));
     }
 }
 
-/// Less than the least conductance passes as pulses whose mean is the share that is due.
+/// A conductance below the least one is produced by pulses, whose mean is the correct share.
 #[test]
 fn a_gate_lets_its_share_pass() {
     let (least, count) = (0.02, 4000);

@@ -1,4 +1,5 @@
-//! Lags, masses on springs, fading memories, means and delays: linear, of gain 1, and exact for lines between nodes.
+//! Lags, masses on springs, fading memories, means and delays: linear, with a gain of 1, and exact for lines between
+//! nodes.
 
 use proptest::prelude::*;
 use stretch_effects::{
@@ -39,7 +40,7 @@ impl Linear {
         respond(&*self.on(&samples()), signal)
     }
 
-    /// Time by which a ramp is trailed in the end, s.
+    /// Steady delay behind a ramp, s.
     fn trail_s(self) -> f64 {
         match self {
             Self::Lag(poles) => poles.tau_s,
@@ -54,7 +55,7 @@ impl Linear {
         }
     }
 
-    /// Time after which less than 1e-12 of what was before is left, s.
+    /// Time after which less than 1e-12 of an earlier state remains, s.
     fn settled_s(self) -> f64 {
         match self {
             Self::Lag(poles) => 60.0 * poles.tau_s,
@@ -75,7 +76,7 @@ fn times() -> impl Strategy<Value = Times> {
         .prop_map(|(tau_s, spread)| Times { tau_s, spread })
 }
 
-/// All that are exact for lines between nodes.
+/// Operators that are exact for lines between nodes.
 fn exact() -> impl Strategy<Value = Linear> {
     prop_oneof![
         (0.005..0.1_f64).prop_map(|tau_s| Linear::Lag(Poles { tau_s, second: 0.0 })),
@@ -86,7 +87,7 @@ fn exact() -> impl Strategy<Value = Linear> {
     ]
 }
 
-/// The others take what comes between nodes as a line or a cubic.
+/// All operators. The others approximate the signal between nodes by a line or a cubic.
 fn linear() -> impl Strategy<Value = Linear> {
     prop_oneof![
         exact(),
@@ -96,7 +97,7 @@ fn linear() -> impl Strategy<Value = Linear> {
     ]
 }
 
-/// Rounding of a few hundred steps of a recursion whose swings last some twenty steps.
+/// Rounding of a few hundred steps of a recursion whose oscillations last some twenty steps.
 const ROUNDING: f64 = 1e-10;
 
 proptest! {
@@ -111,7 +112,7 @@ proptest! {
         prop_assert!(apart(&operator.respond(&sum), &added) <= ROUNDING);
     }
 
-    /// A constant signal passes unchanged, and one that comes to rest is reached.
+    /// A constant signal passes unchanged, and the output reaches a signal that comes to rest.
     #[test]
     fn the_gain_at_rest_is_one(operator in linear(), level in -3.0..3.0_f64, before in signal()) {
         let still = vec![level; 50];
@@ -122,30 +123,30 @@ proptest! {
         prop_assert!((y[y.len() - 1] - level).abs() <= ROUNDING);
     }
 
-    /// A ramp is trailed by one time, whatever its slope.
+    /// The delay behind a ramp does not depend on the slope.
     #[test]
     fn a_ramp_is_trailed(operator in linear(), slope in -9.0..9.0_f64) {
         let count = (operator.settled_s() / DT_S) as usize + 30;
         let ramp: Vec<f64> = (0..count).map(|i| slope * DT_S * i as f64).collect();
-        // What is read early has no values beyond the end.
+        // An operator that reads the signal early has no values after the end.
         let at = count - 15;
         let wanted = ramp[at] - slope * operator.trail_s();
         let found = operator.respond(&ramp)[at];
         prop_assert!((found - wanted).abs() <= ROUNDING * (1.0 + largest(&ramp)), "{found} for {wanted}");
     }
 
-    /// The same signal later gives the same output later.
+    /// A delayed input gives the same output with the same delay (time invariance).
     #[test]
     fn no_moment_is_special(operator in linear(), signal in signal(), later in 1..40_usize) {
         let waits = [vec![signal[0]; later], signal.clone()].concat();
         let (now, then) = (operator.respond(&signal), operator.respond(&waits));
-        // Next to the ends of a record a line replaces the cubic.
+        // Next to the ends of a recording, linear interpolation replaces the cubic.
         let from = if matches!(operator, Linear::Late { .. }) { 13.min(now.len()) } else { 0 };
         let to = if matches!(operator, Linear::Late { .. }) { now.len().saturating_sub(13).max(from) } else { now.len() };
         prop_assert!(apart(&now[from..to], &then[later + from..later + to]) <= ROUNDING);
     }
 
-    /// Lines between nodes may be cut into any steps.
+    /// For lines between nodes, the step length does not matter.
     #[test]
     fn steps_do_not_matter_for_lines(operator in exact(), signal in signal(), step_s in 0.001..0.01_f64, delay_s in 0.0..0.01_f64) {
         let fine = Grid::new(DT_S, step_s, delay_s).unwrap();
@@ -160,7 +161,7 @@ proptest! {
         prop_assert!(apart(&at_samples, &operator.respond(&signal)) <= 1e3 * ROUNDING);
     }
 
-    /// Real poles and means never leave the range of what went in.
+    /// The output of real poles and of means remains in the range of the input.
     #[test]
     fn lags_do_not_overshoot(tau_s in 0.001..0.3_f64, second in 0.0..0.5_f64, window_s in 0.0..0.3_f64, signal in signal()) {
         let [low, high] = [f64::min, f64::max].map(|f| signal.iter().copied().fold(signal[0], f));
@@ -170,7 +171,7 @@ proptest! {
         }
     }
 
-    /// A mass that a ramp sets into motion swings as the closed form says, one behind a joint as well.
+    /// A mass that a ramp sets in motion follows the closed form, also behind a joint.
     #[test]
     fn a_mass_follows_the_closed_form((m, damping) in masses(), slope in -5.0..5.0_f64) {
         let ramp: Vec<f64> = (0..80).map(|i| slope * DT_S * f64::from(i)).collect();
@@ -191,7 +192,7 @@ proptest! {
         }
     }
 
-    /// Drag and dry friction take energy from a swing; dry friction leaves the mass no further off than it says.
+    /// Drag and dry friction damp an oscillation. The final error is at most the dry friction.
     #[test]
     fn drag_and_friction_damp((m, damping) in masses(), drag in 0.0..2.0_f64, dry in 0.0..0.2_f64) {
         let grid = samples();
@@ -204,7 +205,7 @@ proptest! {
         prop_assert!((damped[2999] - 1.0).abs() <= dry + 1e-6, "{}", damped[2999]);
     }
 
-    /// A step comes through a fading memory as 1 + share and fades to 1, never beyond either.
+    /// A step appears behind a fading memory as 1 + share and fades to 1, and never leaves this range.
     #[test]
     fn a_memory_fades(share in -0.5..0.6_f64, times in times()) {
         let step: Vec<f64> = (0..2000).map(|i| f64::from(u8::from(i > 0))).collect();
@@ -214,7 +215,7 @@ proptest! {
         prop_assert!(beyond.iter().all(|part| (-1e-9..=1.0 + 1e-9).contains(part)), "{beyond:?}");
     }
 
-    /// A cubic is read exactly at any time, between any nodes, although two clocks drift apart.
+    /// A cubic is reproduced exactly at any time between any nodes, also if two clocks have different rates.
     #[test]
     fn a_cubic_is_read_exactly(
         c in prop::array::uniform4(-1.0..1.0_f64), skew_s in -0.2..0.2_f64, rate in -1e-3..1e-3_f64, step_s in 0.002..0.01_f64
@@ -231,7 +232,7 @@ proptest! {
         }
     }
 
-    /// Beyond its ends a record keeps its end values, and an empty line holds nothing before the first value arrives.
+    /// Outside its ends a recording keeps its end values; `empty` scales the value before the start.
     #[test]
     fn ends_are_held(signal in signal(), skew_s in 1.0..50.0_f64, empty in 0.0..=1.0_f64) {
         let last = signal[signal.len() - 1];

@@ -1,4 +1,4 @@
-//! Plays, hysteresis and friction by position: loops that do not depend on the rate.
+//! Plays, hysteresis and friction by position: rate-independent loops.
 
 use proptest::prelude::*;
 use stretch_effects::{
@@ -30,7 +30,7 @@ fn contact() -> impl Strategy<Value = Dahl> {
         .prop_map(|(f, s, back)| Dahl { f, s, back, w: 0.0, load_size: None })
 }
 
-/// What a loop holds back along a motion: how far the output is behind, or the force of a contact.
+/// Lag of the output along a motion, or the force of a contact.
 fn held(operator: &dyn Operator, is_force: bool, path: &[f64]) -> Vec<f64> {
     if is_force {
         return force(operator, path, &[]);
@@ -38,7 +38,7 @@ fn held(operator: &dyn Operator, is_force: bool, path: &[f64]) -> Vec<f64> {
     path.iter().zip(respond(operator, path)).map(|(x, y)| x - y).collect()
 }
 
-/// Every loop, with whether it is a force next to the signal.
+/// Every loop, with whether its output is a force.
 fn loops() -> impl Strategy<Value = (Box<dyn Operator>, bool)> {
     prop_oneof![
         play().prop_map(|o| (Box::new(o) as Box<dyn Operator>, false)),
@@ -51,7 +51,7 @@ fn loops() -> impl Strategy<Value = (Box<dyn Operator>, bool)> {
 proptest! {
     #![proptest_config(cases(96))]
 
-    /// Only the path matters, not how quickly it is followed.
+    /// The output depends on the path only, not on the speed.
     #[test]
     fn loops_have_no_rate((operator, is_force) in loops(), turns in turns(), slow in 2..20_usize) {
         let quick = held(&*operator, is_force, &motion(&turns, 1));
@@ -60,7 +60,8 @@ proptest! {
         prop_assert!(apart(&quick, &at_turns) <= ROUNDING, "{quick:?} {at_turns:?}");
     }
 
-    /// From rest no motion gains energy: what is held back moves with the motion, so that its last value bounds the work of a step.
+    /// From rest no motion gains energy. The held part moves with the motion, so its last value bounds the work of a
+    /// step.
     #[test]
     fn loops_are_passive((operator, is_force) in loops(), turns in turns()) {
         let path = motion(&turns, 7);
@@ -72,7 +73,7 @@ proptest! {
         }
     }
 
-    /// What is held back has a bound, which a long way reaches.
+    /// The held part is bounded, and a long move reaches the bound.
     #[test]
     fn a_long_way_fills_a_loop((operator, is_force) in loops(), turns in turns(), side in prop_oneof![Just(-1.0), Just(1.0)]) {
         let far = [turns.as_slice(), &[side * 80.0, side * 120.0]].concat();
@@ -82,7 +83,7 @@ proptest! {
         prop_assert!(all.iter().all(|held| held.abs() <= full.abs() + ROUNDING), "{full} of {all:?}");
     }
 
-    /// A hysteresis state that is given is the one that such a motion leaves.
+    /// A given hysteresis state equals the one that the described motion leaves.
     #[test]
     fn a_given_state_is_that_of_a_motion((operator, is_force) in loops(), turns in turns(), side in prop_oneof![Just(-1.0), Just(1.0)]) {
         let path = motion(&turns, 3);
@@ -93,14 +94,14 @@ proptest! {
             run(&*operator, cells, start, Span { strain, ..Span::whole(&grid) }, signal, path.len())
         };
         let given = after(&mut vec![0.0; operator.cells()], Start::Hysteresis(side));
-        // From far away and straight to the first value.
+        // The motion starts far away and moves straight to the first value.
         let mut cells = vec![0.0; operator.cells()];
         operator.begin(Start::Settled, turns[0] - side * 100.0, &mut cells);
         let moved = after(&mut cells, Start::Carried { rest_s: 0.0 });
         prop_assert!(apart(&given, &moved) <= ROUNDING, "{given:?} {moved:?}");
     }
 
-    /// A trial that carries on is one motion with the trial before.
+    /// A trial that continues the preceding one gives the same output as a single motion.
     #[test]
     fn trials_that_carry_on_are_one_motion((operator, is_force) in loops(), first in turns(), second in turns()) {
         let whole = held(&*operator, is_force, &[first.as_slice(), &second].concat());
@@ -131,7 +132,7 @@ proptest! {
         }
     }
 
-    /// Loops of plays between the same ends have the same form, whatever came before (congruency).
+    /// Loops of plays between the same ends have the same form for any history (congruency).
     #[test]
     fn loops_between_the_same_ends_are_congruent(hysteresis in hysteresis(), one in turns(), other in turns(), low in -2.0..0.0_f64, high in 0.0..2.0_f64) {
         let round = |before: &[f64]| {
@@ -143,7 +144,7 @@ proptest! {
         prop_assert!(apart(&round(&one), &round(&other)) <= ROUNDING);
     }
 
-    /// A wide sweep wipes out what smooth loops remember, and they close.
+    /// A wide sweep erases the memory of smooth loops, and the loops then close.
     #[test]
     fn smooth_loops_close_after_a_wide_sweep(bouc_wen in bouc_wen(), contact in contact(), one in turns(), other in turns()) {
         let wide = |s: f64| 40.0 * s;
@@ -158,7 +159,8 @@ proptest! {
         }
     }
 
-    /// From rest the way d goes into every play up to its half-width, and the mean of that is held back.
+    /// From rest, a move over the distance d fills every play up to its half-width. The output is held back by the mean
+    /// of the plays.
     #[test]
     fn plays_fill_up_to_their_widths(h in 0.0..1.0_f64, s in 0.05..1.5_f64, spread in 0.15..0.95_f64, d in -2.0..2.0_f64) {
         let mean = |widths: [f64; 3]| widths.iter().map(|w| d.abs().min(*w)).sum::<f64>() / 3.0 * d.signum();
@@ -169,7 +171,7 @@ proptest! {
         prop_assert!((behind[1] - mean([s, s * (1.0 - spread), s * (1.0 + spread)])).abs() <= ROUNDING);
     }
 
-    /// A play stays within its half-width, moves only while it is pushed, and no more than its input.
+    /// A play stays within its half-width, moves only if it is pushed, and moves no further than its input.
     #[test]
     fn a_play_is_pushed(w in 0.0..1.5_f64, turns in turns()) {
         let path = motion(&turns, 5);
@@ -183,7 +185,7 @@ proptest! {
         }
     }
 
-    /// Two inputs that differ by less than a band give outputs that do.
+    /// The outputs of two inputs differ by no more than the inputs.
     #[test]
     fn a_play_is_a_contraction(play in play(), pairs in prop::collection::vec((-3.0..3.0_f64, -0.2..0.2_f64), 2..40)) {
         let one: Vec<f64> = pairs.iter().map(|(x, _)| *x).collect();
@@ -192,7 +194,7 @@ proptest! {
         prop_assert!(off_by <= apart(&one, &other) + ROUNDING);
     }
 
-    /// A dead band of firmware that stops a whole band before its target is a play.
+    /// A dead band of the firmware that stops a whole band before its target equals a play.
     #[test]
     fn a_band_that_stops_short_is_a_play(w in 0.0..1.5_f64, turns in turns()) {
         let path = motion(&turns, 4);
@@ -200,7 +202,7 @@ proptest! {
         prop_assert!(apart(&band, &respond(&Backlash::hard(w), &path)) <= ROUNDING);
     }
 
-    /// Behind a play a contact rubs at what the play lets through, and a load scales its force.
+    /// Behind a play the force of a contact follows the output of the play. A load scales the force.
     #[test]
     fn a_contact_rubs_behind_its_play(contact in contact(), w in 0.0..0.5_f64, turns in turns(), load in -3.0..3.0_f64) {
         let path = motion(&turns, 4);
@@ -212,7 +214,7 @@ proptest! {
         prop_assert!(apart(&loaded, &scaled) <= ROUNDING);
     }
 
-    /// The way on which half of the force builds up from rest is s ln 2, however steep it is after a turn.
+    /// Half of the force builds up from rest over a distance of s ln 2, for any steepness after a reversal.
     #[test]
     fn a_contact_builds_up_over_its_presliding_length(contact in contact()) {
         let way = contact.s * 2.0_f64.ln();
@@ -221,7 +223,7 @@ proptest! {
     }
 }
 
-/// Against a full force, a contact after Dahl loses it on s ln 2, one after Bouc and Wen on s.
+/// A full opposing force vanishes over s ln 2 in Dahl's model, and over s in the model of Bouc and Wen.
 #[test]
 fn a_contact_turns_as_steeply_as_it_says() {
     for (back, way) in [(1.0, 2.0_f64.ln()), (0.0, 1.0)] {

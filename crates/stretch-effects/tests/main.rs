@@ -1,4 +1,5 @@
-//! The tests of stretch-effects from outside, one program: linking takes longer than most of them.
+//! Tests of the public interface of stretch-effects, in one program because linking takes longer
+//! than most tests.
 
 mod catalogue;
 mod inverses;

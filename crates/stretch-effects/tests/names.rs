@@ -1,8 +1,8 @@
-//! Names and units come from files of any origin: none of them becomes code.
+//! Names and units may come from untrusted files. None of them may become code.
 
 use stretch_effects::{EffectParameter, Extent, KINDS, Language, Quantity, Signals};
 
-/// Names that would be code, or hide it, in one language or another.
+/// Names that are code in one of the languages, or hide code.
 const HOSTILE: [&str; 14] = [
     "mm\nimport os; os.remove('x')",
     "mm\r\nint y;\rint z;",
@@ -20,7 +20,7 @@ const HOSTILE: [&str; 14] = [
     "\u{c}import os",
 ];
 
-/// The code of every kind in a language, with a name in every place that takes one.
+/// The code of every kind in a language, with the name in every place that accepts one.
 fn codes(language: Language, name: &str) -> Vec<String> {
     let own = |symbol| Quantity {
         unit: name.to_owned().into(),
@@ -39,7 +39,7 @@ fn codes(language: Language, name: &str) -> Vec<String> {
     KINDS.iter().filter_map(code).collect()
 }
 
-/// What a compiler sees of it.
+/// Code without its comments.
 fn without_comments(language: Language, code: &str) -> String {
     let (mut kept, mut rest) = (String::new(), code);
     let (begin, end) = match language {
@@ -48,7 +48,7 @@ fn without_comments(language: Language, code: &str) -> String {
         Language::Matlab => ("%", "\n"),
     };
     while let Some((before, behind)) = rest.split_once(begin) {
-        // #include is none
+        // `#include` occurs only in C, where comments begin with `/*`.
         let (before, behind) = (before.trim_end(), behind);
         kept += before;
         rest = behind.split_once(end).expect("a comment that ends").1;
@@ -69,7 +69,7 @@ fn no_name_becomes_code_in_any_language() {
             for (code, expected) in codes(language, name).iter().zip(&expected) {
                 let (found, expected) =
                     (without_comments(language, code), without_comments(language, expected));
-                // the function has another name
+                // The function has another name.
                 let expected = expected.replace("mm", &own);
                 assert_eq!(found, expected, "{name:?} in {}:\n{code}", language.name());
                 let is_seen = |c: char| c == '\n' || !stretch_core::is_hidden(c);

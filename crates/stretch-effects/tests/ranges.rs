@@ -27,7 +27,7 @@ fn parameters() -> impl Strategy<Value = EffectParameter> {
 proptest! {
     #![proptest_config(cases(32))]
 
-    /// Pieces fill a sample, no piece is longer than asked for, and a delayed switch falls on a border.
+    /// Pieces fill a sample, no piece exceeds the maximum length, and a delayed switch coincides with a border.
     #[test]
     fn pieces_fill_a_sample(dt_s in 0.001..0.1_f64, step in 0.05..2.0_f64, delay in 0.0..5.0_f64) {
         let (step_s, delay_s) = (step * dt_s, delay * dt_s);
@@ -41,7 +41,7 @@ proptest! {
             let step = grid.steps()[(node - 1) % grid.pieces()];
             prop_assert!((grid.time_s(node) - grid.time_s(node - 1) - step).abs() <= 1e-12);
         }
-        // A command acts one delay after its sample.
+        // A command acts after the delay.
         for sample in 0..8 {
             for piece in 0..grid.pieces() {
                 let middle = sample as f64 * dt_s + grid.time_s(piece) + 0.5 * grid.steps()[piece];
@@ -51,7 +51,7 @@ proptest! {
         }
     }
 
-    /// However a signal is cut, each value is led to by the same piece of time.
+    /// For any segment of a signal, each value belongs to the same grid step.
     #[test]
     fn every_value_has_its_piece(grid in grids(), first in 0..50_usize, count in 0..50_usize) {
         let mut visited = Vec::new();
@@ -60,7 +60,7 @@ proptest! {
         prop_assert_eq!(visited, (0..count).map(|i| (i, wanted(i))).collect::<Vec<_>>());
     }
 
-    /// Steps of a converter are found in what was recorded, however large its offset is.
+    /// Quantisation steps are found in recorded data, also with a large offset.
     #[test]
     fn a_lattice_is_found(
         numbers in prop::collection::vec(-40..40_i32, 60..200),
@@ -70,11 +70,11 @@ proptest! {
         let values: Vec<f64> = numbers.iter().map(|n| step * f64::from(n + offset)).collect();
         let extent = Extent::of([&values[..]].into_iter(), 0.01);
         prop_assume!(extent.span() > 20.0 * step);
-        // A lattice is as well one of a whole share of its step.
+        // A step divided by a whole number describes the same lattice.
         let times = step / extent.lattice;
         prop_assert!((times - times.round()).abs() < 0.02 && times > 0.9, "{times}");
         let phase = |x: &f64| (x / extent.lattice - (x / extent.lattice).round()).abs();
-        // The search resolves a tenth of a turn at the farthest value.
+        // The search has a resolution of a tenth of a turn at the farthest value.
         prop_assert!(values.iter().all(|x| phase(x) <= 0.06), "{} of {step} at {offset}", extent.lattice);
     }
 
@@ -90,7 +90,7 @@ proptest! {
         prop_assert!(extent.late_s() >= dt_s && extent.late_s() <= (0.1 * extent.trial_s).max(dt_s));
     }
 
-    /// Points are within the range and do something; in other units they are the same points.
+    /// Points are within the range and have an effect. A change of units scales the points.
     #[test]
     fn points_are_within_the_range(p in parameters(), unit in 0.1..100.0_f64) {
         let (low, high) = p.allowed().into_inner();

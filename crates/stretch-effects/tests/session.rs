@@ -1,4 +1,4 @@
-//! What changes with time, with travel, and with other channels: drifts, warming, softening, clocks, hum, crosstalk.
+//! Effects that depend on time, on travel or on other channels: drifts, warming, softening, clocks, hum, crosstalk.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::support::{
 
 const ROUNDING: f64 = 1e-12;
 
-/// Output for ones, of a trial that begins at a session time.
+/// Output for a constant input of 1, in a trial that begins at a session time.
 fn gain(operator: &dyn Operator, start_s: f64, count: usize) -> Vec<f64> {
     let (grid, mut cells) = (samples(), vec![0.0; operator.cells()]);
     let span = Span { start_s, ..Span::whole(&grid) };
@@ -24,7 +24,7 @@ fn gain(operator: &dyn Operator, start_s: f64, count: usize) -> Vec<f64> {
 proptest! {
     #![proptest_config(cases(64))]
 
-    /// A drift is straight at first, settles at d/settle, and depends on session time alone.
+    /// A drift is linear at first, settles at d/settle, and depends on session time alone.
     #[test]
     fn a_drift_settles(d in -1e-3..1e-3_f64, settle in 1e-3..0.1_f64, start_s in 0.0..500.0_f64) {
         let drift = Drift { per_s: d, settle_per_s: settle };
@@ -33,7 +33,7 @@ proptest! {
         prop_assert!(after(start_s).abs() <= (d * start_s).abs() + ROUNDING, "never more than the straight line");
         let nearly = Drift { settle_per_s: 1e-9, ..drift };
         prop_assert!((gain(&nearly, start_s, 1)[0] - gain(&Drift::straight(d), start_s, 1)[0]).abs() <= 1e-6);
-        // A trial that is cut in two goes on where it ended.
+        // The second half of a trial gives the same output as the same samples in the whole trial.
         let whole = gain(&drift, start_s, 40);
         let rest = gain(&drift, start_s + 20.0 * DT_S, 20);
         prop_assert!(apart(&whole[20..], &rest) <= ROUNDING);
@@ -41,7 +41,7 @@ proptest! {
         prop_assert!((gain(&zero, start_s, 1)[0] - 1.0 - d - settle * start_s).abs() <= ROUNDING * (1.0 + start_s));
     }
 
-    /// Warming begins anew with every trial, never turns back, and ends at 1 + h on any steps.
+    /// Warming begins anew in every trial, is monotone, and ends at 1 + h for any grid steps.
     #[test]
     fn warming_goes_one_way(h in -0.3..0.3_f64, tau_s in 0.02..2.0_f64, spread in prop_oneof![Just(1.0), 1.0..8.0_f64], start_s in 0.0..500.0_f64) {
         let times = Times { tau_s, spread };
@@ -64,7 +64,8 @@ proptest! {
         prop_assert!((found[299] - 1.0 - h * (1.0 - left)).abs() <= 1e-9);
     }
 
-    /// Softening counts the way, not the time, loses between nothing and m of what is above its zero, and remembers between trials.
+    /// Softening depends on the distance, not on the time. It takes between 0 and m of the part above its zero, and
+    /// continues between trials.
     #[test]
     fn softening_counts_the_way(turns in turns(), m in 0.0..0.5_f64, n in 0.5..50.0_f64, tail in prop_oneof![Just(0.0), 0.05..2.5_f64], slow in 2..10_usize) {
         let gauge = Softening { m, n, tail, zero: 0.5, reversal: 1e-6 };
@@ -81,13 +82,13 @@ proptest! {
         prop_assert!(quick.iter().chain(&again).all(|f| (1.0 - m - ROUNDING..=1.0).contains(f)));
         prop_assert!(quick.windows(2).all(|pair| pair[1] <= pair[0]));
         prop_assert!((slow_path[slow_path.len() - 1] - quick[quick.len() - 1]).abs() <= 1e-9);
-        // After the way n: 1 - m (1 - (1 + tail)^(-1/tail)).
+        // After the distance n: 1 - m (1 - (1 + tail)^(-1/tail)).
         let left = if tail == 0.0 { (-1.0_f64).exp() } else { (1.0 + tail).powf(-1.0 / tail) };
         let once = factor(&[0.0, n], Start::Settled);
         prop_assert!((once[1] - 1.0 + m * (1.0 - left)).abs() <= ROUNDING);
     }
 
-    /// Noise that is smaller than a reversal wears nothing.
+    /// Noise that is smaller than a reversal causes no softening.
     #[test]
     fn noise_does_not_soften(noise in prop::collection::vec(-1.0..1.0_f64, 2..80)) {
         let gauge = Softening { m: 0.3, n: 1.0, tail: 0.0, zero: 0.0, reversal: 1e-2 };
@@ -97,7 +98,7 @@ proptest! {
         prop_assert!(out.iter().all(|y| *y == 1.0));
     }
 
-    /// A clock of another pace reads a line of session time ever later, and trials go on where the last one ended.
+    /// A clock of another rate reads a line of session time with a growing delay, which continues from trial to trial.
     #[test]
     fn a_clock_drifts_through_the_session(skew_s in -0.05..0.05_f64, rate in -1e-4..1e-4_f64, start_s in 0.0..500.0_f64) {
         let grid = samples();
@@ -110,7 +111,7 @@ proptest! {
         }
     }
 
-    /// A hum adds one wave of session time, of one amplitude, to whatever it is on.
+    /// A hum adds a wave of session time with constant amplitude to any signal.
     #[test]
     fn a_hum_is_a_wave_of_session_time(x in signal(), a in 0.0..1.0_f64, f_hz in 1.0..70.0_f64, phase in -3.0..3.0_f64, start_s in 0.0..500.0_f64) {
         let (grid, hum) = (samples(), Hum { a, f_hz, phase });
@@ -124,7 +125,7 @@ proptest! {
         }
     }
 
-    /// The phase of a hum is found in the record, second by second, where the noise lets it.
+    /// The phase of a hum is found in each second of the recording if the noise is small enough.
     #[test]
     fn the_phase_of_a_hum_is_found(phase in -3.0..3.0_f64, turn in -1.0..1.0_f64, a in 0.05..0.2_f64) {
         let find = kind_named("hum").unwrap().find.unwrap();
@@ -135,7 +136,7 @@ proptest! {
         let mut found = vec![0.0; 750];
         find(&[a, 50.0], &record(0.01 * a), &mut found);
         prop_assert!(apart(&found, &measured) <= 0.05 * a, "{}", apart(&found, &measured));
-        // Noise as large as that hides it, and no amplitude finds nothing.
+        // A large noise hides the hum, and with an amplitude of zero nothing is added.
         let mut hidden = vec![0.0; 750];
         find(&[a, 50.0], &record(1e3 * a), &mut hidden);
         prop_assert!(largest(&hidden) <= 0.01 * a);
@@ -144,7 +145,7 @@ proptest! {
         prop_assert!(largest(&none) == 0.0);
     }
 
-    /// Crosstalk adds what the other channel says, whatever the signal is.
+    /// Crosstalk adds a function of the other channel to any signal.
     #[test]
     fn crosstalk_adds_another_channel(x in signal(), c in -1.0..1.0_f64, bend in -1.0..1.0_f64, other in -5.0..5.0_f64) {
         let (grid, talk) = (samples(), Crosstalk { c, bend, middle: 1.0, span: 4.0 });

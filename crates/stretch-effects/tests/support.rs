@@ -1,4 +1,4 @@
-//! Runs operators, and makes signals for them.
+//! Functions that run operators and generate test signals.
 
 use proptest::{prelude::*, test_runner::RngSeed};
 use stretch_effects::{Grid, Operator, Span, Start};
@@ -6,12 +6,12 @@ use stretch_effects::{Grid, Operator, Span, Start};
 /// Sample time of the tests, s.
 pub(crate) const DT_S: f64 = 0.01;
 
-/// A number of cases that are the same in every run.
+/// A proptest configuration with a fixed seed, so that the cases are the same in every run.
 pub(crate) fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
 }
 
-/// One step a sample.
+/// A grid with one step a sample.
 pub(crate) fn samples() -> Grid {
     Grid::samples(DT_S).expect("a grid")
 }
@@ -21,13 +21,13 @@ pub(crate) fn respond(operator: &dyn Operator, signal: &[f64]) -> Vec<f64> {
     respond_on(&samples(), operator, signal)
 }
 
-/// The same at every node of a grid.
+/// Output of an operator that starts settled, at every node of a grid.
 pub(crate) fn respond_on(grid: &Grid, operator: &dyn Operator, signal: &[f64]) -> Vec<f64> {
     let mut cells = vec![0.0; operator.cells()];
     run(operator, &mut cells, Start::Settled, Span::whole(grid), signal, signal.len())
 }
 
-/// Output of an operator that looks at a position or velocity besides its signal, which is 0.
+/// Output of an operator that reads a position or a velocity (`strain`); the signal is 0.
 pub(crate) fn force(operator: &dyn Operator, strain: &[f64], load: &[f64]) -> Vec<f64> {
     let (grid, mut cells) = (samples(), vec![0.0; operator.cells()]);
     let span = Span { strain, load, ..Span::whole(&grid) };
@@ -35,7 +35,7 @@ pub(crate) fn force(operator: &dyn Operator, strain: &[f64], load: &[f64]) -> Ve
     run(operator, &mut cells, Start::Settled, span, &zeros, strain.len())
 }
 
-/// A trial in blocks of some length. What an operator remembers begins at the strain where there is one, as in a contact.
+/// Output of a trial that is run in blocks. The memory begins at the first strain if there is one, as in a contact.
 pub(crate) fn run(
     operator: &dyn Operator,
     cells: &mut [f64],
@@ -72,7 +72,7 @@ pub(crate) fn turns() -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(-3.0..3.0_f64, 2..9)
 }
 
-/// A motion from turning point to turning point, each way in that many samples.
+/// A motion between turning points, with that many samples from each to the next.
 pub(crate) fn motion(turns: &[f64], samples: usize) -> Vec<f64> {
     let way = |pair: &[f64]| {
         let (from, to) = (pair[0], pair[1]);

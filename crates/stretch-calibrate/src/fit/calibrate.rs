@@ -1,4 +1,4 @@
-//! From logged trials to a calibration.
+//! Fits a calibration to logged trials.
 
 use stretch_core::{Calibration, Provenance};
 use stretch_data::Trial;
@@ -17,19 +17,19 @@ use super::{
 /// A calibration with the reports and notes of its fit.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
-    /// The record.
+    /// The calibration.
     pub calibration: Calibration,
     /// The report of the linear fit, or one report for each branch.
     pub fits: Vec<FitReport>,
-    /// Changes made to the data before the fit, and doubts about them, one sentence each.
+    /// Changes made to the data before the fit, and doubts about the data, one sentence each.
     pub notes: Vec<String>,
 }
 
 /// Fits a calibration to logged trials.
 ///
-/// Ranges are pooled over all trials (of rates, over each branch) and frozen.
-/// Trials are brought onto an even grid by [`Trial::even`]: lost samples are bridged, long gaps cut a trial, uneven
-/// stamps are resampled. [`Calibrated::notes`] says where.
+/// Ranges are pooled over all trials (those of rates over each branch) and stored. [`Trial::even`] resamples trials to
+/// an even time grid: a few lost samples are interpolated, and long gaps cut a trial. [`Calibrated::notes`] lists the
+/// changes.
 ///
 /// # Errors
 /// [`CalibrateError`], which names the trial and column, or the branch and term.
@@ -58,7 +58,7 @@ pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, Cali
     calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
 }
 
-/// Fits a calibration, with an earlier choice where one is given; answers with the choice that was made.
+/// Fits a calibration, with an earlier choice if one is given. Also returns the choice that was made.
 pub(crate) fn calibrate_with(
     trials: &[Trial],
     options: &Options,
@@ -91,7 +91,7 @@ pub(crate) fn calibrate_with(
     Ok((Calibrated { calibration, fits, notes }, made))
 }
 
-/// Choices about a model that remembers, kept when the model is fitted to parts of the same data.
+/// Choices within a model with memory. They are kept if the model is fitted to parts of the same data.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     History(HistoryChoice),

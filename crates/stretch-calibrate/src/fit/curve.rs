@@ -1,18 +1,18 @@
-//! An observer's curve: straight lines between knots, least squares over them, and the nearest curve that rises.
+//! The curve of an observer: a piecewise linear function that is fitted by least squares and then made increasing.
 
 use stretch_core::Interval;
 
 use super::least_squares::{LinearFactor, RowAccumulator};
 
-/// Knots of the curve.
+/// Number of knots of the curve.
 pub(crate) const KNOTS: usize = 25;
-/// Weight of the curve's second differences against a sample's residual.
+/// Weight of the curve's second differences relative to a sample's residual.
 const BEND: f64 = 1e-3;
 
 /// Least rise of a curve over its whole length, as a share of the signal's range.
 pub(crate) const LEAST_RISE: f64 = 1e-3;
 
-/// The range of the values without the outermost two in ten thousand at either end; `None` where the range is empty.
+/// Returns the range of the values without the outermost 0.02 % at each end; `None` if the range is empty.
 pub(crate) fn inner(mut all: Vec<f64>) -> Option<Interval> {
     let edge = all.len() / 5000;
     let last = all.len().checked_sub(1 + edge)?;
@@ -21,12 +21,12 @@ pub(crate) fn inner(mut all: Vec<f64>) -> Option<Interval> {
     (min < max).then_some(Interval { min, max })
 }
 
-/// A drive's place on the curve.
+/// Position of a drive on the curve. The drive is the input of the curve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
-    /// The knot below.
+    /// Index of the knot below the drive.
     pub(crate) below: usize,
-    /// The share of the way to the next.
+    /// Share of the distance to the next knot.
     pub(crate) share: f64,
 }
 
@@ -38,20 +38,20 @@ impl Place {
         Self { below, share: at - below as f64 }
     }
 
-    /// Value of the curve at the place.
+    /// Returns the value of the curve at this position.
     pub(crate) fn on(self, curve: &[f64]) -> f64 {
         curve[self.below] + self.share * (curve[self.below + 1] - curve[self.below])
     }
 
-    /// Slope of the curve at the place, per unit of drive.
+    /// Returns the slope of the curve at this position, per unit of drive.
     pub(crate) fn slope(self, curve: &[f64], domain: Interval) -> f64 {
         let per_knot = (KNOTS - 1) as f64 / (domain.max - domain.min);
         (curve[self.below + 1] - curve[self.below]) * per_knot
     }
 }
 
-/// Rows over the knots and further terms. A sample touches two knots, so that the samples between the same two knots
-/// fold into a small triangle of their own first.
+/// Least-squares rows of the knots and of further terms. A sample involves two knots only, so samples between the same
+/// two knots are first folded into a small triangle.
 pub(crate) struct CurveRows {
     between: Vec<RowAccumulator>,
     samples: usize,
@@ -60,13 +60,13 @@ pub(crate) struct CurveRows {
 }
 
 impl CurveRows {
-    /// Rows of the knots and `more` further terms, none yet.
+    /// An accumulator for the knots and `more` further terms, without rows.
     pub(crate) fn new(more: usize) -> Self {
         let between = vec![RowAccumulator::new(2 + more); KNOTS - 1];
         Self { between, samples: 0, more, row: Vec::new() }
     }
 
-    /// Adds a sample at a place of the curve, with its further terms.
+    /// Adds a sample at a position on the curve, with its further terms.
     pub(crate) fn push(&mut self, at: Place, more: &[f64], value: f64) {
         self.row.clear();
         self.row.extend([1.0 - at.share, at.share]);
@@ -75,7 +75,7 @@ impl CurveRows {
         self.samples += 1;
     }
 
-    /// The factor of all rows and of the curve's bending: knots first.
+    /// Returns the factor of all rows and of the penalty on the curve's bending. The knots are the first terms.
     pub(crate) fn factor(self) -> LinearFactor {
         let mut rows = RowAccumulator::new(KNOTS + self.more);
         for (below, part) in self.between.into_iter().enumerate() {
@@ -90,7 +90,7 @@ impl CurveRows {
     }
 }
 
-/// The nearest curve that rises by at least `step` from knot to knot: neighbouring knots that violate this are
+/// Returns the nearest curve that rises by at least `step` from knot to knot. Neighbouring knots that violate this are
 /// averaged (Ayer et al. 1955, doi:10.1214/aoms/1177728423).
 pub(crate) fn rising(knots: &[f64], step: f64) -> Vec<f64> {
     let mut pools: Vec<(f64, usize)> = Vec::new();

@@ -1,4 +1,4 @@
-//! The parameters of named defects: initial values and ranges of a fit, and the map that the parameters make.
+//! Parameters of named defects: initial values and ranges for a fit, and the map that the parameters give.
 
 use stretch_core::{DiagnosedMap, FitSummary, Interval, Target as Polarity, Values};
 use stretch_effects::{
@@ -19,8 +19,8 @@ impl Moved {
         format!("{} {}", self.effect.name, self.parameter.name)
     }
 
-    /// The coordinate of a value that a fit moves: its logarithm where the parameter spans decades, else the value
-    /// itself.
+    /// Converts a value to the coordinate that a fit changes: the logarithm if the parameter spans decades, otherwise
+    /// the value itself.
     fn coordinate(&self, value: f64) -> f64 {
         let value = value.clamp(self.parameter.min, self.parameter.max);
         if self.parameter.is_log() { value.ln() } else { value }
@@ -35,13 +35,13 @@ impl Moved {
         self.parameter.max - self.parameter.min
     }
 
-    /// The step of a difference quotient, in the coordinate.
+    /// Returns the step of the difference quotient, in the coordinate.
     pub(crate) fn step(&self) -> f64 {
         if self.parameter.is_log() { 0.01 } else { 0.002 * self.range() }
     }
 
-    /// Likely distance of the coordinate from its initial value. The distance of a form parameter is smaller than
-    /// that of a size.
+    /// Returns the expected distance of the coordinate from its initial value. It is smaller for a form parameter than
+    /// for other parameters.
     fn likely(&self) -> f64 {
         match (self.parameter.is_log(), self.parameter.is_form()) {
             (true, true) => 0.3,
@@ -51,7 +51,7 @@ impl Moved {
         }
     }
 
-    /// The nearest coordinate within the parameter's range.
+    /// Limits a coordinate to the parameter's range.
     pub(crate) fn held(&self, coordinate: f64) -> f64 {
         self.coordinate(self.value(coordinate))
     }
@@ -73,7 +73,7 @@ pub(crate) struct Defects {
 }
 
 impl Defects {
-    /// The defects that a diagnosis named, at the values that it found.
+    /// Returns the defects that a diagnosis named, with the values that it found.
     pub(crate) fn of(prepared: &Prepared) -> Result<Self, CalibrateError> {
         let causes = &prepared.options.causes;
         if causes.is_empty() {
@@ -117,25 +117,25 @@ impl Defects {
         Ok(())
     }
 
-    /// Whether any of the defects lets the resting signal drift.
+    /// Whether any of the defects makes the resting signal drift.
     pub(crate) fn drifts(&self) -> bool {
         self.named.iter().any(|(_, live)| live.drifts)
     }
 
-    /// The same defects at other coordinates, each held to its range.
+    /// Returns the same defects at other coordinates, each limited to its range.
     pub(crate) fn moved_to(&self, at: Vec<f64>) -> Self {
         let at = self.moved.iter().zip(at).map(|(parameter, x)| parameter.held(x)).collect();
         Self { at, ..self.clone() }
     }
 
-    /// For each parameter, the distance from the initial coordinate and the weight of that distance: one over the
-    /// square of the likely distance.
+    /// Returns for each parameter the distance from the initial coordinate and the weight of that distance, which is
+    /// one over the square of the expected distance.
     pub(crate) fn strayed(&self, from: &Self) -> Vec<(f64, f64)> {
         let all = self.moved.iter().zip(&self.at).zip(&from.at);
         all.map(|((parameter, x), from)| (x - from, parameter.likely().powi(-2))).collect()
     }
 
-    /// Every effect with the values of its parameters.
+    /// Returns every effect with the values of its parameters.
     fn values(&self) -> impl Iterator<Item = (&'static Effect, Live, Vec<f64>)> {
         let mut pairs = self.moved.iter().zip(&self.at);
         self.named.iter().map(move |(effect, live)| {
@@ -144,7 +144,7 @@ impl Defects {
         })
     }
 
-    /// The map of the defects, whose curve and filter are not fitted yet.
+    /// Returns the map of the defects, with placeholders for the curve and the filter.
     pub(crate) fn map(&self) -> DiagnosedMap {
         let open = Interval { min: 0.0, max: 1.0 };
         let mut map = DiagnosedMap {
@@ -160,7 +160,7 @@ impl Defects {
             ceiling: None,
             lowpass_s: None,
             skew_s: 0.0,
-            // A stream that begins at one end of the range came there from the other end.
+            // A stream that starts at one end of the range is assumed to have come from the other end.
             initial_hysteresis: [-1.0, 1.0],
             curve: Values::EMPTY,
             drive_domain: open,
@@ -177,7 +177,7 @@ impl Defects {
         map
     }
 
-    /// Removes the effects of the reference itself from targets that were recorded every `period_s`.
+    /// Removes the reference's own defects from targets that were recorded every `period_s`.
     pub(crate) fn undo(&self, period_s: f64, targets: &mut [f64]) {
         let Ok(grid) = Grid::samples(period_s) else { return };
         for (effect, _, values) in self.values().filter(|(.., values)| !values.is_empty()) {

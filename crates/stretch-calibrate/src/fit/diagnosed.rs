@@ -1,4 +1,4 @@
-//! Fits the forward model of the effects that a diagnosis named, then the filter that inverts this model.
+//! Fits the forward model of the effects that a diagnosis named, then the filter that inverts the model.
 
 use stretch_core::{DiagnosedMap, Interval, Model, RestTracker, Values};
 use stretch_receptor::Defects as LiveDefects;
@@ -18,21 +18,21 @@ use super::{
 };
 
 const ITERATIONS: usize = 14;
-/// Least slope by which an error in signal is divided, as a share of the mean slope: where the curve is flat, the
+/// Least slope by which an error of the signal is divided, as a share of the mean slope. Where the curve is flat, the
 /// signal does not determine the target.
 const LEAST_SLOPE: f64 = 0.25;
-/// A fit ends when a step lowers the sum of squares by less than this share.
+/// A fit ends if a step lowers the sum of squares by less than this share.
 const ENDED: f64 = 1e-4;
-/// Time over which errors of the model are taken to be correlated, s.
+/// Time over which model errors are assumed to be correlated, s.
 const BLOCK_S: f64 = 2.0;
 /// Spectral densities of the rate's random walk that are tried, in 1/s^3.
 const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
 /// Correlation times of the rate that are tried, in seconds.
 const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
-/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+/// Acceptance criterion: a more complex alternative is kept if it lowers the error below this share.
 const ACCEPTED: f64 = 0.97;
 
-/// The choices of a fit. A fit that is given earlier choices begins with them.
+/// Choices of a fit. A fit with earlier choices starts from them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DiagnosedChoice {
     at: Vec<f64>,
@@ -42,7 +42,7 @@ pub(crate) struct DiagnosedChoice {
     steady_s: f64,
 }
 
-/// Fits the effects of [`Options::causes`](crate::Options::causes); with `rest` the baseline is followed.
+/// Fits the effects of [`Options::causes`](crate::Options::causes). If `rest` is true, the baseline is tracked.
 pub(crate) fn diagnosed(
     prepared: &Prepared,
     rest: bool,
@@ -84,8 +84,8 @@ pub(crate) fn diagnosed(
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), Choice::Diagnosed(choice)))
 }
 
-/// Fits the forward model to the signal first, then to the error of the target, which the slope of the curve weights
-/// differently. Of the two fits the one with the smaller live error is kept.
+/// Fits the forward model first to the signal, then to the error of the target, which weights the samples by the slope
+/// of the curve. Keeps the fit with the smaller live error.
 fn refined(
     prepared: &Prepared,
     rest: Option<RestTracker>,
@@ -100,7 +100,7 @@ fn refined(
     Ok(if fine_map.fit.rmse < map.fit.rmse { (fine, fine_map) } else { (forward, map) })
 }
 
-/// The numbers that a fit determined.
+/// Results of a forward fit.
 struct Forward {
     errors_in: ErrorsIn,
     defects: Defects,
@@ -139,7 +139,7 @@ struct Record<'a> {
     rest: Option<RestTracker>,
     errors_in: ErrorsIn,
     pieces: Vec<Piece>,
-    /// The range of the targets, without outliers.
+    /// Range of the targets without outliers.
     targets: Option<Interval>,
     period_s: f64,
     least_step: f64,
@@ -148,19 +148,19 @@ struct Record<'a> {
 /// A forward model at given parameter values, and its residuals.
 struct Seen {
     simulated: Simulated,
-    /// The curve in signed signal, rising.
+    /// The increasing curve of the signal multiplied by the sign of its polarity.
     curve: Vec<f64>,
     domain: Interval,
     residuals: Vec<f64>,
     square: f64,
-    /// Sum of squared errors of the signal, whichever errors `square` counts.
+    /// Sum of squared errors of the signal, also if `square` is computed from errors of the target.
     volts: f64,
 }
 
-/// Every drive with its signal, and the state of the defects.
+/// Pairs of drive and signal, and the final state of the defects. The drive is the input of the curve.
 struct Simulated {
     pairs: Vec<(f64, f64)>,
-    /// Hysteresis state of the plays where a trial begins.
+    /// Mean hysteresis state of the plays at the start of a trial, at the lower and upper end of the range.
     initial_hysteresis: [f64; 2],
     /// Travel of the gauge at the end of the trials.
     travelled: f64,
@@ -180,7 +180,7 @@ impl<'a> Record<'a> {
         Ok(Self { prepared, rest, errors_in, pieces, targets, period_s, least_step })
     }
 
-    /// Pairs of drive and signal; the drive is that of `skew_s` earlier.
+    /// Computes the pairs of drive and signal. The drive is read `skew_s` earlier than the signal.
     fn pairs(&self, defects: &Defects) -> Simulated {
         let map = defects.map();
         let live = LiveDefects::<f64>::new(&map, self.period_s);
@@ -205,7 +205,7 @@ impl<'a> Record<'a> {
                 each.map(|(i, &y)| live.advance(&mut now, y, pressure(i))).collect();
             memory = Some(now);
             for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
-                // Beyond an end the drive is held, so that every value of the skew gives the same number of pairs.
+                // Outside the ends the last drive is held, so that the number of pairs does not depend on the skew.
                 let place = (i as f64 - late).clamp(0.0, (drives.len() - 1) as f64);
                 let below = (place as usize).min(drives.len() - 2);
                 let share = place - below as f64;
@@ -213,7 +213,7 @@ impl<'a> Record<'a> {
                 pairs.push((drive, signal));
             }
         }
-        // A stream begins in the state of trials that follow other trials.
+        // A stream is assumed to start in the mean state of trials that follow other trials.
         let mean = |is_upper: bool, otherwise: f64| {
             let own = states.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
             let (n, sum) = own.fold((0.0, 0.0), |(n, sum), (_, share)| (n + 1.0, sum + share));
@@ -223,7 +223,7 @@ impl<'a> Record<'a> {
         Simulated { pairs, initial_hysteresis, travelled: memory.map_or(0.0, |m| m.travelled()) }
     }
 
-    /// The curve with the least residuals, and these residuals.
+    /// Fits the curve and computes its residuals.
     fn look(&self, defects: &Defects) -> Option<Seen> {
         let simulated = self.pairs(defects);
         let pairs = &simulated.pairs;
@@ -255,7 +255,7 @@ impl<'a> Record<'a> {
         Some(Seen { simulated, curve, domain, residuals, square, volts })
     }
 
-    /// Levenberg-Marquardt over the parameters of the defects; the curve is solved for at each step.
+    /// Fits the parameters of the defects by Levenberg-Marquardt. The curve is solved for at each step.
     fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
         let mut defects = begin.clone();
@@ -270,7 +270,7 @@ impl<'a> Record<'a> {
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
             let mut slope =
                 nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
-            // a block counts as one observation, and so does the value that the diagnosis found
+            // The value from the diagnosis has the weight of one observation; a block of samples is one observation.
             let level = self.mean(&seen) * self.block();
             let cost = |seen: &Seen, defects: &Defects| {
                 let stray: f64 = defects.strayed(&begin).iter().map(|(d, w)| w * d * d).sum();
@@ -307,13 +307,13 @@ impl<'a> Record<'a> {
         let errors = self.errors(&normal, self.mean(&seen).sqrt());
         let noise = (seen.volts / seen.residuals.len() as f64).sqrt();
         let range = seen.curve[KNOTS - 1] - seen.curve[0];
-        // a curve that follows noiseless data exactly still needs a positive noise for the weights
+        // A curve that fits noiseless data exactly still needs a positive noise for the weights.
         let noise = noise.max(1e-6 * range);
         let Self { errors_in, rest, .. } = *self;
         Ok(Forward { errors_in, defects, rest, seen, noise, errors })
     }
 
-    /// Samples of a block.
+    /// Returns the number of samples in a block.
     fn block(&self) -> f64 {
         (BLOCK_S / self.period_s).max(1.0)
     }
@@ -343,7 +343,7 @@ impl<'a> Record<'a> {
         (0..defects.at.len()).into_par_iter().map(one).collect()
     }
 
-    /// Standard errors of the coordinates, where a block counts as one observation.
+    /// Returns standard errors of the coordinates, where a block counts as one observation.
     fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
         if normal.is_empty() {
             return Vec::new();
@@ -358,7 +358,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The filter with the least live error.
+    /// Returns the map whose filter has the least live error.
     fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         use rayon::prelude::*;
         let maps: Result<Vec<DiagnosedMap>, CalibrateError> = STEADY_S
@@ -369,7 +369,7 @@ impl<'a> Record<'a> {
         best.ok_or(CalibrateError::NoTrials)
     }
 
-    /// The map with the statistics of its estimates, computed by the receptor that runs live.
+    /// Returns the map with the statistics of its estimates, which the live receptor computes.
     fn judged(
         &self,
         forward: &Forward,
@@ -387,14 +387,14 @@ impl<'a> Record<'a> {
         Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }
 
-    /// The map without these statistics.
+    /// Returns the map without these statistics.
     fn map(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         let Seen { simulated, curve, domain, .. } = &forward.seen;
         let sign = self.prepared.polarity.sign();
         let curve: Vec<f64> = curve.iter().map(|v| sign * v).collect();
         let estimate_domain = self.targets.unwrap_or(*domain);
         let map = forward.defects.map();
-        // the fitted curve gives the signal at rest without noise
+        // The fitted curve gives the resting signal without noise.
         let live = LiveDefects::<f64>::new(&map, self.period_s);
         let mut still = live.begin(estimate_domain.min, 0.0);
         let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);

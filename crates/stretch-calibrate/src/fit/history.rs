@@ -1,5 +1,5 @@
-//! Fits a polynomial of the signal's history, as one least-squares problem whose time constants, radii and ridge are
-//! chosen on data left out.
+//! Fits a polynomial of the signal's history by least squares. Cross-validation chooses its time constants, radii and
+//! ridge.
 
 use stretch_core::{
     FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Values,
@@ -21,11 +21,11 @@ use super::{
 
 /// Name of the model in reports and messages.
 const NAME: &str = "history";
-/// Samples at the start of a piece that are not fitted, while the low-passes forget their initial values.
+/// Samples at the start of a piece that are not fitted, because the low-passes still depend on their initial values.
 pub const SETTLE: usize = 10;
 /// Length of the blocks within which errors may be correlated, in seconds.
 const BLOCK_S: f64 = 0.5;
-/// Ridges that are tried, as shares of a term's own power.
+/// Ridges that are tried, as shares of each term's power.
 const RIDGES: [f64; 3] = [1e-6, 1e-4, 1e-2];
 /// Designs that are tried, the smallest first.
 const DESIGNS: [StateDesign; 5] = [
@@ -36,25 +36,25 @@ const DESIGNS: [StateDesign; 5] = [
     design(&[0.06, 0.25, 1.0], &[0.15], 4),
 ];
 
-/// A choice of states and products.
+/// States of the signal's history, and the degree of their products.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StateDesign {
     /// Time constants, in seconds.
     pub relaxations_s: &'static [f64],
     /// Radii of plays, in normalised signal.
     pub radii: &'static [f64],
-    /// The greatest sum of powers.
+    /// Greatest sum of powers.
     pub degree: u8,
-    /// The greatest sum of the memory states' powers.
+    /// Greatest sum of the powers of the memory states.
     pub memory_degree: u8,
 }
 
-/// A design with all products of states.
+/// A design in which memory states reach the full degree.
 const fn design(relaxations_s: &'static [f64], radii: &'static [f64], degree: u8) -> StateDesign {
     StateDesign { relaxations_s, radii, degree, memory_degree: degree }
 }
 
-/// The states of every sample, end to end: a list of its own for each sample takes three times the memory.
+/// The states of every sample in one vector. A separate vector for each sample would take three times the memory.
 #[derive(Debug, Clone)]
 pub struct States {
     width: usize,
@@ -62,18 +62,18 @@ pub struct States {
 }
 
 impl States {
-    /// The states of each sample.
+    /// Iterates over the states of each sample.
     pub fn iter(&self) -> impl Iterator<Item = &[f64]> + Clone {
         self.values.chunks_exact(self.width)
     }
 
-    /// The states of one sample.
+    /// Returns the states of one sample.
     pub fn at(&self, sample: usize) -> &[f64] {
         &self.values[sample * self.width..][..self.width]
     }
 }
 
-/// The states of a whole piece, and its target.
+/// The states of a piece and its targets.
 struct Piece {
     fold: Vec<usize>,
     states: States,
@@ -81,7 +81,7 @@ struct Piece {
 }
 
 impl StateDesign {
-    /// Which products of the states are terms.
+    /// Returns which products of the states are terms.
     pub fn shape(&self) -> HistoryShape {
         HistoryShape {
             states: 1 + self.relaxations_s.len() + self.radii.len(),
@@ -90,7 +90,7 @@ impl StateDesign {
         }
     }
 
-    /// The states of every sample, computed as in the receptor.
+    /// Computes the states of every sample as in the receptor.
     pub fn states(&self, x: &[f64], period_s: f64) -> States {
         let first = x.first().copied().unwrap_or(0.0);
         let mut slow = vec![first; self.relaxations_s.len()];
@@ -115,14 +115,14 @@ impl StateDesign {
         States { width, values: states }
     }
 
-    /// The least and the greatest value of each state in some pieces.
+    /// Returns the least and the greatest value of each state in some pieces.
     pub fn domain<'a>(&self, pieces: impl Iterator<Item = &'a States> + Clone) -> Vec<Interval> {
         let one =
             |k: usize| extent(pieces.clone().flat_map(States::iter).map(move |states| states[k]));
         (0..self.shape().states).map(one).collect()
     }
 
-    /// Name of a state in a table.
+    /// Returns the name of a state in a table.
     fn name(&self, state: usize) -> String {
         if state == 0 {
             return "x".into();
@@ -144,7 +144,7 @@ impl StateDesign {
     }
 }
 
-/// Scales states and multiplies them out.
+/// Computes rows of terms: scales the states and multiplies them.
 #[derive(Debug, Clone)]
 pub struct TermRows {
     products: Vec<(usize, usize)>,
@@ -153,7 +153,7 @@ pub struct TermRows {
 }
 
 impl TermRows {
-    /// The rows of a shape over the domains of its states.
+    /// Rows of a shape, over the ranges of its states.
     pub fn new(shape: HistoryShape, domain: &[Interval]) -> Self {
         let mut products = Vec::new();
         shape.each_product(|parent, state| products.push((parent, state)));
@@ -177,7 +177,7 @@ impl TermRows {
     }
 }
 
-/// The choices of a fit. A fit that is given earlier choices makes no further ones.
+/// Choices of a fit. A fit with earlier choices makes no further ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HistoryChoice {
     pub(crate) design: StateDesign,
@@ -195,7 +195,7 @@ struct Trained {
     cross_validated: f64,
 }
 
-/// Fits the model; with `rest` the baseline is followed. An earlier `choice`, made on more data, is kept.
+/// Fits the model. If `rest` is true, the baseline is tracked. An earlier `choice`, made on more data, is kept.
 pub(crate) fn history(
     prepared: &Prepared,
     rest: bool,
@@ -249,7 +249,7 @@ pub(crate) fn history(
     Ok(((Model::History(map), vec![report], vec![note]), Choice::History(choice)))
 }
 
-/// The states of one kind in words; empty where the model has none of this kind.
+/// Describes the states of one kind; empty if the model has none of this kind.
 fn several(what: &str, values: &[f64], unit: &str) -> String {
     let words: Vec<String> = values.iter().map(f64::to_string).collect();
     if words.is_empty() { String::new() } else { format!(", {what} {} {unit}", listed(&words)) }
@@ -260,7 +260,7 @@ fn undetermined() -> CalibrateError {
 }
 
 fn choose(prepared: &Prepared, rest: bool) -> Result<Trained, CalibrateError> {
-    // the baseline first, with the smallest design; then states and ridge
+    // The baseline is chosen first, with the smallest design, then the states and the ridge.
     let [first, others @ ..] = DESIGNS;
     let mut best: Option<Trained> = None;
     for tracker in candidates(prepared, rest) {
@@ -273,7 +273,7 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<Trained, CalibrateError> {
     best.ok_or_else(undetermined)
 }
 
-/// Keeps the better of two fits; a design that the data do not determine is passed over.
+/// Keeps the better of two fits. A design that the data do not determine is skipped.
 fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
     if let Ok(found) = found
         && best.as_ref().is_none_or(|b| found.cross_validated < b.cross_validated)
@@ -282,7 +282,7 @@ fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
     }
 }
 
-/// The pieces of all series. A fit that is kept is kept without them, because they are by far the largest part of it.
+/// Computes the pieces of all series. A fit does not store them, because they would be by far its largest part.
 fn pieces(prepared: &Prepared, design: StateDesign, rest: Option<RestTracker>) -> Vec<Piece> {
     let period_s = prepared.sample_rate.period_s();
     let mut pieces = Vec::new();
@@ -336,7 +336,7 @@ fn train(
     Ok(Trained { choice, domain, estimate, rows, samples, whole, cross_validated })
 }
 
-/// The triangular factor of each fold.
+/// Returns the triangular factor of each fold.
 fn factors(pieces: &[Piece], rows: &TermRows, terms: usize) -> Vec<LinearFactor> {
     let last = pieces.iter().flat_map(|p| p.fold.iter()).max().copied().unwrap_or(0);
     let mut folds = vec![RowAccumulator::new(terms); last + 1];
@@ -352,7 +352,7 @@ fn factors(pieces: &[Piece], rows: &TermRows, terms: usize) -> Vec<LinearFactor>
     folds.into_iter().map(RowAccumulator::factor).collect()
 }
 
-/// Least squares with a ridge on all terms but the constant.
+/// Solves by least squares with a ridge on all terms except the constant.
 fn solve(factor: &LinearFactor, ridge: f64) -> Option<Solution> {
     factor.solve(|term, power| if term == 0 { 0.0 } else { ridge * power })
 }
@@ -361,7 +361,7 @@ fn dof(samples: usize, terms: usize) -> f64 {
     (samples as f64 - terms as f64).max(1.0)
 }
 
-/// Root mean square error over all folds, each predicted from the others.
+/// Returns the root mean square error over all folds, each predicted by a fit to the others.
 fn held_out(
     pieces: &[Piece],
     rows: &TermRows,
@@ -390,7 +390,7 @@ fn predict(weights: &[f64], row: &[f64], estimate: Interval) -> f64 {
     free.clamp(estimate.min, estimate.max)
 }
 
-/// Statistics of the final fit, and standard errors of its coefficients.
+/// Returns statistics of the final fit, and standard errors of its coefficients.
 fn judge(best: &Trained, pieces: &[Piece], solution: &Solution, hz: f64) -> (FitSummary, Vec<f64>) {
     let weights = &solution.weights;
     let length = ((BLOCK_S * hz) as usize).max(1);

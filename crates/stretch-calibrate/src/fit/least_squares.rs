@@ -1,36 +1,33 @@
-//! Least squares for models whose terms are no polynomial surface.
+//! Least squares for models that are not polynomial surfaces.
 //!
-//! Rows fold, block by block, into the triangular factor `R` of the design matrix
-//! by Householder reflections (Golub and Van Loan, Matrix Computations, 4th ed.,
-//! section 5.3; block by block: doi:10.1137/080731992). No `X'X` is formed, so
-//! errors grow with the condition number and not with its square, and memory does
-//! not grow with the rows.
+//! Blocks of rows are folded into the triangular factor `R` of the design matrix by Householder reflections (Golub and
+//! Van Loan, Matrix Computations, 4th ed., section 5.3; block by block: doi:10.1137/080731992). `X'X` is never formed,
+//! so errors grow with the condition number and not with its square. The memory does not grow with the number of rows.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows for each column that are collected before they are folded; the triangle's own rows then make a quarter of the
-/// cost.
+/// Rows per column that are collected before they are folded. The rows of the triangle then add a quarter to the cost.
 const WAITING: usize = 4;
 /// Least number of rows that are collected before they are folded.
 const LEAST_WAITING: usize = 64;
 
-/// Takes rows one by one and keeps only their triangle.
+/// An accumulator of rows that keeps only their triangle.
 #[derive(Debug, Clone)]
 pub struct RowAccumulator {
-    /// The triangle of `[X y]` so far; below it the rows that are not folded yet, then zeros.
+    /// The triangle of `[X y]` so far. Below it are the rows that are not folded yet, then zeros.
     stack: DMatrix<f64>,
     filled: usize,
 }
 
 impl RowAccumulator {
-    /// No row of so many terms yet.
+    /// An accumulator for rows with this number of terms.
     pub fn new(terms: usize) -> Self {
         let columns = terms + 1;
         let rows = columns + (WAITING * columns).max(LEAST_WAITING);
         Self { stack: DMatrix::zeros(rows, columns), filled: columns }
     }
 
-    /// Adds a row of all terms.
+    /// Adds a row with all terms.
     pub fn push(&mut self, row: &[f64], value: f64) {
         for (column, &x) in row.iter().chain([&value]).enumerate() {
             self.stack[(self.filled, column)] = x;
@@ -47,7 +44,7 @@ impl RowAccumulator {
         self.advance();
     }
 
-    /// Adds all rows of a factor whose term `k` is term `place(k)` here.
+    /// Adds all rows of a factor. Term `k` of the factor is term `place(k)` of the accumulator.
     pub fn absorb(&mut self, factor: &LinearFactor, place: impl Fn(usize) -> usize) {
         let (terms, value) = (factor.terms(), self.stack.ncols() - 1);
         for row in factor.triangle.row_iter() {
@@ -73,7 +70,7 @@ impl RowAccumulator {
         self.filled = columns;
     }
 
-    /// The factor of all rows.
+    /// Returns the factor of all rows.
     pub fn factor(mut self) -> LinearFactor {
         self.fold();
         let columns = self.stack.ncols();
@@ -90,12 +87,12 @@ pub struct LinearFactor {
 }
 
 impl LinearFactor {
-    /// How many terms a row has.
+    /// Returns the number of terms of a row.
     pub fn terms(&self) -> usize {
         self.triangle.ncols() - 1
     }
 
-    /// The factor of the rows of both factors.
+    /// Returns the factor of the rows of both factors.
     pub fn merged(&self, other: &Self) -> Self {
         let mut rows = RowAccumulator::new(self.terms());
         rows.absorb(self, |term| term);
@@ -103,13 +100,13 @@ impl LinearFactor {
         rows.factor()
     }
 
-    /// Sum of squares of the values about their mean, for rows whose first term is 1.
+    /// Returns the sum of squares of the values about their mean, for rows whose first term is 1.
     pub fn total_sum(&self) -> f64 {
         self.triangle.column(self.terms()).iter().skip(1).map(|q| q * q).sum()
     }
 
-    /// Least squares with `penalty(k, |column k|^2) c_k^2` on each coefficient, as
-    /// rows of their own; `None` where a column adds nothing but rounding to the columns before it.
+    /// Solves with the penalty `penalty(k, |column k|^2) c_k^2` on each coefficient, which is added as separate rows.
+    /// Returns `None` if a column is a linear combination of the columns before it, up to rounding.
     pub fn solve(&self, penalty: impl Fn(usize, f64) -> f64) -> Option<Solution> {
         let terms = self.terms();
         let mut stack = self.triangle.clone().resize_vertically(2 * terms + 1, 0.0);
@@ -132,10 +129,10 @@ impl LinearFactor {
     }
 }
 
-/// The factor of all parts, and for each part the factor of all others.
+/// Returns the factor of all parts, and for each part the factor of all others.
 pub fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec<LinearFactor>)> {
     let (first, rest) = parts.split_first()?;
-    // `after[k]` holds the parts from k + 1 on, so that no part has to be subtracted
+    // `after[k]` holds the parts from k + 1 on, so that no part has to be subtracted.
     let mut after: Vec<LinearFactor> = Vec::with_capacity(rest.len());
     for part in rest.iter().rev() {
         let more = after.last().map_or_else(|| part.clone(), |all| part.merged(all));
@@ -152,26 +149,26 @@ pub fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec<Linear
     Some((before, others))
 }
 
-/// Coefficients, and the triangle from which they were solved.
+/// Coefficients, and the triangle from which they were computed.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// The upper triangle, the rows of the penalty included.
+    /// The upper triangle, which includes the rows of the penalty.
     pub r: DMatrix<f64>,
     /// The coefficients.
     pub weights: Vec<f64>,
 }
 
 impl Solution {
-    /// Condition number (2-norm) of the design matrix with the rows of its penalty:
-    /// the factor by which a relative rounding of the rows may grow in the coefficients.
+    /// Returns the condition number (2-norm) of the design matrix with the rows of its penalty. A relative rounding
+    /// error of the rows may grow by this factor in the coefficients.
     pub fn condition(&self) -> f64 {
         let values = self.r.singular_values();
         values.max() / values.min()
     }
 
-    /// Standard errors that hold for errors correlated within a block: the sandwich
-    /// `A^-1 (sum over blocks of s s') A^-1` with `A = R'R` and `s` a block's sum of
-    /// row times residual (Liang and Zeger 1986, doi:10.1093/biomet/73.1.13).
+    /// Returns standard errors for errors that are correlated within a block. They are given by the sandwich `A^-1 (sum
+    /// over blocks of s s') A^-1` with `A = R'R`, where `s` is a block's sum of row times residual (Liang and Zeger
+    /// 1986, doi:10.1093/biomet/73.1.13).
     pub fn block_errors(&self, blocks: &[Vec<f64>]) -> Vec<f64> {
         let mut variance = vec![0.0; self.weights.len()];
         for block in blocks {
@@ -204,8 +201,8 @@ mod tests {
 
     type Row = ([f64; TERMS], f64);
 
-    /// Rows of a known solution with an error of a tenth. With values that are all error, the solution would be near
-    /// zero and the relative rounding would be large.
+    /// Rows of a known solution with an error of a tenth. If the values were only error, the solution would be near
+    /// zero and the relative rounding error large.
     fn rows(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Row>> {
         let row = (prop::array::uniform5(-1.0..1.0), -0.1..0.1f64).prop_map(|(row, error)| {
             (row, error + row.iter().zip(TRUTH).map(|(x, c)| x * c).sum::<f64>())
@@ -219,7 +216,7 @@ mod tests {
         sums.factor()
     }
 
-    /// Least squares of all rows by one factorisation.
+    /// Solves for all rows by one factorisation.
     fn at_once(rows: &[Row], penalty: f64) -> DVector<f64> {
         let all = rows.len() + TERMS;
         let x = DMatrix::from_fn(all, TERMS, |i, j| match rows.get(i) {
@@ -232,7 +229,7 @@ mod tests {
         r.solve_upper_triangular(&q.tr_mul(&y)).expect("no term follows from the others")
     }
 
-    /// Distance of two solutions, as a share of the norm of the second.
+    /// Returns the distance of two solutions, as a share of the norm of the second.
     fn apart(a: &[f64], b: &DVector<f64>) -> f64 {
         (DVector::from_column_slice(a) - b).norm() / b.norm()
     }
@@ -261,7 +258,7 @@ mod tests {
                     .filter(|&p| p != k)
                     .flat_map(|p| parts[p].iter().copied())
                     .collect();
-                // ten rows of five random terms may be nearly dependent
+                // Ten rows of five random terms may be nearly dependent.
                 let solution = others_of_k.solve(|_, _| 0.0).unwrap();
                 let allowed = tol::FIT_WELL * (solution.condition() / 1e3).max(1.0);
                 let off = apart(&solution.weights, &at_once(&rest, 0.0));
@@ -271,7 +268,7 @@ mod tests {
 
         #[test]
         fn rows_of_few_terms_fold_apart(rows in rows(80..200)) {
-            // even rows touch the terms 0, 1, 4 alone, odd ones 2, 3, 4
+            // Even rows involve only the terms 0, 1 and 4, odd rows only 2, 3 and 4.
             let mut direct = RowAccumulator::new(TERMS);
             let mut parts = [RowAccumulator::new(3), RowAccumulator::new(3)];
             for (i, (row, value)) in rows.iter().enumerate() {
@@ -290,7 +287,7 @@ mod tests {
         }
     }
 
-    /// Powers of a number between 1.23 and 1.25: `X'X` has no digit left.
+    /// Powers of a number between 1.23 and 1.25; `X'X` would have no correct digit.
     #[test]
     fn a_condition_of_1e8_keeps_its_digits_and_says_so() {
         let truth = [0.058, 0.774, 2.30, -2.26];
@@ -302,7 +299,7 @@ mod tests {
         }
         let solution = rows.factor().solve(|_, _| 0.0).unwrap();
         assert!(solution.condition() > 1e8, "{:e}", solution.condition());
-        // the values themselves are rounded, and the effect of this rounding grows with the condition
+        // The values themselves are rounded, and the effect of this rounding grows with the condition number.
         let rounding = f64::EPSILON * solution.condition();
         let off = apart(&solution.weights, &DVector::from_row_slice(&truth));
         assert!(off < rounding, "off by {off:e}, rounding {rounding:e}");

@@ -1,4 +1,4 @@
-//! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts this model.
+//! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts the model.
 
 use stretch_core::{FitSummary, Interval, Model, ObserverMap, RestTracker, Values};
 
@@ -17,25 +17,25 @@ use super::{
     report::{Coefficient, FitReport, Fitted},
 };
 
-/// Ridge on the dynamic parameters, as a share of each one's own power.
+/// Ridge on the dynamic parameters, as a share of each parameter's power.
 const RIDGE: f64 = 1e-4;
 const ITERATIONS: usize = 12;
 /// Spectral densities of the rate's random walk that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
 /// Time constants of the first search, in seconds.
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
-/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+/// Acceptance criterion: a more complex alternative is kept if it lowers the error below this share.
 const ACCEPTED: f64 = 0.97;
-/// Time over which errors of the model are taken to be correlated, s: that of the slowest relevant part of the model,
-/// not a few samples.
+/// Time over which model errors are assumed to be correlated, s. It is the time of the slowest relevant part of the
+/// model.
 const BLOCK_S: f64 = 2.0;
 /// Relative step of a time constant for the derivative of the drive.
 const NUDGE: f64 = 0.01;
-/// Ridge that avoids a division by zero for a parameter that no data determine, as a share of its column's power. The
-/// share is far below that of any data that determine the parameter.
+/// Ridge that avoids a division by zero if no data determine a parameter, as a share of its column's power. It is far
+/// below the share of any data that determine the parameter.
 const BOUNDS_RIDGE: f64 = 1e-9;
 
-/// Fits an observer; with `rest` the baseline is followed. An earlier `choice`, made on more data, is kept.
+/// Fits an observer. If `rest` is true, the baseline is tracked. An earlier `choice`, made on more data, is kept.
 pub(crate) fn observer(
     prepared: &Prepared,
     rest: bool,
@@ -78,7 +78,7 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), Cal
         let pieces = pieces(prepared, rest)?;
         let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
         let two = second_relaxation(prepared, &pieces, one)?;
-        // the structures are compared by the spread of the signal around them, simplest first
+        // The structures are compared by the spread of the signal around the model, simplest first.
         let mut chosen: Option<(f64, ObserverChoice)> = None;
         for taus in [[None; 2], one.taus, two.taus] {
             for plays in [false, true] {
@@ -99,7 +99,7 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), Cal
     best.ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
 }
 
-/// The time constant that explains the signal best: a grid, then golden sections.
+/// Finds the time constant that explains the signal best, on a grid and then by golden sections.
 fn one_relaxation(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -129,7 +129,7 @@ fn second_relaxation(
     let first = one.taus[0];
     let mut best = (f64::INFINITY, one);
     for tau in TAUS {
-        // two time constants this close cannot be distinguished
+        // Time constants that are this close cannot be distinguished.
         if first.is_some_and(|first| (tau / first).ln().abs() < 1.0) {
             continue;
         }
@@ -143,7 +143,7 @@ fn second_relaxation(
     Ok(best.1)
 }
 
-/// A forward model, and the map whose agility gives the least live error.
+/// Returns a forward model, and the map whose agility gives the least live error.
 fn tuned(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -163,7 +163,7 @@ fn tuned(
     Ok((forward, map))
 }
 
-/// Gauss-Newton over curve and dynamics together.
+/// Fits curve and dynamics together by Gauss-Newton steps.
 fn forward(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -187,7 +187,7 @@ fn forward(
         curve = rising(&frozen.0, least_step);
         let (_, moved) =
             solve(samples.clone(), &dynamics, drive, Some(&curve)).ok_or_else(undetermined)?;
-        // smaller steps first, because the curve still absorbs a part of the dynamics
+        // The first steps are smaller, because the curve still absorbs a part of the dynamics.
         let share = if pass < 2 { 0.7 } else { 1.0 };
         let mut change: f64 = 0.0;
         for (d, m) in dynamics.iter_mut().zip(&moved) {
@@ -203,12 +203,12 @@ fn forward(
         curve = rising(&knots, least_step);
     }
     let noise = spread(samples, &dynamics, drive, &curve);
-    // a curve that follows noiseless data exactly still needs a positive noise for the weights
+    // A curve that fits noiseless data exactly still needs a positive noise for the weights.
     let noise = noise.max(1e-6 * (range.max - range.min));
     Ok(Forward { choice, curve, drive, dynamics, noise })
 }
 
-/// The range of the drives, without outliers (see `inner`).
+/// Returns the range of the drives without outliers. A drive is the input of the curve.
 fn drives<'a>(
     samples: impl Iterator<Item = Sample<'a>>,
     dynamics: &[f64],
@@ -217,7 +217,7 @@ fn drives<'a>(
         .ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
 }
 
-/// Solves for the knots alone, or for knots and dynamics linearised about a curve.
+/// Solves for the knots alone, or for knots and dynamics in a model that is linearised about a curve.
 fn solve<'a>(
     samples: impl Iterator<Item = Sample<'a>>,
     dynamics: &[f64],
@@ -226,7 +226,7 @@ fn solve<'a>(
 ) -> Option<(Vec<f64>, Vec<f64>)> {
     let mut rows = CurveRows::new(if about.is_some() { dynamics.len() } else { 0 });
     let mut more = Vec::new();
-    // faster than a loop over several pieces
+    // `for_each` is faster here than a loop over several pieces.
     samples.for_each(|sample| {
         let at = Place::new(sample.drive(dynamics), drive);
         more.clear();
@@ -246,7 +246,7 @@ fn solve<'a>(
     Some((knots, moved))
 }
 
-/// Spread of the signal around the model.
+/// Returns the root mean square deviation of the signal from the model.
 fn spread<'a>(
     samples: impl Iterator<Item = Sample<'a>>,
     dynamics: &[f64],
@@ -261,7 +261,7 @@ fn spread<'a>(
     (sum / f64::from(count)).sqrt()
 }
 
-/// The map with the statistics of its estimates, computed by the receptor that runs live.
+/// Returns the map with the statistics of its estimates, which the live receptor computes.
 fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
     let sign = prepared.polarity.sign();
     let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
@@ -270,7 +270,7 @@ fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, Calibra
     let (amplitudes, weights) = rest.split_at(taus.len());
     let targets = prepared.series.iter().flat_map(|s| s.target.iter());
     let estimate_domain = extent(targets.map(|&t| prepared.target_range.normalise(t)));
-    // the fitted curve gives the signal at rest without noise
+    // The fitted curve gives the resting signal without noise.
     let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
     let rest =
         forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
@@ -292,14 +292,15 @@ fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, Calibra
     Ok(ObserverMap { fit, ..map })
 }
 
-/// Bounds of a forward model on the pieces that it was fitted to.
+/// Returns the uncertainty of a forward model, on the pieces to which it was fitted.
 ///
-/// The first are standard errors of lead, amplitudes and weights of plays, then of the time constants; NaN where the
-/// data do not determine them. The second is the condition number of the rows behind the standard errors.
+/// The first result contains standard errors of lead, amplitudes and play weights, then of the time constants. They are
+/// NaN if the data do not determine them. The second result is the condition number of the rows behind the standard
+/// errors.
 ///
-/// The bounds are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
-/// together: an effect that the curve or a time constant could absorb is
-/// not counted as known. The choice of the structure is taken as known.
+/// The errors are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
+/// together. Correlations of an effect with the curve or with a time constant therefore enlarge its error. The
+/// structure of the model is assumed to be known.
 fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> (Vec<f64>, f64) {
     let Forward { choice, curve, drive, dynamics, .. } = forward;
     let taus: Vec<f64> = choice.taus().collect();
@@ -340,7 +341,7 @@ fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> (Vec<f64>, f64)
             }
         }
     }
-    // the least positive number keeps a column of zeros from dividing by nothing
+    // The smallest constant avoids a division by zero for a column of zeros.
     match rows.factor().solve(|_, power| BOUNDS_RIDGE * power + 1e-300) {
         Some(solution) => (solution.block_errors(&blocks).split_off(KNOTS), solution.condition()),
         None => (vec![f64::NAN; more], f64::INFINITY),

@@ -1,4 +1,4 @@
-//! A gauge's forward model: `signal = curve(drive)`, `drive = target + dynamics`.
+//! The forward model of a gauge: `signal = curve(drive)`, `drive = target + dynamics`.
 
 use stretch_core::{
     Design, Interval, Model, Polarity, Provenance, Range, RestLevel, RestTracker, SampleRate,
@@ -16,12 +16,12 @@ use crate::{
 use super::{curve::Place, history::SETTLE};
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// Least slope of the drive over the target while plays are engaged.
+/// Least slope of the drive with respect to the target while plays are engaged, as a share of the slope without plays.
 const LEAST_ANSWER: f64 = 0.1;
-/// Window of the reference's smoothing, in samples; quadratic.
+/// Window of the quadratic filter that smooths the reference, in samples.
 const SMOOTH: usize = 7;
 
-/// The choices of a fit. A fit that is given earlier choices makes no further ones.
+/// Choices of a fit. A fit with earlier choices makes no further ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverChoice {
     pub(crate) taus: [Option<f64>; 2],
@@ -39,22 +39,22 @@ impl ObserverChoice {
         if self.plays { &RADII } else { &[] }
     }
 
-    /// Number of dynamic parameters: lead, amplitudes and weights of the plays.
+    /// Returns the number of dynamic parameters: lead, amplitudes and play weights.
     pub(crate) fn dynamics(&self) -> usize {
         1 + self.taus().count() + self.radii().len()
     }
 }
 
-/// A piece of a trial: signal above its baseline, the target smoothed, its rate.
+/// A piece of a trial: the signal above its baseline, the smoothed target and its rate.
 pub(crate) struct Piece {
     pub(crate) signal: Vec<f64>,
     pub(crate) smooth: Vec<f64>,
-    /// Pressures; empty where no pressure is needed.
+    /// Pressures; empty if no pressure is needed.
     pub(crate) pressure: Vec<f64>,
     rate: Vec<f64>,
 }
 
-/// Contribution to the drive of a unit of each dynamic parameter, a row for each sample of a piece.
+/// Derivatives of the drive with respect to each dynamic parameter, with a row for each sample of a piece.
 pub(crate) struct Features {
     values: Vec<f64>,
     width: usize,
@@ -74,13 +74,13 @@ impl Features {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample<'a> {
     pub(crate) target: f64,
-    /// Contribution to the drive of a unit of each dynamic parameter.
+    /// Derivatives of the drive with respect to each dynamic parameter.
     pub(crate) features: &'a [f64],
     pub(crate) signal: f64,
 }
 
 impl Sample<'_> {
-    /// The sum that the dynamics add to the target.
+    /// Returns the sum that the dynamics add to the target.
     pub(crate) fn added(&self, dynamics: &[f64]) -> f64 {
         self.features.iter().zip(dynamics).map(|(a, b)| a * b).sum()
     }
@@ -90,7 +90,7 @@ impl Sample<'_> {
     }
 }
 
-/// All pieces, even in time; pieces too short to smooth are left out.
+/// Returns all evenly sampled pieces. Pieces that are too short to be smoothed are left out.
 pub(crate) fn pieces(
     prepared: &Prepared,
     rest: Option<RestTracker>,
@@ -141,7 +141,7 @@ impl Piece {
         Features { values, width }
     }
 
-    /// The samples after the low-passes have settled, with their `features`.
+    /// Iterates over the samples after the low-passes have settled, with their `features`.
     pub(crate) fn samples<'a>(
         &'a self,
         features: &'a Features,
@@ -151,19 +151,19 @@ impl Piece {
     }
 }
 
-/// A forward model in signed signal.
+/// A forward model of the signal multiplied by the sign of its polarity.
 pub(crate) struct Forward {
     pub(crate) choice: ObserverChoice,
     pub(crate) curve: Vec<f64>,
     pub(crate) drive: Interval,
-    /// Lead, amplitudes, weights of the plays.
+    /// Lead, amplitudes, play weights.
     pub(crate) dynamics: Vec<f64>,
     pub(crate) noise: f64,
 }
 
 impl Forward {
-    /// Whether the drive rises with the target whichever plays are engaged: a
-    /// drive that falls cannot be inverted. Plays engage from the widest on.
+    /// Whether the drive rises with the target for any engaged plays. A drive that falls cannot be inverted. The widest
+    /// plays are engaged first.
     pub(crate) fn answers(&self) -> bool {
         let plays = self.choice.radii().len();
         let (instant, weights) = self.dynamics[1..].split_at(self.dynamics.len() - 1 - plays);
@@ -176,28 +176,29 @@ impl Forward {
         least > 0.0 && engaged
     }
 
-    /// The place of a sample's drive on the curve.
+    /// Returns the position of a sample's drive on the curve.
     pub(crate) fn place(&self, sample: &Sample) -> Place {
         Place::new(sample.drive(&self.dynamics), self.drive)
     }
 }
 
-/// Time in which the live baseline of a forward model follows a signal below rest, s. The time is short because the
+/// Time in which the live baseline of a forward model follows a signal below rest, s. It is short because the resting
 /// level of a forward model is exact.
 pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
 /// Time in which a baseline follows a signal below rest, s.
 const CATCH_UP_S: f64 = 0.5;
 /// Leaks that are tried, as shares of the signal's range per second.
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
-/// Standard deviations of the noise by which a signal at rest may lie below the level.
+/// Margin below the resting level for the noise of a signal at rest, in standard deviations.
 const MARGIN: f64 = 1.0;
-/// A trial that begins this low in the range begins at rest.
+/// A trial that begins in this lowest share of the range is assumed to begin at rest.
 const LOWEST_QUARTER: f64 = 0.25;
-/// Samples at a trial's start that may stand at rest.
+/// Number of samples at a trial's start whose median is its starting value.
 const FIRST: usize = 50;
 
-/// Candidate baselines. The resting level is that of the first trial that begins in the lowest quarter of the range,
-/// less a margin for noise. Later rests below this level are drift. Without a baseline that is followed there is one candidate: none.
+/// Returns candidate baselines. The resting level is the start of the first trial that begins in the lowest quarter of
+/// the range, minus a margin for noise. Resting signals below this level are drift. If the baseline is not tracked, the
+/// only candidate is `None`.
 pub(crate) fn candidates(prepared: &Prepared, rest: bool) -> Vec<Option<RestTracker>> {
     if !rest {
         return vec![None];
@@ -224,7 +225,7 @@ pub(crate) fn candidates(prepared: &Prepared, rest: bool) -> Vec<Option<RestTrac
     LEAKS.map(tracker).into()
 }
 
-/// A log minus its baseline, computed as in the receptor.
+/// Subtracts the baseline from a log, as in the receptor.
 pub(crate) fn rested(
     signal: &[f64],
     rest: Option<RestTracker>,
@@ -237,8 +238,8 @@ pub(crate) fn rested(
     signal.iter().map(|v| sign * level.step(&mut baseline, sign * v, 0.0)).collect()
 }
 
-/// What the receptor that runs live makes of the trials with a model, behind the first samples of each. `see` is told of the error of each
-/// reading, in the normalised target.
+/// Runs the live receptor over the trials with a model and returns its error statistics without the first samples of
+/// each piece. Calls `see` with the error of each reading, in the normalised target.
 pub(crate) fn judge_live(
     prepared: &Prepared,
     model: Model,

@@ -6,20 +6,20 @@ use stretch_core::{Branch, Degree, FitSummary, Model, Surface};
 /// A fitted model, a report for each fit, and remarks of one sentence each.
 pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
 
-/// The placeholder for the surface of a model without a surface.
+/// A placeholder for models without a surface.
 fn no_surface() -> Surface {
     Surface::new(Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
 }
 
-/// One fitted surface (or line) with its statistics, in normalised units.
+/// Statistics of one fit, in normalised units.
 #[derive(Debug, Clone, Serialize)]
 pub struct FitReport {
-    /// Name of the fit: `inflation`, `deflation` or `linear fit`.
+    /// Name of the fit: the name of the branch, `linear fit`, `curve`, or the name of the model.
     pub name: String,
-    /// The branch; `None` for a line.
+    /// The branch; `None` if the fit has no branch.
     #[serde(skip)]
     pub branch: Option<Branch>,
-    /// Name of the model, as `poly13` or `linear`.
+    /// Name of the model, such as `poly13` or `linear`.
     pub model: String,
     /// Samples in the fit.
     pub samples: u64,
@@ -31,21 +31,22 @@ pub struct FitReport {
     pub adjusted_r_squared: f64,
     /// `sqrt(SSE/(n - p))`, in normalised target.
     pub rmse: f64,
-    /// Condition number of the design matrix, with the rows of a ridge where the fit has one. The design matrix of an
-    /// observer holds curve, dynamics and time constants.
+    /// Condition number of the design matrix, with the rows of a ridge if the fit has one. The design matrix of an
+    /// observer holds curve, dynamics and time constants. The value is 1 for a diagnosed model, because it is not
+    /// computed.
     pub condition: f64,
-    /// Samples that a bisquare fit rejected altogether.
+    /// Number of samples with zero weight in a robust fit.
     pub rejected: Option<u64>,
     /// Coefficients with 95 % bounds.
     pub coefficients: Vec<Coefficient>,
-    /// Neighbouring orders.
+    /// Fits of neighbouring degrees.
     pub orders: Vec<Order>,
     /// The lowest order that satisfies the acceptance criterion of `stretch_fit::OrderTable`.
     pub recommended: Option<String>,
-    /// Samples for a picture, `[rate, signal, target]`, at most a few thousand.
+    /// Samples for a plot, `[rate, signal, target]`, at most a few thousand.
     #[serde(skip)]
     pub cloud: Vec<[f64; 3]>,
-    /// The surface, for a picture.
+    /// The surface, for a plot.
     #[serde(skip)]
     pub surface: Surface,
 }
@@ -70,7 +71,7 @@ pub struct Coefficient {
 /// One row of the order table.
 #[derive(Debug, Clone, Serialize)]
 pub struct Order {
-    /// Name of the order, as `poly12`.
+    /// Name of the degree, such as `poly12`.
     pub model: String,
     /// Number of terms.
     pub terms: usize,
@@ -80,12 +81,12 @@ pub struct Order {
     pub rmse: Option<f64>,
     /// Root mean square error on data left out of the fit.
     pub cross_validated_rmse: Option<f64>,
-    /// Why there are no numbers.
+    /// Reason why there are no numbers.
     pub problem: Option<String>,
 }
 
 impl Coefficient {
-    /// Coefficients that are no powers of rate and signal, with their standard errors.
+    /// Coefficients that are not powers of rate and signal, from their standard errors.
     pub(crate) fn named(names: Vec<String>, estimates: &[f64], errors: &[f64]) -> Vec<Self> {
         let all = names.into_iter().zip(estimates).zip(errors);
         all.map(|((name, &estimate), error)| {
@@ -97,7 +98,7 @@ impl Coefficient {
 }
 
 impl FitReport {
-    /// The report of a model that is no surface.
+    /// The report of a model that is not a surface.
     pub(crate) fn of_model(
         name: String,
         fit: &FitSummary,
@@ -139,7 +140,7 @@ impl FitReport {
         FitSummary { samples: self.samples, r_squared: self.r_squared, rmse: self.rmse }
     }
 
-    /// A sentence where cross-validation prefers another order.
+    /// Returns a sentence if cross-validation prefers another degree.
     pub(crate) fn note(&self) -> Option<String> {
         let better = self.recommended.as_ref().filter(|r| **r != self.model)?;
         Some(format!(

@@ -1,4 +1,4 @@
-//! Fits a line, a curve, or a surface for each branch.
+//! Fits a line, a curve, or a surface for each branch (direction of motion).
 
 use stretch_core::{
     Branch, BranchSurface, Degree, Interval, LinearMap, MAX_DEGREE, Model, Range, RangeSpec,
@@ -15,10 +15,10 @@ use crate::{
 
 use super::report::{Coefficient, FitReport, Fitted, Order};
 
-/// The number of the fold that contains a sample, and the sample, normalised.
+/// The index of the fold that contains a sample, and the normalised sample.
 type Folded = (usize, Sample<f64>);
 
-/// All samples without their rates, and the signals among them.
+/// Returns all samples without their rates, and the range of the signal.
 fn of_signal(prepared: &Prepared) -> (Vec<Folded>, Interval) {
     let mut samples = Vec::new();
     for (series, folds) in prepared.folds() {
@@ -48,7 +48,7 @@ fn line(signal_domain: Interval, report: &FitReport) -> Model {
     })
 }
 
-/// Parts that a table, or the levels of a reference, are cut into for cross-validation.
+/// Number of parts into which a table, or the levels of a reference, are divided for cross-validation.
 pub(crate) const TABLE_PARTS: usize = 10;
 
 /// Fits a polynomial of the signal alone, for both directions. Its degree is the lowest that cross-validation accepts:
@@ -73,7 +73,7 @@ pub(crate) fn curve(prepared: &Prepared, options: &Options) -> Result<Fitted, Ca
             rate_range: Range::new(any)?,
             surface: report.surface,
             signal_domain,
-            // every rate is inside
+            // The domain contains every rate.
             rate_domain: Interval { min: -MOST, max: MOST },
             fit: report.summary(),
         };
@@ -83,8 +83,9 @@ pub(crate) fn curve(prepared: &Prepared, options: &Options) -> Result<Fitted, Ca
     Ok((model, vec![report], vec![note]))
 }
 
-/// Assigns samples to the folds of a cross-validation by the level of the reference, where it has levels (weights
-/// that were held for many samples) or the samples are a table: neighbours of one level would judge themselves.
+/// Assigns samples to the folds of a cross-validation by the level of the reference. This applies to tables, and to
+/// references with levels (weights that were held for many samples). Otherwise samples of one level would be both
+/// fitted and tested.
 fn leave_out_levels(samples: &mut [Folded], is_table: bool) {
     let mut levels: Vec<f64> = samples.iter().map(|(_, s)| s.value).collect();
     levels.sort_by(f64::total_cmp);
@@ -180,10 +181,10 @@ fn surface(
     Ok((fitted, report))
 }
 
-/// The triangular factor of each fold.
+/// Triangular factors of the folds.
 type Factors = Vec<Factor<f64>>;
 
-/// Fits `degree` to samples.
+/// Fits a polynomial of the given degree to samples.
 fn fit(
     name: &'static str,
     branch: Option<Branch>,
@@ -192,7 +193,7 @@ fn fit(
     robust: Robust,
 ) -> Result<FitReport, CalibrateError> {
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
-    // the order table around a surface needs higher degrees; a line has no table
+    // The order table around a surface needs higher degrees; a line has no table.
     let wide = if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree };
     let folds = factors(samples, wide).map_err(failed)?;
     let whole = merged(&folds).map_err(failed)?;
@@ -214,7 +215,7 @@ fn fit(
     Ok(FitReport { rejected, cloud, ..report(name, branch, degree, &folds, &fitted)? })
 }
 
-/// The report of a fit, without samples; the `folds` hold the neighbouring orders, too.
+/// Returns the report of a fit, without samples. The `folds` must cover the neighbouring degrees.
 fn report(
     name: &'static str,
     branch: Option<Branch>,
@@ -267,10 +268,10 @@ fn report(
     })
 }
 
-/// Greatest number of points in a picture.
+/// Greatest number of points in a plot.
 const CLOUD: usize = 3000;
 
-/// The triangular factor of each fold, of the widest degree that the order table needs.
+/// Returns the triangular factor of each fold, for the given degree.
 fn factors(samples: &[Folded], degree: Degree) -> Result<Factors, FitError> {
     let mut sorted: Vec<&Folded> = samples.iter().collect();
     sorted.sort_by_key(|(fold, _)| *fold);
@@ -290,7 +291,7 @@ fn merged(folds: &Factors) -> Result<Factor<f64>, FitError> {
     Ok(whole)
 }
 
-/// The rows of a table, with the names of their degrees.
+/// Returns the rows of a table, with the names of their degrees.
 fn orders(table: &OrderTable<f64>, named: impl Fn(Degree) -> String) -> Vec<Order> {
     table
         .rows()

@@ -1,4 +1,4 @@
-//! Acceptance criteria: whether a calibration can be used, and whether a log belongs to the calibration.
+//! Acceptance criteria: whether a calibration can be used, and whether a log belongs to it.
 
 use stretch_core::{Calibration, Label};
 use stretch_data::Trial;
@@ -7,20 +7,19 @@ use crate::{fit::FitReport, prepare::without_gross_errors};
 
 use super::evaluate::MethodErrors;
 
-/// A fit that leaves this share of the reference's standard deviation explains nothing: the error of the mean of the
-/// reference alone is at most a twentieth larger. (A model may also cost a twentieth before another form is
-/// preferred.)
+/// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
+/// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
+/// decides between models.)
 const LEFT: f64 = 0.95;
 
-/// Why a fit should not be used: its error is that of the mean of the reference, without any signal.
+/// Returns why a fit should not be used: without any signal, the mean of the reference would have about the same error.
 ///
 /// ```text
 /// sqrt(1 - R^2) > 0.95,  R^2 < 0.0975
 /// ```
 ///
-/// The answer is `None` for a fit that explains more. Such fits come from an error of the reference itself (a
-/// placeholder that the recorder writes for a missing value), a sensor that is not connected, or the column of
-/// another quantity.
+/// Returns `None` for a fit that explains more. Such fits come from an error of the reference itself (a placeholder
+/// that the recorder writes for a missing value), a sensor that is not connected, or a column with another quantity.
 pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     let left = (1.0 - worst.r_squared).max(0.0).sqrt();
@@ -36,7 +35,7 @@ pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// A sentence for a fit that leaves more of the reference than the fit explains; `None` for any other fit.
+/// Returns a sentence for a fit that explains less than half of the reference's variance; `None` for any other fit.
 pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     (worst.r_squared < 0.5).then(|| {
@@ -45,13 +44,13 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// What is asked about a log whose samples lie outside the range of the calibration.
+/// Question about a log whose samples lie outside the range of the calibration.
 pub(super) const IS_IT_THE_SENSOR: &str =
     "is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range";
 
-/// A sentence for a log most of whose samples lie outside the calibrated domain.
+/// Returns a sentence for a log in which most samples lie outside the calibrated domain.
 ///
-/// Most means more than half: the estimates of such a log are those of the domain's ends more often than not.
+/// Most means more than half. The estimates of such a log are mostly those at the ends of the domain.
 pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
@@ -61,7 +60,7 @@ pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     })
 }
 
-/// A sentence for estimates that err more than the mean of the reference does.
+/// Returns a sentence for estimates with a larger error than the mean of the reference.
 pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
@@ -72,12 +71,14 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// Share of the range of the reference from which a constant error is worth a sentence.
+/// Least constant error that is reported, in percent of the range of the reference.
 const FAR_OFF_PERCENT: f64 = 5.0;
 
-/// A sentence for estimates whose error is mostly a constant: `bias^2` at least half of `rmse^2`, and a twentieth of the range.
+/// Returns a sentence for estimates whose error is mostly constant: `bias^2` is at least half of `rmse^2`, and the bias
+/// is more than a twentieth of the range.
 ///
-/// This happens with a reference in centimetres and a calibration in millimetres, and with a sensor that was mounted again.
+/// Typical causes are a reference in centimetres with a calibration in millimetres, and a sensor that was mounted
+/// again.
 pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
@@ -93,7 +94,7 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
     })
 }
 
-/// A sentence for estimates that were compared with a constant reference, where no R^2 says how good they are.
+/// Returns a sentence if the reference is constant, because R^2 is then undefined.
 pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     (!errors.r_squared.is_finite()).then(|| {
         format!(
@@ -103,8 +104,9 @@ pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// A sentence for trials that a calibration was fitted on; `None` where none is. A record holds the names of its first trials and the
-/// checksums of their samples: a trial is found again under another name, and a name that another trial has is reported as well.
+/// Returns a sentence that lists the trials to which a calibration was fitted; `None` if there are none. A calibration
+/// holds the names of its first trials and the checksums of their samples. A trial is therefore recognised under
+/// another name, and a trial that has only the name of a fitted trial is reported as such.
 pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
     let (provenance, columns) = (
         &calibration.spec().provenance,
@@ -114,7 +116,7 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
         let checksum = trial.checksum(&columns);
         checksum.is_some_and(|sum| provenance.checksums().contains(&sum))
     };
-    // a fit leaves out what holds a gross error, and its checksums are of what it kept
+    // A fit leaves out rows with gross errors, and its checksums are those of the remaining rows.
     let cleaned = |trial: &Trial| {
         let (kept, _) = without_gross_errors(vec![trial.clone()], &[columns[1], columns[0]]);
         kept.iter().any(is_known)
@@ -141,7 +143,7 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
     })
 }
 
-/// A share in percent, which is 100 only where `part` is all of `of`.
+/// Returns a share in percent. It is 100 only if `part` equals `of`.
 fn share(part: u64, of: u64) -> f64 {
     let percent = 100.0 * part as f64 / of.max(1) as f64;
     if part < of { (10.0 * percent).floor() / 10.0 } else { percent }

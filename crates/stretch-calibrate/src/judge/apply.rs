@@ -1,4 +1,4 @@
-//! A calibration applied to time-stamped samples, live or from a file.
+//! Applies a calibration to time-stamped samples, live or from a file.
 
 use stretch_core::{
     Calibration, Design, Interval, Model, Range, RangeSpec, RateEstimator, Runner, SampleRate,
@@ -13,13 +13,13 @@ use crate::{
     prepare::{extent, rates_at_use, sample_rate_hz},
 };
 
-/// An interval between samples that differs from the period by more than this share is counted as jitter.
+/// An interval between samples counts as jitter if it differs from the period by more than this share.
 const JITTER_TOLERANCE: f64 = 0.2;
 
-/// A receptor that checks the time stamps: missing ticks are stepped as missing samples, and a stamp that runs
+/// A receptor that checks the time stamps. Missing samples are passed on as missing, and a time stamp that runs
 /// backwards resets the receptor.
 ///
-/// Where a model answers before its rate is known ([`Model::needs_signal_only`]), that rate is NaN.
+/// Some models give estimates before their rate is known ([`Model::needs_signal_only`]). The rate is NaN until then.
 ///
 /// ```
 /// use stretch_calibrate::LiveReceptor;
@@ -41,7 +41,8 @@ pub struct LiveReceptor {
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
-    /// The rate estimator of a model that answers without it, and how many samples in a row were missing.
+    /// The rate estimator of a model that gives estimates without a rate, and the number of consecutive missing
+    /// samples.
     rate: Option<Runner<RateFilter<f64>>>,
     missing: u8,
 }
@@ -49,20 +50,19 @@ pub struct LiveReceptor {
 /// Faults of a stream's time stamps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Faults {
-    /// Samples that did not come.
+    /// Missing samples.
     pub missing: u64,
-    /// Samples early or late by more than a fifth of a period.
+    /// Samples that were early or late by more than a fifth of a period.
     pub jittered: u64,
-    /// Stamps that repeated or ran backwards.
+    /// Time stamps that repeated or ran backwards.
     pub backwards: u64,
 }
 
 impl LiveReceptor {
-    /// A receptor for a calibration whose estimator can run live.
+    /// Builds a receptor for a calibration whose rate estimator can run live.
     ///
     /// # Errors
-    /// [`CalibrateError::Receptor`] for the paper's central difference, which
-    /// needs the next sample.
+    /// [`CalibrateError::Receptor`] for the paper's central difference, because it needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
         let receptor = Receptor::new(calibration)?;
         let spec = calibration.spec();
@@ -81,10 +81,10 @@ impl LiveReceptor {
         })
     }
 
-    /// Takes the next sample.
+    /// Processes the next sample.
     ///
     /// # Errors
-    /// [`Withheld`] when there is no reading for the sample.
+    /// [`Withheld`] if there is no reading for the sample.
     pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
         match self.cadence.step(Seconds(time_s)) {
             Arrival::Gap { missing } => {
@@ -116,21 +116,21 @@ impl LiveReceptor {
         Ok(Reading { rate: known, ..reading })
     }
 
-    /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.
+    /// Sets the pressure for the following samples, if the calibration [needs](pressure_column) a pressure.
     pub fn set_pressure(&mut self, pressure: f64) {
         self.memory.set_pressure(pressure);
     }
 
-    /// Faults of the time stamps so far.
+    /// Returns the faults of the time stamps so far.
     pub fn faults(&self) -> Faults {
         self.faults
     }
 }
 
-/// A trial's readings, one for each sample, and the faults of the trial's time stamps.
+/// The readings of a trial, one for each sample, and the faults of its time stamps.
 #[derive(Debug, Clone)]
 pub struct Applied {
-    /// One answer for each sample.
+    /// One reading, or the reason why it is withheld, for each sample.
     pub readings: Vec<Result<Reading, Withheld>>,
     /// Faults of the time stamps.
     pub faults: Faults,
@@ -138,21 +138,22 @@ pub struct Applied {
 
 /// Applies a calibration to a logged trial, sample by sample, as it would run live.
 ///
-/// A calibration that needs the signal only takes its rates at the trial's sample rate: see [`at_rate`].
+/// A calibration that needs the signal only computes its rates at the trial's sample rate: see [`at_rate`].
 ///
-/// A calibration that names the paper's central difference is applied as published: the rates are taken over the
-/// whole log, one sample ahead.
+/// A calibration with the paper's central difference is applied as published: the rates are computed over the whole log
+/// and use the next sample.
 ///
 /// # Errors
-/// [`CalibrateError::Data`] when the trial lacks the signal,
-/// [`CalibrateError::Filter`] when the estimator cannot be designed.
+/// [`CalibrateError::Data`] if the trial lacks the signal, [`CalibrateError::Filter`] if the estimator cannot be
+/// designed.
 pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
     let mut readings = Vec::with_capacity(trial.len());
     let faults = each_reading(calibration, trial, |reading| readings.push(reading))?;
     Ok(Applied { readings, faults })
 }
 
-/// Gives the readings of [`apply`] one after the other, because all of them together are several times as large as the trial.
+/// Passes on the readings of [`apply`] one by one, because all of them together would take several times the memory of
+/// the trial.
 pub(crate) fn each_reading(
     calibration: &Calibration,
     trial: &Trial,
@@ -180,11 +181,11 @@ pub(crate) fn each_reading(
     Ok(live.faults())
 }
 
-/// A calibration that [needs the signal only](Model::needs_signal_only), at another sample rate. Any other calibration
-/// is returned as it is, because it holds at its own sample rate only.
+/// Returns a calibration that [needs the signal only](Model::needs_signal_only) at another sample rate. Any other
+/// calibration is returned unchanged, because it is valid only at its own sample rate.
 ///
 /// # Errors
-/// [`CalibrateError::Design`] for a rate outside 1e-3 to 1e7 Hz.
+/// [`CalibrateError::Design`] if the rate is outside 1e-3 to 1e7 Hz.
 ///
 /// ```
 /// use stretch_calibrate::at_rate;
@@ -201,7 +202,7 @@ pub fn at_rate(calibration: &Calibration, rate_hz: f64) -> Result<Calibration, C
     Ok(Calibration::new(spec)?)
 }
 
-/// The column of the pressure, if a calibration needs one in addition to its signal.
+/// Returns the column of the pressure, if a calibration needs one in addition to its signal.
 pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
     match &calibration.spec().model {
         Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),
@@ -209,7 +210,7 @@ pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
     }
 }
 
-/// Rates that were taken over a whole log beforehand.
+/// Rates that were computed over a whole log beforehand.
 struct Logged(Vec<Option<f64>>);
 
 impl Design for Logged {
@@ -228,15 +229,14 @@ impl Stage<f64> for Logged {
     }
 }
 
-/// The same calibration with the ranges of one trial: the trial's signal and rate are divided by their own total
-/// ranges, and nothing is clamped (paper section 2.5).
+/// Returns the calibration with the ranges of one trial: the signal and the rate are normalised by the ranges of the
+/// trial, and nothing is clamped (paper section 2.5).
 ///
-/// This function exists for comparison with the paper. A trial's ranges are known only at its end, so that such a
+/// This function allows a comparison with the paper. The ranges of a trial are known only at its end, so such a
 /// calibration cannot run live.
 ///
 /// # Errors
-/// [`CalibrateError::Data`] when the trial lacks the signal,
-/// [`CalibrateError::Constant`] when the signal never changes.
+/// [`CalibrateError::Data`] if the trial lacks the signal, [`CalibrateError::Constant`] if the signal never changes.
 ///
 /// ```
 /// use stretch_calibrate::on_own_ranges;
@@ -279,7 +279,7 @@ pub fn on_own_ranges(
                 branch.rate_domain = rate_extent;
             }
         }
-        // other models have no ranges that a trial could replace
+        // Other models have no ranges that a trial could replace.
         _ => {}
     }
     spec.signal_range = signal_range;

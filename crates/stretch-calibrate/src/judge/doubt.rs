@@ -1,4 +1,4 @@
-//! What makes one doubt estimates and their errors: values with codes, which each entry point shows in its own way.
+//! Doubts about estimates and their errors: values with codes, which each program displays in its own way.
 
 use std::fmt;
 
@@ -15,13 +15,13 @@ use super::{
 };
 use crate::error::PACE_TOLERANCE;
 
-/// A doubt about a result. It is shown as its text.
+/// A doubt about a result. `Display` writes its text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Doubt {
-    /// Its name for programs, which does not change: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
+    /// Stable code for programs: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
     /// `constant_error`, `worse_than_the_mean` or `constant_reference`.
     pub code: &'static str,
-    /// A sentence for people, with what to do.
+    /// A sentence for users that includes advice.
     pub text: String,
 }
 
@@ -30,7 +30,7 @@ impl Doubt {
         Self { code, text }
     }
 
-    /// The same, of a trial or a method that is named before it.
+    /// Prefixes the text with the name of a trial or a method.
     fn of(self, name: &str) -> Self {
         Self { text: format!("{name}: {}", self.text), ..self }
     }
@@ -42,7 +42,7 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// Counts of the samples that a calibration was applied to, and what they make one doubt.
+/// Counts of the samples to which a calibration was applied, and the doubts that follow from them.
 ///
 /// ```
 /// use stretch_calibrate::{LiveReceptor, Seen};
@@ -61,23 +61,23 @@ impl fmt::Display for Doubt {
 pub struct Seen {
     /// All samples.
     pub samples: u64,
-    /// Those without an estimate.
+    /// Samples without an estimate.
     pub withheld: u64,
-    /// Those outside of what was calibrated.
+    /// Samples outside the calibrated domain.
     pub clamped: u64,
     reach: Reach,
     pace: Pace,
 }
 
 impl Seen {
-    /// The counts of a calibration, before the first sample.
+    /// Returns empty counts for a calibration.
     pub fn of(calibration: &Calibration) -> Self {
         let (reach, pace) = (Reach::of(calibration), Pace::of(calibration));
         Self { samples: 0, withheld: 0, clamped: 0, reach, pace }
     }
 
-    /// Takes a sample, its time in seconds, and what came of it. Answers once, where samples come at another rate than those of the
-    /// calibration.
+    /// Counts a sample with its time in seconds and its reading. Returns a doubt, at most once, if samples come at
+    /// another rate than that of the calibration.
     pub fn take(
         &mut self,
         time_s: f64,
@@ -93,7 +93,7 @@ impl Seen {
         self.pace.take(time_s)
     }
 
-    /// What the samples so far make one doubt: whether they are a log of the calibration's sensor.
+    /// Returns a doubt if the samples so far are probably not a log of the calibration's sensor.
     pub fn doubt(&self) -> Option<Doubt> {
         outside(&self.reach, self.clamped, self.samples - self.withheld)
     }
@@ -105,7 +105,7 @@ fn outside(reach: &Reach, clamped: u64, samples: u64) -> Option<Doubt> {
 }
 
 impl Applied {
-    /// Counts of a trial that this was made of, and what makes one doubt the estimates.
+    /// Returns the counts of a trial to which the calibration was applied, and doubts about the estimates.
     pub fn seen(&self, calibration: &Calibration, trial: &Trial) -> (Seen, Vec<Doubt>) {
         let mut seen = Seen::of(&at_own_rate(calibration, trial));
         let signal = trial.channel(calibration.spec().signal.as_str()).into_iter().flatten();
@@ -119,14 +119,14 @@ impl Applied {
     }
 }
 
-/// A line and a curve are applied at the trial's own rate.
+/// Returns the calibration at the trial's sample rate, if it is a line or a curve.
 fn at_own_rate(calibration: &Calibration, trial: &Trial) -> Calibration {
     let own = trial.rate_hz().and_then(|rate_hz| at_rate(calibration, rate_hz).ok());
     own.unwrap_or_else(|| calibration.clone())
 }
 
-/// What makes one doubt the errors of calibrations on trials, which [`evaluate`](crate::evaluate()) found: each sentence begins with the
-/// calibration's name.
+/// Returns doubts about the errors that [`evaluate`](crate::evaluate()) found for calibrations on trials. Each sentence
+/// begins with the calibration's name.
 pub fn evaluation_doubts(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
@@ -141,7 +141,7 @@ pub fn evaluation_doubts(
         let fitted = fitted_on(calibration, trials).map(|text| Doubt::new("fitted_trials", text));
         all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
     }
-    // the first method is the raw signal
+    // The first method is the raw signal.
     for (errors, (name, calibration)) in evaluation.pooled.iter().skip(1).zip(calibrations) {
         let mut reach = Reach::of(calibration);
         let signal = calibration.spec().signal.as_str();
@@ -162,12 +162,12 @@ pub fn evaluation_doubts(
 /// Number of intervals that determine the pace.
 const INTERVALS: usize = 51;
 
-/// The usual interval of a stream, and that of the calibration.
+/// The usual sample interval of a stream compared with that of the calibration.
 #[derive(Debug)]
 struct Pace {
     rate_hz: f64,
     needs_signal_only: bool,
-    /// Those of the first samples, until they tell.
+    /// Time stamps of the first samples, until they determine the rate.
     stamps_s: Vec<f64>,
     is_told: bool,
 }
@@ -179,9 +179,9 @@ impl Pace {
         Self { rate_hz, needs_signal_only, stamps_s: Vec::new(), is_told: false }
     }
 
-    /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
-    /// time counts as one that is missing, so that a slower stream has right rates, but gaps; a faster
-    /// one has wrong rates.
+    /// Counts the time of a sample. Returns a doubt, at most once, if the usual interval differs from that of the
+    /// calibration. In a slower stream, samples count as missing, so the rates are right, but there are gaps. In a
+    /// faster stream the rates are wrong.
     fn take(&mut self, time_s: f64) -> Option<Doubt> {
         if self.is_told || !time_s.is_finite() || self.stamps_s.last() == Some(&time_s) {
             return None;
@@ -192,7 +192,7 @@ impl Pace {
         }
         self.is_told = true;
         let mut stamps_s = std::mem::take(&mut self.stamps_s);
-        // a row that goes back in time is left out of a file, too
+        // A row that goes back in time is also left out of a file.
         for at in out_of_order(&stamps_s).into_iter().rev() {
             stamps_s.remove(at);
         }

@@ -1,4 +1,4 @@
-//! Errors of estimates, by the paper's measures.
+//! Errors of estimates, computed with the paper's measures.
 
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
@@ -13,13 +13,13 @@ use crate::{
 
 use super::apply::apply;
 
-/// Blocks of the paired test, in seconds.
+/// Length of the blocks of the paired test, in seconds.
 const BLOCK_S: f64 = 0.5;
 
-/// The largest lag that is looked for, in seconds.
+/// Largest lag that is searched, in seconds.
 const MAX_LAG_S: f64 = 1.0;
 
-/// One method's errors, on one trial or pooled.
+/// Errors of one method, on one trial or pooled.
 #[derive(Debug, Clone, Serialize)]
 pub struct MethodErrors {
     /// `raw`, or the calibration's name.
@@ -48,7 +48,7 @@ pub struct MethodErrors {
     pub max: f64,
     /// Coefficient of determination.
     pub r_squared: f64,
-    /// Seconds by which the estimate runs behind the reference; `None` where no trial determines the lag.
+    /// Delay of the estimate behind the reference, in seconds; `None` if no trial determines it.
     pub lag_s: Option<f64>,
 }
 
@@ -61,20 +61,20 @@ pub struct Comparison {
     pub second: String,
     /// Mean of first minus second, in the unit of the reference.
     pub mean_difference: f64,
-    /// P with samples taken as independent, as the paper did.
+    /// P value if samples are assumed to be independent, as in the paper.
     pub p_samples: Option<f64>,
-    /// P on means of half-second blocks.
+    /// P value for means of half-second blocks.
     pub p_blocks: Option<f64>,
     /// Number of blocks.
     pub blocks: u64,
-    /// 95 % interval of the mean difference, on blocks.
+    /// 95 % interval of the mean difference, from blocks.
     pub interval_95: Option<(f64, f64)>,
 }
 
-/// Errors of each trial and pooled errors, and tests between the methods.
+/// Errors of each trial, pooled errors, and tests between the methods.
 #[derive(Debug, Clone, Serialize)]
 pub struct Evaluation {
-    /// Unit of the reference, as in `mm` or `N`.
+    /// Unit of the reference, such as `mm` or `N`.
     pub unit: String,
     /// Errors by trial; the order of the methods is the same in all trials.
     pub trials: Vec<TrialErrors>,
@@ -84,7 +84,7 @@ pub struct Evaluation {
     pub comparisons: Vec<Comparison>,
 }
 
-/// One trial's errors and, for pictures, its curves.
+/// Errors of one trial and, for plots, its curves.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrialErrors {
     /// The trial.
@@ -100,10 +100,10 @@ pub struct TrialErrors {
     /// The reference.
     #[serde(skip)]
     pub reference: Vec<f64>,
-    /// Estimates of each method; NaN where withheld.
+    /// Estimates of each method; NaN if withheld.
     #[serde(skip)]
     pub estimates: Vec<Vec<f64>>,
-    /// Rates of each method's estimate; NaN where a method has no rate.
+    /// Rates of each method's estimate; NaN if a method has no rate.
     #[serde(skip)]
     pub rates: Vec<Vec<f64>>,
 }
@@ -115,15 +115,15 @@ struct Estimates {
     clamped: u64,
 }
 
-/// Judges calibrations against the reference of each trial.
+/// Evaluates calibrations against the reference of each trial.
 ///
-/// The first method is always `raw`: the trial's voltage, scaled so that its
-/// extremes meet the reference's. All calibrations must share signal and
-/// reference.
+/// The first method is always `raw`: the trial's signal, scaled so that its extremes equal those of the reference. All
+/// calibrations must use the same signal and reference.
 ///
 /// # Errors
-/// [`CalibrateError::Data`] when a trial lacks signal or reference, or the trials have more than [`MOST_ROWS`](crate::MOST_ROWS) rows,
-/// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up, or with fewer samples a second than the calibration expects.
+/// [`CalibrateError::Data`] if a trial lacks signal or reference, or if the trials have more than
+/// [`MOST_ROWS`](crate::MOST_ROWS) rows, [`CalibrateError::NothingEstimated`] for a trial that is shorter than the
+/// warm-up, or has a lower sample rate than the calibration.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
@@ -149,7 +149,8 @@ pub fn evaluate(
             methods.push(estimates(calibration, trial)?);
         }
         if let Some(turn) = turn {
-            // an angle that wraps says nothing of its turn: it is taken in the turn of the first estimates
+            // The turn of an angle that wraps is unknown, so the reference is shifted to the turn of the first
+            // calibration's estimates.
             let off = reference.iter().zip(&methods[1].values).map(|(x, y)| y - x);
             let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();
             let shift =
@@ -192,7 +193,7 @@ pub fn evaluate(
     })
 }
 
-/// The uncalibrated signal: its extremes scaled onto the reference's.
+/// Returns the uncalibrated signal, with its extremes scaled to those of the reference.
 fn raw(
     calibration: &Calibration,
     trial: &Trial,
@@ -227,7 +228,7 @@ struct Tally {
     agreement: Agreement<f64>,
     withheld: u64,
     clamped: u64,
-    /// Sum of the lags, each weighted by its samples, and the sum of these samples.
+    /// Sum of the lags, each weighted by its number of samples, and the sum of these numbers.
     lag: (f64, u64),
 }
 
@@ -241,7 +242,7 @@ impl Tally {
                 tally.agreement.push(truth, estimate);
             }
         }
-        // the warm-up is at the start, and the estimates after it have no gap
+        // The warm-up is at the start. The lag is computed from the first estimate on.
         let start = method.values.iter().position(|x| !x.is_nan()).unwrap_or(reference.len());
         let (truth, estimate) = (&reference[start..], &method.values[start..]);
         let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
@@ -284,7 +285,7 @@ impl Tally {
     }
 }
 
-/// Paired tests of absolute errors between all pairs of methods that are reported.
+/// Paired tests of absolute errors, for all pairs of methods that are reported.
 struct Tests {
     pairs: Vec<(usize, usize)>,
     samples: Vec<PairedT<f64>>,

@@ -1,4 +1,4 @@
-//! Errors of one model on parts of the trials that are left out of its fit in turn.
+//! Cross-validation of one model: its errors on parts of the trials that are left out of its fit in turn.
 
 use std::ops::Range;
 
@@ -16,19 +16,19 @@ use crate::{
 
 use super::apply::each_reading;
 
-/// Seconds on either side of a part left out that are not fitted either, because neighbouring samples are correlated.
+/// Margin on either side of a part left out that is not fitted either, because neighbouring samples are correlated, s.
 const GAP_S: f64 = 2.0;
-/// Samples of warm-up that no model is judged on.
+/// Number of warm-up samples that are not evaluated.
 const SETTLE: usize = 20;
-/// Number of parts that each trial is cut into where there are few trials.
+/// Number of parts into which each trial is divided if there are few trials.
 pub(crate) const PARTS: usize = 6;
-/// A turn counts when the reference has come back by this share of its range.
+/// Return of the reference that counts as a reversal, as a share of its range.
 const TURN: f64 = 0.1;
-/// A trial with at least this many turns counts as one that reverses.
+/// Number of reversals from which a trial counts as reversing.
 const LEAST_TURNS: usize = 3;
 const MAX_LAG_S: f64 = 0.5;
 
-/// Whether a trial can distinguish memory from position: such a trial turns at least three times.
+/// Whether a trial can distinguish memory from position, because it reverses at least three times.
 fn reverses(reference: &[f64]) -> bool {
     let range = extent(reference.iter().copied());
     let turn = TURN * (range.max - range.min);
@@ -55,34 +55,34 @@ fn reverses(reference: &[f64]) -> bool {
     turns >= LEAST_TURNS
 }
 
-/// Data that are left out together: the same samples of some trials.
+/// Data that are left out together: a range of samples of some trials.
 struct Fold {
     trials: Vec<usize>,
     samples: Range<usize>,
 }
 
-/// The cross-validation of one model, from which [`choose_among`](crate::choose_among) chooses. The value serialises as JSON, so that
-/// workers that share no memory can judge models.
+/// Result of the cross-validation of one model, from which [`choose_among`](crate::choose_among) chooses. It serialises
+/// as JSON, so that separate processes can evaluate models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
-    /// Numbers that the fit determines.
+    /// Number of parameters of the fit.
     pub(crate) parameters: usize,
     pub(crate) errors: Errors,
 }
 
-/// Errors of one model on everything left out.
+/// Errors of one model on all parts left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Errors {
-    /// Mean squared error of each part left out; `None` where nothing was estimated.
+    /// Mean squared error of each part left out; `None` if nothing was estimated.
     pub(crate) parts: Vec<Option<f64>>,
-    /// Sums of squares and counts: arbitrary, pulses, ramps.
+    /// Sum of squares and count for each kind of motion: arbitrary, pulses, ramps.
     kinds: [(f64, f64); 3],
     pub(crate) worst: f64,
     /// Sum of the lags, in seconds, and their count.
     pub(crate) lag: (f64, f64),
 }
 
-/// Judges one model as [`choose_model`](crate::choose_model) does.
+/// Cross-validates one model as [`choose_model`](crate::choose_model) does.
 ///
 /// # Errors
 /// As [`calibrate`](crate::calibrate).
@@ -115,7 +115,7 @@ pub fn judge_model(
     Ok(Judged { parameters, errors })
 }
 
-/// Which trials reverse; a table, whose rows have no order, does not.
+/// Returns which trials reverse. A table never does, because its rows have no order.
 pub(crate) fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, CalibrateError> {
     let one = |trial: &Trial| Ok(!options.is_table && reverses(trial.require(&options.reference)?));
     trials.iter().map(one).collect()
@@ -143,7 +143,7 @@ fn folds(trials: &[Trial], options: &Options) -> Vec<Fold> {
     (0..trials.len()).flat_map(cut).collect()
 }
 
-/// The trials without a fold.
+/// Returns the trials without a fold.
 fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
     let mut rest = Vec::new();
     for (index, trial) in trials.iter().enumerate() {
@@ -154,7 +154,7 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
         if options.is_table {
             let stays: Vec<bool> = (0..trial.len()).map(|i| !fold.samples.contains(&i)).collect();
             let mut part = rows(trial, &stays);
-            // no row was lost: they have no order
+            // The rows of a table have no order, so none of them counts as lost.
             part.time_s = (0..part.len()).map(|i| i as f64).collect();
             rest.extend((!part.is_empty()).then_some(part));
             continue;
@@ -162,7 +162,7 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
         let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
         let Range { start, end } = fold.samples;
         for span in [0..start.saturating_sub(gap), end.saturating_add(gap)..trial.len()] {
-            // a short remainder is not fitted, because the estimators would hardly warm up on it
+            // A short remainder is not fitted, because the estimators would hardly warm up on it.
             if span.len() > 5 * SETTLE {
                 let stays: Vec<bool> = (0..trial.len()).map(|i| span.contains(&i)).collect();
                 rest.push(rows(trial, &stays));
@@ -172,8 +172,8 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
     rest
 }
 
-/// A line or a curve that is not held at the ends of the signals that it was fitted to: of a table without its largest
-/// weight the estimate of that weight is an extrapolation, and tells how good the form is.
+/// Returns a line or a curve that is not clamped to the signals of its fit. If a table is fitted without its largest
+/// weight, the estimate of that weight is an extrapolation, whose error shows how good the form is.
 fn beyond_its_ends(
     calibration: Calibration,
     signals: &[f64],
@@ -191,17 +191,17 @@ fn beyond_its_ends(
 }
 
 impl Errors {
-    /// Root mean square error over everything.
+    /// Returns the root mean square error over all parts.
     pub(crate) fn rmse(&self) -> Option<f64> {
         root_mean(self.kinds.iter().fold((0.0, 0.0), |(s, n), k| (s + k.0, n + k.1)))
     }
 
-    /// Root mean square error over arbitrary motion (0), pulses (1) or ramps (2).
+    /// Returns the root mean square error over arbitrary motion (0), pulses (1) or ramps (2).
     pub(crate) fn rmse_of(&self, kind: usize) -> Option<f64> {
         root_mean(self.kinds[kind])
     }
 
-    /// Takes in the errors of a calibration on samples of a trial that it was not fitted to.
+    /// Adds the errors of a calibration on samples of a trial to which it was not fitted.
     fn take_trial(
         &mut self,
         calibration: &Calibration,
@@ -262,8 +262,8 @@ fn root_mean((sum, count): (f64, f64)) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-/// Mean difference of two models' errors, part by part, and its standard error. A part of any length counts as one
-/// draw.
+/// Returns the mean difference of two models' squared errors over the parts, and its standard error. Each part counts
+/// as one observation, independent of its length.
 pub(crate) fn excess(parts: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
     let differences: Vec<f64> =
         parts.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();

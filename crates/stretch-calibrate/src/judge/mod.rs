@@ -1,4 +1,4 @@
-//! Applies calibrations and judges them; chooses a model, or a signal, by what was left out of the fit.
+//! Applies and evaluates calibrations, and chooses a model or a signal by cross-validation.
 
 mod acceptance;
 mod apply;

@@ -1,4 +1,4 @@
-//! Which model and which signal to calibrate with, by errors on data left out, and what a model costs on a board.
+//! Chooses a model or a signal by cross-validation, and gives the cost of a model on a board.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -18,42 +18,43 @@ use super::{
 
 /// A root mean square error of at most this multiple of the best one counts as equally good.
 const AS_GOOD: f64 = 1.05;
-/// Greatest cost of following the baseline, as a ratio of root mean square errors on trials left out. A followed
-/// baseline lowers the cost of a drift of 5 % in a minute by a quarter.
+/// Greatest cost of tracking the baseline, as a ratio of cross-validated root mean square errors. A tracked baseline
+/// reduces the effect of a drift of 5 % in a minute by a quarter.
 const PREMIUM: f64 = 1.05;
-/// Rows that candidates judged at the same time hold together, because each candidate needs some 200 bytes a row.
+/// Greatest number of rows that candidates evaluated in parallel hold in memory together. Each candidate needs some
+/// 200 bytes a row.
 const JUDGED_TOGETHER: usize = 1_000_000;
 /// The result of cross-validation for one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelRow {
-    /// Name of the model, as `--model` takes it.
+    /// Name of the model, as in `--model`.
     pub model: String,
-    /// Numbers that the fit determines.
+    /// Number of parameters of the fit.
     pub parameters: usize,
-    /// Instructions a sample on a Cortex-M3, from volts in `f32`, as measured.
+    /// Measured number of instructions a sample on a Cortex-M3, from volts in `f32`.
     pub m3_instructions: Option<f64>,
-    /// Instructions a sample in fixed point, where the model has a fixed-point form.
+    /// Number of instructions a sample in fixed point, if the model has a fixed-point form.
     pub m3_instructions_fixed: Option<f64>,
     /// Root mean square error on trials left out, in the reference's unit.
     pub rmse: Option<f64>,
     /// Root mean square error on trials that reverse at arbitrary times.
     pub rmse_arbitrary: Option<f64>,
-    /// Root mean square error on trials of pulses (trials with `pulse` in their name).
+    /// Root mean square error on trials that reverse and have `pulse` in their name.
     pub rmse_pulses: Option<f64>,
-    /// Root mean square error on trials that move one way.
+    /// Root mean square error on trials that reverse less than three times, and on tables.
     pub rmse_ramps: Option<f64>,
-    /// Seconds that the estimate runs behind, mean over trials that reverse.
+    /// Mean delay of the estimate over trials that reverse, in seconds.
     pub lag_s: Option<f64>,
     /// Greatest absolute error.
     pub worst: Option<f64>,
     /// Mean squared error on the parts left out minus that of the best model, and the standard error of this
     /// difference.
     pub excess: Option<(f64, f64)>,
-    /// Why the row has no numbers.
+    /// Reason why the row has no numbers.
     pub problem: Option<String>,
 }
 
-/// A choice of model, and the figures behind the choice.
+/// A choice of model, and the figures on which it is based.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelChoice {
     /// All candidates, in the order of their errors.
@@ -61,7 +62,7 @@ pub struct ModelChoice {
     /// The model to use.
     #[serde(skip)]
     pub model: ModelKind,
-    /// Why this model was chosen, with the figures that were compared.
+    /// Explanation of the choice, with the figures that were compared.
     pub why: String,
     /// Questions that the data cannot answer, one sentence each.
     pub notes: Vec<String>,
@@ -69,19 +70,21 @@ pub struct ModelChoice {
 
 /// Chooses a model by cross-validation.
 ///
-/// Each candidate is fitted with one trial left out, run live over that trial and judged there. All trials are left
-/// out in turn (parts of trials where there are fewer than three trials). Time constants, radii and ridge are chosen
-/// once, on all trials. The simplest candidate is taken whose mean squared error, part by part, exceeds that of the
-/// best candidate by at most one standard error (Breiman et al. 1984, section 3.4.3), or whose root mean square error
-/// is within 5 % of that of the best. For a length, which cannot pass its resting stop, the same model with a
-/// followed baseline is taken where the followed baseline costs at most 5 %, because short recordings rarely show
-/// drift.
+/// Each candidate is fitted without one fold, run live over the trials of this fold and evaluated there. A fold is a
+/// trial, or several trials if there are more than sixteen. If there are fewer than three trials, each fold is a part
+/// of a trial. Time constants, radii and ridge are chosen once, on all trials.
 ///
-/// Where every trial moves one way, models that remember are not chosen, because such data cannot distinguish memory
-/// from rate. [`ModelChoice::notes`] then says what to record.
+/// The chosen model is the simplest one that is as good as the best. It is as good if its mean squared error over the
+/// parts exceeds that of the best by at most one standard error (Breiman et al. 1984, section 3.4.3), or if its root
+/// mean square error is within 5 % of that of the best. A length cannot exceed its resting length. For a length, the
+/// chosen model is therefore replaced by its form with a tracked baseline if this costs at most 5 %, because short
+/// recordings rarely show drift.
+///
+/// If every trial moves one way, models with memory are not chosen, because such data cannot distinguish memory from
+/// rate. [`ModelChoice::notes`] then recommends what to record.
 ///
 /// # Errors
-/// [`CalibrateError`] of the simplest model when none can be fitted.
+/// The [`CalibrateError`] of the simplest model if none can be fitted.
 pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
     let rows: usize = trials.iter().map(Trial::len).sum();
     let candidates = candidate_models(options);
@@ -99,14 +102,14 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let judged =
         judged.into_iter().map(|(kind, judged)| (kind, judged.map_err(&mut in_words))).collect();
     choose_among(trials, options, judged).ok_or_else(|| {
-        // a part without a sample has no trial, but the user named at least one trial
+        // A part without samples gives the error that there is no trial, which would mislead a user who named trials.
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
         first.unwrap_or(CalibrateError::TooFewToJudge)
     })
 }
 
-/// The models that [`choose_model`] judges: a line and a curve of a table, else every model with a name. The diagnosed model is among them only where a
-/// diagnosis named an effect.
+/// Returns the models that [`choose_model`] compares: a line and a curve for a table, otherwise every model with a
+/// name. The diagnosed model is a candidate only if a diagnosis named an effect.
 pub fn candidate_models(options: &Options) -> Vec<ModelKind> {
     if options.is_table {
         return vec![ModelKind::Linear, ModelKind::Curve];
@@ -118,8 +121,8 @@ pub fn candidate_models(options: &Options) -> Vec<ModelKind> {
     ModelKind::named().into_iter().filter(is_here).collect()
 }
 
-/// Chooses by the rule of [`choose_model`] among judged models, each given with its cross-validation or with the
-/// reason why there is none. The answer is `None` where no model has a cross-validation.
+/// Chooses by the rule of [`choose_model`] among models that were already cross-validated. Each model has a result or
+/// the reason why there is none. Returns `None` if no model has a result.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, Options, choose_among, judge_model};
@@ -144,7 +147,7 @@ pub fn choose_among(
 ) -> Option<ModelChoice> {
     let turning = turning(trials, options).ok()?;
     let found: Vec<Found> = judged.into_iter().map(Found::new).collect();
-    // of a table no candidate remembers
+    // No candidate for a table has a memory.
     let memory_shows = options.is_table || turning.iter().any(|&t| t);
     let is_eligible =
         |i: usize| memory_shows || !matches!(found[i].kind, ModelKind::Remembering { .. });
@@ -157,7 +160,7 @@ pub fn choose_among(
         _ => None,
     };
     let best = least(&|_| true)?;
-    // among the candidates that may be chosen: the best one and all that are equally good
+    // The eligible candidates: the best one, and all that are equally good.
     let bar = least(&is_eligible).unwrap_or(best);
     let is_as_good = |i: &usize| {
         let is_close = excess_over(*i, bar).is_some_and(|(mean, error)| mean <= error);
@@ -165,7 +168,7 @@ pub fn choose_among(
     };
     let model =
         (0..found.len()).filter(is_as_good).min_by_key(|&i| found[i].numbers).unwrap_or(bar);
-    // a length cannot pass its resting stop, so that a followed baseline insures against drift
+    // A length cannot exceed its resting length, so a tracked baseline protects against drift.
     let insured = (0..found.len()).find(|&i| {
         let twin = matches!((found[model].kind, found[i].kind),
             (ModelKind::Remembering { kind: a, rest: false }, ModelKind::Remembering { kind: b, rest: true }) if a == b);
@@ -189,15 +192,15 @@ pub fn choose_among(
     Some(ModelChoice { rows, model, why, notes: notes(trials, options, memory_shows) })
 }
 
-/// A candidate, and how it erred on the data left out of its fit.
+/// A candidate, and its errors on data left out of its fit.
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) kind: ModelKind,
-    /// Numbers that the fit determines.
+    /// Number of parameters of the fit.
     pub(crate) numbers: usize,
-    /// The errors, or why there are none.
+    /// The errors, or the reason why there are none.
     pub(crate) errors: Result<Errors, String>,
-    /// Root mean square error; not a number if it is not known.
+    /// Root mean square error; NaN if it is not known.
     pub(crate) rmse: f64,
 }
 
@@ -259,13 +262,13 @@ fn row(found: &Found, excess: Option<(f64, f64)>) -> ModelRow {
     }
 }
 
-/// Figures that `firmware/gate.sh --write` measures and `firmware/gate.sh` checks against a new measurement.
+/// Figures that `firmware/gate.sh --write` measures and `firmware/gate.sh` compares with a new measurement.
 const BUDGET: &str = include_str!("../budget.txt");
 
-/// Instructions a sample on a Cortex-M3, from volts in `f32`, without a floating-point unit; `None` for a model that
-/// was not measured.
+/// Returns the number of instructions a sample on a Cortex-M3, from volts in `f32`, without a floating-point unit;
+/// `None` for a model that was not measured.
 ///
-/// The figure holds for the largest shape that a fit of that name may choose, with one relaxation in an observer.
+/// The number applies to the largest shape that a fit of that name may choose, with one relaxation in an observer.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
@@ -279,14 +282,14 @@ pub fn m3_instructions(model: ModelKind) -> Option<f64> {
         ModelKind::Linear | ModelKind::Surface(Degree::POLY13) => {
             mean(&format!("{model}-f32-volts"))
         }
-        // a curve of three terms or more costs less than a surface
+        // A curve of three terms or more costs less than a surface.
         ModelKind::Curve => None,
         _ => mean(&model.to_string()),
     }
 }
 
-/// Instructions a sample on a Cortex-M3, from a converter's codes in fixed point; `None` for a model without a
-/// fixed-point form.
+/// Returns the number of instructions a sample on a Cortex-M3, from a converter's codes in fixed point; `None` for a
+/// model without a fixed-point form.
 pub fn m3_instructions_fixed(model: ModelKind) -> Option<f64> {
     mean(&format!("{model}-fixed"))
 }
@@ -306,21 +309,20 @@ fn mean(program: &str) -> Option<f64> {
 pub struct Candidate {
     /// The column.
     pub signal: String,
-    /// Root mean square error on data left out, over both branches, in normalised target; `None` where the signal
-    /// cannot be calibrated on.
+    /// Root mean square error on data left out of the fit, over both branches, in normalised target; `None` if the
+    /// signal cannot be calibrated.
     pub cross_validated_rmse: Option<f64>,
-    /// Why the signal cannot be calibrated on.
+    /// Reason why the signal cannot be calibrated.
     pub problem: Option<String>,
 }
 
 /// Ranks signals by their cross-validated error with the model of `options`,
 /// best first.
 ///
-/// Trials are left out one by one, or tenths of the data when there are fewer
-/// than three.
+/// The folds are trials (at most sixteen folds), or tenths of the data if there are fewer than three trials.
 ///
 /// # Errors
-/// [`CalibrateError`] of the first candidate when none can be calibrated on.
+/// The [`CalibrateError`] of the first candidate if none can be calibrated.
 pub fn rank_signals(
     trials: &[Trial],
     signals: &[String],
@@ -352,7 +354,7 @@ pub fn rank_signals(
     }
 }
 
-/// Both branches' cross-validated errors as one, weighted by samples.
+/// Returns the cross-validated error over both branches, weighted by samples.
 fn pooled(calibrated: &Calibrated) -> Option<f64> {
     let mut squares = 0.0;
     let mut samples = 0.0;

@@ -1,33 +1,34 @@
-//! Sentences that say why a model was chosen.
+//! Explanations of the choice of a model.
 
 use super::{model_choice::Found, reach::four_digits};
 
-/// The figures behind a choice.
+/// Figures that determine a choice.
 #[derive(Debug)]
 pub(crate) struct Grounds<'a> {
-    /// The candidate of the least error, among the candidates that may be chosen.
+    /// The candidate with the least error, among the eligible candidates.
     pub(crate) best: &'a Found,
-    /// The runner-up of the best.
+    /// The second best eligible candidate.
     pub(crate) second: Option<&'a Found>,
     /// The simplest candidate that counts as equally good.
     pub(crate) simplest: &'a Found,
-    /// Mean squared error of the simplest candidate minus that of the best, part by part, and its standard error.
+    /// Mean over the parts of the squared error of the simplest candidate minus that of the best, and its standard
+    /// error.
     pub(crate) excess: Option<(f64, f64)>,
-    /// The simplest candidate with a followed baseline, where this form was taken instead.
+    /// The simplest candidate with a tracked baseline, if this form was chosen.
     pub(crate) insured: Option<&'a Found>,
     /// Unit of the reference.
     pub(crate) unit: &'a str,
-    /// Whether models that remember were among the candidates.
+    /// Whether models with memory were eligible.
     pub(crate) memory_shows: bool,
     /// Largest multiple of the best error that counts as equally good.
     pub(crate) as_good: f64,
 }
 
-/// A sentence with the figures that were compared and the rule that decided.
+/// Returns a sentence with the figures that were compared and the rule that decided.
 pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
     let error = |seen: &Found| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
-    // the form with a followed baseline is no candidate of this comparison
+    // The form with a tracked baseline does not take part in this comparison.
     let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.kind));
     let mut sentence = if simplest.kind == best.kind {
         let next = second.map_or(String::new(), |s| format!(" ({}: {})", s.kind, error(s)));

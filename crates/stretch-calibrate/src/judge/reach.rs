@@ -1,4 +1,4 @@
-//! Whether a log's signal lies in the range of a calibration, as given or in another unit.
+//! Checks whether a log's signal lies in the range of a calibration, as given or in another unit.
 
 use stretch_core::{Calibration, Interval, Range};
 use stretch_data::unit_of;
@@ -7,15 +7,16 @@ use crate::prepare::extent;
 
 use super::{acceptance::IS_IT_THE_SENSOR, doubt::Doubt};
 
-/// Powers of ten by which a signal is multiplied for a trial: from nano to giga.
+/// Powers of ten with which a signal is multiplied to test other units: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
 /// Number of powers.
 const COUNT: usize = 19;
 
-/// Fewest samples that make an equal signal one that is not connected, and not one at rest on a coarse converter.
+/// Least number of equal samples from which a sensor counts as not connected. Fewer may come from a rest and a coarse
+/// converter.
 const CONSTANT: u64 = 100;
 
-/// Samples of a signal compared with the range of a calibration.
+/// Counts of a signal's samples compared with the range of a calibration.
 ///
 /// ```
 /// use stretch_calibrate::Reach;
@@ -34,21 +35,21 @@ pub struct Reach {
     range: Range<f64>,
     unit: String,
     samples: u64,
-    /// Least and greatest of them.
+    /// Least and greatest sample.
     seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
 }
 
 impl Reach {
-    /// The counts of a calibration, before the first sample.
+    /// Returns empty counts for a calibration.
     pub fn of(calibration: &Calibration) -> Self {
         let unit = unit_of(calibration.spec().signal.as_str());
         let range = calibration.spec().signal_range;
         Self { range, unit, samples: 0, seen: extent(std::iter::empty()), inside: [0; COUNT] }
     }
 
-    /// Takes a sample; a missing sample is not counted.
+    /// Counts a sample; missing samples are ignored.
     pub fn take(&mut self, signal: f64) {
         if !signal.is_finite() {
             return;
@@ -61,8 +62,8 @@ impl Reach {
         }
     }
 
-    /// A doubt about a log whose samples are all equal, or most of whose samples lie outside. The sentence names the unit in which most
-    /// samples would lie inside, where there is one.
+    /// Returns a doubt about a log whose samples are all equal, or of which most samples lie outside the range. If most
+    /// samples would lie inside in another unit, the sentence names this unit.
     pub fn doubt(&self) -> Option<Doubt> {
         if self.samples >= CONSTANT && self.seen.min >= self.seen.max {
             let (count, value) = (thousands(self.samples), self.seen.min);
@@ -106,7 +107,7 @@ fn ten_to(power: i32) -> f64 {
     if power < 0 { 1.0 / up } else { up }
 }
 
-/// The unit of numbers that must be multiplied by a power of ten to be in `unit`: `mV` for `V` and -3.
+/// Returns the unit of numbers that must be multiplied by a power of ten to be in `unit`: `mV` for `V` and -3.
 fn in_other_unit(unit: &str, power: i32) -> Option<String> {
     const PREFIXES: [(&str, i32); 7] =
         [("n", -9), ("u", -6), ("m", -3), ("c", -2), ("k", 3), ("M", 6), ("", 0)];
@@ -117,12 +118,12 @@ fn in_other_unit(unit: &str, power: i32) -> Option<String> {
     });
     let (base, own) = split?;
     let meant = PREFIXES.iter().find(|(_, p)| *p == own + power);
-    // no unit is written cV
+    // The prefix c is used only with m.
     let is_used = |prefix: &&str| *prefix != "c" || base == "m";
     meant.map(|(prefix, _)| *prefix).filter(is_used).map(|prefix| format!("{prefix}{base}"))
 }
 
-/// `5,990`.
+/// Formats a count as in `5,990`.
 fn thousands(count: u64) -> String {
     let digits = count.to_string();
     let mut grouped = String::new();
@@ -135,7 +136,7 @@ fn thousands(count: u64) -> String {
     grouped
 }
 
-/// Four significant digits, without zeros behind them.
+/// Formats four significant digits without trailing zeros.
 pub(crate) fn four_digits(x: f64) -> String {
     let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
     if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
@@ -178,7 +179,7 @@ mod tests {
         };
         assert_eq!(doubt([middle, middle, 1e3 * middle]), None);
         assert_eq!(doubt([f64::NAN; 3]), None);
-        // values that no single power of ten brings inside
+        // Values that no power of ten brings inside.
         let other = doubt([-1.0, -2.0, -3.0]).expect("all are outside");
         assert!(other.contains("the calibrated sensor"), "{other}");
         let other = doubt([1e2 * middle; 3]).expect("all are outside");

@@ -1,4 +1,4 @@
-//! What makes one doubt a trial, alone and compared with the others.
+//! Doubts about a trial, alone and compared with other trials.
 
 use std::ops::RangeInclusive;
 
@@ -8,28 +8,29 @@ use crate::Options;
 
 use super::{series::extent, trials::Piece};
 
-/// Correlation squared from which a trial has a line that can be compared with another's: it explains more than it leaves.
+/// Least squared correlation at which the line of a trial can be compared with another: the line explains at least half
+/// of the variance.
 const HAS_LINE: f64 = 0.5;
-/// Slopes over that of another trial which hysteresis, another rate or another range bring about.
+/// Ratios of two trials' slopes that hysteresis, another rate or another range can cause.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
-/// Decimals, or significant digits, that a file may have been saved with.
+/// Numbers of decimals, or of digits after the first significant one, with which a file may have been saved.
 const DIGITS: RangeInclusive<i32> = 0..=12;
 /// Least number of equal readings in a row at which a signal counts as stuck.
 const STANDS: usize = 5;
-/// Share of its range by which the reference must move on while the signal is stuck.
+/// Share of its range by which the reference must move while the signal is stuck.
 const MOVES_ON: f64 = 0.1;
-/// A slower recording of some length is likely one of milliseconds, Hz.
+/// Rates below this limit, Hz, are probably due to time stamps in milliseconds.
 const SLOW_HZ: f64 = 0.5;
-/// Fewest samples that distinguish a slow recording from a wrong unit of time.
+/// Least number of samples at which a low rate is attributed to a wrong unit of time.
 const TELLING: usize = 50;
 
-/// Most trials that each is compared with; if there are more, evenly chosen ones.
+/// Greatest number of trials with which each trial is compared. If there are more, they are chosen evenly.
 const OTHERS: usize = 32;
-/// Trials next in the mean of the reference that each is compared with, to find copies.
+/// Number of neighbours, in the order of the mean reference, with which each trial is compared to find copies.
 const NEXT: usize = 8;
 
-/// A possible mistake in one trial: a function from its line and that of another trial to its line as it is and without the mistake,
-/// and the message.
+/// A possible mistake in one trial. The function computes from the trial's line and that of another trial the trial's
+/// line as recorded and the line without the mistake. The text is the message.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
 const MISTAKES: [Mistake; 4] = [
@@ -38,7 +39,7 @@ const MISTAKES: [Mistake; 4] = [
         "{trial} has {signal} and {reference} exchanged, compared with {other}: swap the two column names with stretch convert, or leave the trial out",
     ),
     (
-        // the zero of what was reversed is unknown
+        // The zero of a reversed column is unknown.
         |own, other| {
             let own = Line { means: other.means, ..own };
             [own, Line { correlation: -own.correlation, ..own }]
@@ -58,19 +59,19 @@ const MISTAKES: [Mistake; 4] = [
     ),
 ];
 
-/// The line through signal and reference by least squares, and how far both spread.
+/// The least-squares line through signal and reference, with the standard deviations of both.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     /// Means of signal and reference.
     pub(super) means: [f64; 2],
     /// Standard deviations of signal and reference.
     spreads: [f64; 2],
-    /// Correlation of signal and reference; 0 where one of them is constant.
+    /// Correlation of signal and reference; 0 if one of them is constant.
     correlation: f64,
 }
 
 impl Line {
-    /// The line of a trial's parts.
+    /// Returns the line of a trial's parts.
     pub(super) fn of<'a>(parts: impl Iterator<Item = &'a Piece> + Clone) -> Self {
         let pairs = parts.flat_map(|(_, [signal, reference, _])| signal.iter().zip(reference));
         let count = pairs.clone().count().max(1) as f64;
@@ -100,7 +101,7 @@ impl Line {
         if slope.is_finite() { slope } else { 0.0 }
     }
 
-    /// The reference at a signal.
+    /// Returns the reference at a signal.
     pub(super) fn at(&self, signal: f64) -> f64 {
         self.means[1] + self.slope() * (signal - self.means[0])
     }
@@ -111,13 +112,14 @@ impl Line {
         Self { means, spreads, ..self }
     }
 
-    /// Root mean square of the distance to another line, over the samples of this one.
+    /// Returns the root mean square distance to another line, over the samples of this one.
     fn misfit(&self, other: &Self) -> f64 {
         let off = self.means[1] - other.at(self.means[0]);
         off.hypot((self.slope() - other.slope()) * self.spreads[0])
     }
 
-    /// What is said if this line and another are one with a mistake, and two without.
+    /// Returns the message of the mistake that best explains the difference between two lines; `None` if none explains
+    /// it.
     fn mistake(self, other: Self) -> Option<&'static str> {
         if ![self, other].iter().all(Self::is_clear) {
             return None;
@@ -137,7 +139,7 @@ fn swap([a, b]: [f64; 2]) -> [f64; 2] {
     [b, a]
 }
 
-/// A trial's parts and line.
+/// The parts and the line of a trial.
 struct Held<'a> {
     name: &'a str,
     parts: Vec<&'a Piece>,
@@ -145,16 +147,17 @@ struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// Whether two trials are one, to the digits that one of them was saved with.
+    /// Whether two trials have the same samples, within the digits with which one of them was saved.
     fn is_copy_of(&self, other: &Self) -> bool {
         let mut both = self.parts.iter().zip(&other.parts);
         self.parts.len() == other.parts.len()
             && both.all(|((_, own), (_, its))| (0..2).all(|i| is_same(&own[i], &its[i])))
     }
 
-    /// The value at which the signal is stuck while the reference moves on, away from where the signal reached that value.
+    /// Returns the end of the signal's range at which the signal is stuck, while the reference moves further in the
+    /// same direction.
     fn stands_at(&self) -> Option<f64> {
-        // if the signal does not follow the reference, its value says nothing
+        // If the signal does not follow the reference, a constant signal is no sign of a fault.
         if !self.line.is_clear() {
             return None;
         }
@@ -173,7 +176,7 @@ impl Held<'_> {
                     let began = at;
                     at += run.len();
                     let moves = |x: &f64| way * (x - reference[began]) > enough;
-                    // at its first sample a play may hold the signal
+                    // A run at the first sample is ignored, because a play may hold the signal there.
                     let is_run = began > 0 && run.len() >= STANDS && run[0] == end;
                     is_run && reference[began..at].iter().any(moves)
                 })
@@ -183,12 +186,13 @@ impl Held<'_> {
     }
 }
 
-/// Whether two columns are equal to the digits that one of them was saved with. Two runs of one motion are not, however alike.
+/// Whether two columns are equal within the digits with which one of them was saved. Two repetitions of a motion are
+/// not equal.
 fn is_same(one: &[f64], other: &[f64]) -> bool {
     one.len() == other.len() && (one == other || is_rounded(one, other) || is_rounded(other, one))
 }
 
-/// Whether one column is the other to some decimals or some significant digits, and is not constant.
+/// Whether one column is the other rounded to some decimals or significant digits, and is not constant.
 fn is_rounded(coarse: &[f64], fine: &[f64]) -> bool {
     let is_one = |step: &dyn Fn(f64) -> f64| {
         coarse.iter().zip(fine).all(|(coarse, fine)| {
@@ -206,7 +210,7 @@ fn is_rounded(coarse: &[f64], fine: &[f64]) -> bool {
     is_some && coarse.iter().any(|x| *x != coarse[0])
 }
 
-/// For each trial an earlier one that it is a copy of.
+/// Returns for each trial an earlier trial of which it is a copy.
 fn copies(held: &[Held<'_>]) -> Vec<Option<usize>> {
     let mean = |i: usize| held[i].line.means[1];
     let mut sorted: Vec<usize> = (0..held.len()).collect();
@@ -225,7 +229,7 @@ fn copies(held: &[Held<'_>]) -> Vec<Option<usize>> {
     first
 }
 
-/// Sentences about trials that are likely not what they are taken for, each with what to do.
+/// Returns sentences about trials with probable mistakes, each with advice.
 pub(super) fn doubts(
     names: &[&str],
     pieces: &[Piece],
@@ -273,7 +277,7 @@ pub(super) fn doubts(
         .par_iter()
         .map(|own| others().map(|j| (j, own.line.mistake(held[j].line))).collect())
         .collect();
-    // the trial in doubt is that which more of the others contradict; of two it is the second
+    // A mistake is reported for the trial that more of the others contradict; of two trials, for the second.
     let rank = |i: usize| (mistakes[i].iter().filter(|(_, says)| says.is_some()).count(), i);
     let copies = copies(&held);
     for (i, own) in held.iter().enumerate() {

@@ -1,21 +1,21 @@
-//! Gross errors: values that no motion can have taken, such as the placeholder of a logger for a missing value.
+//! Gross errors: values that no motion can produce, such as a logger's placeholder for a missing value.
 
 use stretch_core::Interval;
 use stretch_data::{Channel, Trial};
 
 use super::series::extent;
 
-/// Greatest share of the rows that can be gross errors. With a larger share, two levels that a channel really has (a
-/// muscle held at two lengths) could be taken for values and their outliers. The simplest robust location estimate,
-/// the decile mean, still tolerates a tenth.
+/// Greatest share of the rows that can be gross errors. With a larger share, two true levels of a channel (a muscle
+/// held at two lengths) could be mistaken for values and outliers. The simplest robust location estimate, the decile
+/// mean, tolerates a tenth as well.
 const MOST_SHARE: f64 = 0.1;
 
-/// The trials without the rows in which one of `columns` has a gross error, and a sentence for each column
-/// that had such values.
+/// Removes the rows in which one of `columns` has a gross error. Also returns a sentence for each column with such
+/// values.
 ///
-/// A channel that was sampled while it moved leaves no hole in its values. Gross errors are values beyond a hole that
-/// is wider than the whole range of the other values, in at most a tenth of the rows: `-999` among lengths, or a
-/// spike to the supply. Outliers inside that range are left to the robust fit.
+/// A channel that was sampled during motion has no gap between its sorted values. Gross errors are values beyond a gap
+/// that is wider than the whole range of the other values, in at most a tenth of the rows: `-999` among lengths, or a
+/// spike to the supply voltage. Outliers inside that range are treated by the robust fit.
 ///
 /// ```
 /// use stretch_calibrate::without_gross_errors;
@@ -42,7 +42,7 @@ pub fn without_gross_errors(trials: Vec<Trial>, columns: &[&str]) -> (Vec<Trial>
         let counts = (gross.len() as u64, values.len() as u64);
         sentences.push(sentence(column, counts, (least, most), (low, high)));
         for trial in &mut kept {
-            // a trial with columns of unequal length stays as it is, because the fit refuses it
+            // A trial with columns of unequal length stays as it is, because the fit refuses it.
             let own = trial.channel(column).filter(|_| trial.check_lengths().is_ok());
             let Some(own) = own else { continue };
             let stays: Vec<bool> = own.iter().map(|&x| !is_gross(x)).collect();
@@ -53,7 +53,8 @@ pub fn without_gross_errors(trials: Vec<Trial>, columns: &[&str]) -> (Vec<Trial>
     (kept, sentences)
 }
 
-/// A sentence on the gross errors of a column: their number, that of all values, and their least and greatest value.
+/// Returns a sentence about the gross errors of a column: their number, that of all values, and their least and
+/// greatest value.
 fn sentence(
     column: &str,
     (gross, of): (u64, u64),
@@ -67,13 +68,13 @@ fn sentence(
     )
 }
 
-/// The least and the greatest value that is no gross error; `None` where no value is a gross error.
+/// Returns the least and the greatest value that are not gross errors; `None` if there are no gross errors.
 fn span(values: &[f64]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let most = (MOST_SHARE * sorted.len() as f64) as usize;
     let (mut from, mut to) = (0, sorted.len().checked_sub(1)?);
-    // the widest holes lie furthest out, so that the ends are cut one after the other until nothing changes
+    // The widest gaps lie furthest outside, so the ends are cut alternately until nothing changes.
     loop {
         let before = (from, to);
         let left = most - (from + sorted.len() - 1 - to).min(most);
@@ -94,11 +95,11 @@ fn span(values: &[f64]) -> Option<(f64, f64)> {
         }
     }
     let (low, high) = (sorted[from], sorted[to]);
-    // a channel that is constant but for a few values has no range to compare with
+    // A channel that is constant except for a few values has no range for a comparison.
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
 }
 
-/// The rows of a trial that stay.
+/// Returns the rows of a trial for which `stays` is true.
 pub(crate) fn rows(trial: &Trial, stays: &[bool]) -> Trial {
     let kept = |values: &[f64]| {
         values.iter().zip(stays).filter(|(_, stays)| **stays).map(|(x, _)| *x).collect()
@@ -131,9 +132,9 @@ mod tests {
                 "{gross:?} {found:?}"
             );
         }
-        // these values are outside the range, but no gap separates them from it
+        // These values are outside the range, but no gap separates them from it.
         assert_eq!(with(&[200.0, 140.0]), None);
-        // two levels at which a muscle is held are no gross errors
+        // Two levels at which a muscle is held are not gross errors.
         let held: Vec<f64> =
             (0..100).map(|n| if n < 85 { 150.0 } else { 170.0 } + f64::from(n % 5)).collect();
         assert_eq!(span(&held), None);

@@ -1,4 +1,4 @@
-//! Brings trials onto one even grid, with the rates that a live receptor has and the ranges of a calibration.
+//! Resamples trials to one even time grid, and computes the rates of the live receptor and the ranges of a calibration.
 
 mod doubts;
 mod gross_errors;

@@ -1,4 +1,4 @@
-//! A trial prepared for a fit: even in time, with the rates of signal and target and the branch of each sample.
+//! Prepares a trial for a fit: an even time grid, the rates of signal and target, and the branch of each sample.
 
 use stretch_core::{
     Branch, Design, Interval, Polarity, RateEstimator, RateSource, SampleRate, Stage, Target,
@@ -13,39 +13,39 @@ use crate::{CalibrateError, Options, SplitBy};
 
 use super::trials::{even, noise_gain};
 
-/// A stretch of a trial without gaps, on an even grid.
+/// A part of a trial without gaps, on an even time grid.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
     pub trial: usize,
     pub signal: Vec<f64>,
     pub target: Vec<f64>,
-    /// Pressures; empty where no pressure is needed.
+    /// Pressures; empty if no pressure is needed.
     pub pressure: Vec<f64>,
-    /// Rate of the signal, signed by polarity, by the estimator of the live receptor.
+    /// Rate of the signal from the estimator of the live receptor, multiplied by the sign of the polarity.
     pub signal_rate: Vec<Option<f64>>,
-    /// Rate of the target, by central differences or the centred form of the estimator.
+    /// Rate of the target, from central differences or the centred form of the estimator.
     pub target_rate: Vec<f64>,
 }
 
-/// The median sample rate of a trial, in hertz.
+/// Returns the median sample rate of a trial, in hertz.
 ///
 /// # Errors
 /// [`CalibrateError::TooShort`] for fewer than two samples.
 pub fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
     let too_short = || CalibrateError::TooShort { trial: trial.name.clone(), samples: trial.len() };
     let hz = trial.rate_hz().ok_or_else(too_short)?;
-    // time stamps are printed to the millisecond, so that 100.0000001 Hz means 100 Hz
+    // Time stamps are printed to the millisecond, so 100.0000001 Hz means 100 Hz.
     let whole = hz.round();
     Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
 }
 
-/// Standard deviation of the noise of some records; zero for less than three samples.
+/// Returns the standard deviation of the noise of some recordings; zero for fewer than three samples.
 pub fn noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
     let mut bends: Vec<f64> = records.flat_map(second_differences).collect();
     noise_of_differences(&mut bends).unwrap_or(0.0)
 }
 
-/// The least and the greatest value.
+/// Returns the least and the greatest value.
 pub fn extent(values: impl Iterator<Item = f64>) -> Interval {
     values.fold(Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }, |e, x| Interval {
         min: e.min.min(x),
@@ -53,8 +53,8 @@ pub fn extent(values: impl Iterator<Item = f64>) -> Interval {
     })
 }
 
-/// The rates of a log by the estimator of the calibration: the live estimator, or the paper's central difference over
-/// the whole log.
+/// Computes the rates of a log with the estimator of the calibration: the live estimator, or the paper's central
+/// difference over the whole log.
 pub(crate) fn rates_at_use(
     estimator: RateEstimator,
     rate: SampleRate,
@@ -70,7 +70,7 @@ pub(crate) fn rates_at_use(
     Ok(signal.iter().map(|&x| filter.step(&mut memory, x)).collect())
 }
 
-/// The rates of the target without delay, by the centred form of a Savitzky-Golay estimator or by central
+/// Computes the rates of the target without delay, by the centred form of a Savitzky-Golay estimator or by central
 /// differences.
 fn target_rates(
     estimator: RateEstimator,
@@ -88,7 +88,7 @@ fn target_rates(
     Ok(out)
 }
 
-/// Whether the signal rises with the target: the sign of their covariance.
+/// Returns whether the signal rises or falls with the target: the sign of their covariance.
 pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polarity {
     let count = pairs.clone().count().max(1) as f64;
     let (x, y) = pairs.clone().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
@@ -96,7 +96,7 @@ pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polar
     if covariance < 0.0 { Polarity::Falling } else { Polarity::Rising }
 }
 
-/// The series of one even piece of a trial, with the rates of signal and target.
+/// Returns the series of one evenly sampled piece of a trial, with the rates of signal and target.
 pub(crate) fn series(
     trial: usize,
     piece: [Vec<f64>; 3],
@@ -120,7 +120,7 @@ pub(crate) struct DeadBands {
     pub target: f64,
 }
 
-/// The branch of each sample; `None` where the estimator had no rate yet.
+/// Returns the branch of each sample; `None` if the estimator has no rate yet.
 pub(crate) fn branches(series: &Series, options: &Options, dead: DeadBands) -> Vec<Option<Branch>> {
     match options.split {
         SplitBy::Rate => by_rate(series, options.rate_source, dead),
@@ -137,7 +137,7 @@ fn by_rate(series: &Series, source: RateSource, dead: DeadBands) -> Vec<Option<B
         RateSource::Voltage => series.signal_rate[i].map(|rate| (rate, dead.signal)),
         RateSource::Strain => series.signal_rate[i].map(|_| (series.target_rate[i], dead.target)),
     };
-    // before the first movement the branch is that of the movement
+    // Before the first movement, the branch is that of this movement.
     let first = (0..series.target.len())
         .filter_map(decide)
         .find(|(rate, dead)| rate.abs() > *dead)
@@ -153,15 +153,15 @@ fn by_rate(series: &Series, source: RateSource, dead: DeadBands) -> Vec<Option<B
         .collect()
 }
 
-/// A trial on its own even grid, with the rate of its signal at each sample.
+/// A trial on an even time grid, with the rate of its signal at each sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rated {
-    /// Samples a second of the grid.
+    /// Sample rate of the grid.
     pub sample_rate: SampleRate,
     /// The trial, or its parts between gaps.
     pub parts: Vec<RatedPart>,
-    /// Three standard deviations of the rate's noise, in units of the signal a second: the dead band that
-    /// [`calibrate`](crate::calibrate()) would take of this trial alone.
+    /// Three standard deviations of the rate's noise, in units of the signal per second. This is the dead band that
+    /// [`calibrate`](crate::calibrate()) would use for this trial alone.
     pub dead_band: f64,
     /// Counts of the rows.
     pub rows: Rows,
@@ -169,20 +169,21 @@ pub struct Rated {
     pub notes: Vec<String>,
 }
 
-/// A part of a trial without a gap.
+/// A part of a trial without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatedPart {
-    /// The columns that were asked for, the signal first.
+    /// The requested columns, the signal first.
     pub even: EvenPart,
-    /// Rate of the signal in its unit per second, computed as in the live receptor; `None` while the estimator warms
-    /// up.
+    /// Rate of the signal in its unit per second, computed as in the live receptor; `None` during the warm-up of the
+    /// estimator.
     pub rate: Vec<Option<f64>>,
 }
 
-/// Brings a trial onto an even grid (the trial's own where no grid is given) and computes the rate of its signal, as
-/// [`calibrate`](crate::calibrate()) does before a fit. The rates are those of the live receptor and can be stored.
+/// Resamples a trial to an even time grid (at the trial's median rate if no grid is given) and computes the rate of its
+/// signal, as [`calibrate`](crate::calibrate()) does before a fit. The rates equal those of the live receptor and can
+/// be stored.
 ///
-/// The rate has the sign of the signal's own change, whatever the polarity.
+/// The rate has the sign of the signal's own change, independent of the polarity.
 ///
 /// # Errors
 /// The errors of [`calibrate`](crate::calibrate()): a missing column, too few samples, an estimator that cannot be

@@ -1,4 +1,4 @@
-//! Trials made ready to fit: even in time, with pooled ranges.
+//! Prepares trials for a fit: an even time grid and pooled ranges.
 
 use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
@@ -14,28 +14,28 @@ use super::{
     series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series},
 };
 
-/// Parts of a trial with fewer samples have no rate.
+/// Least number of samples of a part; shorter parts have no rate.
 const SHORTEST: usize = 3;
 
-/// The most rows of all trials together that a calibration is fitted to or judged on: a day at 100 Hz. A row was measured to take 110 bytes
-/// (linear), 120 (poly13) and 140 (evaluate).
+/// Greatest number of rows of all trials together to which a calibration is fitted or on which it is evaluated: about a
+/// day at 100 Hz. The measured memory is 110 bytes a row (linear), 120 (poly13) and 140 (evaluate).
 pub const MOST_ROWS: usize = 10_000_000;
-/// The same for models that remember, which take 145 bytes (history) to 180 bytes (observer) a row.
+/// The same limit for models with memory, which take 145 (history) to 180 bytes (observer) a row.
 const MOST_REMEMBERED: usize = 3_000_000;
 
-/// Fewest trials that are left out whole in a cross-validation; of fewer, parts are left out.
+/// Least number of trials for a cross-validation that leaves out whole trials. With fewer trials, parts are left out.
 pub(crate) const LEAST_TRIALS: usize = 3;
 
-/// The most folds that trials are left out in. Of more trials each fold holds several, because the time of one fit for each trial would grow
-/// with the square of their number.
+/// Greatest number of folds of whole trials. If there are more trials, each fold holds several, because with one fit
+/// for each trial the time would grow with the square of their number.
 const MOST_FOLDS: usize = 16;
 
-/// The fold of each trial in a cross-validation that leaves whole trials out.
+/// Returns the fold of a trial in a cross-validation that leaves out whole trials.
 pub(crate) fn fold_of(trial: usize) -> usize {
     trial % MOST_FOLDS
 }
 
-/// All trials, even in time, with pooled ranges.
+/// All trials on an even time grid, with pooled ranges.
 pub(crate) struct Prepared {
     pub series: Vec<Series>,
     pub sample_rate: SampleRate,
@@ -67,7 +67,7 @@ impl Prepared {
         let signal_range = range(&options.signal, options.zero(seen), seen)?;
         let target_range = range(&options.reference, 0.0, extent(pairs.map(|(_, t)| t)));
         let target_range = target_range.map_err(|error| match (error, pieces.first()) {
-            // the message gives the value in the file, not the contraction computed from it
+            // The message gives the value in the file, not the contraction computed from it.
             (CalibrateError::Constant { column, .. }, Some((_, [_, reference, _]))) => {
                 let value = reference.first().copied().unwrap_or_default();
                 CalibrateError::Constant { column, value }
@@ -75,7 +75,7 @@ impl Prepared {
             (other, _) => other,
         })?;
         let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
-        // without a given one, three standard deviations of the rate's noise
+        // The default is three standard deviations of the rate's noise.
         let signal = match options.dead_band {
             Some(dead_band) => dead_band,
             None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
@@ -101,7 +101,7 @@ impl Prepared {
         })
     }
 
-    /// A record of a model fitted to these trials.
+    /// Returns the calibration of a model that was fitted to these trials.
     pub(crate) fn calibration(
         &self,
         model: Model,
@@ -124,8 +124,8 @@ impl Prepared {
         })?)
     }
 
-    /// Each series, and the number of the fold of each of its samples in cross-validation: that of its trial, or
-    /// each tenth of the samples when there are fewer than [`LEAST_TRIALS`] trials.
+    /// Returns each series with the fold of each of its samples in cross-validation. The fold is that of the trial, or
+    /// a tenth of all samples if there are fewer than [`LEAST_TRIALS`] trials.
     pub(crate) fn folds(&self) -> impl Iterator<Item = (&Series, Vec<usize>)> {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         let total: usize = self.series.iter().map(|s| s.signal.len()).sum();
@@ -140,18 +140,18 @@ impl Prepared {
     }
 }
 
-/// Trials, or their parts between gaps, on the grid of the first trial, with the counts of their rows.
+/// Trials, or their parts between gaps, on the time grid of the first trial, with the counts of their rows.
 #[derive(Default)]
 struct Evened {
     pieces: Vec<Piece>,
     rows: Rows,
     notes: Vec<String>,
-    /// The turn by which the reference wraps in some trial, in its unit.
+    /// The jump of a reference that wraps, in its unit, if the reference wraps in any trial.
     turn: Option<f64>,
 }
 
 impl Evened {
-    /// All trials on the grid of the first one, and its rate.
+    /// Returns all trials on the time grid of the first one, and the sample rate.
     fn of(trials: &[Trial], options: &Options) -> Result<(SampleRate, Self), CalibrateError> {
         let first = trials.first().ok_or(CalibrateError::NoTrials)?;
         check_rows(trials, most_rows(options.model))?;
@@ -176,7 +176,7 @@ impl Evened {
         Ok((sample_rate, evened))
     }
 
-    /// Takes in a trial; `first` names the trial whose grid is used.
+    /// Adds a trial. `first` is the name of the trial whose time grid is used.
     fn take(
         &mut self,
         index: usize,
@@ -190,7 +190,8 @@ impl Evened {
             return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
         }
         let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
-        // Only where the pressure was recorded: an error names the cause that lacks it.
+        // The column is added only if the pressure was recorded. If it is missing, a later error names the cause that
+        // needs it.
         let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
         columns.extend(has_pressure.then_some(options.pressure.as_str()));
         let even = even(trial, &columns, 1, sample_rate)?;
@@ -205,10 +206,11 @@ impl Evened {
     }
 }
 
-/// Moves the reference of each part by whole turns to the line through the part with the widest signal, reference = a + b signal.
+/// Shifts the reference of each part by whole turns to the line reference = a + b signal through the part with the
+/// widest signal.
 ///
-/// An angle that wraps says nothing of its turn, so a trial may begin on the other side of the seam. Returns the number of moved parts, or
-/// nothing if none had to be moved.
+/// The turn of an angle that wraps is unknown, so a trial may begin on the other side of the seam. Returns the number
+/// of shifted parts, or `None` if there are none.
 fn align_turns(pieces: &mut [Piece], turn: f64) -> Option<usize> {
     let width = |(_, [signal, ..]): &Piece| {
         let seen = extent(signal.iter().copied());
@@ -233,10 +235,10 @@ fn most_rows(model: ModelKind) -> usize {
     if matches!(model, ModelKind::Remembering { .. }) { MOST_REMEMBERED } else { MOST_ROWS }
 }
 
-/// A trial on an even grid. The first `signals` of its columns must not wrap.
+/// Resamples a trial to an even time grid. The first `signals` of its columns must not wrap.
 ///
 /// # Errors
-/// [`CalibrateError::WrappedSignal`], and [`CalibrateError::Data`] for a column that is not there.
+/// [`CalibrateError::WrappedSignal`], and [`CalibrateError::Data`] for a missing column.
 pub fn even(
     trial: &Trial,
     columns: &[&str],
@@ -256,17 +258,17 @@ pub fn even(
     }
 }
 
-/// The signals of trials, brought onto an even grid as [`calibrate`](crate::calibrate()) does before a fit: a list for
-/// each part without a gap.
+/// Returns the signals of trials, resampled as [`calibrate`](crate::calibrate()) does before a fit: a list for each
+/// part without gaps.
 ///
 /// # Errors
-/// Those of [`calibrate`](crate::calibrate()) about the trials.
+/// The errors of [`calibrate`](crate::calibrate()) that concern the trials.
 pub fn even_signals(trials: &[Trial], options: &Options) -> Result<Vec<Vec<f64>>, CalibrateError> {
     let (_, evened) = Evened::of(trials, options)?;
     Ok(evened.pieces.into_iter().map(|(_, [signal, ..])| signal).collect())
 }
 
-/// Errors of estimates in normalised target, summed sample by sample.
+/// Errors of estimates in normalised target, accumulated sample by sample.
 #[derive(Default)]
 pub(crate) struct Tally {
     squares: f64,
@@ -276,7 +278,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Takes in a normalised target and its error.
+    /// Adds a normalised target and its error.
     pub(crate) fn take(&mut self, truth: f64, error: f64) {
         self.squares += error * error;
         self.sum += truth;
@@ -284,7 +286,7 @@ impl Tally {
         self.count += 1.0;
     }
 
-    /// Number of errors taken in.
+    /// Returns the number of errors.
     pub(crate) fn count(&self) -> f64 {
         self.count
     }
@@ -300,7 +302,7 @@ impl Tally {
     }
 }
 
-/// Standard deviation of an estimator's rate for white noise of unit standard deviation.
+/// Returns the standard deviation of an estimator's rate for white noise with a standard deviation of one.
 pub(crate) fn noise_gain(
     estimator: RateEstimator,
     rate: SampleRate,
@@ -311,7 +313,7 @@ pub(crate) fn noise_gain(
     }
 }
 
-/// Number of the trial; signal, reference and, where needed, the pressure.
+/// Index of the trial, and its signal, reference and, if needed, pressure.
 pub(super) type Piece = (usize, [Vec<f64>; 3]);
 
 fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
@@ -330,7 +332,7 @@ fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError>
     })
 }
 
-/// The range of a column from its extent.
+/// Returns the range of a column from its extent.
 ///
 /// # Errors
 /// [`CalibrateError::Constant`] for a column that never changes.

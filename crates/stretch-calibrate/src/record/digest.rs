@@ -1,4 +1,4 @@
-//! The digest of a record in JSON: the record's last field, computed over every other byte that is no white space.
+//! The digest of a JSON calibration file. It is the last field and covers every other byte except white space.
 
 use serde::{Serialize, de::DeserializeOwned};
 use serde_path_to_error::Error;
@@ -6,13 +6,13 @@ use stretch_core::record::checksum;
 
 use crate::CalibrateError;
 
-/// The white space of JSON, and no other.
+/// The white space characters of JSON.
 const SPACE: [char; 4] = [' ', '\n', '\r', '\t'];
 
-/// The digest of an object as the text of the digest field: `crc32c 5a0e17c3`.
+/// Returns the digest of an object as the text of the digest field: `crc32c 5a0e17c3`.
 ///
-/// White space outside of strings does not count, so that a record can be reformatted. The order of the fields and
-/// the spelling of numbers count.
+/// White space outside strings is ignored, so a file can be reformatted. The order of the fields and the spelling of
+/// numbers matter.
 pub fn digest(object: &str) -> String {
     let (mut in_string, mut escaped) = (false, false);
     let counts = |byte: &u8| {
@@ -28,8 +28,8 @@ pub fn digest(object: &str) -> String {
     format!("crc32c {:08x}", checksum(&bytes))
 }
 
-/// The object without its digest, and the digest where the object has one. Where other fields follow it the fields were put in another
-/// order, which no digest survives.
+/// Returns the object without its digest, and the digest if there is one. If other fields follow the digest, the fields
+/// were reordered, and the digest no longer matches.
 pub fn split(text: &str) -> (String, Option<String>) {
     let cut = || {
         let text = trimmed(trimmed(text).strip_suffix('}')?);
@@ -48,10 +48,10 @@ pub fn split(text: &str) -> (String, Option<String>) {
     }
 }
 
-/// The object of a record whose digest is that of its text.
+/// Returns the object of a file whose digest matches its text.
 ///
 /// # Errors
-/// What is wrong with the digest, and the advice: what to do.
+/// Describes the fault of the digest, followed by `advice`.
 pub fn verified(text: &str, advice: &str) -> Result<String, String> {
     let (object, found) = split(text);
     let computed = digest(&object);
@@ -64,31 +64,31 @@ pub fn verified(text: &str, advice: &str) -> Result<String, String> {
     }
 }
 
-/// What to do about a calibration whose digest is not that of its text.
+/// Returns advice about a calibration file whose digest does not match its text.
 pub fn how_to_renew(file: &str) -> String {
     format!(
         "check every number, then renew it with: stretch export --calibration {file} --seal; or calibrate again"
     )
 }
 
-/// The value of an object without its digest.
+/// Parses an object without its digest.
 ///
 /// # Errors
-/// The fault, and the field that has it.
+/// The fault, and the field that contains it.
 pub fn parse<T: DeserializeOwned>(object: &str) -> Result<T, Error<serde_json::Error>> {
     serde_path_to_error::deserialize(&mut serde_json::Deserializer::from_str(object))
 }
 
-/// The object with its digest behind the last field.
+/// Appends the digest to an object as its last field; `None` if the text is not a JSON object.
 pub fn join(object: &str) -> Option<String> {
     let open = trimmed(trimmed(object).strip_suffix('}')?);
     Some(format!("{open},\n  \"digest\": \"{}\"\n}}\n", digest(object)))
 }
 
-/// A record in indented JSON, with its digest as the last field.
+/// Returns a record as indented JSON with the digest as its last field.
 ///
 /// # Errors
-/// [`CalibrateError::Record`] for what is no object, or has numbers that are not finite.
+/// [`CalibrateError::Record`] if the record is not an object, or has numbers that are not finite.
 pub fn seal(record: &impl Serialize) -> Result<String, CalibrateError> {
     let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
     let object = serde_json::to_string_pretty(record).map_err(|e| problem(e.to_string()))?;
@@ -115,7 +115,7 @@ mod tests {
         ] {
             assert_ne!(digest(same[0]), digest(other), "{other}");
         }
-        // a quote that is escaped ends no string
+        // An escaped quote does not end a string.
         assert_ne!(digest(r#"{"a":"\" x"}"#), digest(r#"{"a":"\"x"}"#));
         assert_eq!(digest(r#"{"a":"\\" }"#), digest(r#"{"a":"\\"}"#));
     }

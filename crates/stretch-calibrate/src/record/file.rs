@@ -1,4 +1,5 @@
-//! Calibration records as files, in JSON for people or in postcard for a board. Both forms carry a seal.
+//! Calibration files, in JSON for people or in postcard (a binary format) for a board. Both forms carry a seal: a
+//! digest in JSON, a checksum in postcard.
 
 use std::{io::ErrorKind, path::Path};
 
@@ -9,33 +10,33 @@ use crate::CalibrateError;
 
 use super::digest;
 
-/// Room for the largest record in postcard: two poly55 surfaces and sixteen trials.
+/// Room for the largest calibration in postcard: two poly55 surfaces and sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
 
-/// How a record's seal is treated.
+/// Treatment of the seal of a calibration file.
 #[derive(Clone, Copy, PartialEq)]
 enum Seal {
-    /// The seal must be that of the record.
+    /// The seal must match the content.
     Checked,
-    /// The seal is ignored, because the record was edited by hand.
+    /// The seal is ignored, because the file was edited by hand.
     Ignored,
 }
 
-/// Whether a record of that name is in postcard.
+/// Whether a file of that name is in postcard.
 pub fn is_postcard(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "postcard")
 }
 
-/// A calibration from its record: postcard when the name ends in `.postcard`, else JSON.
+/// Reads a calibration from a file: postcard if the name ends in `.postcard`, otherwise JSON.
 ///
 /// # Errors
-/// [`CalibrateError::Record`] with the file, the field and the fault of that field. A seal that does not match the
-/// record is refused as well.
+/// [`CalibrateError::Record`] with the file, the field and the fault. A file whose seal does not match its content is
+/// refused as well.
 pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     let file = path.display().to_string();
     let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
     let bytes = read_whole(path).map_err(|e| {
-        // what is refused without a word of the system says itself what to do
+        // Errors of the kind `Other` come from this program and already contain advice.
         let what_to_do = match e.kind() {
             ErrorKind::Other => "",
             _ => "; name a record made by stretch calibrate",
@@ -47,13 +48,13 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
         let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is no text: {e}")))?;
         return calibration_from_json(&text, &file);
     }
-    // the specification is loaded without its checks, so that a message can name the field
+    // The specification is loaded without its checks, so that a message can name the field.
     let spec = record::load::<CalibrationSpec>(&bytes);
     let made = spec.and_then(Calibration::new);
     made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
 }
 
-/// A calibration from a record in JSON that is held in memory; messages call the record `name`.
+/// Reads a calibration from JSON text. Messages call the text `name`.
 ///
 /// # Errors
 /// As [`read_calibration`].
@@ -74,50 +75,48 @@ pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, Cali
     from_json(text, name, Seal::Checked)
 }
 
-/// A calibration from a record in JSON that may have been edited by hand: its digest is not checked.
+/// Reads a calibration from JSON text that may have been edited by hand. Its digest is not checked.
 ///
 /// # Errors
-/// As [`read_calibration`], except that of the digest.
+/// As [`read_calibration`], except for the digest.
 pub fn calibration_from_edited_json(text: &str, name: &str) -> Result<Calibration, CalibrateError> {
     from_json(text, name, Seal::Ignored)
 }
 
-/// The record of a calibration in JSON, sealed.
+/// Returns a calibration as sealed JSON.
 ///
 /// # Errors
-/// Never for a [`Calibration`], because all of its numbers are finite.
+/// None for a [`Calibration`], because all of its numbers are finite.
 pub fn calibration_to_json(calibration: &Calibration) -> Result<String, CalibrateError> {
     digest::seal(calibration)
 }
 
-/// The number under which the record of a calibration is sealed: CRC-32C of its bytes in postcard.
+/// Returns the seal of a calibration: the CRC-32C of its bytes in postcard.
 ///
-/// The number identifies the calibration where the record is held in another form (constants in C, a board that
-/// answers with the seal of its record).
+/// The seal identifies the calibration in other forms, such as constants in C, or a board that reports the seal of its
+/// calibration.
 ///
 /// # Errors
-/// Never for a [`Calibration`], because the buffer has room for the largest record.
+/// None for a [`Calibration`], because the buffer has room for the largest one.
 pub fn calibration_seal(calibration: &Calibration) -> Result<u32, CalibrateError> {
     let mut buffer = [0; POSTCARD_BYTES];
     let bytes = record::store(calibration, &mut buffer)?;
     Ok(record::seal(bytes)?.unwrap_or_default())
 }
 
-/// Writes a calibration record, whole or not at all: postcard when the name ends
-/// in `.postcard`, else JSON.
+/// Writes a calibration file completely or not at all: postcard if the name ends in `.postcard`, otherwise JSON.
 ///
 /// # Errors
-/// [`CalibrateError::Data`] with path and cause.
+/// `CalibrateError::File` with path and cause.
 pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), CalibrateError> {
     let bytes = calibration_bytes(path, calibration)?;
     Ok(write_whole(path, |out| out.write_all(&bytes))?)
 }
 
-/// The record of a calibration as the bytes of a file of that name: postcard when the name ends in `.postcard`, else
-/// JSON.
+/// Returns a calibration as the bytes of a file of that name: postcard if the name ends in `.postcard`, otherwise JSON.
 ///
 /// # Errors
-/// Never for a [`Calibration`], because the buffer has room for the largest record and all numbers are finite.
+/// None for a [`Calibration`], because the buffer has room for the largest one and all numbers are finite.
 pub fn calibration_bytes(
     path: &Path,
     calibration: &Calibration,
@@ -131,7 +130,8 @@ pub fn calibration_bytes(
 
 const UNUSABLE: &str = "this calibration cannot be used";
 
-/// An object without where its movements turn, which are a record of `stretch-sleeve`; `None` where it has none.
+/// Removes the field `turns` (turning points of movements), which `stretch-sleeve` writes; `None` if there is no such
+/// field.
 fn without_turns(object: &str) -> Option<serde_json::Value> {
     let mut value: serde_json::Value = serde_json::from_str(object).ok()?;
     value.as_object_mut()?.remove("turns").map(|_| value)
@@ -164,7 +164,7 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
     end.map_err(|error| unusable(error.to_string()))?;
     let schema = spec.schema;
     let calibration = Calibration::new(spec).map_err(|error| unusable(error.to_string()))?;
-    // records of schema 1 had no digest
+    // Files of schema 1 had no digest.
     let may_lack_it = found.is_none() && schema != Schema::CURRENT;
     if seal == Seal::Checked && !may_lack_it {
         digest::verified(text, &digest::how_to_renew(name)).map_err(unusable)?;

@@ -1,4 +1,4 @@
-//! A calibration over a board's converter, in integers, as the record for its flash.
+//! Integer calibrations for a board's converter, as records (sealed bytes) for its flash.
 
 use std::{fmt, path::Path};
 
@@ -14,13 +14,13 @@ use stretch_receptor::{
 
 use crate::{CalibrateError, SpellingError};
 
-/// Room for the largest record, an observer's with every number at its longest.
+/// Room for the largest record: an observer in which every number has its greatest length.
 const BYTES: usize = 1024;
 
-/// Least step of an estimate in integers, in the unit of the reference.
+/// Step of an integer estimate, in the unit of the reference.
 pub const FIXED_STEP: f64 = 1e-3;
 
-/// The numbers that the step of a record uses, for an implementation in another language.
+/// The numbers that one step of a receptor uses, for an implementation in another language.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // one lives at a time
 pub enum RecordNumbers {
@@ -30,31 +30,28 @@ pub enum RecordNumbers {
     Observer(IntegerObserver),
 }
 
-/// A record for a board, and the type that reads the record on the board.
+/// A calibration for a board, and the type that reads it there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedRecord {
-    /// The record in postcard under its seal: about 100 bytes, or 450 for an observer.
+    /// The calibration in postcard with its seal: about 100 bytes, or 450 for an observer.
     pub bytes: Vec<u8>,
-    /// The type in [`stretch_receptor::code`] whose record the bytes are.
+    /// The type in [`stretch_receptor::code`] that the bytes contain.
     pub read_as: String,
     /// The numbers that the bytes hold.
     pub numbers: RecordNumbers,
 }
 
-/// The record of a calibration in integers: codes of `adc` in, thousandths of the
-/// reference's unit out.
+/// Returns a calibration in integers. Its inputs are codes of `adc`, its outputs thousandths of the reference's unit.
 ///
 /// Linear models and surfaces with no term beyond poly13 become a
 /// [`FixedCalibration`], observers a [`FixedObserver`].
 ///
 /// # Errors
-/// [`CalibrateError::FixedBits`] for a converter of more than 16 bits,
-/// [`CalibrateError::NoFixedForm`] for any other model,
-/// [`CalibrateError::FixedRate`] for a rate that no type was compiled for (an
-/// observer needs none), [`CalibrateError::OutsideConverter`] when all of the
-/// trials' signal lies outside the converter, [`CalibrateError::FixedStep`] when a step of
-/// an estimate ([`FIXED_STEP`]) is more than the fit's error, [`CalibrateError::Fixed`] when a number
-/// does not fit its format.
+/// [`CalibrateError::FixedBits`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
+/// model, [`CalibrateError::FixedRate`] for a rate for which no type was compiled (an observer needs none),
+/// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter,
+/// [`CalibrateError::FixedStep`] if a step of an estimate ([`FIXED_STEP`]) exceeds the fit's error,
+/// [`CalibrateError::Fixed`] if a number does not fit its format.
 ///
 /// ```
 /// use stretch_calibrate::{fixed_record, parse_adc};
@@ -108,7 +105,8 @@ fn too_coarse(calibration: &Calibration) -> CalibrateError {
     CalibrateError::FixedStep { reference, error: fit_error(calibration) }
 }
 
-/// RMSE of a calibration's fit in the unit of its reference, at least a thousandth of the range: a fit can be exact.
+/// Returns the RMSE of a calibration's fit in the unit of its reference, but at least a thousandth of the range,
+/// because a fit can be exact.
 pub fn fit_error(calibration: &Calibration) -> f64 {
     let spec = calibration.spec();
     let rmse = match &spec.model {
@@ -124,14 +122,14 @@ pub fn fit_error(calibration: &Calibration) -> f64 {
     rmse.max(1e-3) * span(calibration)
 }
 
-/// The range of the target in the unit of the reference.
+/// Returns the range of the target in the unit of the reference.
 fn span(calibration: &Calibration) -> f64 {
     let spec = calibration.spec();
     let [low, high] = [spec.target_range.min(), spec.target_range.max()];
     (spec.target.to_reference(high) - spec.target.to_reference(low)).abs()
 }
 
-/// Rates are part of a type; this program is compiled for these rates.
+/// The window of a rate estimator is part of a type, so only the windows listed below are compiled in.
 macro_rules! windows {
     ($($window:literal)*) => {
         const WINDOWS: &[u16] = &[$($window),*];
@@ -172,7 +170,7 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
     let fixed =
         fixed.map_err(|error| match error {
-            // a step of more than what the arithmetic may be off by; otherwise the converter is too coarse
+            // The step exceeds the permitted error of the arithmetic. If it does not, the converter is too coarse.
             ReceptorError::Calibration(DesignError::OutOfRange {
                 field: "fixed.error", ..
             }) if FIXED_STEP > 1e-4 * span(calibration) => too_coarse(calibration),
@@ -188,13 +186,13 @@ fn made<T: Serialize>(
     numbers: RecordNumbers,
 ) -> Result<FixedRecord, CalibrateError> {
     let mut buffer = [0; BYTES];
-    // the buffer has room for every number, so that this cannot fail
+    // The buffer has room for every number, so this cannot fail.
     let bytes = record::store(fixed, &mut buffer);
     let bytes = bytes.map_err(|error| CalibrateError::Fixed(error.into()))?;
     Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers })
 }
 
-/// A record of `stretch export --fixed` that runs here with the same bits as on the board.
+/// The receptor of a file from `stretch export --fixed`. It gives the same bits here as on the board.
 ///
 /// ```
 /// use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc};
@@ -215,8 +213,8 @@ pub struct BoardReceptor {
 }
 
 impl BoardReceptor {
-    /// The receptor of a record; `None` where the bytes are no such record, or hold a rate that [`fixed_record`] does
-    /// not write.
+    /// Builds the receptor from the bytes of a record; `None` if the bytes are not such a record, or have a rate that
+    /// [`fixed_record`] does not write.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         rated_receptor(bytes).or_else(|| {
             let observer: FixedObserver = record::load(bytes).ok()?;
@@ -225,20 +223,20 @@ impl BoardReceptor {
         })
     }
 
-    /// The receptor of a record in a file; `None` where the file cannot be read or holds no such record.
+    /// Builds the receptor from a file; `None` if the file cannot be read or contains no such record.
     pub fn read(path: &Path) -> Option<Self> {
         Self::new(&stretch_data::files::read_whole(path).ok()?)
     }
 
-    /// Bits of the converter that the record was made for.
+    /// Returns the number of bits of the converter for which the record was made.
     pub fn adc_bits(&self) -> u8 {
         self.adc_bits
     }
 
-    /// Takes the next code; estimates are thousandths of the reference's unit.
+    /// Processes the next code. Estimates are in thousandths of the reference's unit.
     ///
     /// # Errors
-    /// [`Withheld`] when there is no reading for it.
+    /// [`Withheld`] if there is no reading for the code.
     pub fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld> {
         self.running.step(code)
     }
@@ -279,10 +277,10 @@ where
 const CONVERTER: &str = "BITS,ZERO_V,FULL_SCALE_V such as 12,0,3.3: 1 to 24 bits, the signal at \
                          code 0, and a larger one at the last code";
 
-/// A converter from its spelling: its bits, the signal at code 0 and the signal at the last code.
+/// Parses a converter: its bits, the signal at code 0 and the signal at the last code.
 ///
 /// # Errors
-/// [`SpellingError`] with the spelling that is understood.
+/// [`SpellingError`] with the accepted spelling.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;

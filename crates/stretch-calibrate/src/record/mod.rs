@@ -1,4 +1,5 @@
-//! Records of calibrations: files under a seal, and integers for a board.
+//! Calibration files: sealed files (with a checksum or a digest), and integer calibrations for a
+//! board.
 
 pub mod digest;
 mod file;

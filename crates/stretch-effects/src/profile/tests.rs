@@ -1,4 +1,4 @@
-//! An S profile against the closed form of its seven segments, and its limits under any command.
+//! Tests of the S profile: its closed form of seven segments, and its limits under any command.
 
 use alloc::vec::Vec;
 
@@ -27,7 +27,7 @@ fn greatest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Place at t of the seven segments of constant jerk from rest at 0 to rest at `way`, integrated one after the other.
+/// Position at time t of the seven segments of constant jerk, from rest at 0 to rest at `way`.
 fn seven_segments(way: f64, [jerk, acceleration, rate]: [f64; 3], t: f64) -> f64 {
     let rounds = acceleration / jerk;
     let (holds, cruises) =
@@ -54,8 +54,8 @@ fn seven_segments(way: f64, [jerk, acceleration, rate]: [f64; 3], t: f64) -> f64
 }
 
 proptest! {
-    /// Every place of a move from rest to rest, and its time, is that of the closed form. The trapezoid beneath goes in steps of constant
-    /// speed, which are up to a whole step of speed ahead of the continuous one: rate x step.
+    /// Every position of a move from rest to rest, and its duration, agree with the closed form. The trapezoid moves in
+    /// steps of constant speed, which are ahead of the continuous motion by up to rate x step.
     #[test]
     fn a_move_has_seven_segments(acceleration in 10.0..60.0_f64, rate in 1.0..3.0_f64, part in 0.1..0.9_f64, more in 1.05..3.0_f64) {
         let round_s = part * rate / acceleration;
@@ -73,12 +73,13 @@ proptest! {
         prop_assert!((arrives as f64 * dt_s - takes_s).abs() <= 3.0 * dt_s, "{arrives} for {takes_s} s");
     }
 
-    /// Whatever is commanded, no limit is exceeded, and rounding adds nothing to rate or acceleration.
+    /// No limit is exceeded under any command, up to rounding in rate and acceleration.
     #[test]
     fn limits_hold_under_any_command(
         command in proptest::collection::vec(-5.0..5.0_f64, 2..40), acceleration in 5.0..80.0_f64, rate in 0.5..4.0_f64, samples in 1..30_u32
     ) {
-        // Whole samples, so that differences of samples are means of the profile's.
+        // The rounding time is a whole number of samples, so that differences of samples are means of those of the
+        // profile.
         let round_s = f64::from(samples) * DT_S;
         let command: Vec<f64> = command.iter().flat_map(|x| [*x; 25]).collect();
         let profile = Profile { acceleration, rate };
@@ -95,7 +96,8 @@ proptest! {
         prop_assert!(j <= 2.0 * acceleration / round_s + 100.0 * ROUNDING, "{j} above {}", 2.0 * acceleration / round_s);
     }
 
-    /// Without rounding it is the trapezoid to the last bit; with a large jerk it differs by less than the way of half the rounding.
+    /// A rounding time of 0 gives the trapezoid to the last bit. A short one changes it by at most the distance covered
+    /// in half of that time.
     #[test]
     fn a_large_jerk_is_the_trapezoid(
         command in proptest::collection::vec(-5.0..5.0_f64, 2..12), acceleration in 5.0..80.0_f64, rate in 0.5..4.0_f64, round_s in 1e-6..1e-3_f64

@@ -1,8 +1,9 @@
-//! Reads a recording, and prints the most memory that the process had, in kB, and how many rows there are:
+//! Reads a recording, and prints the peak memory of the process, in kB, and the number of rows:
 //!
 //!     cargo run --release -p stretch-recording --example peak_memory -- run.npz
 //!
-//! Linux counts it. `tests/memory.rs` holds every reader to its limit with this.
+//! The peak comes from Linux (`/proc/self/status`). `tests/memory.rs` checks the limit of every reader with this
+//! program.
 
 use std::{env, fs, io};
 

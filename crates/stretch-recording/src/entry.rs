@@ -7,10 +7,11 @@ use stretch_data::{DataSet, SessionTrial, TrialEntry};
 use crate::{ReadOptions, Recording, RecordingError};
 
 impl Recording {
-    /// Reads a trial from its data set's folder, in whatever format.
+    /// Reads a trial of a data set from the folder of the data set. The file can have any supported format.
     ///
     /// # Errors
-    /// As [`Recording::read`]; a file that is not the one that the data set was written with.
+    /// The errors of [`Recording::read`], and an error if the file differs from the one with which the data set was
+    /// written.
     pub fn of_entry(
         entry: &TrialEntry,
         folder: impl AsRef<Path>,
@@ -22,7 +23,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads a trial of a data set from the bytes of its file, which is in no folder.
+    /// Reads a trial of a data set from the bytes of its file, without a folder.
     ///
     /// # Errors
     /// As [`Recording::of_entry`].
@@ -47,7 +48,7 @@ impl Recording {
         Self::session_by(set, |entry| Self::of_entry(entry, &folder, options))
     }
 
-    /// Every trial of a data set, read by `read`: for files that are in no folder.
+    /// Reads every trial of a data set with the function `read`, for files that are not in a folder.
     ///
     /// # Errors
     /// Those of `read`.
@@ -69,7 +70,7 @@ impl Recording {
         let mut is_told = false;
         let load = |entry: &TrialEntry| {
             let mut recording = read(entry)?;
-            // once for all trials: what is wrong is one line of dataset.toml
+            // Report a wrong rate once for all trials, because its cause is one line of dataset.toml.
             let told = set.rate_mismatch(&recording.trial).filter(|_| !is_told);
             is_told |= told.is_some();
             recording.notes.extend(told);

@@ -1,4 +1,4 @@
-//! What can be wrong with a recording, with the evidence.
+//! Errors of reading a recording.
 
 use std::{fmt, io, path::Path};
 
@@ -9,15 +9,15 @@ use crate::read::STDIN;
 
 /// Why a recording could not be read.
 ///
-/// Each variant carries the evidence, and each message is one sentence that
-/// says where, what, and what to do.
+/// Each variant contains the evidence. Each message is one sentence: where the problem is, what it
+/// is, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A file that could not be read, or samples that are none.
+    /// A file that could not be read, a missing column, or invalid samples.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// A file without a byte, or with blank lines only.
+    /// A file that is empty or contains only blank lines.
     #[error(
         "{file}: the file is empty; it needs a header line with the names of its columns, then one row per sample"
     )]
@@ -25,7 +25,7 @@ pub enum RecordingError {
         /// The file.
         file: String,
     },
-    /// A header and nothing below it.
+    /// A header line without samples below it.
     #[error(
         "{file}: there is a header line and no sample below it; record the trial again or leave the file out"
     )]
@@ -54,14 +54,14 @@ pub enum RecordingError {
         file: String,
         /// How many rows.
         rows: String,
-        /// Numbers of a row.
+        /// Numbers in each row.
         numbers: usize,
         /// The first row.
         row: u64,
-        /// What is above them.
+        /// Description of the line above the rows.
         above: String,
     },
-    /// A row that cannot be read, in a recording from which it may not be left out.
+    /// A row that cannot be read and may not be left out.
     #[error("{first} ({reason})")]
     Refused {
         /// What is wrong with the row.
@@ -69,7 +69,7 @@ pub enum RecordingError {
         /// Why it is not left out.
         reason: String,
     },
-    /// Two columns of one name that is asked for.
+    /// Two columns with the same requested name.
     #[error(
         "{file}: the header names column {column} twice; ask for {column}.0 or {column}.1, the first and the second of them"
     )]
@@ -97,7 +97,7 @@ pub enum RecordingError {
         /// The field, shortened.
         value: String,
     },
-    /// A field without a character.
+    /// An empty field.
     #[error("{at}: the field is empty; fill it in or remove that row")]
     EmptyField {
         /// Where.
@@ -111,7 +111,7 @@ pub enum RecordingError {
         /// The field.
         value: String,
     },
-    /// Text in another encoding than UTF-8 that is not guessed.
+    /// Text in UTF-16, which is not decoded.
     #[error("{file}: the text is UTF-16; save the file with the encoding UTF-8")]
     Utf16 {
         /// The file.
@@ -147,7 +147,7 @@ pub enum RecordingError {
         /// The field.
         value: String,
     },
-    /// A date or a time of day that is none.
+    /// A time stamp that is not a valid date or time of day.
     #[error(
         "{at}: \"{value}\" is not a time stamp that is understood; write it as 2024-05-01T12:00:00.250Z, or as seconds"
     )]
@@ -157,7 +157,7 @@ pub enum RecordingError {
         /// The field.
         value: String,
     },
-    /// A date of which the day and the month may be exchanged.
+    /// A date in which it is unclear which number is the day and which the month.
     #[error(
         "{at}: it is unclear which number of \"{value}\" is the day; say it with --time {}:dmy or {}:mdy", .at.column, .at.column
     )]
@@ -167,7 +167,7 @@ pub enum RecordingError {
         /// The field.
         value: String,
     },
-    /// Other columns than there are names for them.
+    /// A number of columns that differs from the number of given names.
     #[error(
         "{file}, row {row}: the row has {found} numbers, but --columns names {given}; give {found} names"
     )]
@@ -181,23 +181,23 @@ pub enum RecordingError {
         /// Names given.
         given: usize,
     },
-    /// A rate at which no recorder works.
+    /// A sample rate outside the accepted range.
     #[error(
         "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between {least_hz:e} and {most_hz:e}; say what its numbers count with --time {column}:s, :ms, :us, :ns, :min, :h or :d, or the rate with --sample-rate HZ"
     )]
     Rate {
         /// The file.
         file: String,
-        /// The time.
+        /// The time column.
         column: String,
         /// The rate as it was read.
         rate_hz: f64,
-        /// The least rate that is read.
+        /// The lowest accepted rate.
         least_hz: f64,
-        /// The greatest rate that is read.
+        /// The highest accepted rate.
         most_hz: f64,
     },
-    /// A column of time that cannot be one.
+    /// A time column with invalid time stamps.
     #[error("{at}: {problem}; the rate with --sample-rate HZ replaces a column of time")]
     Stamps {
         /// Where.
@@ -205,7 +205,7 @@ pub enum RecordingError {
         /// What is wrong with its stamps.
         problem: String,
     },
-    /// A grid that has many more instants than were recorded.
+    /// A resampling grid with many more instants than were recorded.
     #[error(
         "{file}: a grid of {rate_hz} Hz has {:.1e} instants in its {span_s} s, many times what was recorded; give a lower rate with --grid, or split the recording at the gap in its time", .rate_hz * .span_s
     )]
@@ -214,32 +214,32 @@ pub enum RecordingError {
         file: String,
         /// The grid's rate.
         rate_hz: f64,
-        /// How long the recording lasts.
+        /// Duration of the recording, s.
         span_s: f64,
     },
-    /// A column of seconds that may count something shorter.
+    /// A time column that was taken for seconds and may be in milliseconds.
     #[error("{file}, column {column}: its times go up by {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time {column}:s or {column}:ms, or rename it {column_ms}", 1e3 * .rate_hz)]
     SlowSeconds {
         /// The file.
         file: String,
-        /// The time.
+        /// The time column.
         column: String,
-        /// From sample to sample.
+        /// Step of the time from sample to sample.
         step: f64,
-        /// The rate if they are seconds.
+        /// Sample rate if the times are seconds.
         rate_hz: f64,
-        /// What the column should be called if they are milliseconds.
+        /// Name that the column should have if the times are milliseconds.
         column_ms: String,
     },
-    /// There is no column of the time.
+    /// A missing time column.
     #[error(
         "{missing}; say which column is the time with --time COLUMN, or --time 100hz if there is none"
     )]
     MissingTime {
-        /// The column, and those that are there.
+        /// The missing column, and the columns that are present.
         missing: DataError,
     },
-    /// Nothing but a time.
+    /// A recording that contains only a time.
     #[error("{file}: it holds no column of numbers besides the time{}", if notes.is_empty() { String::new() } else { format!(" ({notes})") })]
     NoChannels {
         /// The file.
@@ -271,28 +271,28 @@ pub enum RecordingError {
         /// Its span.
         second_s: String,
     },
-    /// A format that is read in Python.
+    /// A format that only the Python package reads.
     #[error(
         "{file}: this is {format}, which is not read here; convert it with `python -m stretch_gap convert {command}` (pip install \"stretch-gap[{extra}]\")"
     )]
     Convert {
         /// The file.
         file: String,
-        /// What it is.
+        /// Name of the format.
         format: &'static str,
-        /// What the command converts, and into what.
+        /// Arguments of the command: input file and output file.
         command: String,
-        /// The extra of the Python package that has the library.
+        /// Extra of the Python package that installs the required library.
         extra: &'static str,
     },
-    /// Something in a file that is no text, where a reader could not go on.
+    /// A file that cannot be read in its format.
     #[error("{file}: this {format} file cannot be read: {problem}")]
     Format {
         /// The file.
         file: String,
-        /// What it is.
+        /// Name of the format.
         format: &'static str,
-        /// Where, what, and what to do.
+        /// Where the problem is, what it is, and what to do.
         problem: String,
     },
     /// A line longer than the reader accepts.
@@ -322,18 +322,18 @@ impl RecordingError {
         DataError::missing_column(file, column, present).into()
     }
 
-    /// No column that is the time among names.
+    /// Returns the error for column names without a time.
     pub(crate) fn missing_time(file: &str, column: &str, names: &[String]) -> Self {
         let present = names.iter().map(String::as_str);
         Self::MissingTime { missing: DataError::missing_column(file, column, present) }
     }
 
-    /// The same error of a recording from which the row may not be left out.
+    /// Marks the error as that of a row that may not be left out.
     pub(crate) fn refused(self, reason: String) -> Self {
         Self::Refused { first: Box::new(self), reason }
     }
 
-    /// Whether it is open which numbers are meant, in this row and in others.
+    /// Returns whether the decimal notation is ambiguous, in this row and in others.
     pub(crate) fn is_about_notation(&self) -> bool {
         matches!(self, Self::DecimalComma { .. } | Self::DecimalPoint { .. })
     }
@@ -343,7 +343,7 @@ impl RecordingError {
         matches!(self, Self::EmptyField { .. } | Self::Data(DataError::NotFinite { .. }))
     }
 
-    /// The row that is wrong, if it is one.
+    /// Returns the row at fault, if the error is about one row that can be left out.
     pub(crate) fn row(&self) -> Option<u64> {
         match self {
             Self::NotANumber { at, .. }
@@ -356,7 +356,7 @@ impl RecordingError {
         }
     }
 
-    /// A file that the Python package converts, with the command that does it.
+    /// Returns the error for a file that the Python package converts, with the command.
     pub(crate) fn convert(file: &str, format: &'static str, extra: &'static str) -> Self {
         let quoted = |path: &str| {
             let is_plain = path.chars().all(|c| c.is_alphanumeric() || "._-/+:\\".contains(c));

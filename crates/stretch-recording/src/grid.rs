@@ -1,4 +1,4 @@
-//! Channels on clocks of their own, brought to one grid.
+//! Brings channels that were recorded on separate clocks to one grid.
 
 use stretch_data::{Channel, DataError, Place, Trial, can_name, rate_of, tidy_time};
 
@@ -13,15 +13,15 @@ use crate::{
     text::{bad_rows::BadRows, columns::KNOWN},
 };
 
-/// Channels that a device holds from one sample to the next.
+/// Channels that are held from one sample to the next instead of interpolated, because they are commands.
 const HELD: [&str; 2] = ["inlet", "outlet"];
-/// Names that a sentence holds; more are counted.
+/// Number of names in a note. Further names are only counted.
 const TOLD: usize = 4;
 
 /// Channels that were recorded at the same instants.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Track {
-    /// What the clock is called.
+    /// Name of the clock in messages.
     pub(crate) label: String,
     pub(crate) stamps: Stamps,
     /// NaN where a sample has no value.
@@ -29,12 +29,12 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Channels on the clock of a column.
+    /// Creates a track whose clock is named after its time column.
     pub(crate) fn new(stamps: Stamps, channels: Vec<Channel>) -> Self {
         Self { label: stamps.name.clone(), stamps, channels }
     }
 
-    /// Takes samples out, which are given in order.
+    /// Removes samples. Their indices must be in ascending order.
     pub(crate) fn remove(&mut self, samples: &[usize]) {
         if samples.is_empty() {
             return;
@@ -53,7 +53,7 @@ impl Track {
     }
 }
 
-/// A track whose clock counts seconds from the recording's beginning.
+/// A track whose time is in seconds from the origin that all tracks share.
 struct Timed {
     clock: String,
     time_s: Vec<f64>,
@@ -66,7 +66,7 @@ impl Timed {
     }
 }
 
-/// One recording of tracks whose channels are called as their file calls them.
+/// Merges tracks into one recording. The channels still have the names from the file.
 pub(crate) fn merged(
     file: &str,
     mut tracks: Vec<Track>,
@@ -78,7 +78,7 @@ pub(crate) fn merged(
         find(file, &mut tracks, wanted)?;
     }
     for known in KNOWN {
-        // Whether or not it is there.
+        // A known channel may be missing.
         let _ = find(file, &mut tracks, known);
     }
     let tracks = tracks.into_iter().flat_map(|track| sparse(track, options, &mut notes));
@@ -94,14 +94,15 @@ fn no_channels(file: &str, notes: &[String]) -> RecordingError {
     RecordingError::NoChannels { file: file.to_owned(), notes: notes.join("; ") }
 }
 
-/// One recording of tracks: on the clock that there is, on the fastest of several, or on an even grid.
+/// Joins tracks into one recording: on the only clock, on the fastest of several clocks, or on an even grid.
 pub(crate) fn joined(
     file: &str,
     mut tracks: Vec<Track>,
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<Recording, RecordingError> {
-    // Every clock that is taken shortens what all of them cover: clocks without a requested column are not taken.
+    // Each additional clock can shorten the time that all clocks cover. Clocks without a requested column are therefore
+    // left out.
     if tracks.len() > 1 && !options.required().is_empty() {
         let is_asked = |c: &Channel| options.required().contains(&c.name);
         let (needed, other): (Vec<_>, Vec<_>) =
@@ -138,16 +139,17 @@ pub(crate) fn joined(
     on_one_grid(file, &timed, options.grid_hz, notes)
 }
 
-/// Whether a column is asked for or, if none is, known by its name.
+/// Returns whether a column is requested or, if none is requested, is one of the format's known columns.
 pub(crate) fn is_needed(name: &str, options: &ReadOptions) -> bool {
     let asked = options.required();
     asked.iter().any(|asked| asked == name) || (asked.is_empty() && KNOWN.contains(&name))
 }
 
-/// Gives columns of a sparse table, in which each row has the values of one clock and blanks for the others, clocks of their own rows.
+/// Moves the columns of a sparse table to separate tracks, each with the stamps of its filled rows. In a sparse table,
+/// each row has the values of one clock and blanks for the others.
 ///
-/// Such a column has many blanks between its first and its last value, and nearly all of its blank rows have a value in another column.
-/// One that is not asked for is taken only if no column is whole.
+/// A column is moved if it has many blanks between its first and last value, and if nearly all of its blank rows have a
+/// value in another column. A column that is not needed is moved only if all columns of the table have many blanks.
 pub(crate) fn sparse(
     mut track: Track,
     options: &ReadOptions,
@@ -196,7 +198,8 @@ pub(crate) fn sparse(
     std::iter::once(track).filter(|t| !t.channels.is_empty()).chain(own).collect()
 }
 
-/// Whether more than a few blanks are between the first and the last value: at the ends a sensor is lost.
+/// Returns whether more than one in five of the values between the first and the last one are blank. Blanks at the ends
+/// do not count, because they mean that the sensor was lost.
 fn has_blanks_between(values: &[f64]) -> bool {
     let is_value = |x: &f64| x.is_finite();
     let ends = values.iter().position(is_value).zip(values.iter().rposition(is_value));
@@ -206,7 +209,7 @@ fn has_blanks_between(values: &[f64]) -> bool {
     !BadRows::are_few(blank, between.len())
 }
 
-/// Names with units in this project's way.
+/// Rewrites names with units in the project's notation, such as `pos_mm` for `Pos (mm)`. Requested names stay.
 fn tidy_names(tracks: &mut [Track], notes: &mut Vec<String>, options: &ReadOptions) {
     let mut told = Vec::new();
     for channel in tracks.iter_mut().flat_map(|t| &mut t.channels) {
@@ -219,7 +222,8 @@ fn tidy_names(tracks: &mut [Track], notes: &mut Vec<String>, options: &ReadOptio
     note(notes, "columns named with their units", &told);
 }
 
-/// Finds a channel by its name, or by the last part of its path where only one ends so, which is then called by that alone.
+/// Finds a channel by its name, or by the last part of its path if only one path ends with it. The channel is then
+/// renamed to that last part.
 fn find(file: &str, tracks: &mut [Track], wanted: &str) -> Result<(), RecordingError> {
     let all = || tracks.iter().flat_map(|t| &t.channels).map(|c| c.name.as_str());
     if all().any(|name| name == wanted) {
@@ -239,7 +243,8 @@ fn find(file: &str, tracks: &mut [Track], wanted: &str) -> Result<(), RecordingE
     Ok(())
 }
 
-/// Leaves out channels with holes and those of a name that was there before; of channels that are needed, the few rows with holes.
+/// Leaves out channels with holes (values that are not finite), with a name that occurred before, or with an invalid
+/// name. If a needed channel has few holes, leaves out their rows instead.
 fn whole_channels(
     file: &str,
     track: &mut Track,
@@ -280,7 +285,8 @@ fn whole_channels(
     Ok(())
 }
 
-/// Clocks in seconds, from the recording's beginning where they count from long ago or from an origin of their own.
+/// Converts the clocks to seconds. If they count from a distant or separate origin, the time starts at the beginning of
+/// the recording.
 fn timed(
     file: &str,
     tracks: Vec<Track>,
@@ -311,7 +317,7 @@ fn timed(
         if let Some(i) = time_s.iter().position(|t| !t.is_finite()) {
             return Err(DataError::NotFinite { at: place(i), value: time_s[i].to_string() }.into());
         }
-        // Stamps that differ by less than what numbers of their size resolve are one.
+        // Stamps become equal if they differ by less than the resolution of floating-point numbers of their size.
         if let Some(i) = time_s.windows(2).position(|t| t[1] <= t[0]) {
             let (previous_s, time_s) = (time_s[i], time_s[i + 1]);
             return Err(DataError::TimeNotRising { at: place(i + 1), time_s, previous_s }.into());
@@ -323,11 +329,11 @@ fn timed(
 
 fn fastest(timed: &[Timed]) -> usize {
     let rates = timed.iter().enumerate();
-    // The first of equals.
+    // Of equal rates, take the first.
     rates.rev().max_by(|a, b| a.1.rate_hz().total_cmp(&b.1.rate_hz())).map_or(0, |(i, _)| i)
 }
 
-/// Brings tracks to the stamps of the fastest, or to a rate, within the time that all of them cover.
+/// Resamples tracks to the stamps of the fastest track, or to an even grid, within the time that all tracks cover.
 fn on_one_grid(
     file: &str,
     timed: &[Timed],
@@ -400,7 +406,7 @@ fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, Re
     Ok((0..=count as u64).map(|i| at(i).min(to_s)).collect())
 }
 
-/// Takes out the instants of the grid at which a track has a gap: a line across it would be invented.
+/// Removes the instants of the grid that lie in a gap of a track, because interpolation across a gap would invent data.
 fn leave_gaps(grid: &mut Vec<f64>, track: &Timed) {
     let longest_s = BRIDGED / track.rate_hz();
     let mut gaps = track.time_s.windows(2).filter(|t| t[1] - t[0] > longest_s).peekable();
@@ -410,7 +416,7 @@ fn leave_gaps(grid: &mut Vec<f64>, track: &Timed) {
     });
 }
 
-/// Values at instants within the track's time.
+/// Interpolates values linearly at the instants of a grid, or holds the previous value.
 fn onto(grid: &[f64], time_s: &[f64], values: &[f64], held: bool) -> Vec<f64> {
     let mut right = 1;
     let at = |t: &f64| {
@@ -479,14 +485,14 @@ fn tell(
     }
 }
 
-/// Notes what is true of some names, if there are any.
+/// Adds a note with a list of names, unless the list is empty.
 pub(crate) fn note<S: AsRef<str>>(notes: &mut Vec<String>, what: &str, names: &[S]) {
     if !names.is_empty() {
         notes.push(format!("{what}: {}", listed(names)));
     }
 }
 
-/// A few names, and how many more there are.
+/// Lists the first names and the number of the others.
 pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.len() {

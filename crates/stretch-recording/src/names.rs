@@ -1,10 +1,10 @@
-//! Names of columns as people write them: units in brackets or in a row of their own, and what may be the time.
+//! Interprets the names of columns: units in brackets or in a separate row, and names that may be the time.
 
 use stretch_data::spelt_unit;
 
 use crate::TimeUnit;
 
-/// Names that a time column has elsewhere, the likeliest first.
+/// Usual names of a time column, the likeliest first.
 const TIMES: [&str; 39] = [
     "time_s",
     "time",
@@ -47,7 +47,8 @@ const TIMES: [&str; 39] = [
     "date",
 ];
 
-/// Words of which one in a name makes it a time if no other name has one; in German at the end of a word, too.
+/// Words for time. If only one name contains such a word, it is the time. German `zeit` also counts at the end of a
+/// longer word.
 const TIME_WORDS: [&str; 12] = [
     "time",
     "timestamp",
@@ -62,20 +63,22 @@ const TIME_WORDS: [&str; 12] = [
     "czas",
     "uptime",
 ];
-/// Ends of the names of two columns that make up a stamp, as ROS writes it: whole seconds, and nanoseconds of the next one.
+/// Endings of the names of two columns that together are a stamp, as in ROS: whole seconds, and the nanoseconds within
+/// the second.
 const WHOLE_SECONDS: [&str; 3] = ["sec", "secs", "seconds"];
 const NANOSECONDS: [&str; 5] = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"];
-/// The time of a table that LabVIEW writes.
+/// Name of the time column in tables written by LabVIEW.
 const LABVIEW_TIME: &str = "x_value";
 
-/// The unit in this project's spelling: `mm`, `n`, `m_per_s2`, `percent`; empty for a pure number, `None` if it is no unit.
+/// Returns a unit in the project's notation: `mm`, `n`, `m_per_s2`, `percent`. The result is empty for a pure number
+/// and `None` if the text is not a unit.
 pub(crate) fn unit(text: &str) -> Option<String> {
     let text = text.trim();
     if matches!(text, "" | "-" | "1" | "--") {
         return Some(String::new());
     }
     let mut parts = text.split('/');
-    // A scope calls numbers of samples a sequence.
+    // Oscilloscopes give sample numbers the unit `sequence`.
     let spell = |part: &str| {
         let is_number = part.trim().eq_ignore_ascii_case("sequence");
         if is_number { Some("") } else { spelt_unit(part) }
@@ -88,7 +91,7 @@ pub(crate) fn unit(text: &str) -> Option<String> {
     Some(spelt)
 }
 
-/// Small letters, digits and underscores.
+/// Converts a text to lower-case letters, digits and underscores.
 pub(crate) fn plain(text: &str) -> String {
     let mut name = String::new();
     for c in text.trim().chars() {
@@ -101,7 +104,7 @@ pub(crate) fn plain(text: &str) -> String {
     name.trim_end_matches('_').to_owned()
 }
 
-/// A name in small letters with an underscore between its words: `time_us` for `TimeUS`, `t_ms` for `t (ms)`.
+/// Converts a name to lower case with an underscore between its words: `time_us` for `TimeUS`, `t_ms` for `t (ms)`.
 pub(crate) fn words(name: &str) -> String {
     let mut parted = String::new();
     for c in name.chars() {
@@ -113,7 +116,8 @@ pub(crate) fn words(name: &str) -> String {
     plain(&parted)
 }
 
-/// A column's name in this project's way: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`; any other as it is.
+/// Converts a column's name to the project's notation: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`. Other names
+/// stay as they are.
 ///
 /// ```
 /// use stretch_recording::tidy_column;
@@ -124,8 +128,8 @@ pub fn tidy_column(name: &str) -> String {
     tidy(name, None).unwrap_or_else(|| name.to_owned())
 }
 
-/// A name with its unit as its last part, from `Pos (mm)`, `force[N]`, `pos, mm` or from a unit below it;
-/// `None` if the name says no unit in such a way.
+/// Returns a name with its unit as the last part. The unit comes from the name, as in `Pos (mm)`, `force[N]` or `pos,
+/// mm`, or from the row below it. Returns `None` if neither contains a unit.
 pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
     let (base, unit) = match below.filter(|b| !b.is_empty()) {
         Some(below) => (name, unit(unbracketed(below))?),
@@ -140,12 +144,12 @@ pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
     })
 }
 
-/// A name without the unit behind it, and that unit.
+/// Splits a name into the part before its unit, and the unit.
 fn bracketed(name: &str) -> Option<(&str, String)> {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']'), ('{', '}')] {
         if let Some((base, rest)) = name.strip_suffix(close).and_then(|n| n.rsplit_once(open)) {
-            // `q[1]` is one of several.
+            // The brackets in `q[1]` contain an index.
             let is_index = rest.bytes().all(|byte| byte.is_ascii_digit());
             return Some((base, unit(rest).filter(|_| !is_index || rest.is_empty())?));
         }
@@ -158,7 +162,7 @@ fn unbracketed(text: &str) -> &str {
     text.trim().trim_start_matches(['(', '[', '{']).trim_end_matches([')', ']', '}'])
 }
 
-/// Whether a row holds units: each field is one or empty, one at least is.
+/// Returns whether a row contains units: each field is a unit or empty, and at least one is a unit.
 pub(crate) fn are_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     let mut any = false;
     for field in fields {
@@ -170,13 +174,14 @@ pub(crate) fn are_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     any
 }
 
-/// How likely a name is that of the time, 0 first; `None` if it is not.
+/// Returns the rank of a name among the usual names of the time, 0 for the likeliest. Returns `None` if it is not one
+/// of them.
 pub(crate) fn time_rank(name: &str) -> Option<usize> {
     let name = words(name);
     let known = |name: &str| TIMES.iter().position(|time| *time == name);
     let is_unit = |word: &str| TimeUnit::of(word).is_some();
     let of_unit = || name.rsplit_once('_').filter(|(_, last)| is_unit(last)).map(|(base, _)| base);
-    // `milliseconds` is a time, `ms` and `d` alone may be anything.
+    // A long unit such as `milliseconds` is a time. A short one such as `d` may be anything.
     let is_word = || name.len() > 3 && !name.contains('_') && is_unit(&name);
     known(&name)
         .or_else(|| known(of_unit()?).map(|rank| TIMES.len() + rank))
@@ -198,7 +203,8 @@ pub(crate) fn may_be_time(name: &str) -> bool {
     words(name).split('_').any(|word| TIME_WORDS.contains(&word) || word.ends_with("zeit"))
 }
 
-/// What a clock called `name` is the clock of: `imu` for `imu_t`, `t_imu`, `imu/time_s`; empty for a clock that says nothing.
+/// Returns the group of channels that a clock with this name belongs to: `imu` for `imu_t`, `t_imu` or `imu/time_s`,
+/// and empty if the name contains no group. Returns `None` if the name is not that of a clock.
 pub(crate) fn clock_of(name: &str) -> Option<String> {
     let (group, last) = name.rsplit_once(['/', '.']).unwrap_or(("", name));
     let within = |tag: &str| match (group, tag) {
@@ -214,7 +220,7 @@ pub(crate) fn clock_of(name: &str) -> Option<String> {
     for time in TIMES {
         let tail = last.strip_suffix(time).and_then(|tag| tag.strip_suffix('_'));
         let head = last.strip_prefix(time).and_then(|tag| tag.strip_prefix('_'));
-        // `us` and `ms` next to a name are units of something else.
+        // In a longer name, `us` and `ms` are the unit of another quantity.
         let found = tail.or(head).filter(|_| !matches!(time, "us" | "ms"));
         if let Some(found) = found.filter(|f| !f.is_empty() && time.len() > best) {
             (best, tag) = (time.len(), Some(found));

@@ -1,4 +1,4 @@
-//! What a reader asks of a recording.
+//! Options for reading a recording.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::value::StrDeserializer};
@@ -32,7 +32,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// Counts in a second.
+    /// Returns the counts per second, such as 1000 for milliseconds.
     pub fn per_second(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
@@ -45,7 +45,7 @@ impl TimeUnit {
         }
     }
 
-    /// What is counted, in a sentence.
+    /// Returns the name of the unit in the plural, for a message.
     pub(crate) fn plural(self) -> &'static str {
         match self {
             Self::Seconds => "seconds",
@@ -69,7 +69,7 @@ impl TimeUnit {
         Self::deserialize(StrDeserializer::<serde::de::value::Error>::new(text)).ok()
     }
 
-    /// The unit that the last word of a column's name says, in whatever case.
+    /// Returns the unit that is the last word of a column's name, in upper or lower case.
     ///
     /// ```
     /// use stretch_recording::TimeUnit;
@@ -94,7 +94,7 @@ pub enum DateOrder {
     MonthFirst,
 }
 
-/// What a reader asks of a file.
+/// Options for reading a file or stream.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, Recording};
@@ -121,7 +121,7 @@ pub struct ReadOptions {
     pub(crate) date_order: Option<DateOrder>,
 }
 
-/// What the time is called unless an option says otherwise.
+/// Default name of the time column.
 pub(crate) const TIME: &str = "time_s";
 
 impl Default for ReadOptions {
@@ -143,29 +143,31 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// The same, of one episode of a file that holds several.
+    /// Returns the same options for one episode of a file that contains several.
     pub(crate) fn of_episode(&self, episode: u32) -> Self {
         Self { episode: Some(episode), ..self.clone() }
     }
 
-    /// Asks for `time_s` only, and for lines of at most 64 KiB.
+    /// Returns the default options: the time is `time_s` or a column with a usual name for it, no other column is
+    /// required, and lines have at most 64 KiB.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes the time from another column. Its unit is the last word of its name, or what its numbers show; otherwise it is seconds.
+    /// Takes the time from another column. Its unit is the last word of its name or follows from its values. Otherwise
+    /// the unit is seconds.
     pub fn time(mut self, column: impl Into<String>) -> Self {
         self.time = column.into();
         self
     }
 
-    /// Says what the time column counts, whatever its name says.
+    /// Sets the unit of the time column, whatever its name is.
     pub fn time_unit(mut self, unit: TimeUnit) -> Self {
         self.time_unit = Some(unit);
         self
     }
 
-    /// Asks for a column: it must be there, and each of its fields a finite number.
+    /// Requires a column. It must be present, and a row in which it is not a finite number cannot be read.
     pub fn require(mut self, column: impl Into<String>) -> Self {
         self.required.push(column.into());
         self
@@ -177,21 +179,22 @@ impl ReadOptions {
         self
     }
 
-    /// Says how many samples a second a recording has, whatever a column of time says; the time then counts from 0.
+    /// Sets the sample rate of a recording. A time column is then ignored, and the time counts from 0.
     pub fn sample_rate_hz(mut self, rate_hz: f64) -> Self {
         self.sample_rate_hz = Some(rate_hz);
         self
     }
 
-    /// Samples a second of a recording without any time where nothing else states them; 1 makes the time the number of the row.
-    /// They also place the samples of a stream whose clock has not ticked yet.
+    /// Sets the sample rate of a recording that has no time and does not state a rate. With a rate of 1, the time is
+    /// the sample number. The rate also places the samples of a live stream before its clock first advances.
     pub fn untimed_hz(mut self, rate_hz: f64) -> Self {
         self.untimed_hz = Some(rate_hz);
         self
     }
 
-    /// Samples a second where they are counted, and who says so: by the options whether there is a time or not, else by what is
-    /// stated above a table without one.
+    /// Returns the sample rate if samples are counted, and the words for a note on its source. The option
+    /// `sample_rate_hz` replaces a time column. Without a time, the rate `stated` above the table applies, then
+    /// `untimed_hz`.
     pub(crate) fn counted(
         &self,
         has_time: bool,
@@ -205,7 +208,7 @@ impl ReadOptions {
         given.or_else(|| stated().or_else(usual).filter(|_| !has_time))
     }
 
-    /// Brings a [`Recording`](crate::Recording) onto an even grid of so many samples a second.
+    /// Resamples a [`Recording`](crate::Recording) to an even grid of this rate.
     pub fn grid_hz(mut self, rate_hz: f64) -> Self {
         self.grid_hz = Some(rate_hz);
         self
@@ -217,19 +220,19 @@ impl ReadOptions {
         self
     }
 
-    /// Refuses a recording with a row that cannot be read, which is otherwise left out with a note.
+    /// Refuses a recording if a row cannot be read. Otherwise such a row is left out with a note.
     pub fn strict(mut self, is_strict: bool) -> Self {
         self.strict = is_strict;
         self
     }
 
-    /// Says which number of a date is the day, where no date of the first rows shows it.
+    /// Sets which number of a date is the day, in case no date of the first rows shows it.
     pub fn date_order(mut self, order: DateOrder) -> Self {
         self.date_order = Some(order);
         self
     }
 
-    /// The names that are asked for: of the time and of the columns.
+    /// Returns the names of the required columns and of the time.
     pub(crate) fn asked(&self) -> Vec<&String> {
         self.required.iter().chain([&self.time]).collect()
     }
@@ -239,7 +242,7 @@ impl ReadOptions {
         &self.required
     }
 
-    /// Counts in a second of a time column of this name.
+    /// Returns the counts per second of a time column with this name.
     pub(crate) fn divisor(&self, column: &str) -> f64 {
         let unit = self.time_unit.or_else(|| TimeUnit::of(column));
         unit.unwrap_or(TimeUnit::Seconds).per_second()

@@ -15,7 +15,7 @@ use crate::{
     text,
 };
 
-/// What standard input is called in messages.
+/// Name of standard input in messages.
 pub(crate) const STDIN: &str = "standard input";
 
 impl Recording {
@@ -23,23 +23,25 @@ impl Recording {
     ///
     /// The format is recognised by the file's first bytes, never by its name:
     ///
-    /// - A table of text: separated by commas, semicolons, tabs or runs of blanks; decimal points or, where no comma
-    ///   separates, decimal commas; comment lines (`#`, `%`, `//`), lines above the header, a row of units, units in
-    ///   brackets (`Pos (mm)` becomes `pos_mm`), time in seconds, `ms`, `us`, `ns`, since 1970, or as ISO 8601; without
-    ///   a header line with [`ReadOptions::columns`].
+    /// - A table of text: separated by commas, semicolons, tabs or runs of blanks; with decimal points or, if commas do
+    ///   not separate columns, decimal commas; with comment lines (`#`, `%`, `//`), lines above the header, a row of
+    ///   units, or units in brackets (`Pos (mm)` becomes `pos_mm`). The time can be in seconds, `ms`, `us` or `ns`,
+    ///   count from 1970, or be in ISO 8601. There can be no header line if [`ReadOptions::columns`] names the columns.
     /// - NumPy's NPY and NPZ.
     /// - Any of these in gzip.
-    /// - Parquet (feature `parquet`). Of LeRobot's files with several episodes, `FILE#3` is episode 3.
+    /// - Parquet (feature `parquet`). `FILE#3` reads episode 3 of a LeRobot file with several episodes.
     ///
-    /// MCAP, ROS bags, MAT and HDF5 are refused with the command of the Python package that converts them.
+    /// MCAP, ROS bags, MAT and HDF5 are refused. The error names the command of the Python package that converts them.
     ///
-    /// Channels on several clocks are brought to that of the fastest, or to [`ReadOptions::grid_hz`], within the time
-    /// that all of them cover: by straight lines, the commands `inlet` and `outlet` held.
+    /// Channels on several clocks are resampled to the fastest clock, or to [`ReadOptions::grid_hz`], within the time
+    /// that all of them cover. Values are interpolated linearly; the commands `inlet` and `outlet` are held.
     ///
     /// # Errors
-    /// A file that cannot be opened or read, what its format refuses, with row and column where there are any; a column that
-    /// [`ReadOptions::require`] asks for and the file lacks; a rate outside 1e-3 .. 1e7 Hz; seconds that must be milliseconds; a format
-    /// that is not read.
+    /// - The file cannot be opened or read, or its format is not read.
+    /// - The content is invalid for its format. The error gives row and column, if there are any.
+    /// - A column that [`ReadOptions::require`] asks for is missing.
+    /// - The sample rate is outside 1e-3 .. 1e6 Hz, or 1e-3 .. 1e7 Hz if an option gives the unit or the rate.
+    /// - A time without a clear unit may be seconds or milliseconds.
     pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         if path.as_os_str() == "-" {
@@ -70,7 +72,8 @@ impl Recording {
         Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options, None)
     }
 
-    /// Whether a stream that begins so is a table of text, whose rows can be read as they come.
+    /// Returns whether a stream that begins with `head` is a table of text. The rows of a table can be read one at a
+    /// time.
     pub fn is_text(head: &[u8]) -> bool {
         Format::of(head) == Format::Text
     }
@@ -112,7 +115,7 @@ impl Recording {
     }
 }
 
-/// A file and the episode of it that is asked for: `file.parquet#3`.
+/// Splits `file.parquet#3` into the file and the requested episode.
 pub(crate) fn episode(path: &Path) -> Option<(&Path, u32)> {
     let (file, episode) = path.to_str()?.rsplit_once('#')?;
     Some((Path::new(file), episode.parse().ok()?))

@@ -1,8 +1,8 @@
-//! What a recording is once it is read: a trial, and what had to be done for it.
+//! The result of reading a recording: a trial and notes.
 
 use stretch_data::{SessionTrial, Trial};
 
-/// A trial and what had to be done to read it.
+/// A trial, and notes on how it was read.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, Recording};
@@ -23,9 +23,10 @@ use stretch_data::{SessionTrial, Trial};
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
-    /// What was recorded, on one clock.
+    /// The recorded channels, on one clock.
     pub trial: Trial,
-    /// Sentences: what was guessed, renamed, resampled or left out. None for a file in this project's own form.
+    /// Sentences on what was guessed, renamed, resampled or left out. There are none for a file in the project's own
+    /// format.
     pub notes: Vec<String>,
 }
 

@@ -1,4 +1,5 @@
-//! How much memory a file may take once it is read: a small file that unpacks to gigabytes is refused before they are taken.
+//! Limits the memory that a file may take when it is read. A small file that unpacks to gigabytes is refused before the
+//! memory is allocated.
 
 use std::{
     cell::Cell,
@@ -8,21 +9,22 @@ use std::{
 
 /// Memory that any file may take, bytes.
 const ANY: u64 = 192 << 20;
-/// What a file may take beyond that, in multiples of its size: with its bytes themselves there are four.
+/// Additional memory that a file may take, in multiples of its size. With the bytes of the file itself, the factor is
+/// four.
 const TIMES: u64 = 3;
-/// The largest file of arrays, which are read whole, and the most numbers of a table of text, bytes.
+/// Largest file of arrays, which is read as a whole, and largest memory for the numbers of a table of text, bytes.
 const LARGEST: u64 = 4 << 30;
-/// What a packed file may always unpack to, bytes.
+/// Size to which any packed file may unpack, bytes.
 const UNPACKED: u64 = 64 << 20;
-/// Greatest length of what is unpacked in lengths of what was packed. Recordings reach 20; a kilobyte of blanks in each byte is an attack.
+/// Largest compression ratio. Recordings reach 20; a ratio of a thousand is an attack.
 const RATIO: u64 = 100;
-/// Bytes that are read at once.
+/// Number of bytes that are read at once.
 const PIECE: u64 = 1 << 20;
 
-/// Bytes of a packed stream that have been unpacked so far.
+/// Number of bytes of a packed stream that have been read so far.
 pub(crate) type Packed = Cell<u64>;
 
-/// Memory that the data of a file may take in addition to the bytes of the file.
+/// Memory budget for the data of a file, in addition to the bytes of the file.
 #[derive(Debug)]
 pub(crate) struct Room {
     most: u64,
@@ -30,20 +32,20 @@ pub(crate) struct Room {
 }
 
 impl Room {
-    /// The room of a file of so many bytes.
+    /// Creates the budget of a file of `file_bytes` bytes.
     pub(crate) fn beside(file_bytes: u64) -> Self {
         Self { most: ANY.saturating_add(TIMES.saturating_mul(file_bytes)), taken: 0 }
     }
 
-    /// The room of a table of text that is not packed.
+    /// Creates the budget of a table of text that is not packed.
     pub(crate) fn of_text() -> Self {
         Self { most: LARGEST, taken: 0 }
     }
 
-    /// Takes room before memory is taken.
+    /// Reserves memory from the budget before it is allocated.
     ///
     /// # Errors
-    /// There is no more; the text says so.
+    /// The budget is exceeded. The error is a sentence about this.
     pub(crate) fn take(&mut self, bytes: u64) -> Result<(), String> {
         self.taken = self.taken.saturating_add(bytes);
         if self.taken <= self.most {
@@ -55,32 +57,32 @@ impl Room {
         ))
     }
 
-    /// Takes room for numbers.
+    /// Reserves memory for numbers.
     pub(crate) fn take_numbers(&mut self, count: usize) -> Result<(), String> {
         self.take((count as u64).saturating_mul(size_of::<f64>() as u64))
     }
 
-    /// Takes room for what every recording has in addition to its channels: its time, and for its rate the steps of that.
+    /// Reserves memory for the time of a recording, and for the steps of that time from which the rate is computed.
     pub(crate) fn take_time(&mut self, rows: usize) -> Result<(), String> {
         self.take_numbers(rows.saturating_mul(2))
     }
 
-    /// Unpacks a stream into memory.
+    /// Reads an unpacked stream into memory, within the budget.
     pub(crate) fn unpack(&mut self, reader: impl Read) -> io::Result<Result<Vec<u8>, String>> {
         let (mut bytes, left) = (Vec::new(), self.most.saturating_sub(self.taken));
         reader.take(left + 1).read_to_end(&mut bytes)?;
-        // what it grew into is up to twice as much
+        // The vector may have grown to twice its length.
         bytes.shrink_to_fit();
         Ok(self.take(bytes.len() as u64).map(|()| bytes))
     }
 
-    /// Gives room back that is used no more.
+    /// Returns memory that is no longer used to the budget.
     pub(crate) fn give_back(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_sub(bytes as u64);
     }
 }
 
-/// A file of arrays as a whole, and the memory that it may take.
+/// Reads a file of arrays as a whole. Returns its bytes and its memory budget.
 pub(crate) fn whole(
     reader: &mut dyn Read,
     packed: Option<&Packed>,
@@ -106,7 +108,7 @@ pub(crate) fn whole(
     }
 }
 
-/// What a stream of gzip unpacks to, refused where it grows beyond any recording.
+/// An unpacked gzip stream. Reading fails if its compression ratio exceeds that of any recording.
 pub(crate) struct Unpacked<R> {
     decoder: flate2::read::MultiGzDecoder<Counted<R>>,
     given: u64,
@@ -119,7 +121,7 @@ struct Counted<R> {
 }
 
 impl<R: Read> Unpacked<R> {
-    /// Unpacks a stream; the count of its packed bytes comes with it.
+    /// Creates the unpacked stream, and the counter of the packed bytes read so far.
     pub(crate) fn new(reader: R) -> (Self, Rc<Packed>) {
         let count = Rc::new(Packed::new(0));
         let counted = Counted { reader, count: count.clone() };

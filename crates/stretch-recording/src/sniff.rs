@@ -1,4 +1,4 @@
-//! What a file is, by its first bytes.
+//! Recognises the format of a file by its first bytes.
 
 use std::io::Read;
 
@@ -9,7 +9,8 @@ use crate::{
     room::{self, Packed},
 };
 
-/// Bytes that tell every format apart: HDF5 behind the header of a MAT file begins at 512.
+/// Number of first bytes that are enough to distinguish all formats. The HDF5 signature after the header of a MAT file
+/// begins at byte 512.
 const HEAD_BYTES: usize = 520;
 
 /// A format of recordings.
@@ -20,9 +21,10 @@ pub(crate) enum Format {
     Npy,
     Npz,
     Parquet,
-    /// Read in Python, where the owners of the format keep a library: what it is, and the extra of the package.
+    /// A format that is read in Python, because its owners maintain a library there: its name, and the extra of the
+    /// Python package.
     Python(&'static str, &'static str),
-    /// Known and not read: what it is, and what to do.
+    /// A known format that is not read: its name, and what to do.
     Foreign(&'static str, &'static str),
 }
 
@@ -36,7 +38,7 @@ const PYTHON: [(&[u8], &str, &str); 5] = [
 ];
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Formats that are known to be none of those that are read.
+/// Known formats that are not read.
 const FOREIGN: [(&[u8], &str, &str); 5] = [
     (b"ARROW1", "Arrow", "write it as Parquet"),
     (b"\x28\xb5\x2f\xfd", "zstd", "unpack it with unzstd, or pack it with gzip"),
@@ -44,11 +46,11 @@ const FOREIGN: [(&[u8], &str, &str); 5] = [
     (b"\xfd7zXZ\0", "xz", "unpack it with unxz, or pack it with gzip"),
     (b"\xd0\xcf\x11\xe0", "Excel", EXCEL),
 ];
-/// What to do with a workbook of either kind.
+/// What to do with an old or new Excel workbook.
 pub(crate) const EXCEL: &str = "save the sheet as CSV";
 
 impl Format {
-    /// The format of a file that begins so.
+    /// Returns the format of a file that begins with `head`.
     pub(crate) fn of(head: &[u8]) -> Self {
         let find = |known: &[(&[u8], &'static str, &'static str)]| {
             let found = known.iter().find(|(magic, ..)| head.starts_with(magic));
@@ -59,7 +61,7 @@ impl Format {
             _ if head.starts_with(b"\x93NUMPY") => Self::Npy,
             _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => Self::Npz,
             _ if head.starts_with(b"PAR1") => Self::Parquet,
-            // behind a header of 512 bytes that may say anything
+            // The 512 bytes before the HDF5 signature can contain anything.
             _ if head.get(512..).is_some_and(|h| h.starts_with(HDF5)) => {
                 Self::Python("a MAT file of version 7.3", "matlab")
             }
@@ -76,7 +78,7 @@ impl Format {
         }
     }
 
-    /// Reads a recording that is no table of text: what is on each clock, and notes.
+    /// Reads a recording that is not a table of text. Returns one track per clock, and notes.
     pub(crate) fn tracks(
         self,
         reader: &mut dyn Read,
@@ -119,13 +121,13 @@ fn is_json(head: &[u8]) -> bool {
         if rest.trim_ascii_start().starts_with(b"\""))
 }
 
-/// A MAT file of version 5: its text, or its version and byte order.
+/// Returns whether a file is a MAT file of version 5, from its header text or from its version and byte order.
 fn is_mat(head: &[u8]) -> bool {
     head.starts_with(b"MATLAB 5.0 MAT-file")
         || matches!(head.get(124..128), Some([0, 1, b'I', b'M'] | [1, 0, b'M', b'I']))
 }
 
-/// The first bytes of a stream, and what they tell.
+/// Reads the first bytes of a stream, and returns them with the format that they show.
 pub(crate) fn head(reader: &mut dyn Read, file: &str) -> Result<(Vec<u8>, Format), RecordingError> {
     let mut head = Vec::with_capacity(HEAD_BYTES);
     let read = reader.take(HEAD_BYTES as u64).read_to_end(&mut head);

@@ -1,25 +1,25 @@
-//! Time stamps written as dates: ISO 8601, and a time of day alone.
+//! Time stamps written as text: ISO 8601 and other dates with a time of day, and a time of day alone.
 
 use std::borrow::Cow;
 
 use crate::DateOrder;
 
-/// Why a text is no time stamp.
+/// Reason why a text is not a time stamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StampFault {
     Unknown,
-    /// Which number is the day and which the month is open.
+    /// It is unclear which number is the day and which the month.
     DayOrMonth,
 }
 
-/// The nanoseconds of a stamp: since 1970 for a date, since midnight for a time of day.
-/// A date without a zone counts as UTC. If a point is between the numbers of a date, the day comes first.
+/// Returns a time stamp in nanoseconds: since 1970 for a date, since midnight for a time of day. A date without a time
+/// zone is in UTC. The day comes first if points separate the numbers of a date and `order` is `None`.
 pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, StampFault> {
     use jiff::{Timestamp, civil::DateTime, civil::Time, tz::TimeZone};
     if let Ok(stamp) = text.parse::<Timestamp>() {
         return Ok(stamp.as_nanosecond());
     }
-    // A date alone is no sample's time, and the parser would take it for midnight.
+    // A date without a time of day is not the time of a sample, but the parser below would take it for midnight.
     if !text.contains(':') {
         return Err(StampFault::Unknown);
     }
@@ -30,7 +30,7 @@ pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, 
     let mut time = of_day(time);
     let unknown = |_| StampFault::Unknown;
     let Some(date) = date else {
-        // minutes and seconds alone: only seconds have a fraction
+        // A text with one colon and a fraction is minutes and seconds, because only seconds have a fraction.
         if time.contains('.') && time.matches(':').count() == 1 {
             time = Cow::Owned(format!("00:{time}"));
         }
@@ -43,7 +43,7 @@ pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, 
     Ok(zoned.timestamp().as_nanosecond())
 }
 
-/// A time of day with two digits for its hour, of 24, and a point.
+/// Rewrites a time of day with a two-digit hour from 0 to 23 and with a decimal point.
 fn of_day(time: &str) -> Cow<'_, str> {
     let half = |end: &str| {
         let at = time.len().checked_sub(end.len())?;
@@ -65,7 +65,7 @@ fn of_day(time: &str) -> Cow<'_, str> {
     }
 }
 
-/// Year, month and day of a date in numbers.
+/// Splits a numeric date into year, month and day.
 fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), StampFault> {
     let parts: Option<Vec<u32>> = date.split(['.', '/', '-']).map(|p| p.parse().ok()).collect();
     let Some([first, second, last]) = parts.as_deref() else { return Err(StampFault::Unknown) };
@@ -87,7 +87,7 @@ fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), Sta
     }
 }
 
-/// The order of a date that has only one.
+/// Returns the order of day and month, if only one order is possible.
 pub(crate) fn order_of(text: &str) -> Option<DateOrder> {
     let day_first = nanoseconds(text, Some(DateOrder::DayFirst));
     let month_first = nanoseconds(text, Some(DateOrder::MonthFirst));
@@ -98,7 +98,7 @@ pub(crate) fn order_of(text: &str) -> Option<DateOrder> {
     }
 }
 
-/// Whether a text has the look of a date or a time of day, understood or not.
+/// Returns whether a text looks like a date or a time of day, even if it cannot be parsed.
 pub(crate) fn looks_like_stamp(text: &str) -> bool {
     let digits = text.bytes().take_while(u8::is_ascii_digit).count();
     match text.as_bytes().get(digits) {

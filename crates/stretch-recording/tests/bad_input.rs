@@ -1,4 +1,4 @@
-//! Every way in which a file can be wrong, and the sentence that says so.
+//! Tests of every way in which a file can be invalid, with the error message.
 
 use std::io::{self, Read};
 
@@ -10,7 +10,7 @@ fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
     Recording::from_reader(text.as_ref(), "t.csv", &options).map(|recording| recording.trial)
 }
 
-/// Of a file in which so many of all rows are bad.
+/// Checks the error for a file in which `bad` of `all` rows are bad.
 #[track_caller]
 fn refuses(text: impl AsRef<[u8]>, message: &str, bad: usize, all: usize) {
     let share =
@@ -83,7 +83,7 @@ fn fields() {
     let not_a_number =
         "t.csv, row 3, column bridge_v: \"oops\" is not a number; correct it or remove that row";
     refuses("time_s,bridge_v\n0,1\n0.1,oops\n", not_a_number, 1, 2);
-    // A column that the format knows is held to it where nothing is asked for.
+    // A known column must be numeric if no column is required.
     let known = "time_s,bridge_v,length_mm\n0,1,180mm\n";
     assert_eq!(read(known).expect("bridge_v").channels.len(), 1);
     let error = Recording::from_reader(known.as_bytes(), "t.csv", &ReadOptions::new());
@@ -110,7 +110,7 @@ fn fields() {
         1,
         1,
     );
-    // Nothing says which notation is meant, however few the rows are.
+    // The notation of the numbers is ambiguous, however few rows there are.
     says(
         "time_s,bridge_v\n0,\"1,5\"\n",
         "t.csv, row 2, column bridge_v: \"1,5\" has a decimal comma; export the file again with \
@@ -142,7 +142,7 @@ fn bytes_that_are_no_text() {
     let utf16: Vec<u8> =
         "\u{feff}time_s,bridge_v\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     assert!(matches!(read(utf16), Err(RecordingError::Utf16 { .. })));
-    // A control character never reaches the terminal.
+    // Error messages contain no control characters, because they are printed in a terminal.
     let error = read("time_s,bridge_v\n0,\u{1b}[2J\n").expect_err("no number").to_string();
     assert!(!error.contains('\u{1b}'), "{error:?}");
 }
@@ -173,7 +173,7 @@ fn rows_and_time() {
     );
 }
 
-/// A gigabyte without a line end, which counts what is taken from it.
+/// A stream of a gigabyte without a line end, which counts the bytes that are left.
 struct Endless {
     left: u64,
     head: &'static [u8],
@@ -265,7 +265,7 @@ fn a_stream_survives_its_rows() {
 
 #[test]
 fn a_stream_answers_each_line_before_it_asks_for_more() {
-    /// Fails when it is asked for more than its lines.
+    /// A reader that fails if it is read beyond its lines.
     struct Lines(Vec<&'static [u8]>);
     impl Read for Lines {
         fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {

@@ -1,4 +1,4 @@
-//! Rows that cannot be read are left out and counted, in files and live alike; too many of them are refused.
+//! Rows that cannot be read are left out and counted, in files and in live streams. Too many of them are refused.
 
 use proptest::prelude::*;
 use stretch_data::{Trial, strategies};
@@ -19,7 +19,7 @@ fn good_rows(count: usize) -> Vec<String> {
 
 const HEADER: &str = "time_s,length_mm,bridge_v";
 
-/// A file of a header and rows, and what is read of it: the times in hundredths, and the notes.
+/// Reads a file of a header and rows. Returns the times in hundredths of a second, and the notes.
 fn read(lines: &[String], options: &ReadOptions) -> Result<(Vec<u32>, Vec<String>), String> {
     let text = lines.join("\n");
     let read = Recording::from_reader(text.as_bytes(), "t.csv", options);
@@ -28,7 +28,7 @@ fn read(lines: &[String], options: &ReadOptions) -> Result<(Vec<u32>, Vec<String
     Ok((trial.time_s.iter().map(|t| (100.0 * t).round() as u32).collect(), notes))
 }
 
-/// Times that a live stream gives, in hundredths.
+/// Returns the times from a live stream, in hundredths of a second.
 fn live(lines: &[String], options: &ReadOptions) -> Vec<u32> {
     let text = lines.join("\n");
     let mut rows = RowReader::new(text.as_bytes(), "live", options).expect("a header");
@@ -42,7 +42,7 @@ fn live(lines: &[String], options: &ReadOptions) -> Vec<u32> {
     times
 }
 
-/// Ways in which one line, with the one below it, comes to harm; and how many rows are lost.
+/// Ways to damage one line, with the line below it, and the number of rows that are lost.
 const HARMS: [(&str, usize); 11] = [
     ("cut", 1),
     ("glued", 2),
@@ -92,7 +92,7 @@ fn every_harm_at_every_place_costs_its_rows_alone() {
             let (times, notes) =
                 read(&lines, &asked()).unwrap_or_else(|e| panic!("{way} {at}: {e}"));
             assert_eq!(times, expected, "{way} at {at}: {notes:?}");
-            // What is above the first row is no part of the table.
+            // Lines above the first row do not belong to the table.
             let is_top =
                 at == 1 && matches!(way, "words" | "header" | "noise" | "all blank" | "quote");
             let named = format!("row {}", at + 1);
@@ -111,7 +111,7 @@ fn every_harm_at_every_place_costs_its_rows_alone() {
 
 #[test]
 fn what_is_around_a_table_is_no_row_of_it() {
-    // the power went off in the last line
+    // The power failed while the last line was written.
     let mut lines = good_rows(60);
     lines.insert(0, HEADER.to_owned());
     lines.push("1.2".to_owned());
@@ -122,7 +122,7 @@ fn what_is_around_a_table_is_no_row_of_it() {
     let (times, notes) = read(&lines, &asked()).expect("60 rows");
     assert_eq!((times.len(), live(&lines, &asked()).len()), (60, 60));
     assert_eq!(notes, ["the first line is no part of the table and is passed over"]);
-    // summaries below the numbers
+    // Summaries follow the numbers.
     lines.remove(0);
     lines.extend(["", "End of test", "Maximum,105.3", "Mean;1.02"].map(str::to_owned));
     let (times, notes) = read(&lines, &asked()).expect("60 rows");
@@ -163,7 +163,7 @@ fn a_share_of_bad_rows_is_left_out_and_a_larger_one_refused() {
     }
 }
 
-/// Where nothing is asked for, a row is bad if nearly all others have a number there, and a column is text otherwise.
+/// If no columns are required, a row is bad if nearly all others have a number there. Otherwise the column is text.
 #[test]
 fn a_column_that_nobody_asks_for_keeps_its_numbers() {
     let lines: Vec<String> = std::iter::once("time_s,force,state,rare".to_owned())
@@ -187,7 +187,7 @@ fn a_column_that_nobody_asks_for_keeps_its_numbers() {
     );
 }
 
-/// Where columns are asked for, no other costs a row, in a file as in a stream.
+/// If columns are required, a hole in any other column costs no row, in a file as in a stream.
 #[test]
 fn a_hole_beside_what_is_asked_for_costs_no_row() {
     let mut lines = good_rows(30);
@@ -200,7 +200,7 @@ fn a_hole_beside_what_is_asked_for_costs_no_row() {
     assert_eq!(read(&lines, &ReadOptions::new()).expect("29 rows").0.len(), 29);
 }
 
-/// A row that is lost takes its time where the time is counted.
+/// A lost row takes time if samples are counted.
 #[test]
 fn a_lost_sample_takes_time() {
     let mut lines = vec!["bridge_v,x".to_owned()];

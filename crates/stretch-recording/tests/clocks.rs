@@ -1,4 +1,5 @@
-//! Time stamps as loggers really write them, and sparse tables: each recording is 400 samples at 50 Hz unless a test says otherwise.
+//! Time stamps as loggers write them, and sparse tables. Each recording has 400 samples at 50 Hz unless a test states
+//! otherwise.
 
 use proptest::prelude::*;
 use stretch_recording::{Array, ReadOptions, Recording, RecordingError, RowReader, TimeUnit};
@@ -6,7 +7,7 @@ use stretch_recording::{Array, ReadOptions, Recording, RecordingError, RowReader
 const SAMPLES: usize = 400;
 const RATE_HZ: f64 = 50.0;
 
-/// A table whose time column is called `name`, with stamps of the instants of 50 Hz.
+/// Returns a table with a time column `name` and stamps at 50 Hz.
 fn table(name: &str, stamp: impl Fn(usize, f64) -> String) -> String {
     let rows = (0..SAMPLES).map(|i| format!("{},{i}\n", stamp(i, i as f64 / RATE_HZ)));
     std::iter::once(format!("{name},bridge_v\n")).chain(rows).collect()
@@ -20,7 +21,8 @@ fn read(text: &str) -> Recording {
     read_as(text, &ReadOptions::new().require("bridge_v")).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The recording is the one at 50 Hz from sample `first` on, within `within_s`, and one of its notes says so.
+/// Checks that the recording is at 50 Hz from sample `first` on, within `within_s`, and that one of its notes contains
+/// `says`.
 #[track_caller]
 fn is_at_50_hz(recording: &Recording, first: usize, within_s: f64, says: &str) {
     let Recording { trial, notes } = recording;
@@ -74,7 +76,7 @@ fn units_that_are_open_are_asked_for() {
         let error = read_as(&text, &ReadOptions::new()).expect_err("two meanings").to_string();
         assert!(error.contains(&format!("--time {name}:s")), "{error}");
     }
-    // An option that says what is counted is believed.
+    // An option that gives the unit overrides the values.
     let text = table("time", |_, t| format!("{:.1}", t * 1e3));
     let options = ReadOptions::new().time("time").time_unit(TimeUnit::Milliseconds);
     is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-9, "");
@@ -126,7 +128,7 @@ fn samples_may_be_lost_where_a_clock_rolls_over() {
         ("time_ms", 2_f64.powi(16), 1e3),
         ("time_s", 86_400.0, 1.0),
     ] {
-        // half a second is lost just there
+        // Half a second is lost at the roll-over.
         let after = |i: usize, t: f64| if i < 200 { t } else { t + 0.5 };
         let begin = modulus - 4.2 * per_second;
         let stamp = |i, t| format!("{:.2}", (begin + after(i, t) * per_second) % modulus);
@@ -141,7 +143,7 @@ fn samples_may_be_lost_where_a_clock_rolls_over() {
         };
         assert!(trial.time_s.windows(2).enumerate().all(is_step), "{name}");
     }
-    // a recording that begins again is none
+    // A step back that is not a roll-over is refused.
     let text = table("time_s", |i, t| format!("{:.2}", if i < 200 { 100.0 + t } else { t - 4.0 }));
     assert!(read_as(&text, &ReadOptions::new()).unwrap_err().to_string().contains("split"));
 }
@@ -154,7 +156,7 @@ fn seconds_and_nanoseconds_in_two_columns_are_one_stamp() {
         ("header.stamp.secs", "header.stamp.nsecs"),
         ("/joint_states/header/stamp/sec", "/joint_states/header/stamp/nanosec"),
     ] {
-        // 2 ms early and late, which no spreading could show
+        // The jitter of 2 ms shows that the stamps are read and not spread evenly.
         let time_s = |i: usize| i as f64 / RATE_HZ + if i % 2 == 1 { 0.002 } else { 0.0 };
         let row = |i: usize| {
             let (ns, begin) = ((time_s(i) * 1e9).round() as u64, 1_700_000_000);
@@ -204,13 +206,13 @@ fn repeated_and_coarse_stamps_are_spread() {
     is_at_50_hz(&read(&table("time_s", once)), 0, 1e-9, "row 102 has the stamp of the row before");
     let seconds = |_: usize, t: f64| format!("2024-02-17 23:59:{:02.0}", (50.0 + t + 1e-9).floor());
     is_at_50_hz(&read(&table("time", seconds)), 0, 1e-6, "50 a second");
-    // the first second is not whole
+    // The recording begins within a second.
     let late = |_: usize, t: f64| format!("{}", (1_714_564_800.4 + t + 1e-9).floor());
     is_at_50_hz(&read(&table("timestamp", late)), 0, 1e-6, "50 a second");
-    // stamps that stayed the same while the clock went on
+    // The stamps stayed the same while samples continued.
     let stuck = |i: usize, t: f64| format!("{:.2}", if (100..130).contains(&i) { 2.0 } else { t });
     is_at_50_hz(&read(&table("time_s", stuck)), 0, 1e-9, "29 rows have the stamp");
-    // lost samples are no ticks, not even regular ones
+    // Lost samples are not mistaken for ticks, even at regular intervals.
     for every in [9, 37] {
         let text = table("time_s", |_, t| format!("{t:.2}"));
         let lines = text.split_inclusive('\n').enumerate();
@@ -256,10 +258,10 @@ fn a_rate_replaces_a_column_of_time() {
     assert_eq!(rows.next_row().unwrap().unwrap().time_s, 0.02);
 }
 
-/// Stamps in which a stream looks for the ticks of its clock.
+/// Number of stamps in which a stream looks for the ticks of its clock.
 const LOOKED_AT: usize = 64;
 
-/// Times of a stream, and its notes.
+/// Returns the times of a stream and its notes.
 fn live(text: &str) -> (Vec<f64>, Vec<String>) {
     live_as(text, ReadOptions::new())
 }
@@ -291,7 +293,7 @@ fn a_stream_has_the_same_clock() {
         times.iter().enumerate().skip(50).all(|(i, t)| (t - 0.02 * (i + 1) as f64).abs() < 0.032)
     );
     assert!(notes.iter().any(|note| note.contains("stamps repeat")), "{notes:?}");
-    // where a usual rate is known, as that of a calibration, it places the samples before the first tick
+    // If an expected rate is known, such as that of a calibration, it places the samples before the first tick.
     let whole = table("time_s", |_, t| format!("{:.0}", t.floor()));
     for (usual_hz, near_s) in [(RATE_HZ, 1e-9), (1.1 * RATE_HZ, 0.1), (0.5 * RATE_HZ, 1.1)] {
         let (times, _) = live_as(&whole, ReadOptions::new().untimed_hz(usual_hz));
@@ -305,10 +307,9 @@ fn a_stream_has_the_same_clock() {
     assert!((times[1] - times[0] - 0.02).abs() < 1e-6);
 }
 
-/// A stamp of a time in seconds.
+/// Returns the stamp at a time in seconds.
 type Stamp = fn(f64) -> f64;
 
-/// A clock of 15.6 ms on which no stamp of 50 samples a second repeats.
 #[test]
 fn the_first_step_of_a_stream_shows_its_unit() {
     for (unit, per_second, from) in [
@@ -329,6 +330,7 @@ fn the_first_step_of_a_stream_shows_its_unit() {
     }
 }
 
+/// A clock with ticks of 15.6 ms, on which no stamp of 50 samples a second repeats.
 #[test]
 fn a_stream_with_coarse_stamps_has_the_usual_rate() {
     let usual = || ReadOptions::new().untimed_hz(RATE_HZ);
@@ -344,13 +346,13 @@ fn a_stream_with_coarse_stamps_has_the_usual_rate() {
         for pair in times[LOOKED_AT..].windows(2) {
             assert!((pair[1] - pair[0] - 1.0 / RATE_HZ).abs() < 1e-6, "{tick_s}: {pair:?}");
         }
-        // a lost sample stays one
+        // A lost sample remains a gap.
         let lost =
             table("time_s", |i, t| format!("{:.6}", ticks(if i < 200 { t } else { t + 0.02 })));
         let (times, _) = live_as(&lost, usual());
         assert!((times[399] - 8.0).abs() < tick_s, "{tick_s}: {}", times[399]);
     }
-    // early and late samples are no ticks, and a clock of another rate is not bent to the usual one
+    // Jitter is not mistaken for ticks, and a clock of another rate is not adjusted to the expected one.
     let early = |i: usize, t: f64| format!("{:.4}", t + 0.001 * ((i * 7 % 5) as f64 - 2.0) + 1.0);
     let (times, notes) = live_as(&table("time_s", early), usual());
     assert_eq!((times[1], notes.len()), (1.02, 0), "{notes:?}");
@@ -406,22 +408,22 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
             (trial.require("/joint/position").unwrap(), trial.require("/cmd/data").unwrap());
         for ((t, joint), bridge) in trial.time_s.iter().zip(joint).zip(bridge) {
             assert!((joint - 100.0 - t).abs() < 1e-9, "at {t}");
-            // what is written three milliseconds late was sampled then
+            // The bridge is written three milliseconds late with its own stamp.
             assert!((bridge - 1.0 - (t - 0.003)).abs() < 1e-9, "at {t}");
         }
     }
-    // what other programs write in place of a blank
+    // Words that other programs write in place of a blank
     for missing in ["nan", "NA", "N/A", "null", "None"] {
         let filled = text.replace(",\n", &format!(",{missing}\n"));
         let filled = filled.replace(",,", &format!(",{missing},"));
         assert_ne!(filled, text);
         assert_eq!(read_as(&filled, &on_grid).unwrap().trial, grid.trial, "{missing}");
     }
-    // one of the topics alone
+    // One topic alone
     let one = read_as(&text, &ReadOptions::new().require("/cmd/data")).unwrap();
     assert_eq!(one.trial.len(), 300);
     assert!((one.trial.rate_hz().unwrap() - RATE_HZ).abs() < 1e-6);
-    // a slow column next to a fast one
+    // A slow column and a fast one
     let slow = table("time_s,length_mm", |i, t| {
         if i % 5 == 0 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
     });
@@ -430,13 +432,13 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
     assert_eq!(trial.len(), 396);
     let length = trial.require("length_mm").unwrap();
     assert!(length.iter().zip(&trial.time_s).all(|(x, t)| (x - 100.0 - t).abs() < 1e-9));
-    // A sensor that is lost has no separate clock.
+    // A sensor that fails has no separate clock.
     let lost = table("time_s,length_mm", |i, t| {
         if i < 250 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
     });
     let error = read_as(&lost, &options).expect_err("too many blanks").to_string();
     assert!(error.contains("row 252, column length_mm") && error.contains("150 of 400"), "{error}");
-    // Blank rows are no topic.
+    // A column of blanks has no separate clock.
     let blank = table("time_s,length_mm", |_, t| format!("{t:.2},"));
     assert!(read_as(&blank, &options).is_err());
 }
@@ -451,7 +453,7 @@ proptest! {
         let rows = (0..samples).map(|i| format!("{},{i}\n", stamp(i)));
         let text: String = std::iter::once("time_s,bridge_v\n".to_owned()).chain(rows).collect();
         let Ok(Recording { trial, notes }) = read_as(&text, &ReadOptions::new()) else {
-            // a recording within one tick has no clock
+            // A recording that is shorter than a few ticks may have no usable clock.
             prop_assert!(stamp(samples - 1) - stamp(0) < 2.5 * tick_s);
             return Ok(());
         };

@@ -1,11 +1,11 @@
-//! Small bad and odd files, a folder a reader, each with the sentence that it must earn (`sentences.txt`).
+//! Small invalid and unusual files, one folder per reader, each with the expected note or error (`sentences.txt`).
 
 use std::{fs, path::Path};
 
 use stretch_recording::{ReadOptions, Recording};
 use testkit::corpus::is_as_it_should;
 
-/// What comes of a file, in a line.
+/// Returns the result of reading a file, in one line.
 fn told(folder: &Path, name: &str) -> String {
     let mut options = ReadOptions::new();
     if name.starts_with("serial") {
@@ -27,7 +27,7 @@ fn told(folder: &Path, name: &str) -> String {
     }
 }
 
-/// A test a folder.
+/// Defines one test per folder.
 macro_rules! readers {
     ($($reader:ident)*) => {$(
         #[test]
@@ -43,7 +43,7 @@ readers!(text npz foreign);
 #[cfg(feature = "parquet")]
 readers!(parquet);
 
-/// A file that breaks off anywhere is refused or read, and never more than that.
+/// A file that is cut off anywhere is either refused or read, without a panic.
 #[test]
 fn whatever_breaks_off_is_told() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference/recordings");

@@ -1,4 +1,4 @@
-//! Data sets that are written come back, and files of two of them are not mixed.
+//! Data sets that were written are read back unchanged, and files of two data sets are not mixed.
 
 use std::{fs, path::Path};
 
@@ -98,7 +98,7 @@ fn what_is_the_users_comes_along_and_what_the_last_data_set_was_goes() {
     assert_eq!(fs::read_to_string(out.join("own/deep/notes.txt")).expect("there"), "mine");
     assert_eq!(fs::read_to_string(out.join("b.csv")).expect("there"), "edited by hand");
 
-    // A trial of another data set under the name of one of this one.
+    // A trial of another data set has the name of a trial of this one.
     let set = DataSet::read(&out).expect("read");
     load(&set.trials[0], &out).expect("its own");
     fs::write(out.join("a.csv"), "time_s,length_mm\n0,180\n0.01,181\n").expect("written");
@@ -106,7 +106,7 @@ fn what_is_the_users_comes_along_and_what_the_last_data_set_was_goes() {
     for part in ["dataset.toml", "a.csv", "two data sets may be mixed", "remove this line"] {
         assert!(error.to_string().contains(part), "{error}");
     }
-    // What is written by hand has no digest.
+    // A data set that is written by hand has no digest.
     let mut by_hand = set.trials[0].clone();
     by_hand.digest = None;
     load(&by_hand, &out).expect("read");

@@ -1,4 +1,4 @@
-//! What is written in a dialect is read back the same, whole or a row at a time.
+//! A table that is written in any dialect is read back unchanged, as a whole or row by row.
 
 use proptest::prelude::*;
 use stretch_data::{Trial, push_number, strategies};
@@ -47,7 +47,7 @@ impl Dialect {
     fn names(&self, bare: &[(&str, &str)]) -> Vec<String> {
         let name = |(name, unit): &(&str, &str)| match self.units {
             Units::InNames => format!("{name}_{unit}"),
-            // Blanks between columns cannot be in names that are not quoted.
+            // Names that are not quoted cannot contain the blanks that separate columns.
             Units::Brackets if self.is_quoted => format!("\"{name} ({unit})\""),
             Units::Brackets => format!("{name}[{unit}]"),
             Units::Row if self.is_quoted => format!("\"{name}\""),
@@ -63,7 +63,7 @@ impl Dialect {
         if self.has_commas { text.replace('.', ",") } else { text }
     }
 
-    /// The text of `length_mm` and `bridge_v` over the time.
+    /// Writes `length_mm` and `bridge_v` over the time.
     fn write(&self, trial: &Trial) -> String {
         let mut text = String::new();
         if self.has_mark {
@@ -91,7 +91,7 @@ proptest! {
     #[test]
     fn a_table_in_any_dialect(trial in strategies::rig_trial(2..40), dialect in dialect()) {
         let text = dialect.write(&trial);
-        // A name that says its unit in capitals is asked for as it is written.
+        // A name with its unit in capitals is required as it is written.
         let capital = dialect.units == Units::InNames;
         let bridge = if capital { "bridge_V" } else { "bridge_v" };
         let options = ReadOptions::new().require("length_mm").require(bridge);
@@ -101,7 +101,7 @@ proptest! {
         prop_assert_eq!(read.require("length_mm")?, trial.require("length_mm")?);
         prop_assert_eq!(read.require(bridge)?, trial.require("bridge_v")?);
 
-        // Live, a row at a time.
+        // Read the table as a live stream, row by row.
         let mut rows = RowReader::new(text.as_bytes(), "t.csv", &options)?;
         for (i, time_s) in trial.time_s.iter().enumerate() {
             let row = rows.next_row().expect("as many rows")?;
@@ -116,7 +116,7 @@ proptest! {
         let header = Dialect { comments: "", units: Units::InNames, is_trailed: false, has_mark: false, ..dialect };
         let text = header.write(&trial);
         let (_, rows) = text.split_once('\n').expect("a header");
-        // A serial port is opened in the middle of a line.
+        // A serial port can be opened in the middle of a line.
         let cut = cut.min(rows.find('\n').expect("a row"));
         let options = ReadOptions::new().columns(["time_s", "length_mm", "bridge_v"]).require("bridge_v");
         let whole = Recording::from_reader(rows.as_bytes(), "port", &options)?;
@@ -125,7 +125,7 @@ proptest! {
         let mut live = RowReader::new(rest, "port", &options)?;
         let mut values = Vec::new();
         while let Some(row) = live.next_row() {
-            // What is left of the first line may look like a whole one with another time.
+            // The rest of the first line may look like a complete line with another time.
             if let Ok(row) = row {
                 values.push(row.values[0]);
             }

@@ -1,4 +1,5 @@
-//! Files that fuzzing found: each once made a reader panic, or gave what cannot be written.
+//! Files that were found by fuzzing. Each of them once caused a panic in a reader, or was read as
+//! something that cannot be written.
 
 use std::{fs, path::Path};
 

@@ -1,8 +1,9 @@
-//! Where a table begins and what its columns are called, as loggers and instruments write it.
+//! Where a table begins and what its columns are named, for files as loggers and instruments write
+//! them.
 
 use stretch_recording::{DateOrder, ReadOptions, Recording, RowReader};
 
-/// Rows of numbers at 50 Hz, 40 of them, with a separator and what follows the last number.
+/// Returns 40 rows of numbers at 50 Hz with a separator. `end` follows the last number of each row.
 fn rows(separator: &str, end: &str) -> String {
     let row = |i: u32| {
         let t = 0.02 * f64::from(i);
@@ -12,7 +13,7 @@ fn rows(separator: &str, end: &str) -> String {
     (0..40).map(row).collect()
 }
 
-/// Names of what is read, and the notes.
+/// Returns the names of the channels that are read, and the notes.
 #[track_caller]
 fn names(text: &str, options: &ReadOptions) -> (String, Vec<String>) {
     let read = Recording::from_reader(text.as_bytes(), "t.txt", options);
@@ -38,11 +39,11 @@ fn the_header_is_directly_above_the_numbers() {
     let semicolons = rows(";", "");
     let commas = rows(",", "");
     for (text, expected) in [
-        // names, then units, with or without a separator behind either
+        // names, then units, with or without a separator after each
         (format!("Time;Pos;U;\ns;mm;V;\n{semicolons}"), "pos_mm u_v"),
         (format!("Time;Pos;U\n(s);(mm);(V)\n{}", rows(";", ";")), "pos_mm u_v"),
         (format!("\"sep=;\"\nTime;Pos;U\ns;mm;V\n{semicolons}"), "pos_mm u_v"),
-        // results above the raw data, of as many columns and of others
+        // results above the raw data, in the same and in other numbers of columns
         (
             format!(
                 "Results\n,\"Load\",\"E\"\n,\"(N)\",\"(MPa)\"\n1,\"12.3\",\"1.2\"\n\nRaw data\n\"Time\",\"Pos\",\"F\"\n\"(s)\",\"(mm)\",\"(N)\"\n{commas}"
@@ -56,7 +57,7 @@ fn the_header_is_directly_above_the_numbers() {
             "pos_mm f_n",
         ),
         (format!("Sample rate,50\nOperator,A. Smith\nt,a,b\n{commas}"), "a b"),
-        // a line of dots or lines below the names
+        // a line of dashes or of text below the names
         (format!("t;a;b\n------\n{semicolons}"), "a b"),
         (format!("t;a;b\nraw;filtered;\n{semicolons}"), "a b"),
         // labels before the names
@@ -74,7 +75,7 @@ fn the_header_is_directly_above_the_numbers() {
             ),
             "force_n pos_mm",
         ),
-        // a head with numbers in it
+        // lines with numbers above the names
         (
             format!(
                 "LabVIEW Measurement\t\nChannels\t2\t\t\nSamples\t60\t60\t\nX_Dimension\tTime\tTime\t\nX0\t0,0\t0,0\t\nDelta_X\t0,02\t0,02\t\n***End_of_Header***\t\t\t\nX_Value\ta\tb\tComment\n{}",
@@ -82,7 +83,7 @@ fn the_header_is_directly_above_the_numbers() {
             ),
             "a b",
         ),
-        // more names than numbers: remarks
+        // more names than numbers: the surplus names are remarks
         (format!("X_Value\ta\tb\tComment\n{}", rows("\t", "")), "a b"),
         // names in a comment
         (format!("Frame Count 3\n# exported\n# time_s a b\n{}", rows(" ", "")), "a b"),
@@ -104,7 +105,7 @@ fn the_unit_of_the_time_stands_below_it() {
     let (read, notes) = names(&text, &ReadOptions::new());
     assert_eq!(read, "unit_a_length_cal_mm unit_a_gauge_cal_mv");
     assert!(notes.contains(&"the time is column unit_a_timestamp_cal_ms".to_owned()), "{notes:?}");
-    // any number of names that is right
+    // The number of names may differ from the header if it matches the rows.
     let given = ReadOptions::new().columns(["t_ms", "length_mm", "gauge_mv"]);
     assert_eq!(names(&text, &given).0, "length_mm gauge_mv");
 }
@@ -120,7 +121,7 @@ fn a_rate_above_the_table_is_taken_where_there_is_no_time() {
     assert!(notes.contains(
         &"there is no time: samples are counted at 50 Hz, as Increment above it says".to_owned()
     ));
-    // what is said counts
+    // A rate that is given replaces the rate in the file.
     let Recording { trial, .. } =
         Recording::from_reader(scope.as_bytes(), "t", &ReadOptions::new().sample_rate_hz(10.0))
             .expect("read");
@@ -184,7 +185,7 @@ fn a_serial_monitor_puts_a_time_of_day_before_each_line() {
     assert_eq!(names(&lines, &given).0, "pos_mm volt_v");
     let commas: String = (0..40).map(|i| format!("{}101,{i:02}; 1,02\n", stamp(i))).collect();
     assert_eq!(names(&commas, &given).0, "pos_mm volt_v");
-    // names of the board's own, with and without a time among them
+    // names from the board, with and without a time among them
     let named = format!("{}pos_mm,volt_v\n{lines}", stamp(0));
     assert_eq!(names(&named, &ReadOptions::new()).0, "pos_mm volt_v");
 }
@@ -214,7 +215,7 @@ fn the_time_goes_by_many_names() {
     for time in ["elapsed_ms", "Millis", "time [Millis]", "Time (milliseconds)", "rel_time (ms)"] {
         assert_eq!(names(&format!("{time};a\n{in_ms}"), &ReadOptions::new()).0, "a", "{time}");
     }
-    // two that may be the time, of which no name is usual
+    // two columns that may be the time, without a usual name
     let two = format!("rise_time_s;fall_time_s;b\n{}", rows(";", ""));
     fails(
         &two,
@@ -232,7 +233,7 @@ fn names_of_one_kind_are_numbered_and_only_what_is_asked_for_must_be_one() {
     assert_eq!(names(&text, &ReadOptions::new().require("X.1")).0, "X X.1");
     assert_eq!(names(&text, &ReadOptions::new().require("X.0")).0, "X.0 X.1");
     fails(&text, &ReadOptions::new().require("X"), &["names column X twice", "X.0 or X.1"]);
-    // of several times the first is the time
+    // If several columns have the name of the time, the first is the time.
     let twice = format!("Time (s),a,Time (s)\n{}", rows(",", ""));
     assert_eq!(names(&twice, &ReadOptions::new()).0, "a time_s.1");
     let stray: String =
@@ -290,7 +291,8 @@ fn dates_are_read_in_the_order_that_they_show() {
     assert!(notes.contains("2024-02-17T22:00:00Z"), "{notes}");
     let commas = dated("17.02.2024", "").replace(".0", ",0").replace("17,02", "17.02");
     assert_eq!(names(&commas, &ReadOptions::new()).0, "a");
-    // a point means that the day comes first; a stroke means nothing
+    // Points between the numbers of a date mean that the day comes first. Slashes leave the order
+    // open.
     let notes = first(&dated("05.01.2024", ""), &ReadOptions::new());
     assert!(notes.contains("2024-01-05T10"), "{notes}");
     let open = dated("05/01/2024", "");
@@ -302,7 +304,7 @@ fn dates_are_read_in_the_order_that_they_show() {
     let said = |order| first(&open, &ReadOptions::new().time("Zeit").date_order(order));
     assert!(said(DateOrder::DayFirst).contains("2024-01-05T10"));
     assert!(said(DateOrder::MonthFirst).contains("2024-05-01T10"));
-    // a later row shows it
+    // A later row shows the order.
     let midnight = "t;a\n12/11/2024 23:50:00;1\n13/11/2024 00:00:00;1\n13/11/2024 00:10:00;2\n";
     let read = Recording::from_reader(midnight.as_bytes(), "t", &ReadOptions::new()).expect("read");
     assert_eq!(read.trial.time_s, [0.0, 600.0, 1200.0]);

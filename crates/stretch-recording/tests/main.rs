@@ -1,4 +1,4 @@
-//! The tests of stretch-recording from outside, one program: linking takes longer than most of them.
+//! Integration tests of stretch-recording, in one program because linking takes longer than most of them.
 
 mod bad_input;
 mod bad_rows;

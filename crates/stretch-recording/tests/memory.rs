@@ -1,7 +1,7 @@
-//! Peak memory of every reader: four times the file and 256 MB at most, or a refusal.
+//! Peak memory of every reader: at most four times the size of the file and 256 MB. Other files are refused.
 //!
-//! Each file is read by a separate process, which reports the most memory that it had. The files are such as take most for their size: what
-//! they hold repeats, and numbers of a byte have eight in memory.
+//! A separate process reads each file and reports its peak memory. The files are those that need most memory for their
+//! size: their content is repetitive, and numbers of one byte become eight bytes in memory.
 #![cfg(target_os = "linux")]
 
 use std::{fs, path::Path, process::Command};
@@ -11,9 +11,9 @@ use flate2::{Compression, write::GzEncoder};
 /// Memory that any file may take in addition to four times its size, bytes.
 const BESIDE: u64 = 256 << 20;
 
-/// Reads a file in a separate process: the most memory that it had, bytes, and what came of it.
+/// Reads a file in a separate process. Returns its peak memory, bytes, and the result of reading.
 ///
-/// The example `peak_memory` reads, which `cargo test` builds with the tests.
+/// The process is the example `peak_memory`, which `cargo test` builds with the tests.
 fn peak(path: &Path) -> (u64, String) {
     let tests = std::env::current_exe().unwrap();
     let program = tests.ancestors().nth(2).unwrap().join("examples/peak_memory");
@@ -26,7 +26,7 @@ fn peak(path: &Path) -> (u64, String) {
     (kb.parse::<u64>().unwrap() << 10, told.to_owned())
 }
 
-/// Numbers that with their time nearly fill the memory that a small file may take.
+/// Count of numbers that, with their time, nearly fill the memory that a small file may take.
 const MANY: usize = 7_000_000;
 
 fn text() -> Vec<u8> {
@@ -47,7 +47,7 @@ fn npy(count: usize) -> Vec<u8> {
     [&head.concat()[..], &vec![1; count]].concat()
 }
 
-/// A file with one column of numbers: of lists of four, or a number a row.
+/// Returns a file with one column, of lists of four numbers or of one number per row.
 #[cfg(feature = "parquet")]
 fn parquet(count: usize, is_list: bool) -> Vec<u8> {
     use ::parquet::{
@@ -77,7 +77,7 @@ fn parquet(count: usize, is_list: bool) -> Vec<u8> {
 #[test]
 fn no_file_takes_more_than_four_times_its_size_and_256_mb() {
     let folder = tempfile::tempdir().unwrap();
-    // each once small enough to be read, and once beyond what a file of its size may take
+    // Each file is once small enough to be read, and once too large in memory for its size.
     let text = text();
     let cases = [
         ("text.csv", text.clone(), true),

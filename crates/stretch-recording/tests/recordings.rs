@@ -1,4 +1,4 @@
-//! Recordings that other tools wrote (`reference/recordings/make.py`) come back as the table that they were made from.
+//! Recordings written by other tools (`reference/recordings/make.py`) are read as the table from which they were made.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ fn read(name: &str, options: &ReadOptions) -> Recording {
     Recording::read(path(name), options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The table that all of them hold.
+/// Returns the table that all of these files contain.
 fn plain() -> Trial {
     Recording::read(path("plain.csv"), &ReadOptions::new()).expect("the table").trial
 }
@@ -22,7 +22,7 @@ fn asked() -> ReadOptions {
     ReadOptions::new().require("length_mm").require("bridge_v")
 }
 
-/// Largest distance to the table's channel.
+/// Returns the largest difference from the table's channel.
 #[track_caller]
 fn off(trial: &Trial, channel: &str) -> f64 {
     let (own, table) = (trial.require(channel).expect("there"), plain());
@@ -34,10 +34,10 @@ fn off(trial: &Trial, channel: &str) -> f64 {
 #[track_caller]
 fn is_the_table(trial: &Trial) {
     let late = trial.time_s.iter().zip(plain().time_s).map(|(a, b)| (a - b).abs());
-    // Stamps of an epoch come in nanoseconds.
+    // Stamps since 1970 are in nanoseconds.
     assert!(late.fold(0.0, f64::max) < 1e-9);
     assert_eq!(off(trial, "length_mm"), 0.0);
-    // A channel that was written in single precision.
+    // This channel was written in single precision.
     assert!(off(trial, "bridge_v") < 2e-7);
 }
 
@@ -88,7 +88,7 @@ fn parquet() {
     }
 }
 
-/// Whole numbers of Parquet whose bits are all ones: how the column is declared, and what it then says.
+/// Declarations of Parquet integer columns, and the value that they give a number with all bits set.
 #[cfg(feature = "parquet")]
 const ONES: [(&str, f64); 7] = [
     ("INT32 c", -1.0),
@@ -194,7 +194,7 @@ fn a_table_has_no_episodes() {
     assert!(refused.unwrap_err().to_string().contains("it holds no episodes"));
 }
 
-/// Numbers as the array of a name.
+/// Returns a one-dimensional array with this name.
 fn array(name: &str, values: impl IntoIterator<Item = f64>) -> Array {
     let values: Vec<f64> = values.into_iter().collect();
     Array { name: name.to_owned(), shape: vec![values.len()], values }

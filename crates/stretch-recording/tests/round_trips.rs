@@ -1,4 +1,4 @@
-//! What is written reads back to the bit, and nothing that is read panics.
+//! Written recordings are read back bit by bit, and no input causes a panic.
 
 use proptest::prelude::*;
 use stretch_data::{Trial, strategies};
@@ -8,7 +8,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// The trial as a user may have recorded it: 100 samples a second, and names that are no numbers.
+/// Changes a trial to one that a user may have recorded: 100 samples a second, and names that are not numbers.
 fn as_recorded(mut trial: Trial) -> Trial {
     trial.time_s = (0..trial.len()).map(|i| i as f64 / 100.0).collect();
     for (i, channel) in trial.channels.iter_mut().enumerate() {
@@ -81,7 +81,7 @@ proptest! {
     }
 }
 
-/// Columns may be called by numbers: the header of this project's own form is still no row of numbers.
+/// Columns may have numbers as names. The header of the project's format is not a row of numbers even then.
 #[test]
 fn a_trial_whose_columns_are_called_by_numbers_is_read_as_it_was_written() {
     let text = "time_s,180,1.24\n0,178,1.3\n0.01,179,1.4\n";

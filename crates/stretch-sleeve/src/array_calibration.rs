@@ -1,4 +1,4 @@
-//! The record of a calibration of several gauges that share a recorder.
+//! The calibration of several gauges that share a recorder.
 
 use serde::{Deserialize, Serialize};
 use stretch_core::{
@@ -6,43 +6,42 @@ use stretch_core::{
     sizes::{RATES_HZ, extent, size},
 };
 
-/// The most channels of an [`ArrayCalibration`].
+/// Largest number of channels of an [`ArrayCalibration`].
 pub const MAX_CHANNELS: usize = 16;
-/// The most time constants of a channel of an [`ArrayCalibration`].
+/// Largest number of time constants of a channel of an [`ArrayCalibration`].
 pub const ARRAY_RELAXATIONS: usize = 4;
-/// The most states of a channel: its signal, and what it changed over each time constant.
+/// Largest number of states of a channel: its signal, and its change over each time constant.
 pub const ARRAY_STATES: usize = 1 + ARRAY_RELAXATIONS;
-/// The most terms of a channel.
+/// Largest number of terms of a channel. A term is a product of states.
 pub const ARRAY_TERMS: usize = 15;
 
-/// One channel of an [`ArrayCalibration`]: its states, and the limits at which it counts as lost.
+/// One channel of an [`ArrayCalibration`]: the domains of its states, and the limits beyond which it counts as lost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArrayChannel<const N: usize> {
     /// Column of the signal.
     pub signal: Label,
-    /// Lower end of each state in the fit, in the signal's unit.
+    /// Lower end of the range of each state in the fitted data, in the signal's unit.
     pub state_min: Values<ARRAY_STATES>,
-    /// Upper end of each state in the fit, in the signal's unit.
+    /// Upper end of the range of each state in the fitted data, in the signal's unit.
     pub state_max: Values<ARRAY_STATES>,
-    /// A sample outside is impossible for this channel: the channel is cut off or at the end of its
-    /// converter.
+    /// Range of possible samples. A sample outside means that the channel is cut off or at the end of its converter.
     pub possible: Interval,
-    /// A channel with so many repetitions of one value, counted while another channel changes,
-    /// sticks; 0: repetitions are usual.
+    /// Number of repetitions of one value, counted while another channel changes, from which on the channel counts as
+    /// stuck. 0: repetitions are usual and not checked.
     pub still_samples: u16,
-    /// Coefficients that predict the movement of this channel from that of each other one; 0 for
-    /// itself.
+    /// Coefficients that predict the movement of this channel from the movements of the other channels; 0 for itself.
     pub follows: Values<N>,
-    /// The largest jump of the difference from what the others predict, in the signal's unit.
+    /// The largest jump of the difference between this channel and its prediction from the others, in the signal's
+    /// unit.
     pub largest_jump: f64,
 }
 
-/// Gains of the terms of all channels, in the reference's unit; empty lists for channels that are not used.
+/// Gains of the terms of all channels, in the reference's unit. The list of a channel that is not used is empty.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArrayGains<const N: usize> {
-    /// The estimate if every term is zero.
+    /// The estimate for terms that are all zero.
     pub constant: f64,
     /// One gain per term except the constant, for each channel.
     pub terms: heapless::Vec<Values<ARRAY_TERMS>, N>,
@@ -50,26 +49,26 @@ pub struct ArrayGains<const N: usize> {
     pub sd: f64,
 }
 
-/// How far each channel deviates from what the other channels predict, in the calibration's own
-/// recordings. A shifted gauge is detected against these values.
+/// The usual deviation of each channel from the prediction of the other channels, in the calibration's own recordings.
+/// A shifted gauge is detected against these values.
 ///
-/// The difference of a channel is its estimate alone minus that of all others; the criterion is its
-/// mean over blocks of `block_s`. The calibration has `n` blocks with mean `m` and standard
-/// deviation `s`, each estimated without its own part of the data. A further block exceeds `m ± t s
-/// sqrt(1 + 1/n)` with probability `p`, where `t` is the two-sided quantile of Student's t for `n -
-/// 1` degrees of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6). All channels
-/// share `p`: `p = false_alarms_an_hour block_s/(3600 s)/channels`.
+/// The difference of a channel is the estimate from this channel alone minus the estimate from all others. The
+/// criterion is the mean of this difference over blocks of `block_s`. The calibration has `n` blocks with mean `m` and
+/// standard deviation `s`. The estimates in a block come from a fit without that part of the data. A further block
+/// deviates from `m` by more than `t s sqrt(1 + 1/n)` with probability `p`, where `t` is the two-sided quantile of
+/// Student's t for `n - 1` degrees of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6). All channels
+/// have the same `p = false_alarms_an_hour block_s/(3600 s)/channels`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArrayShifts<const N: usize> {
     /// Length of a block, in seconds.
     pub block_s: f64,
-    /// The rate of false alarms for which the limits are derived, of all channels together, for
-    /// movements of the kind that the calibration saw.
+    /// The rate of false alarms of all channels together, from which the limits are derived. It holds for movements
+    /// like those in the calibration.
     pub false_alarms_an_hour: f64,
-    /// The usual mean of each channel's difference, in the reference's unit.
+    /// Usual mean of each channel's difference, in the reference's unit.
     pub usual: Values<N>,
-    /// Largest deviation of a block's mean from it, in the reference's unit.
+    /// Largest deviation of a block's mean from the usual mean, in the reference's unit.
     pub limits: Values<N>,
 }
 
@@ -77,46 +76,46 @@ pub struct ArrayShifts<const N: usize> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArraySpec<const N: usize> {
-    /// First in every record, so that a newer one is refused before the rest is read.
+    /// Version of the format. It is the first field, so that a newer version is refused before the rest is read.
     pub schema: Schema,
     /// Column of the reference.
     pub reference: Label,
-    /// Samples a second.
+    /// Sample rate.
     pub sample_rate_hz: SampleRate,
-    /// Time constants of every channel, rising, in seconds.
+    /// Time constants of every channel, in ascending order, in seconds.
     pub relaxations_s: Values<ARRAY_RELAXATIONS>,
-    /// The greatest sum of powers, 1 to 3.
+    /// Largest total degree of a term in the states, 1 to 3.
     pub degree: u8,
-    /// The greatest sum of the powers of states other than the signal.
+    /// Largest total degree of a term in the states other than the signal.
     pub memory_degree: u8,
-    /// The references that the fit saw.
+    /// Range of the reference in the fitted data.
     pub estimate_domain: Interval,
     /// The channels.
     pub channels: heapless::Vec<ArrayChannel<N>, N>,
-    /// Gains of all channels together.
+    /// Gains for all channels together.
     pub all: ArrayGains<N>,
-    /// Gains without each channel in turn.
+    /// Gains for all channels but one, for each channel that can be lost.
     pub without: heapless::Vec<ArrayGains<N>, N>,
-    /// Gains of each channel alone.
+    /// Gains for each channel alone.
     pub alone: heapless::Vec<ArrayGains<N>, N>,
-    /// Limits at which a channel is reported as shifted; `None` if the recordings are too short to
-    /// derive them.
+    /// Limits beyond which a channel is reported as shifted; `None` if the recordings are too short to derive them.
     #[serde(default)]
     pub shifts: Option<ArrayShifts<N>>,
-    /// Where it comes from.
+    /// Origin of the calibration: its date and files.
     pub provenance: Provenance,
 }
 
 /// A checked calibration of up to `N` gauges: `estimate = constant + sum over channels and terms of gain times term`.
 ///
-/// The states of a channel `x` are `x` and, for each time constant `tau` in rising order, `l_before -
-/// l` with `l' = (x - l)/tau`, as those of a [`HistoryMap`](stretch_core::HistoryMap). Each is
-/// shifted into its domain and scaled to -1..1, and the terms are the products of [`HistoryShape`]
-/// except the constant. The estimate is clipped to `estimate_domain`.
+/// The states of a channel `x` are `x` and, for each time constant `tau` in ascending order, `l_before - l`. Here `l`
+/// is the low-pass of `x` with `l' = (x - l)/tau`, and `l_before` is the low-pass of the previous time constant (`x`
+/// for the first), as in a [`HistoryMap`](stretch_core::HistoryMap). Each state is shifted and scaled such that its
+/// domain becomes -1..1. The terms are the products of [`HistoryShape`] except the constant. The estimate is clipped to
+/// `estimate_domain`.
 ///
-/// For the loss of any single channel the record holds the gains of the remaining ones, and for the
-/// loss of more the gains of each channel alone. `N` is the capacity: a record of four channels
-/// loads into an `ArrayCalibration<4>` on a board and into an `ArrayCalibration<16>` on a computer.
+/// The calibration contains the gains of the remaining channels for the loss of any single channel, and the gains of
+/// each channel alone for the loss of more. `N` is the capacity: a calibration of four channels loads into an
+/// `ArrayCalibration<4>` on a board and into an `ArrayCalibration<16>` on a computer.
 ///
 /// ```
 /// # use stretch_core::*;
@@ -164,7 +163,7 @@ pub struct ArraySpec<const N: usize> {
 pub struct ArrayCalibration<const N: usize>(ArraySpec<N>);
 
 impl<const N: usize> ArraySpec<N> {
-    /// Which products of a channel's states are its terms.
+    /// Returns which products of a channel's states are its terms.
     pub fn shape(&self) -> HistoryShape {
         HistoryShape {
             states: 1 + self.relaxations_s.len(),
@@ -175,7 +174,8 @@ impl<const N: usize> ArraySpec<N> {
 }
 
 impl<const N: usize> ArrayCalibration<N> {
-    /// Checks the parts: every number is finite and of a usable size, every list has its length.
+    /// Creates a calibration from its parts. Checks that every number is finite and not too large, and that every list
+    /// has the right length.
     ///
     /// # Errors
     /// [`DesignError`] that names the field.
@@ -224,13 +224,13 @@ impl<const N: usize> ArrayCalibration<N> {
         &self.0
     }
 
-    /// The parts, to change and check again.
+    /// Returns the parts, which can be changed and checked again.
     pub fn into_spec(self) -> ArraySpec<N> {
         self.0
     }
 }
 
-/// Checks how many numbers a list has.
+/// Checks the length of a list.
 fn count(field: &'static str, got: usize, want: usize) -> Result<(), DesignError> {
     DesignError::check(field, got as f64, got == want).map(|_| ())
 }

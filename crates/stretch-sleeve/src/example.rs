@@ -1,10 +1,11 @@
-//! The calibration that the documentation's examples run with.
+//! The calibration that is used in the examples of the documentation.
 
 use stretch_core::{DesignError, Interval, Label, Provenance, SampleRate, Schema, Values};
 
 use crate::{ArrayCalibration, ArrayChannel, ArrayGains, ArrayShifts, ArraySpec};
 
-/// Two gauges in volts on a knee, each of which may be lost: 1 to 2 V over 0 to 90 degrees, with a memory of 0.3 s.
+/// Returns the calibration of two gauges on a knee: 1 to 2 V for 0 to 90 degrees, with a memory of 0.3 s. Either gauge
+/// may be lost.
 ///
 /// ```
 /// assert_eq!(stretch_sleeve::example_array().spec().channels.len(), 2);

@@ -1,4 +1,4 @@
-//! The record of one gauge, and of the turning points of its movements, from which a zero shift is detected.
+//! The calibration of one gauge with the turning points of its movements, from which a shift of the zero is detected.
 
 use serde::{Deserialize, Serialize};
 use stretch_core::{
@@ -8,8 +8,8 @@ use stretch_core::{
 
 /// A calibration of one gauge, and the turning points of its movements.
 ///
-/// In bytes the record begins with that of the calibration; a board that does not watch the zero loads a
-/// [`Calibration`] alone.
+/// In postcard the bytes begin with those of the [`Calibration`]. A board that does not watch the zero can therefore
+/// load a [`Calibration`] alone.
 ///
 /// ```
 /// use stretch_core::record;
@@ -29,7 +29,7 @@ use stretch_core::{
 pub struct GaugeCalibration(Calibration, Option<Turns>);
 
 impl GaugeCalibration {
-    /// A record with the turning points of movements; without them if too few were recorded.
+    /// Creates a calibration with the turning points of movements, or without them if too few movements were recorded.
     ///
     /// # Errors
     /// [`DesignError`] that names the field of the turns.
@@ -58,23 +58,22 @@ impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
 
 /// The levels at which the signal turned during the calibration, and the limits for later ones.
 ///
-/// A movement goes down and up again by at least `least_span`. Its level is `y = (1 - high_share)
-/// low + high_share high` of its two turning points, weighted such that levels of the calibration
-/// scatter least. The calibration has `n` movements with mean `level` and standard deviation
-/// `scatter`. The median of five further movements deviates by more than `limit = t scatter sqrt(v +
-/// 1/n)` with probability `p = false_alarms_an_hour/movements_an_hour`. Here `t` is the two-sided
-/// quantile of Student's t for `n - 1` degrees of freedom (Hahn and Meeker, Statistical Intervals,
-/// 1991, section 4.6), and `v` is the ratio of the variance of a median of five to that of one,
-/// 0.2868 for normal and independent levels (David and Nagaraja, Order Statistics, 2003, section
-/// 3.2). `n` and `v` account for the correlation of neighbouring levels. For levels that are not
-/// normal the limit is at least the distance that a share `q` of the calibration's levels exceeds
-/// on either side, where `10 q^3 = p/2`: three of five exceed it as often as that.
+/// A movement goes down and up again by at least `least_span`. Its level is the weighted mean of its two turning
+/// points, `y = (1 - high_share) low + high_share high`. The weight is chosen such that the levels in the calibration
+/// scatter least. The calibration has `n` movements with mean `level` and standard deviation `scatter`. The median of
+/// five further movements deviates from `level` by more than `limit = t scatter sqrt(v + 1/n)` with probability `p =
+/// false_alarms_an_hour/(2 movements_an_hour)`. Here `t` is the two-sided quantile of Student's t for `n - 1` degrees
+/// of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6). `v` is the variance of a median of five
+/// divided by that of a single level: 0.2868 for normal and independent levels (David and Nagaraja, Order Statistics,
+/// 2003, section 3.2). `n` and `v` are corrected for the correlation of neighbouring levels. If levels are not normal,
+/// the limit is at least the deviation that a share `q` of the calibration's levels exceeds on either side, where `10
+/// q^3 = p/2`, because three of five levels exceed it that often.
 ///
-/// A smaller but lasting deviation is found by a running mean of levels about `level`, clipped at
-/// [`MOST_INNOVATION`](Self::MOST_INNOVATION) standard deviations, with a weight of
-/// [`MEAN_SHARE`](Self::MEAN_SHARE) for the newest (Roberts, Technometrics 1 (1959) 239). Its
-/// variance is that of levels times `k/(2 - k)`, and `mean_limit` is derived from it as `limit` is
-/// from `v`. Each of the two has half of the false alarms.
+/// A smaller but lasting deviation is found by a running mean of the deviations from `level`. Each deviation is clipped
+/// at [`MOST_INNOVATION`](Self::MOST_INNOVATION) standard deviations, and the newest has a weight `k` of
+/// [`MEAN_SHARE`](Self::MEAN_SHARE) (Roberts, Technometrics 1 (1959) 239). The variance of the mean is that of a level
+/// times `k/(2 - k)`. `mean_limit` is derived from this factor as `limit` is from `v`. Each of the two criteria has
+/// half of the false alarms.
 ///
 /// ```
 /// use stretch_sleeve::Turns;
@@ -97,37 +96,38 @@ impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turns {
-    /// Mean level of the movements, each clipped at [`Turns::MOST_INNOVATION`] standard deviations from it, in the signal's unit.
+    /// Mean level of the movements, in the signal's unit. Deviations from it are clipped at [`Turns::MOST_INNOVATION`]
+    /// standard deviations.
     pub level: f64,
-    /// Weight of the high turning point in a level, 0 to 1. High is where the target is.
+    /// Weight of the high turning point in a level, 0 to 1. The high turning point is the one with the larger target.
     pub high_share: f64,
-    /// What the signal goes back by at least before that is a turn, in the signal's unit.
+    /// Smallest change back that counts as a turn, in the signal's unit.
     pub least_span: f64,
     /// Standard deviation of levels, in the signal's unit.
     pub scatter: f64,
-    /// Movements of the calibration.
+    /// Number of movements in the calibration.
     pub movements: u32,
-    /// How far the median of five levels may be off, in the signal's unit.
+    /// Largest deviation of the median of five levels, in the signal's unit.
     pub limit: f64,
-    /// How far the running mean of levels may be off, in the signal's unit.
+    /// Largest deviation of the running mean of levels, in the signal's unit.
     pub mean_limit: f64,
-    /// The rate of false alarms that both limits are for, while movements are of the kind that the calibration saw.
+    /// Rate of false alarms of both limits together, for movements like those in the calibration.
     pub false_alarms_an_hour: f64,
-    /// Movements an hour of the calibration.
+    /// Movements per hour in the calibration.
     pub movements_an_hour: f64,
-    /// Share of a level's innovation by which a zero that is followed moves, 0 to 1.
+    /// Share of a level's innovation (its deviation from the expected level) by which a followed zero moves, 0 to 1.
     pub follow: f64,
     /// Change of the estimate per change of the signal at the level.
     pub reference_per_signal: f64,
 }
 
 impl Turns {
-    /// Levels whose median is compared with the limit.
+    /// Number of levels whose median is compared with the limit.
     pub const MEDIAN_OF: usize = 5;
     /// Weight of the newest level in the running mean: twenty movements are a minute or two.
     pub const MEAN_SHARE: f64 = 0.05;
-    /// What a level counts for at most in a mean, or in a zero that is followed, in standard deviations of levels: a movement
-    /// that ends elsewhere is no drift (Huber, Ann. Math. Stat. 35 (1964) 73, doi 10.1214/aoms/1177703732).
+    /// Largest deviation with which a level counts in a mean or in a followed zero, in standard deviations of levels. A
+    /// movement that ends elsewhere is not drift (Huber, Ann. Math. Stat. 35 (1964) 73, doi 10.1214/aoms/1177703732).
     pub const MOST_INNOVATION: f64 = 2.0;
 
     /// Checks every number.

@@ -1,4 +1,4 @@
-//! Several gauges: every kind of fault on every channel.
+//! Tests of the receptor of several gauges with every kind of fault on every channel.
 
 use stretch_core::{Design, Interval, Label, Provenance, SampleRate, Schema, Stage, Values};
 use stretch_sleeve::{
@@ -9,10 +9,11 @@ const CHANNELS: usize = 4;
 const HZ: f64 = 100.0;
 /// Sample at which a channel is lost.
 const AT: usize = 700;
-/// Samples within which a loss must be found.
+/// Number of samples within which a loss must be found.
 const SOON: usize = 10;
 
-/// Four gauges that follow one motion with gains of 1 to 4 V, so that each tells the whole.
+/// Four gauges that follow one motion with gains of 1 to 4 V, so that each alone determines the
+/// angle.
 fn calibration() -> ArrayCalibration<CHANNELS> {
     let gain = |k: usize| 1.0 + k as f64;
     let channel = |k: usize| ArrayChannel {
@@ -30,7 +31,7 @@ fn calibration() -> ArrayCalibration<CHANNELS> {
         .unwrap(),
         largest_jump: 0.1 * gain(k),
     };
-    // angle = 90 u with u from 0 to 1; a term is 2 u - 1, and the memory adds nothing
+    // angle = 90 u with u from 0 to 1. A term is 2 u - 1, and the memory adds nothing.
     let gains = |keep: &[usize]| ArrayGains {
         constant: 45.0,
         terms: (0..CHANNELS)
@@ -61,17 +62,18 @@ fn calibration() -> ArrayCalibration<CHANNELS> {
     .unwrap()
 }
 
-/// The motion, 0 to 1: it never rests for a whole window.
+/// The motion, 0 to 1, which never rests for as long as a window.
 fn motion(n: usize) -> f64 {
     0.5 + 0.4 * (2.0 * n as f64 / HZ).sin()
 }
 
 fn samples(n: usize) -> [f64; CHANNELS] {
-    // a little noise of a kind that never repeats
+    // Add a little noise that never repeats.
     std::array::from_fn(|k| (1.0 + k as f64) * (motion(n) + 1e-3 * ((n * (7 + k)) as f64).sin()))
 }
 
-/// What a fault makes of a sample, the sample at which it began, and how it is called.
+/// The function from a sample and the sample at the beginning of the fault to the faulty sample,
+/// and the expected reason.
 type Fault = (fn(f64, f64) -> f64, ArrayLoss);
 
 const FAULTS: [(&str, Fault); 5] = [
@@ -141,7 +143,7 @@ fn what_is_lost_says_so_in_the_deviation_and_comes_back_when_asked() {
     assert_eq!((alone.sd, alone.lost), (5.0, 0b0110));
     (0..CHANNELS).for_each(|k| memory.readmit(k));
     assert_eq!(run(&mut memory, &[], 200).map(|r| (r.lost, r.sd)), Ok((0, 2.0)));
-    // all are cut off
+    // All channels are cut off.
     assert_eq!(receptor.step(&mut memory, [99.0; CHANNELS]), Err(ArrayWithheld::AllLost));
     assert_eq!(run(&mut memory, &[], 250), Err(ArrayWithheld::AllLost));
 }
@@ -150,7 +152,7 @@ fn what_is_lost_says_so_in_the_deviation_and_comes_back_when_asked() {
 fn a_recorder_that_is_silent_costs_no_channel() {
     let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration());
     let mut memory = receptor.memory();
-    // the last channel is lost before
+    // The last channel is already lost.
     let channels = |n: usize| {
         let mut now = samples(n);
         now[3] = 99.0;
@@ -164,7 +166,7 @@ fn a_recorder_that_is_silent_costs_no_channel() {
         } else {
             let reading = reading.unwrap();
             assert_eq!(reading.lost, 0b1000, "at {n}");
-            // three samples are bridged, in which the motion goes on
+            // Three samples are bridged while the motion continues.
             let off = (reading.estimate - 90.0 * motion(n)).abs();
             assert!(off < if silent { 3.0 } else { 1.0 }, "off by {off} at {n}");
         }
@@ -187,7 +189,7 @@ fn a_short_gap_is_bridged() {
 
 #[test]
 fn a_gauge_at_the_end_of_its_converter_is_found_although_noise_takes_it_below() {
-    // the motion rises from here, and every third sample falls below the end
+    // The motion rises from here on, and every third sample falls below the end.
     const RISES: usize = 630;
     for channel in 0..CHANNELS {
         let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration());
@@ -213,12 +215,12 @@ fn outliers_and_a_recorder_that_repeats_itself_are_no_faults_of_a_channel() {
     let mut held = samples(0);
     for n in 0..20_000 {
         let mut now = samples(n);
-        // one sample in fifty is off by half a range, one channel after the other
+        // One sample in fifty is off by half a range, in one channel after another.
         if n % 50 == 0 {
             let channel = n / 50 % CHANNELS;
             now[channel] += 0.5 * (1.0 + channel as f64) * if motion(n) > 0.5 { -1.0 } else { 1.0 };
         }
-        // for 50 ms in two seconds no new sample comes from any channel
+        // For 50 ms in every two seconds, no channel has a new sample.
         if n % 200 >= 195 {
             now = held;
         }

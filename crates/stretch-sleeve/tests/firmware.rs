@@ -1,7 +1,7 @@
-//! The firmware's record of several gauges and its golden checksum are those of this code on this host.
+//! The firmware's calibration of several gauges and its golden checksum are those that this code produces on this host.
 //!
-//! After a change that is meant to alter them, write them anew with
-//! `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-sleeve --test it firmware`.
+//! After an intended change of either, write both again with `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-sleeve
+//! --test it firmware`.
 
 use std::{fs, path::PathBuf};
 
@@ -29,7 +29,7 @@ fn writes() -> bool {
     std::env::var_os("STRETCH_WRITE_FIRMWARE").is_some()
 }
 
-/// The trial of the firmware: converter codes, `u16::MAX` for a sample that did not come.
+/// Returns the trial of the firmware as converter codes. A missing sample is `u16::MAX`.
 fn trial() -> Vec<u16> {
     let bytes = fs::read(file("data/trial.u16le")).unwrap();
     bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect()

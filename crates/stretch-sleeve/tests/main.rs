@@ -1,4 +1,5 @@
-//! The tests of stretch-sleeve from outside, one program: linking takes longer than most of them.
+//! Integration tests of stretch-sleeve, in one program because linking takes longer than most of
+//! them.
 
 mod array;
 mod firmware;

@@ -1,4 +1,4 @@
-//! Records of gauges: what they hold, who reads them, and that no flipped bit of them is accepted.
+//! Files of calibrations: their content, their readers, and the rejection of every flipped bit.
 
 use std::fs;
 
@@ -12,7 +12,7 @@ use stretch_sleeve::{
     seal_record,
 };
 
-/// Levels at which movements turn.
+/// Draws the turning points of movements.
 fn turns() -> impl Strategy<Value = Turns> {
     let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 1e-6..1e3, 1e-3..1e3];
     (sizes, 0.0..1.0, -100.0..100.0, any::<u32>(), 0.0..0.2, -1e3..1e3).prop_map(
@@ -43,7 +43,7 @@ fn with_turns() -> GaugeCalibration {
     GaugeCalibration::new(example_calibration(), Some(some_turns())).unwrap()
 }
 
-/// How many of all single flipped bits are accepted.
+/// Counts how many of all single flipped bits are accepted.
 fn accepted(bytes: &[u8], accepts: impl Fn(&[u8]) -> bool) -> usize {
     assert!(accepts(bytes), "the record itself");
     let mut flipped = bytes.to_vec();
@@ -74,9 +74,9 @@ fn turns_stand_beside_a_calibration_in_text_and_are_checked() {
     let gauge = with_turns();
     let text = gauge.to_json().unwrap();
     assert_eq!(GaugeCalibration::from_json(&text, "cal.json").unwrap(), gauge);
-    // who reads a calibration passes over them
+    // A reader of a calibration skips the turning points.
     assert_eq!(&calibration_from_json(&text, "cal.json").unwrap(), gauge.calibration());
-    // without them the record is that of the calibration
+    // Without turning points the file is that of the calibration.
     let without = GaugeCalibration::new(example_calibration(), None).unwrap();
     assert_eq!(without.to_json().unwrap(), calibration_to_json(&example_calibration()).unwrap());
     let spoilt = |change: &dyn Fn(&mut Value)| {
@@ -176,12 +176,12 @@ fn a_hand_edit_is_told_apart_and_sealed_again() {
     assert_eq!(read_calibration(&path).unwrap().spec().dead_band, 0.125);
     let SleeveCalibration::One(sealed) = sealed else { panic!("one gauge") };
     assert_eq!(sealed.turns(), Some(&some_turns()));
-    // a digest that went with the edit
+    // An edit that also changes the name of the digest
     edit("\"digest\"", "\"digesd\"");
     assert!(refused().contains("digesd"));
     edit(",\n  \"digesd\"", ",\n  \"digest\"");
     edit("0.125", "-1.0");
-    // a seal is no pardon
+    // A new seal does not excuse an invalid value.
     let message = seal_record(&path).unwrap_err().to_string();
     assert!(message.contains("dead_band"), "{message}");
 }
@@ -204,7 +204,7 @@ fn records_with_sorted_fields_or_an_edit_are_told_as_such_and_sealed_again() {
         if let Some(field) = edited {
             *value.pointer_mut(field).unwrap() = json!(0.125);
         }
-        // as jq -S writes it
+        // The program jq -S writes files in this way.
         fs::write(&path, value.to_string()).unwrap();
         let message = SleeveCalibration::read(&path).unwrap_err().to_string();
         let says =
@@ -213,7 +213,7 @@ fn records_with_sorted_fields_or_an_edit_are_told_as_such_and_sealed_again() {
         let sealed = seal_record(&path).unwrap();
         assert_eq!(SleeveCalibration::read(&path).unwrap(), sealed);
         assert_eq!(&sealed == calibration, edited.is_none());
-        // no seal is a pardon
+        // A new seal does not excuse an unknown field.
         value["of_tomorrow"] = json!(1);
         fs::write(&path, value.to_string()).unwrap();
         let message = seal_record(&path).unwrap_err().to_string();

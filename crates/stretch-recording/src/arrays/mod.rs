@@ -1,4 +1,5 @@
-//! Named arrays, as NPZ holds them and the Python package makes them of other formats: which of them are clocks, and whose.
+//! Named arrays, as an NPZ file contains them or as the Python package converts them from other formats. This module
+//! decides which arrays are clocks (arrays of sample times) and which clock each other array belongs to.
 
 pub(crate) mod npy;
 
@@ -14,15 +15,16 @@ use crate::{
     text::bad_rows::BadRows,
 };
 
-/// Blocks in which a matrix is taken apart.
+/// Number of blocks of rows in which a matrix is split into columns.
 const BLOCKS: usize = 32;
 
-/// Columns of one array that are taken.
+/// Largest number of columns of one array. An array with more columns is left out.
 const MOST_COLUMNS: usize = 64;
 
-/// Longest array that is a date or a time of day rather than a clock, where there is a clock many times as long.
+/// Longest array that is taken for a date or a time of day instead of a clock, if there is a clock that is
+/// `MUCH_LONGER` times as long.
 const DATE: usize = 3;
-/// How many times as long that clock is.
+/// Smallest ratio of the length of that clock to the length of the array.
 const MUCH_LONGER: usize = 10;
 
 /// One array of numbers, the last index running fastest.
@@ -30,28 +32,30 @@ const MUCH_LONGER: usize = 10;
 pub struct Array {
     /// Path within the file, with `/` or `.` between its parts.
     pub name: String,
-    /// Lengths, the slowest index first.
+    /// Length of each dimension, that of the slowest index first.
     pub shape: Vec<usize>,
-    /// As many as the lengths say.
+    /// Elements, as many as the product of the lengths in `shape`.
     pub values: Vec<f64>,
 }
 
 /// Channels that were recorded at the same instants.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Clock {
-    /// What the array of the instants is called.
+    /// Name of the array of sample times.
     pub name: String,
-    /// The instants, s.
+    /// Sample times, s.
     pub time_s: Vec<f64>,
-    /// NaN where an instant has no value.
+    /// One value for each sample time, NaN if there is none.
     pub channels: Vec<Channel>,
 }
 
 impl Recording {
-    /// Reads named arrays as those of an NPZ file: the channels on one clock, and the clocks as they were recorded.
+    /// Reads named arrays in the same way as those of an NPZ file. Returns the recording, with all channels on one
+    /// clock, and the clocks as they were recorded, with their channels.
     ///
     /// # Errors
-    /// As [`Recording::read`] of such a file; an array whose lengths do not fit its values.
+    /// The errors of [`Recording::read`] for an NPZ file, and an error if the shape of an array does not match its
+    /// number of values.
     ///
     /// ```
     /// use stretch_recording::{Array, ReadOptions, Recording};
@@ -86,7 +90,8 @@ impl Recording {
         let (tracks, notes) = tracks(name, arrays, notes, options)?;
         let clocks = tracks.iter().map(|track| {
             let mut read = track.clone();
-            // A clock that nothing asked for is on stays as it was recorded if it cannot be read.
+            // A clock that cannot be read is returned as recorded. If the recording needs this clock, `merged` returns
+            // the error.
             if clock::read(name, &mut read, options, &mut Vec::new()).is_err() {
                 read = track.clone();
             }
@@ -102,7 +107,9 @@ impl Recording {
 }
 
 impl Array {
-    /// Rows and columns; `None` if it has more than two lengths above 1, or no values, because with a length of 0 the others can be anything.
+    /// Returns the number of rows and columns, without dimensions of length 1. Returns `None` if more than two
+    /// dimensions remain. Also returns `None` for an empty array, because next to a dimension of length 0 the others
+    /// can have any length.
     fn matrix(&self) -> Option<(usize, usize)> {
         if self.values.is_empty() {
             return None;
@@ -116,8 +123,9 @@ impl Array {
         }
     }
 
-    /// Number of its columns over `samples` instants, whichever way it lies, and the steps to the next sample and to the next column;
-    /// `None` if it has another length.
+    /// Returns the number of columns of `samples` values, and the steps in memory to the next sample and to the next
+    /// column. Samples may run along either dimension. Returns `None` if neither dimension has this length or if there
+    /// are too many columns.
     fn layout(&self, samples: usize) -> Option<(usize, usize, usize)> {
         let (rows, columns) = self.matrix()?;
         let (count, step, next) = match (rows == samples, columns == samples) {
@@ -128,10 +136,11 @@ impl Array {
         (count <= MOST_COLUMNS).then_some((count, step, next))
     }
 
-    /// Its columns over `samples` instants; `None` if it has another length.
+    /// Splits the array into columns of `samples` values. Returns `None` if no dimension has this length or if there
+    /// are too many columns.
     ///
-    /// Rows are moved from the last to the first, block by block, and what was moved is given back: in addition to the array itself there is never
-    /// more than a block.
+    /// Blocks of rows are moved from the last to the first, and the memory of each moved block is released. The peak
+    /// memory is therefore that of the array and one block.
     fn into_columns(mut self, samples: usize) -> Option<Vec<Channel>> {
         let (count, step, next) = self.layout(samples)?;
         if count == 1 {
@@ -139,7 +148,7 @@ impl Array {
         }
         let mut columns = vec![Vec::new(); count];
         if next == 1 {
-            // a row behind the other
+            // The values of one row are contiguous.
             let block = samples.div_ceil(BLOCKS);
             let mut left = samples;
             while left > 0 {
@@ -154,7 +163,7 @@ impl Array {
             }
             columns.iter_mut().for_each(|column| column.reverse());
         } else {
-            // a column behind the other
+            // The values of one column are contiguous.
             for (i, column) in columns.iter_mut().enumerate().rev() {
                 *column = self.values.split_off(i * next);
                 self.values.shrink_to_fit();
@@ -165,7 +174,7 @@ impl Array {
     }
 }
 
-/// Takes room for the time that the longest of some arrays will have.
+/// Reserves memory in `room` for the time of the longest array.
 pub(crate) fn beside(arrays: &[Array], room: &mut Room) -> Result<(), String> {
     let lengths = arrays.iter().filter_map(Array::matrix).map(|(rows, columns)| rows.max(columns));
     room.take_time(lengths.max().unwrap_or(0))
@@ -174,20 +183,20 @@ pub(crate) fn beside(arrays: &[Array], room: &mut Room) -> Result<(), String> {
 /// An array that may be a clock.
 #[derive(Debug, Clone)]
 struct Candidate {
-    /// The group that it is the clock of.
+    /// Name of the group of arrays that the clock belongs to. It can be empty.
     of: String,
-    /// How likely its name is that of a clock, 0 first.
+    /// Rank of its name among the usual names of a time. 0 is the likeliest.
     rank: usize,
     rises: bool,
 }
 
-/// A clock among the arrays.
+/// An array that is a clock, and the group that it belongs to.
 struct ClockArray {
     array: Array,
     of: String,
 }
 
-/// Gives each array to the clock that it runs on.
+/// Assigns each array to its clock. Returns one track (channels on one clock) per clock, and notes.
 pub(crate) fn tracks(
     file: &str,
     arrays: Vec<Array>,
@@ -237,7 +246,8 @@ pub(crate) fn tracks(
     Ok((clocks.into_iter().zip(channels).map(track).collect(), notes))
 }
 
-/// What the array is the clock of, if it can be one: named so, of one dimension, and rising.
+/// Returns the array as a candidate if it may be a clock: it has one dimension, more than one value and a suitable
+/// name, and it rises or its name is usual for a time.
 fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
     let (samples, 1) = array.matrix()? else { return None };
     let (group, last) = parts(&array.name);
@@ -249,7 +259,7 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
         false => return None,
     };
     let rank = if is_wanted { Some(0) } else { time_rank(last).map(|rank| rank + 1) };
-    // A clock may roll over, repeat its stamps, and begin with a stale one.
+    // Some steps back are allowed, because a clock may roll over, repeat its stamps or begin with a stale one.
     let back = array.values.windows(2).filter(|t| t[1] < t[0]).count();
     let rises =
         BadRows::are_few(back, samples) && array.values.iter().any(|t| *t != array.values[0]);
@@ -260,17 +270,19 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
     })
 }
 
-/// Which of the candidates are clocks.
+/// Decides which of the candidates are clocks.
 fn choose(arrays: &[Array], found: &[Option<Candidate>]) -> Vec<bool> {
     let all = || arrays.iter().zip(found).filter_map(|(a, found)| Some((a, found.as_ref()?)));
-    // One that does not rise is a clock only by its name, and reported as one where there is no other.
+    // A candidate that does not rise is a clock by its name only. It is accepted if no candidate rises, so that the
+    // error is about it.
     let one_rises = all().any(|(_, found)| found.rises);
     let longest = all().filter(|(_, c)| c.rises).map(|(a, _)| a.values.len()).max().unwrap_or(0);
     let is_clock = |array: &Array, own: &Candidate| {
         let samples = array.values.len();
         let is_date = samples <= DATE && longest >= MUCH_LONGER * samples;
         let (group, _) = parts(&array.name);
-        // In a group with a `time_s`, as in one with a likelier name, another array of times is a channel.
+        // An array of times is a channel if its group has a clock of the same length with a likelier name, such as
+        // `time_s`.
         let has_better = all().any(|(other, better)| {
             let is_same = better.of == own.of || (!group.is_empty() && group == better.of);
             let is_likelier = better.rank < own.rank && (better.rises || !own.rises);
@@ -282,12 +294,13 @@ fn choose(arrays: &[Array], found: &[Option<Candidate>]) -> Vec<bool> {
     pairs.map(|(array, own)| own.as_ref().is_some_and(|own| is_clock(array, own))).collect()
 }
 
-/// The group that a path leads to, and the last part.
+/// Splits a path into its group and its last part.
 fn parts(path: &str) -> (&str, &str) {
     path.rsplit_once(['/', '.']).unwrap_or(("", path))
 }
 
-/// The clock of an array: of its length, and with the nearest name; `None` if two are as near.
+/// Returns the index of the clock that has the length of the array and the nearest name. Returns `None` if no clock
+/// fits, or if two clocks are equally near and have different times.
 fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     let fits = clocks.iter().enumerate().filter_map(|(i, clock)| {
         array.layout(clock.array.values.len())?;
@@ -305,7 +318,8 @@ fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     }
 }
 
-/// How much a name says that it runs on the clock of `of`: its letters, if it is in that group or named after it.
+/// Rates how well the name of an array matches the group `of` of a clock: 1 if the group has no name, 1 plus the length
+/// of the group's name if the array is in the group or named after it, and 0 otherwise.
 fn nearness(name: &str, of: &str) -> usize {
     let path = name.to_lowercase().replace('.', "/");
     let of = of.to_lowercase().replace('.', "/");
@@ -320,7 +334,7 @@ fn nearness(name: &str, of: &str) -> usize {
     }
 }
 
-/// Arrays without a clock, at a rate that the file or an option says.
+/// Puts arrays without a clock on a clock with the rate that the option or else a scalar in the file gives.
 fn counted(
     file: &str,
     others: Vec<Array>,

@@ -1,7 +1,7 @@
 //! NumPy's arrays: one in an NPY file, several in an NPZ archive.
 //!
-//! The header is read here because the crate `npyz` brings 70 others, among them an old `zip` and a build from assembly, and
-//! allocates what a header asks for.
+//! The header is parsed here and not with the crate `npyz`, because `npyz` has 70 dependencies, among them an old `zip`
+//! and a build from assembly, and allocates as much memory as a header asks for.
 
 use std::io::Cursor;
 
@@ -16,7 +16,7 @@ use crate::{
 
 type Tracks = (Vec<Track>, Vec<String>);
 
-/// Reads one array: columns with names, or those that an option names.
+/// Reads an NPY file. Its columns have names in the file, or the option `columns` names them.
 pub(crate) fn read(
     (bytes, mut room): (Vec<u8>, Room),
     file: &str,
@@ -91,7 +91,7 @@ pub(crate) fn read_archive(
     tracks(file, arrays, notes, options)
 }
 
-/// The columns of a matrix by the names that an option gives.
+/// Splits a matrix into columns with the given names.
 fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     let (rows, columns) = match array.shape[..] {
         [rows] => (rows, 1),
@@ -118,18 +118,18 @@ fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     Ok(names.iter().enumerate().map(one).collect())
 }
 
-/// A number in memory: where it is in an item, and how it is written.
+/// Binary type of a number.
 #[derive(Debug, Clone, PartialEq)]
 struct Kind {
     is_big: bool,
     letter: u8,
     bytes: usize,
-    /// Of a date: in a second.
+    /// Counts per second of a date or a duration; 1 for other types.
     per_second: f64,
 }
 
 impl Kind {
-    /// From NumPy's spelling: `<f8`, `|b1`, `<M8[ns]`.
+    /// Parses NumPy's notation: `<f8`, `|b1`, `<M8[ns]`.
     fn parse(text: &str) -> Result<Self, String> {
         let fail = || format!("numbers of type {text} are not read; save them as float64");
         let mut letters = text.bytes();
@@ -163,21 +163,22 @@ impl Kind {
     }
 }
 
-/// A field of an item: its name, where it begins, what it is.
+/// A field of an item: its name, its offset in bytes, and its type.
 type Place = (String, usize, Kind);
 
-/// What an array's header says.
+/// Contents of an array's header.
 struct Head {
     fields: Vec<Place>,
     shape: Vec<usize>,
     is_fortran: bool,
-    /// Number of its items, bytes of each, and where the first is.
+    /// Number of items, bytes per item, and offset of the first item.
     count: usize,
     item: usize,
     begin: usize,
 }
 
-/// The arrays of one NPY file: one, or one a field. The outer error is that of the whole file: its room is used up.
+/// Parses one NPY file. Returns one array, or one per field of a structured array. The outer error means that the
+/// memory limit for the whole file is exceeded; the inner error is about this array only.
 fn parse(
     bytes: &[u8],
     name: &str,
@@ -194,7 +195,7 @@ fn parse(
         shape.reverse();
     }
     let array = |(name, at, kind): Place| {
-        // A date is counted in what the name of its column says.
+        // Dates are converted to the unit in which the reader of the time column will count them.
         let scale = match kind.letter {
             b'M' | b'm' => options.divisor(&name) / kind.per_second,
             _ => 1.0,
@@ -205,7 +206,7 @@ fn parse(
     Ok(Ok(fields.into_iter().map(array).collect()))
 }
 
-/// Reads an array's header, and whether all of its values are there.
+/// Reads an array's header and checks that all values are present.
 fn head(bytes: &[u8], name: &str) -> Result<Head, String> {
     let broken = || "it ends within its header; save it again with numpy.save".to_owned();
     let wide = bytes.get(6).is_some_and(|&version| version >= 2);
@@ -245,7 +246,7 @@ fn head(bytes: &[u8], name: &str) -> Result<Head, String> {
     Ok(Head { fields, shape, is_fortran, count, item, begin: data })
 }
 
-/// Fields of an item and its length in bytes.
+/// Returns the fields of an item and its length in bytes.
 fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
     let quoted = |text: &str| -> Vec<String> {
         text.split('\'').skip(1).step_by(2).map(str::to_owned).collect()
@@ -257,7 +258,7 @@ fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
         return Ok((vec![(name.to_owned(), 0, kind)], bytes));
     };
     let list = list.split_once(']').map_or(list, |(list, _)| list);
-    // `[ns]` of a date closes a bracket, too.
+    // The type of a date, such as `<M8[ns]`, also contains a closing bracket. The list ends at the last `],`.
     let whole = descr.rsplit_once("],").map_or(list, |(list, _)| list.trim_start_matches('['));
     let (mut places, mut at) = (Vec::new(), 0);
     for field in whole.split("),").filter(|f| f.contains('\'')) {
@@ -284,13 +285,13 @@ fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
     Ok((places, at))
 }
 
-/// The number of at most eight bytes.
+/// Returns an unsigned integer of at most eight bytes.
 fn word(bytes: &[u8], is_big: bool) -> u64 {
     let push = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
     if is_big { bytes.iter().fold(0, push) } else { bytes.iter().rev().fold(0, push) }
 }
 
-/// The value of a word of so many bytes whose first bit is the sign.
+/// Returns the value of a two's complement integer of `bytes` bytes.
 fn signed(word: u64, bytes: usize) -> f64 {
     let unused = 64 - 8 * bytes as u32;
     (((word << unused) as i64) >> unused) as f64

@@ -1,40 +1,43 @@
-//! The clock of a live stream, a stamp at a time.
+//! Converts the time stamps of a live stream to seconds, one at a time.
 
 use crate::{
     ReadOptions, TimeUnit,
     clock::{Steps, order, spread, unit},
 };
 
-/// Stamps in which the ticks of a coarse clock are looked for.
+/// Number of first stamps that are searched for a coarse clock. A clock is coarse if the resolution of its stamps (its
+/// tick) is not much shorter than the sample period.
 const LOOKED_AT: usize = 64;
 
 /// The clock of a stream.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LiveClock {
-    /// Counts in a second, once they are known.
+    /// Counts per second, once known. A count is one unit of a recorded time stamp.
     per_second: Option<f64>,
-    /// Whether they are taken for seconds because nothing says otherwise: then the first step decides.
+    /// Whether the unit is assumed to be seconds, because neither an option nor the name nor the value of the time
+    /// shows it. The first step then decides.
     is_assumed: bool,
-    /// Samples a second, if samples are counted.
+    /// Sample rate, if samples are counted instead of reading a time.
     rate_hz: Option<f64>,
-    /// Samples a second that are usual: they place the samples of the first stamp, before it has risen.
+    /// Expected sample rate, Hz. It places the samples that share the first stamp, shows the unit of the first step,
+    /// and evens out a coarse clock.
     usual_hz: Option<f64>,
-    /// The end of what the samples of the first stamp take, in counts.
+    /// Latest time given to a sample that has the first stamp, in counts.
     first_end: f64,
     /// The newest stamp, as it was recorded.
     last: Option<f64>,
-    /// What roll-overs add to it.
+    /// Offset that is added to recorded stamps, from roll-overs and a changed unit.
     added: f64,
-    /// The newest step that rises.
+    /// The newest positive step, in counts.
     tick: Option<f64>,
-    /// Samples and steps that rise.
+    /// Number of samples, and number of positive steps.
     samples: u64,
     ticks: u64,
     /// Samples since the stamp last rose.
     run: u64,
     /// The first stamps, until they show whether the clock is coarse.
     first: Vec<f64>,
-    /// The tick of a coarse clock, whose samples come at the usual rate; and the time of the newest sample, in counts.
+    /// Tick of a coarse clock, and time of the newest sample, both in counts.
     coarse: Option<f64>,
     even: f64,
     pub(crate) notes: Vec<String>,
@@ -48,7 +51,7 @@ pub(crate) struct NotRising {
 }
 
 impl LiveClock {
-    /// The clock of a column, or of samples that are counted.
+    /// Creates the clock of a time column, or of samples that are counted at `rate_hz`.
     pub(crate) fn new(column: Option<&str>, rate_hz: Option<f64>, options: &ReadOptions) -> Self {
         let named = || TimeUnit::of(column?);
         let per_second = options.time_unit.or_else(named).map(TimeUnit::per_second);
@@ -60,15 +63,15 @@ impl LiveClock {
         self.samples += 1;
     }
 
-    /// The stamps are dates, which count seconds whatever their column is called.
+    /// Sets the unit to seconds, because the stamps are dates. The name of the column does not matter.
     pub(crate) fn count_seconds(&mut self) {
         self.per_second = Some(1.0);
     }
 
-    /// Seconds of the next sample, whose stamp is a count from an origin.
+    /// Returns the time of the next sample in seconds, counted from `origin`. Its stamp is `origin + count`.
     ///
     /// # Errors
-    /// Time stays the same or goes back. The clock goes on from there.
+    /// Time stays the same or goes back. The clock continues from this stamp.
     pub(crate) fn take(&mut self, row: u64, count: f64, origin: f64) -> Result<f64, NotRising> {
         let sample = self.samples;
         self.samples += 1;
@@ -91,7 +94,7 @@ impl LiveClock {
             && let Some(other) = self.usual_hz.and_then(|usual_hz| unit::by_step(step, usual_hz))
         {
             self.notes.push(format!("by its steps, the time counts {}", other.plural()));
-            // the time goes on from that of the first sample
+            // Keep the time of the first sample, which was already returned.
             self.added = last * (other.per_second() / per_second - 1.0);
             self.first_end = last + self.added;
             per_second = other.per_second();
@@ -123,7 +126,7 @@ impl LiveClock {
                 return Ok(self.first_end / per_second);
             }
             let share = self.run as f64 * self.ticks as f64 / sample as f64;
-            // whatever comes, before the next tick
+            // Stay below the next tick, however many samples follow.
             let share = share.min((self.run + 1) as f64 / (self.run + 2) as f64);
             return Ok((stamp + share * tick).max(self.after_first(tick)) / per_second);
         }
@@ -140,7 +143,8 @@ impl LiveClock {
         Err(NotRising { time_s: count / per_second, previous_s })
     }
 
-    /// The time of a sample on a clock that is coarse, in counts: a usual period after the sample before, but within the tick of its stamp.
+    /// Returns the time of a sample on a coarse clock, in counts: one expected period after the previous sample,
+    /// limited to the tick of its stamp. Returns `None` if the clock is not known to be coarse.
     fn evened(&mut self, row: u64, stamp: f64, per_second: f64) -> Option<f64> {
         let period = per_second / self.usual_hz?;
         if self.coarse.is_none() && self.first.len() < LOOKED_AT {
@@ -158,7 +162,8 @@ impl LiveClock {
         self.coarse.map(|tick| (self.even + period).clamp(stamp, stamp + tick))
     }
 
-    /// The least count after the samples of the first stamp, which reach into the next where the usual rate is too low.
+    /// Returns the earliest time, in counts, after the samples of the first stamp. Those samples extend beyond the next
+    /// stamp if the expected rate is too low.
     fn after_first(&mut self, tick: f64) -> f64 {
         self.first_end += 1e-6 * tick;
         self.first_end

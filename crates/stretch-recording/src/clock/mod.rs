@@ -1,7 +1,7 @@
-//! What a clock is: which column holds the time, what its numbers count, and when each row was recorded.
+//! Determines which column is the time, which unit it has, and when each row was recorded.
 //!
-//! Every reader gives its time column to [`read`] (a live stream to [`live::LiveClock`]). What is repaired or left out is counted in a
-//! note; what could mean two things is an error that names the option to use.
+//! Every reader passes its time column to [`read`]; a live stream uses [`live::LiveClock`]. Repairs and rows that are
+//! left out are counted in a note. An ambiguous time is an error that names the option to use.
 
 pub(crate) mod live;
 mod order;
@@ -19,27 +19,29 @@ use crate::{
     text::bad_rows::BadRows,
 };
 
-/// Seconds since 1970 in any recording; no recorder runs for three years.
+/// Smallest time, s, that is taken for seconds since 1970. It is about three years, and no recorder runs that long.
 pub(crate) const EPOCH_S: f64 = 1e8;
-/// Samples that may be lost where a clock rolls over or stops, plus one; as many as a live receptor bridges.
+/// Longest step, in sample periods, that is not a gap and that a clock may make where it rolls over. Three lost
+/// samples, as many as a live receptor bridges, are a step of four periods.
 pub(crate) const BRIDGED: f64 = 4.5;
 
 /// A column of time as it was recorded.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Stamps {
-    /// What the column is called.
+    /// Name of the column.
     pub(crate) name: String,
-    /// What was recorded, less `origin`.
+    /// Recorded values minus `origin`.
     pub(crate) counts: Vec<f64>,
-    /// What the counts are counted from.
+    /// Recorded value at which `counts` is 0.
     pub(crate) origin: f64,
-    /// Counts in a second, if the format says so or the samples are counted.
+    /// Counts per second, if the format defines them or the samples are counted.
     pub(crate) per_second: Option<f64>,
     /// Where each count is in the file.
     pub(crate) rows: Rows,
 }
 
-/// Rows of a file, in the order in which they were read: where they begin anew, and from which row.
+/// Row numbers of the samples, in the order in which they were read. Consecutive rows form a run: `begins` holds the
+/// first sample of each run and its row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Rows {
     begins: Vec<(usize, u64)>,
@@ -48,7 +50,7 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// So many rows, the first of which is row 1.
+    /// Creates `count` rows, the first of which is row 1.
     pub(crate) fn counted(count: usize) -> Self {
         Self { begins: vec![(0, 1)], count, next: count as u64 + 1 }
     }
@@ -77,7 +79,7 @@ impl Rows {
 }
 
 impl Stamps {
-    /// The time of so many samples that are counted at a rate.
+    /// Creates the time of `count` samples at a constant rate.
     pub(crate) fn at_rate(count: usize, rate_hz: f64) -> Self {
         Self {
             name: TIME.to_owned(),
@@ -98,20 +100,20 @@ impl Stamps {
     }
 }
 
-/// Steps from stamp to stamp.
+/// Statistics of the steps from one stamp to the next, in counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Steps {
-    /// Median of those that rise.
+    /// Median positive step.
     tick: f64,
-    /// Mean step from sample to sample without gaps: shorter than a tick if stamps repeat.
+    /// Mean step from sample to sample without gaps. It is shorter than `tick` if stamps repeat.
     sample: f64,
-    /// How many do not rise, and how many go back.
+    /// Number of steps that are zero, and number of steps that go back.
     repeated: usize,
     back: usize,
 }
 
 impl Steps {
-    /// None if no step rises.
+    /// Returns `None` if no step is positive.
     fn of(counts: &[f64]) -> Option<Self> {
         let mut rising = Vec::with_capacity(counts.len());
         let (mut repeated, mut back) = (0, 0);
@@ -135,7 +137,8 @@ impl Steps {
     }
 }
 
-/// Where the time is among names: under the name that is asked for, or under one that is usual for it.
+/// Returns the index of the time among column names. The time has the requested name or, if none was requested, a name
+/// that is usual for a time.
 pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usize> {
     let wanted = &options.time;
     let usual = || {
@@ -143,7 +146,7 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         let stamp = || names.iter().position(|s| names.iter().any(|ns| are_a_stamp(s, ns)));
         ranked.min().map(|(_, i)| i).or_else(stamp)
     };
-    // A name of which only a word says so must be the only one.
+    // A name that only contains a word for time must be the only such name.
     let only = || {
         let mut may_be = names.iter().enumerate().filter(|(_, name)| may_be_time(name));
         may_be.next().filter(|_| may_be.next().is_none()).map(|(i, _)| i)
@@ -155,14 +158,15 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         .or_else(|| if wanted == TIME { guessed() } else { None })
 }
 
-/// A note on samples that are counted, whatever a column of time says.
+/// Returns the note that samples are counted and that a time column, if there is one, is not read.
 pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
     let time =
         column.map_or("there is no time".to_owned(), |name| format!("column {name} is not read"));
     format!("{time}: samples are counted at {rate_hz} Hz, {by}")
 }
 
-/// A note on a time that counts from long ago, or is a time of day, and is counted from its first sample instead.
+/// Returns the note that time is counted from the first sample, because it was recorded as a time of day or counts from
+/// a distant origin.
 pub(crate) fn note_on_epoch(first_s: f64) -> String {
     if first_s.abs() < EPOCH_S {
         return "time counts from the first sample".to_owned();
@@ -170,10 +174,11 @@ pub(crate) fn note_on_epoch(first_s: f64) -> String {
     format!("time counts from the first sample, {}", date(first_s))
 }
 
-/// Reads a track's clock: its counts then rise and are free of roll-overs, and what a second is in them is known.
+/// Repairs the clock of a track (channels on one clock). Afterwards its counts increase, are free of roll-overs and
+/// have a known unit.
 ///
 /// # Errors
-/// What the counts mean is open; no recording has such a rate; too many rows have a stamp that cannot be right.
+/// The unit is ambiguous, the sample rate is implausible, or too many rows have an impossible stamp.
 pub(crate) fn read(
     file: &str,
     track: &mut Track,
@@ -206,7 +211,7 @@ pub(crate) fn read(
         let what = "is long before the others";
         leave_out(file, track, &(0..unset).collect::<Vec<_>>(), what, options, notes)?;
     }
-    // Most recordings are as they should be, and their steps are looked at once.
+    // Compute the steps a second time only after a repair. Most recordings need none.
     if steps.back > 0 || track.stamps.counts.len() < samples {
         let anew = Steps::of(&track.stamps.counts);
         steps = anew.ok_or_else(|| never_rises(file, &track.stamps))?;
@@ -216,12 +221,12 @@ pub(crate) fn read(
     unit::check_rate(file, &track.stamps, steps, options)
 }
 
-/// Adds the nanoseconds that have a column of their own to whole seconds, and says so.
+/// Adds a separate column of nanoseconds to the whole seconds, and returns a note.
 fn add_nanoseconds(track: &mut Track) -> Option<String> {
     let Track { stamps, channels, .. } = track;
     let at = channels.iter().position(|c| are_a_stamp(&stamps.name, &c.name))?;
     let nanoseconds = channels.remove(at);
-    // differences from the first stamp keep all digits
+    // Subtract the first stamp first, so that no digits are lost.
     let first = stamps.counts.iter().copied().find(|count| count.is_finite())?;
     stamps.origin += first;
     for (count, ns) in stamps.counts.iter_mut().zip(&nanoseconds.values) {
@@ -231,10 +236,10 @@ fn add_nanoseconds(track: &mut Track) -> Option<String> {
     Some(format!("column {} is added to {}", nanoseconds.name, stamps.name))
 }
 
-/// Leaves out rows whose stamps cannot be right, with a note.
+/// Leaves out rows with impossible stamps, and adds a note.
 ///
 /// # Errors
-/// They are too many, or no row may be left out.
+/// There are too many such rows, or the option `strict` allows none.
 fn leave_out(
     file: &str,
     track: &mut Track,
@@ -265,14 +270,14 @@ fn leave_out(
     Ok(())
 }
 
-/// Where time goes back for the first time.
+/// Returns the place at which time goes back for the first time, and a description.
 fn goes_back(file: &str, stamps: &Stamps) -> Option<(Place, String)> {
     let last = stamps.counts.windows(2).position(|t| t[1] < t[0])?;
     let (from, to) = (stamps.recorded(last), stamps.recorded(last + 1));
     Some((stamps.place(file, last + 1), format!("time goes back from {from} to {to}")))
 }
 
-/// The error for stamps of which none rises.
+/// Returns the error for stamps without a positive step.
 fn never_rises(file: &str, stamps: &Stamps) -> RecordingError {
     let still =
         || (stamps.place(file, 1), format!("time does not advance at {}", stamps.recorded(1)));

@@ -1,31 +1,36 @@
-//! Stamps that go back: counters that roll over, and rows whose stamps are out of order.
+//! Stamps that go back because a counter rolls over, and stamps from before the clock was set.
 
 use crate::clock::{BRIDGED, Stamps};
 
-/// Bits after which counters begin again.
+/// Widths of counters that roll over, bits.
 const BITS: [i32; 4] = [16, 24, 31, 32];
-/// Seconds after which times begin again: the hour, half a day, a day, a week of GPS.
+/// Periods after which a time of day or of the week starts again, s: an hour, half a day, a day, a GPS week.
 const PERIODS_S: [f64; 4] = [3600.0, 43_200.0, 86_400.0, 604_800.0];
-/// Steps that a counter holds at least.
+/// Shortest period of a counter, in steps.
 const SHORTEST: f64 = 3.0;
-/// A counter that holds more steps than this may lose samples where it rolls over; steps over the end of a shorter one, which may be so
-/// long by chance, differ by less than this share.
+/// A counter whose period is more than `LONG` steps may lose samples where it rolls over. With a shorter period, a step
+/// back can look like a roll-over by chance. The step across the roll-over must therefore match the others within the
+/// share `SAME`.
 const LONG: f64 = 100.0;
 const SAME: f64 = 0.02;
-/// Share of what a counter holds, at either end, between which samples may be lost where it rolls over.
+/// Longest step across a roll-over, as a share of the period, if both stamps lie within the range of the counter. More
+/// samples may be lost there than `BRIDGED` allows.
 const END: f64 = 0.01;
-/// Gap after stamps of a clock that was not set yet, in lengths of all that follows, and in steps.
+/// Shortest gap after the stamps of a clock that was not set yet, in lengths of the recording after the gap, and in
+/// steps. Both must be exceeded.
 const UNSET: (f64, f64) = (10.0, 1e6);
 
-/// Counts after which a clock with so many a second may begin again: those of a counter, also one whose counts were divided.
+/// Returns the periods, in counts, of clocks with `per_second` counts per second. They include counters of ms, us or ns
+/// whose values were then converted to another unit.
 fn moduli(per_second: f64) -> impl Iterator<Item = f64> {
     let units = [1.0, per_second / 1e3, per_second / 1e6, per_second / 1e9];
     let counters = BITS.into_iter().flat_map(move |bits| units.map(|unit| 2_f64.powi(bits) * unit));
     counters.chain(PERIODS_S.map(|period_s| period_s * per_second))
 }
 
-/// What is added to a stamp that goes back, if a clock rolled over: the step over its end is then as long as the others, or leads from
-/// the end of a counter to its beginning. The stamps are as recorded.
+/// Returns the period to add if a stamp goes back because the clock rolled over. The step across the roll-over must be
+/// about as long as the others, or lead from the end of the counter's range to its beginning. The stamps are as
+/// recorded.
 pub(super) fn roll_over(from: f64, to: f64, step: f64, per_second: f64) -> Option<f64> {
     moduli(per_second).find(|modulus| {
         let (over_the_end, length) = (to - from + modulus, modulus / step);
@@ -37,7 +42,7 @@ pub(super) fn roll_over(from: f64, to: f64, step: f64, per_second: f64) -> Optio
     })
 }
 
-/// Adds what a clock lost where it rolled over, and says so.
+/// Adds the period of the clock after each roll-over, and returns a note.
 pub(super) fn unroll(stamps: &mut Stamps, step: f64, per_second: f64) -> Option<String> {
     let (mut added, mut first, mut times) = (0.0, None, 0);
     for i in 1..stamps.counts.len() {
@@ -65,7 +70,8 @@ pub(super) fn note(row: u64, added_s: f64, times: usize) -> String {
     }
 }
 
-/// How many of the first samples were stamped before the clock was set: the gap behind them is many times what follows.
+/// Counts the first samples that were stamped before the clock was set. The gap after them is many times as long as the
+/// rest of the recording.
 pub(super) fn before_the_clock_was_set(counts: &[f64], step: f64) -> usize {
     let Some(last) = counts.last() else { return 0 };
     let is_gap = |i: &usize| {

@@ -1,26 +1,29 @@
-//! Stamps that repeat or come in coarse ticks: samples are spread evenly within the ticks.
+//! Stamps that repeat or have a coarse resolution (tick). Their samples are spread evenly within the ticks.
 
 use crate::clock::{Stamps, Steps};
 
-/// One stamp in so many that repeats makes the clock a coarse one.
+/// A clock is coarse if at least one stamp in this many repeats.
 const ONE_IN: usize = 20;
-/// One step in so many of another number of ticks does, too: fewer may be lost samples, also at regular times.
+/// A clock without repeated stamps is coarse if at least one step in this many is not the usual number of ticks. Fewer
+/// such steps may be lost samples, even if they are regular.
 const OTHER_ONE_IN: usize = 5;
-/// Fewest steps of another number of ticks that do.
+/// Smallest number of such steps on a coarse clock.
 const FEWEST: usize = 8;
-/// Most ticks between two samples of a clock that is called coarse.
+/// Largest median step of a coarse clock, in shortest steps.
 const MOST_TICKS: f64 = 3.5;
-/// By how much of a tick a step may differ from whole ticks: clocks of 15.6 ms are written as 15 and 16.
+/// Largest difference between a step and a whole number of ticks, in ticks. Recorded steps are rounded: 15.6 ms are
+/// written as 15 or 16.
 const WHOLE: f64 = 0.15;
-/// How far stamps may be from an even clock, in ticks, beyond the one by which ticks are coarse.
+/// Allowed range of the deviations of stamps from an even clock, in ticks, in addition to the one tick of the coarse
+/// resolution.
 const ROUNDING: f64 = 0.02;
-/// The same if stamps repeat: ticks themselves come early and late.
+/// The same allowance for stamps that repeat. It is larger because their ticks have jitter.
 const JITTERED: f64 = 1.0;
-/// Ticks after which a coarse clock has a gap.
+/// Longest step of a coarse clock without a gap, in ticks.
 const GAP: f64 = 3.5;
 
-/// Spreads samples with the same stamp evenly up to the next one, and those of a coarse clock along an even one; the samples for which
-/// there is no time left.
+/// Spreads samples with the same stamp evenly up to the next stamp, and the samples of a coarse clock along an even
+/// clock. Returns the samples for which there is no time left.
 pub(super) fn spread(
     stamps: &mut Stamps,
     steps: Steps,
@@ -59,20 +62,20 @@ pub(super) fn spread(
     left_out
 }
 
-/// Whether an even clock of this step is nowhere farther from the stamps than a tick.
+/// Returns whether the deviations of the stamps from an even clock of this step span at most about one tick.
 pub(super) fn is_even(counts: &[f64], step: f64, tick: f64) -> bool {
     let (least, greatest) = offsets(counts, step);
     greatest - least <= (1.0 + ROUNDING) * tick
 }
 
-/// With one digit and so many more.
+/// Rounds a value to `1 + more` significant digits.
 pub(super) fn rounded(value: f64, more: i32) -> f64 {
     let scale = 10_f64.powi(more.saturating_sub(value.abs().log10().floor() as i32));
     let rounded = (value * scale).round() / scale;
     if rounded.is_finite() { rounded } else { value }
 }
 
-/// The tick of a clock without repeated stamps whose steps are now one number of ticks, now another.
+/// Returns the tick of a coarse clock without repeated stamps, on which steps are different whole numbers of ticks.
 pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     if steps.repeated > 0 {
         return None;
@@ -82,7 +85,7 @@ pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     if steps.tick > MOST_TICKS * least {
         return None;
     }
-    // Most clocks are even; that needs no division.
+    // Most clocks are even. This check needs no division.
     let is_other = |step: &f64| (step - steps.tick).abs() > 0.5 * least;
     if all().filter(is_other).count() < FEWEST {
         return None;
@@ -105,8 +108,8 @@ pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     (others >= FEWEST && others * OTHER_ONE_IN >= counts.len()).then_some(tick)
 }
 
-/// Puts the samples between gaps on an even clock that no stamp is more than `most` ticks away from; the step of that clock. None, and
-/// nothing is changed, if there is no such clock.
+/// Puts the samples between gaps on an even clock, and returns the step of that clock. The deviations of the stamps
+/// from it span at most `most` ticks. If there is no such clock, nothing is changed and `None` is returned.
 fn even_out(counts: &mut [f64], tick: f64, most: f64, per_second: f64) -> Option<f64> {
     let parts: Vec<&mut [f64]> = counts.chunk_by_mut(|a, b| b - a <= GAP * tick).collect();
     let longest = parts.iter().max_by_key(|part| part.len())?;
@@ -116,7 +119,7 @@ fn even_out(counts: &mut [f64], tick: f64, most: f64, per_second: f64) -> Option
         let (least, greatest) = offsets(part, step);
         greatest - least
     };
-    // The rate with the fewest digits that fits as well as any.
+    // Prefer the rate with the fewest digits that fits as well as the fitted rate.
     let as_good = range(longest, fitted).max(tick) * (1.0 + 1e-3);
     let nice = (0..6).find_map(|more| {
         let step = per_second / rounded(per_second / fitted, more);
@@ -133,7 +136,7 @@ fn even_out(counts: &mut [f64], tick: f64, most: f64, per_second: f64) -> Option
     Some(step)
 }
 
-/// Step of the straight line through samples.
+/// Returns the slope of the least-squares line through the stamps of consecutive samples.
 fn slope(part: &[f64]) -> Option<f64> {
     let middle = (part.len() as f64 - 1.0) / 2.0;
     let (mut across, mut along) = (0.0, 0.0);
@@ -144,14 +147,15 @@ fn slope(part: &[f64]) -> Option<f64> {
     Some(along / across).filter(|slope| *slope > 0.0 && slope.is_finite())
 }
 
-/// Least and greatest stamp less the time of an even clock.
+/// Returns the smallest and largest difference between a stamp and an even clock that starts at 0.
 fn offsets(part: &[f64], step: f64) -> (f64, f64) {
     let offset = part.iter().enumerate().map(|(i, count)| count - i as f64 * step);
     offset.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
 }
 
-/// Spreads each run of samples with one stamp up to the next stamp; the samples for which there is no room: on a clock that is not
-/// coarse, those that came within less than their usual steps.
+/// Spreads each run of samples with the same stamp up to the next stamp. Returns the samples for which there is no
+/// time. On a clock that is not coarse, these are the repeats in a run that is too short for its samples at the usual
+/// step.
 fn spread_runs(counts: &mut [f64], steps: Steps, is_coarse: bool) -> Vec<usize> {
     let (mut left_out, mut begin) = (Vec::new(), 0);
     while begin < counts.len() {

@@ -1,4 +1,4 @@
-//! What the numbers of a time column count: by an option, by the format, by the column's name and by the numbers themselves.
+//! Unit of a time column, from an option, the format, the name of the column, or its values.
 
 use std::ops::RangeInclusive;
 
@@ -7,32 +7,33 @@ use crate::{
     clock::{Stamps, Steps},
 };
 
-/// Rates that are recorded, Hz, if an option says what the time counts.
+/// Accepted sample rates, Hz, if an option gives the unit or the rate.
 pub(crate) const RATES_HZ: RangeInclusive<f64> = 1e-3..=1e7;
-/// Rates that are recorded if no option does: a stretch is not sampled at megahertz.
+/// Accepted sample rates, Hz, without such an option. A stretch sensor is not sampled at megahertz.
 const USUAL_HZ: RangeInclusive<f64> = 1e-3..=1e6;
-/// Rates of nearly all recordings.
+/// Sample rates of nearly all recordings, Hz.
 const LIKELY_HZ: RangeInclusive<f64> = 0.5..=5e3;
 /// Seconds since 1970, from 1989 to 2103.
 const SINCE_1970_S: RangeInclusive<f64> = 6e8..=4.2e9;
-/// Days of a spreadsheet (from 1954 to 2119), of MATLAB, and Julian days.
+/// Day numbers of spreadsheets (from 1954 to 2119) and of MATLAB, and Julian days.
 const DAYS: [RangeInclusive<f64>; 3] = [2e4..=8e4, 7e5..=7.8e5, 2.43e6..=2.5e6];
-/// A clock of seconds that is faster than this may be one of days.
+/// Sample rate, Hz, above which a time that was taken for seconds may be in days.
 const DAYS_HZ: f64 = 1e4;
-/// Fewest samples that distinguish a slow recording from a wrong unit.
+/// Smallest number of samples for which a rate of at most 1 Hz is reported as an ambiguous unit.
 const TELLING: usize = 50;
 
-/// A step's rate over the usual one, if its unit is right: stamps come early and late.
+/// Ratio of the rate of one step to the expected rate if the unit is right. The range is wide because stamps have
+/// jitter.
 const NEAR: RangeInclusive<f64> = 0.25..=4.0;
 
-/// Units of a count since 1970.
+/// Units in which time since 1970 is counted.
 const EPOCHS: [TimeUnit; 4] =
     [TimeUnit::Seconds, TimeUnit::Milliseconds, TimeUnit::Microseconds, TimeUnit::Nanoseconds];
 
-/// Counts in a second.
+/// Returns the counts per second of a time column.
 ///
 /// # Errors
-/// Two units are as likely.
+/// Seconds and milliseconds are both plausible.
 pub(super) fn decide(
     file: &str,
     stamps: &Stamps,
@@ -66,13 +67,13 @@ pub(super) fn decide(
     Ok(unit.per_second())
 }
 
-/// The unit that the numbers show, if it is not the one of the name.
+/// Returns the unit that the values show, if it differs from that of the name (seconds if the name has none).
 fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<TimeUnit> {
     let value = stamps.recorded(stamps.counts.len() / 2);
     let rate_hz = |unit: TimeUnit| unit.per_second() / steps.sample;
     let own = named.unwrap_or(TimeUnit::Seconds);
     let other = if let Some(epoch) = epoch(value).filter(|unit| USUAL_HZ.contains(&rate_hz(*unit)))
-        // A name is wrong only if it makes a date that no recording has.
+        // The values override a name only if its unit would give a date that no recording has.
         && (named.is_none() || value / own.per_second() > *SINCE_1970_S.end())
     {
         Some(epoch)
@@ -87,7 +88,7 @@ fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<T
     other.filter(|other| *other != own)
 }
 
-/// The unit other than seconds in which a step is near that of a usual rate.
+/// Returns the unit in which a step fits the expected rate, if it does not fit in seconds.
 pub(super) fn by_step(step: f64, usual_hz: f64) -> Option<TimeUnit> {
     let is_near = |unit: TimeUnit| NEAR.contains(&(unit.per_second() / step / usual_hz));
     let others = [
@@ -100,7 +101,7 @@ pub(super) fn by_step(step: f64, usual_hz: f64) -> Option<TimeUnit> {
     others.into_iter().find(|unit| is_near(*unit)).filter(|_| !is_near(TimeUnit::Seconds))
 }
 
-/// The unit in which a number is a time since 1970 of our days.
+/// Returns the unit in which a number is a plausible time since 1970.
 pub(super) fn epoch(value: f64) -> Option<TimeUnit> {
     EPOCHS.into_iter().find(|unit| SINCE_1970_S.contains(&(value / unit.per_second())))
 }
@@ -109,7 +110,7 @@ fn are_days(value: f64) -> bool {
     DAYS.iter().any(|days| days.contains(&value))
 }
 
-/// Refuses a rate that no recording has.
+/// Refuses an implausible sample rate.
 pub(super) fn check_rate(
     file: &str,
     stamps: &Stamps,

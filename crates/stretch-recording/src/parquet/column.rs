@@ -1,4 +1,4 @@
-//! A column of a Parquet file: a number a row, or a list of numbers a row.
+//! A column of a Parquet file, with a number or a list of numbers in each row.
 
 use ::parquet::{
     basic::{ConvertedType as Kind, LogicalType, TimeUnit as Unit},
@@ -13,28 +13,29 @@ use stretch_data::Channel;
 
 use crate::room::Room;
 
-/// Rows that are taken at once.
+/// Number of rows that are read at once.
 const PIECE: usize = 1 << 16;
 /// Longest list whose numbers become channels.
 const LONGEST: usize = 64;
-/// Memory of a number of a list while it is read, bytes: itself twice, its two levels, where its list begins, in lists that grow to twice their length.
+/// Memory for each number of a list while it is read, bytes. It covers the number twice, its two levels and the
+/// beginning of its list, in vectors that grow to twice their length.
 const LISTED: u64 = 48;
 
 /// Numbers of a column as they are read.
 #[derive(Debug, Default)]
 struct Values {
     numbers: Vec<f64>,
-    /// Of a column of lists: where each row's list begins among the numbers.
+    /// For a column of lists: index in `numbers` at which the list of each row begins.
     begins: Vec<usize>,
 }
 
 /// Why a column gives no channels.
 pub(super) enum Refused {
-    /// It is none of numbers; the file can be read without it.
+    /// The column does not contain numbers. The file can be read without it.
     LeftOut(String),
     /// The file cannot be read.
     File(String),
-    /// What the library says of the file.
+    /// Error of the Parquet library.
     Damaged(ParquetError),
 }
 
@@ -44,7 +45,8 @@ impl From<ParquetError> for Refused {
     }
 }
 
-/// Reads column `i` of a file with so many rows: a channel, or one an item where its rows hold lists of one length. What has no value is NaN.
+/// Reads column `i` of a file with `rows` rows. Returns one channel, or one per list item if the rows contain lists of
+/// equal length. Missing values are NaN.
 pub(super) fn read(
     file: &dyn FileReader,
     i: usize,
@@ -63,14 +65,14 @@ pub(super) fn read(
     }
     for group in 0..file.num_row_groups() {
         let group = file.get_row_group(group)?;
-        // more rows than the file says it has are no rows of it
+        // Refuse row groups with more rows than the metadata of the file declares.
         let its_rows = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
         let have = if is_list { values.begins.len() } else { values.numbers.len() };
         if its_rows > rows - have.min(rows) {
             let why = "its groups hold more rows than the file; write it again";
             return Err(Refused::File(why.to_owned()));
         }
-        // its pages are in memory while it is read
+        // The pages of a row group are in memory while it is read.
         let pages = usize::try_from(group.metadata().column(i).uncompressed_size());
         let pages = pages.unwrap_or(usize::MAX);
         room.take(pages as u64).map_err(Refused::File)?;
@@ -90,7 +92,7 @@ pub(super) fn read(
     }
 }
 
-/// Counts in a second, where a column holds stamps.
+/// Returns the counts per second, if a column contains time stamps.
 pub(super) fn stamp_counts(column: &ColumnDescriptor) -> Option<f64> {
     let unit = match column.logical_type_ref()? {
         LogicalType::Timestamp(stamp) => stamp.unit,
@@ -105,7 +107,7 @@ pub(super) fn stamp_counts(column: &ColumnDescriptor) -> Option<f64> {
 }
 
 impl Values {
-    /// A channel an item of lists of one length: `action.0`, `action.1` ...
+    /// Returns one channel for each item of lists of equal length: `action.0`, `action.1` ...
     fn items(&self, name: &str, rows: usize) -> Result<Vec<Channel>, String> {
         let count = self.numbers.len().checked_div(rows).unwrap_or(0);
         let begins = self.begins.iter().enumerate();
@@ -125,11 +127,11 @@ impl Values {
     }
 }
 
-/// How many values a group's column holds by the heads of its pages, empty lists among them.
+/// Counts the values in a column of a row group, including empty lists, from the page headers.
 fn levels(group: &dyn RowGroupReader, i: usize) -> Result<u64, ParquetError> {
     let (mut pages, mut all) = (group.get_column_page_reader(i)?, 0_u64);
     while let Some(page) = pages.peek_next_page()? {
-        // of an older page its rows are all that is said, which are its values
+        // An older page states only a number of rows, which then equals the number of values.
         let values = page.num_levels.or(page.num_rows).unwrap_or(0);
         all = all.saturating_add(if page.is_dict { 0 } else { values as u64 });
         pages.skip_next_page()?;
@@ -137,7 +139,7 @@ fn levels(group: &dyn RowGroupReader, i: usize) -> Result<u64, ParquetError> {
     Ok(all)
 }
 
-/// Appends a row group's column; false where it holds no numbers.
+/// Appends a column of a row group. Returns false if the column does not contain numbers.
 fn append_group(
     group: &dyn RowGroupReader,
     i: usize,
@@ -191,7 +193,7 @@ fn append<T: DataType>(
         if records == 0 {
             break;
         }
-        // a level of 0 begins the list of another row
+        // A repetition level of 0 begins the list of the next row.
         let first = into.numbers.len();
         let begins = lists.iter().enumerate().filter(|(_, level)| **level == 0);
         into.begins.extend(begins.map(|(i, _)| first + i));
@@ -199,7 +201,7 @@ fn append<T: DataType>(
         if full == 0 {
             into.numbers.extend(read);
         } else {
-            // A level below the full one is a row without a value.
+            // A definition level below the maximum means that the value is missing.
             let whole = |level: i16| if level == full { read.next() } else { None };
             into.numbers.extend(levels.drain(..).map(whole).map(|x| x.unwrap_or(f64::NAN)));
         }

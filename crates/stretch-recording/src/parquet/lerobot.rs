@@ -1,4 +1,4 @@
-//! LeRobot's data sets: Parquet tables of episodes, with what their columns mean in `meta/info.json` next to them.
+//! LeRobot data sets: Parquet tables of episodes. The file `meta/info.json` describes their columns.
 
 use std::{io::Read, path::Path};
 
@@ -8,13 +8,13 @@ use stretch_data::{Channel, files::open_input};
 
 use crate::grid::Track;
 
-/// The column that says of which episode a row is.
+/// Column with the number of the episode of each row.
 const EPISODE: &str = "episode_index";
 /// The longest description that is read, bytes.
 const LONGEST: u64 = 16 << 20;
 
-/// Calls the items of lists as the data set's description does: `action.0` becomes `action.elbow.pos`. A file that is in no data set keeps
-/// its numbers.
+/// Renames list items as the description of the data set names them: `action.0` becomes `action.elbow.pos`. The items
+/// of a file outside a data set keep their numbers.
 pub(crate) fn name(file: &Path, channels: &mut [Channel]) {
     let Some(features) = features(file) else { return };
     for channel in channels {
@@ -29,7 +29,8 @@ pub(crate) fn name(file: &Path, channels: &mut [Channel]) {
     }
 }
 
-/// What the columns are, from `meta/info.json` above `data/chunk-000/file.parquet`.
+/// Reads the description of the columns from `meta/info.json`, in the folder that contains
+/// `data/chunk-000/file.parquet`.
 fn features(file: &Path) -> Option<Value> {
     let root = file.ancestors().nth(3)?;
     let mut text = String::new();
@@ -39,7 +40,7 @@ fn features(file: &Path) -> Option<Value> {
     info.get_mut("features").map(Value::take)
 }
 
-/// Names of the items: a list, or a list under a word such as `motors`.
+/// Returns the names of the items: a list, or a list under a key such as `motors`.
 fn listed(names: &Value) -> Option<&Vec<Value>> {
     names.as_array().or_else(|| match names.as_object()?.values().next() {
         Some(Value::Array(names)) => Some(names),
@@ -47,7 +48,7 @@ fn listed(names: &Value) -> Option<&Vec<Value>> {
     })
 }
 
-/// One episode of a table: the one that is asked for, else the first. A table of one episode stays as it is.
+/// Keeps one episode of a table: the requested one, or else the episode of the first row.
 pub(crate) fn episode(
     mut track: Track,
     asked: Option<u32>,

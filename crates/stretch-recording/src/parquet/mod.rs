@@ -1,4 +1,5 @@
-//! Parquet: a table whose columns are numbers, stamps, or lists of numbers of one length; LeRobot's data sets are such tables.
+//! Parquet: a table whose columns are numbers, time stamps, or lists of numbers of equal length. LeRobot data sets are
+//! such tables.
 
 mod column;
 mod lerobot;
@@ -21,7 +22,7 @@ use crate::{
     room::Room,
 };
 
-/// Reads a file's columns, those without a value as NaN.
+/// Reads the columns of a file. Missing values are NaN.
 pub(crate) fn read(
     (bytes, mut room): (Vec<u8>, Room),
     file: &str,
@@ -62,7 +63,7 @@ pub(crate) fn read(
     Ok((vec![track], notes))
 }
 
-/// The channels with the one among them that is their time.
+/// Creates a track from channels, one of which is the time.
 fn on_its_clock(
     file: &str,
     mut channels: Vec<Channel>,

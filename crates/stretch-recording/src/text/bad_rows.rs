@@ -1,14 +1,15 @@
-//! The row policy: a row that cannot be read is left out and counted, unless too many are.
+//! Policy for rows that cannot be read: they are left out and counted, unless there are too many.
 
 use crate::RecordingError;
 
-/// One row in so many may be left out.
+/// At most one row in this many may be left out.
 const ONE_IN: usize = 5;
-/// Lines below a table that are no rows of it, beyond which they count as bad rows.
+/// Number of lines below a table that may be a footer. Further lines count as bad rows.
 const FOOTER: usize = 16;
-/// Bad rows after which a text with more bad rows than good ones is given up.
+/// Number of bad rows above which reading stops if there are more bad rows than good ones.
 const HOPELESS: usize = 1000;
-/// Rows that a note names if there are no more; otherwise one less is.
+/// Largest number of rows that a note lists completely. If there are more, the note lists one less
+/// and counts the others.
 const NAMED: usize = 5;
 
 /// Rows of a table that cannot be read.
@@ -17,7 +18,7 @@ pub(crate) struct BadRows {
     rows: Vec<u64>,
     /// The first of them, and what is wrong with it.
     first: Option<(u64, RecordingError)>,
-    /// Lines of another number of fields since the last of so many good rows.
+    /// Lines with a wrong number of fields after the last good row, and number of good rows then.
     footer: usize,
     good: usize,
     is_strict: bool,
@@ -28,7 +29,7 @@ impl BadRows {
         Self { is_strict, ..Self::default() }
     }
 
-    /// Whether so many bad rows of so many may be left out.
+    /// Returns whether `bad` of `all` rows may be left out.
     pub(crate) fn are_few(bad: usize, all: usize) -> bool {
         bad * ONE_IN <= all
     }
@@ -38,10 +39,10 @@ impl BadRows {
         self.rows.len()
     }
 
-    /// Leaves out a row below so many good ones.
+    /// Leaves out a row that follows `good` good ones.
     ///
     /// # Errors
-    /// No row may be left out, too many are, or the error is about more than the row.
+    /// The option `strict` is set, too many rows are bad, or the error is about more than this row.
     #[cold]
     pub(crate) fn take(
         &mut self,
@@ -60,10 +61,10 @@ impl BadRows {
         Ok(())
     }
 
-    /// Leaves out rows, of which the first has an error.
+    /// Leaves out rows. The error is that of the first row.
     ///
     /// # Errors
-    /// No row may be left out, or the error is about more than the row.
+    /// The option `strict` is set, or the error is about more than the row.
     pub(crate) fn leave_out(
         &mut self,
         rows: impl IntoIterator<Item = u64>,
@@ -84,7 +85,7 @@ impl BadRows {
         Ok(())
     }
 
-    /// Refuses a table with so many good rows if too many are bad.
+    /// Refuses a table with `good` good rows if too many rows are bad.
     fn check(&mut self, good: usize) -> Result<(), RecordingError> {
         let is_last = self.good == good && good > 0;
         let bad = self.len() - if is_last { self.footer.min(FOOTER) } else { 0 };
@@ -97,7 +98,7 @@ impl BadRows {
         }
     }
 
-    /// The note on what was left out of a table with so many good rows, if anything.
+    /// Returns the note on the rows that were left out of a table with `good` good rows, if any.
     ///
     /// # Errors
     /// Too many rows are bad.

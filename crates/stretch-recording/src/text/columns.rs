@@ -1,4 +1,4 @@
-//! Columns of numbers that grow by a row.
+//! Columns of numbers that are filled row by row.
 
 use stretch_data::{Channel, DataError, Place};
 
@@ -11,21 +11,21 @@ use crate::{
     text::row::{Fault, Role, RowFault},
 };
 
-/// The channels that every trial file of the format knows by name.
+/// Names of the channels that the project's format of trial files defines.
 pub(crate) const KNOWN: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
-/// Fields that are no numbers after which a column may be taken for text.
+/// Number of fields with words, above which a column may be text.
 const MOST_HOLES: usize = 16;
 
-/// Columns that grow by a row at a time.
+/// Columns that are filled row by row.
 pub(crate) struct Columns {
     pub(crate) roles: Vec<Role>,
-    /// What the time column counts, or how many samples came before.
+    /// Value of the time column, or number of preceding samples if samples are counted.
     counts: Vec<f64>,
     rows: Rows,
     kept: Vec<Kept>,
     /// Whether columns are kept that were not requested.
     keeps_all: bool,
-    /// Samples with a field that is no number.
+    /// Samples in which a field is not a number.
     holes: Vec<usize>,
 }
 
@@ -34,14 +34,15 @@ struct Kept {
     column: usize,
     values: Vec<f64>,
     holes: usize,
-    /// Of the holes those that are neither blank nor a number that is not finite.
+    /// Number of holes that are neither blank nor a number that is not finite.
     words: usize,
-    /// The first field that is no number.
+    /// Error of the first field that is not a number.
     first: Option<RecordingError>,
 }
 
 impl Columns {
-    /// The columns of a header; `time` is that of the time, `is_counted` says that it is not read.
+    /// Creates the columns of a header. `time` is the index of the time column. `is_counted` means that samples are
+    /// counted and the time column is not read.
     pub(crate) fn new(
         file: &str,
         header: &Header,
@@ -84,7 +85,7 @@ impl Columns {
         }
     }
 
-    /// Notes which fields of the newest row are no numbers. A column of text is given up.
+    /// Records which fields of the newest row are not numbers. A column of text is dropped.
     #[cold]
     pub(crate) fn spoil(&mut self, fields: impl IntoIterator<Item = (usize, RecordingError)>) {
         let count = self.len();
@@ -104,8 +105,9 @@ impl Columns {
         }
     }
 
-    /// The tracks of the columns: one, and in a sparse table those of columns that have the clock of their own rows. Leaves out rows with
-    /// holes if they are few, or else the columns that have them; too many holes in a column that is needed are bad rows.
+    /// Converts the columns to tracks: one, or several if the table is sparse. Leaves out rows with holes if they are
+    /// few. Otherwise leaves out the columns with holes that are not needed. Rows in which a needed column has a hole
+    /// then count as bad rows.
     pub(crate) fn into_tracks(
         mut self,
         header: &Header,
@@ -133,7 +135,7 @@ impl Columns {
         };
         let is_needed = |c: &Channel| is_needed(&c.name, options);
         let holes_of = |c: &Channel| self.holes.iter().filter(|i| c.values[**i].is_nan()).count();
-        // No row is left out for a column that others are asked for instead of.
+        // If columns are requested, no row is left out because of another column.
         let most = if self.keeps_all { count } else { 0 };
         table.channels.retain(|c| is_needed(c) || BadRows::are_few(holes_of(c), most));
         let rows_with_holes = |channels: &[Channel]| -> Vec<usize> {

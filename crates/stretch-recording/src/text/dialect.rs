@@ -1,4 +1,4 @@
-//! One row of whatever dialect: comments, separators, decimal commas, time stamps.
+//! Parses one row of a table in any dialect: comments, separators, decimal commas, time stamps.
 
 use std::borrow::Cow;
 
@@ -11,12 +11,13 @@ use crate::{
     text::row::{Fault, Field, Role, RowFault, field, is_finite, number, numbers},
 };
 
-/// Longest whole number that is read as floating point: this project writes none longer, and clocks of nanoseconds are.
+/// Number of characters of the longest integer time that is read as floating point. The project writes no longer ones;
+/// nanosecond clocks do.
 const EXACT_DIGITS: usize = 17;
 /// Separator that represents runs of blanks and tabs.
 pub(crate) const BLANKS: u8 = b' ';
 
-/// What is between a number's whole part and its fraction.
+/// Decimal separator of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mark {
     /// No number had a fraction yet.
@@ -25,19 +26,19 @@ enum Mark {
     Comma,
 }
 
-/// How a row's time is written.
+/// Notation of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Clock {
-    /// No row came yet.
+    /// No time has been read yet.
     Open,
     Number,
-    /// As dates; the first of them, ns.
+    /// Dates or times of day; the first of them, ns.
     Stamps(Option<i128>),
-    /// As whole numbers that 64 bits of floating point cannot hold; the first of them.
+    /// Integers that an `f64` cannot represent exactly; the first of them.
     Counts(Option<i128>),
 }
 
-/// How the rows of a table are written, as far as the rows so far tell.
+/// Notation of the rows of a table, as far as the rows read so far show it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Dialect {
     pub(crate) delimiter: u8,
@@ -48,12 +49,13 @@ pub(crate) struct Dialect {
     mark: Mark,
     clock: Clock,
     is_plain: bool,
-    /// What is wrong with welcome fields of the newest row.
+    /// Faults in fields of the newest row that were accepted as NaN.
     spoilt: Vec<(usize, Fault)>,
 }
 
 impl Dialect {
-    /// Rows below a header, the time in column `time`; the first of them may show the order of dates.
+    /// Creates the dialect of the rows below a header. `time` is the index of the time column. The first `rows` may
+    /// show the order of day and month.
     pub(crate) fn new(
         header: &Header,
         time: Option<usize>,
@@ -61,11 +63,11 @@ impl Dialect {
         rows: &[(u64, Vec<u8>)],
     ) -> Self {
         let (delimiter, recorded) = (header.delimiter, header.recorded);
-        // A comma between columns cannot be in numbers, too.
+        // If commas separate columns, they are not decimal commas.
         let mark = if delimiter == b',' { Mark::Point } else { Mark::Open };
         let shown = |(_, line): &(u64, Vec<u8>)| {
             let time = cells(line, delimiter)?.into_iter().nth(time?)?;
-            // most times are numbers, and reading each as two dates is slow
+            // Most times are numbers, and parsing each of them as two dates would be slow.
             if is_finite(&time) { None } else { order_of(&text(&time)) }
         };
         let date_order = date_order.or_else(|| rows.iter().find_map(shown));
@@ -73,7 +75,7 @@ impl Dialect {
         Self { delimiter, recorded, time, date_order, mark, clock, is_plain: false, spoilt }
     }
 
-    /// What was wrong with welcome fields of the newest row.
+    /// Returns the faults in fields of the newest row that were accepted as NaN, and clears them.
     #[inline]
     pub(crate) fn take_spoilt(&mut self) -> Option<Vec<(usize, Fault)>> {
         (!self.spoilt.is_empty()).then(|| std::mem::take(&mut self.spoilt))
@@ -84,7 +86,7 @@ impl Dialect {
         if let Clock::Stamps(first) = self.clock { first } else { None }
     }
 
-    /// The first of counts that are too long for a floating-point number; the time counts from it.
+    /// Returns the first time if times are integers that an `f64` cannot represent exactly. The time counts from it.
     pub(crate) fn first_count(&self) -> Option<i128> {
         if let Clock::Counts(first) = self.clock { first } else { None }
     }
@@ -94,7 +96,7 @@ impl Dialect {
         self.mark == Mark::Comma
     }
 
-    /// Reads a row into `out`; false where the line is a comment.
+    /// Reads a row into `out`. Returns false if the line is a comment.
     #[inline]
     pub(crate) fn parse(
         &mut self,
@@ -118,7 +120,7 @@ impl Dialect {
         self.parse_loosely(line, roles, out).map(|()| true)
     }
 
-    /// What this row tells that no row before it did.
+    /// Learns the notation of times and numbers from this row, if no row before it has shown it.
     fn learn(&mut self, line: &[u8]) {
         let Some(cells) = cells(line, self.delimiter) else { return };
         if self.clock == Clock::Open {
@@ -167,7 +169,7 @@ impl Dialect {
             };
             out[column] = match value {
                 Ok(value) => value,
-                // Two notations in one file: which numbers use which is unknown.
+                // Refuse a row with the other notation, because it is unclear which numbers of the file use which.
                 Err(fault @ Fault::DecimalPoint(_)) => {
                     return Err(RowFault::Field { column, fault });
                 }
@@ -181,7 +183,8 @@ impl Dialect {
         Ok(())
     }
 
-    /// Whether a column that is needed may lack a value: it may have a separate clock.
+    /// Returns whether a needed column may lack a value in this row. Any column but the time may, because it may have a
+    /// separate clock.
     fn may_be_blank(&self, fault: &Fault, column: usize) -> bool {
         matches!(fault, Fault::Empty | Fault::NotFinite(_)) && Some(column) != self.time
     }
@@ -216,7 +219,7 @@ impl Dialect {
     }
 }
 
-/// A line that people wrote for people.
+/// Returns whether a line is a comment.
 pub(crate) fn is_comment(line: &[u8]) -> bool {
     // Nearly every line begins with a digit or a sign.
     match line.first() {
@@ -273,7 +276,7 @@ pub(crate) fn cells(line: &[u8], delimiter: u8) -> Option<Vec<Cow<'_, [u8]>>> {
     }
 }
 
-/// The first cell whose quotation marks do not pair up.
+/// Returns the fault of the first cell whose quotation marks do not pair up.
 fn broken(line: &[u8], delimiter: u8) -> RowFault {
     let (mut column, mut at) = (0, 0);
     while let Field::Plain(_, end) | Field::Quoted(_, end) = field(line, at, delimiter) {
@@ -291,7 +294,7 @@ pub(crate) fn is_value(cell: &[u8], delimiter: u8) -> bool {
     is_finite(cell) || with_commas() || looks_like_stamp(&text(cell))
 }
 
-/// A whole number, which may be long; not so long that a difference of two is too long.
+/// Parses an integer that may be long. It is limited so that the difference of two does not overflow.
 fn whole(cell: &[u8]) -> Option<i128> {
     text(cell).parse().ok().filter(|n: &i128| n.unsigned_abs() < 1 << 100)
 }

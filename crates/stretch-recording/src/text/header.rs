@@ -15,16 +15,16 @@ use crate::{
 pub(crate) struct Header {
     pub(crate) names: Vec<String>,
     pub(crate) delimiter: u8,
-    /// How many columns each row has; what is named beyond them is a remark, or not recorded.
+    /// Number of columns in each row. A name beyond them is a remark or a column that was not recorded.
     pub(crate) recorded: usize,
 }
 
 impl Header {
-    /// Names from the cells of a header line. The second column called `X` becomes `X.1`, with a note; the first is `X.0` if the
-    /// options ask for that.
+    /// Returns the names of columns from the cells of a header line. The second column `X` becomes `X.1`, with a note.
+    /// The first becomes `X.0` if the options ask for that name.
     ///
     /// # Errors
-    /// A control character in a name; two columns of a name that is asked for.
+    /// A name contains a control character, or two columns have the same requested name.
     pub(crate) fn named(
         file: &str,
         row: u64,
@@ -40,7 +40,7 @@ impl Header {
                 let at = Place { file: file.to_owned(), row, column };
                 return Err(RecordingError::ControlCharacter { at, value: shown(cell.as_bytes()) });
             }
-            // A serial monitor puts the time of day before the names as well.
+            // A serial monitor also writes the time of day before the header line.
             if looks_like_stamp(cell) {
                 names[column] = "stamp".to_owned();
             }
@@ -50,7 +50,7 @@ impl Header {
             if cell.is_empty() || !is_twice {
                 continue;
             }
-            // Of several columns of the usual name of the time the first is it.
+            // If several columns have the default name of the time, the first of them is the time.
             if asked.contains(&cell) && cell != TIME {
                 return Err(RecordingError::DuplicateColumn {
                     file: file.to_owned(),
@@ -64,7 +64,8 @@ impl Header {
         Ok(names)
     }
 
-    /// The column of the time, and the samples a second, with a note, if samples are counted instead of read.
+    /// Returns the index of the time column. If samples are counted instead, also returns the sample rate and adds a
+    /// note.
     pub(crate) fn time(
         &self,
         file: &str,
@@ -72,7 +73,7 @@ impl Header {
         options: &ReadOptions,
         notes: &mut Vec<String>,
     ) -> Result<(Option<usize>, Option<f64>), RecordingError> {
-        // A name without numbers below it, such as a remark behind the last column, is no time.
+        // A name without numbers below it, such as a remark after the last column, is not the time.
         let time = time_among(&self.names[..self.recorded], options);
         let counted = options.counted(time.is_some(), stated);
         if time.is_none() && counted.is_none() {
@@ -85,14 +86,14 @@ impl Header {
         Ok((time, rate_hz))
     }
 
-    /// Where column `name` is.
+    /// Returns the index of column `name`.
     pub(crate) fn position(&self, file: &str, name: &str) -> Result<usize, RecordingError> {
         self.names.iter().position(|n| n == name).ok_or_else(|| {
             RecordingError::missing_column(file, name, self.names.iter().map(String::as_str))
         })
     }
 
-    /// What to call the column at `position` in a message.
+    /// Returns the name of the column at `position` for a message.
     pub(crate) fn label(&self, position: usize) -> String {
         match self.names.get(position) {
             Some(name) if !name.is_empty() => name.clone(),

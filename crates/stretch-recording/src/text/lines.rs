@@ -1,4 +1,4 @@
-//! Lines of a stream in bounded memory, each as soon as it is there.
+//! Splits a stream into lines in bounded memory. Each line is returned as soon as it is complete.
 
 use std::io::{BufRead, BufReader, Read};
 
@@ -6,14 +6,14 @@ use crate::{RecordingError, stamps::looks_like_stamp};
 
 const BUFFER_BYTES: usize = 256 * 1024;
 
-/// Splits a stream into lines; never holds more than its buffer and one line.
+/// A splitter of a stream into lines. It never holds more than its buffer and one line.
 pub(crate) struct Lines<R> {
     reader: BufReader<R>,
     file: String,
     line: Vec<u8>,
     row: u64,
     limit: usize,
-    /// Whether the line that came last goes on.
+    /// Whether the rest of the last line has not been read yet.
     is_cut: bool,
 }
 
@@ -24,8 +24,8 @@ impl<R: Read> Lines<R> {
         Self { reader, file: file.to_owned(), line: Vec::new(), row: 0, limit, is_cut: false }
     }
 
-    /// The next line that is not blank and its row, the first of which is 1; without its end, and without the mark of UTF-8
-    /// before it. The one after an error of a line that is too long is the line below that.
+    /// Returns the next line that is not blank, and its row, counted from 1. The line end and a UTF-8 byte-order mark
+    /// are removed. After an error for a line that is too long, the next line follows.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &[u8])>, RecordingError> {
         loop {
             if !self.read()? {
@@ -50,7 +50,7 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// Takes up to the end of the next line, or enough of it to see that it is too long; whether there is one.
+    /// Reads the next line, or enough of it to detect that it is too long. Returns false if there is none.
     fn read(&mut self) -> Result<bool, RecordingError> {
         let failed = |e| RecordingError::io(&self.file, "read it", e);
         if std::mem::take(&mut self.is_cut) {
@@ -63,7 +63,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// Puts a separator behind the time that a serial monitor writes before each line: `10:00:00.020 -> 101.3,1.02`, and
+/// Puts a separator after the time that a serial monitor writes before each line: `10:00:00.020 -> 101.3,1.02`, and
 /// `[2024-05-01 10:00:00.020] 101.3,1.02`.
 fn part_stamp(line: &mut Vec<u8>) {
     let (start, end): (_, &[u8]) = if line.starts_with(b"[") { (1, b"] ") } else { (0, b" -> ") };
@@ -75,9 +75,9 @@ fn part_stamp(line: &mut Vec<u8>) {
     }
 }
 
-/// Text in the encoding of Windows in western Europe.
+/// Decodes text in Windows-1252.
 pub(crate) fn windows_1252(bytes: &[u8]) -> String {
-    /// Characters from 0x80 on; five bytes have none.
+    /// Characters of 0x80 to 0x9f. Five of these bytes are not assigned.
     const FROM_0X80: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8d}Ž\u{8f}\u{90}‘’“”•–—˜™š›œ\u{9d}žŸ";
     let character = |byte: &u8| match byte {
         0x80..=0x9f => FROM_0X80.chars().nth(usize::from(byte - 0x80)).unwrap_or_default(),
@@ -92,7 +92,7 @@ mod tests {
 
     use super::*;
 
-    /// Hands out one byte a read: the worst case for a splitter.
+    /// Returns one byte per read, which is the worst case for splitting lines.
     struct Dribble<'a>(&'a [u8]);
 
     impl Read for Dribble<'_> {

@@ -1,4 +1,4 @@
-//! A table of text in whatever dialect, in one pass.
+//! Reads a table of text in any dialect, in one pass.
 
 pub(crate) mod bad_rows;
 pub(crate) mod columns;
@@ -40,7 +40,7 @@ pub(crate) fn read(
         table.take(row, line)?;
         if table.columns.len() % 4096 == 0 {
             let numbers = table.columns.len().saturating_mul(table.header.names.len());
-            // text takes at most four times its length as numbers; what is packed has no such measure
+            // As numbers, text takes at most four times its length. Packed text has no such limit.
             let (mut room, format) = match packed {
                 Some(packed) => (Room::beside(packed.get()), "gzip"),
                 None => (Room::of_text(), "text"),
@@ -55,7 +55,7 @@ pub(crate) fn read(
     table.finish(options)
 }
 
-/// Columns that grow, and how their rows are written.
+/// A table while it is read.
 struct Table<'a> {
     file: &'a str,
     header: Header,
@@ -67,13 +67,13 @@ struct Table<'a> {
     rate_hz: Option<f64>,
     comments: usize,
     bad: BadRows,
-    /// Bad rows that are samples, which take time.
+    /// Number of bad rows that are samples. They take time if samples are counted.
     lost: usize,
     notes: Vec<String>,
 }
 
 impl<'a> Table<'a> {
-    /// The table that some lines begin, with the rows that were read ahead.
+    /// Finds the table at the beginning of the lines, and takes the rows that were read ahead.
     fn begun(
         lines: &mut Lines<impl Read>,
         file: &'a str,
@@ -146,7 +146,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// The time as far as the table says what it is.
+    /// Returns what the table shows of the time: its name, origin and unit.
     fn stamps(&self) -> Stamps {
         let name = self.time.map_or(TIME, |i| &self.header.names[i]).to_owned();
         let origin = self.dialect.first_count().map_or(0.0, |count| count as f64);

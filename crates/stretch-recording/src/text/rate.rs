@@ -6,7 +6,7 @@ use crate::{
     text::dialect::cells,
 };
 
-/// Names of the time from sample to sample.
+/// Names of a field with the sample interval.
 const INTERVALS: [&str; 9] = [
     "increment",
     "interval",
@@ -18,11 +18,12 @@ const INTERVALS: [&str; 9] = [
     "tinc",
     "dt",
 ];
-/// Names of the samples a second.
+/// Names of a field with the sample rate.
 const RATES: [&str; 6] =
     ["sample_rate", "sampling_rate", "sample_frequency", "sampling_frequency", "samplerate", "fs"];
 
-/// Samples a second, and the name of the field that states them: its value follows it, or is below it.
+/// Returns the stated sample rate and the name of its field. The value is in the same cell as the name, in the next
+/// cell, or in the cell below.
 pub(crate) fn stated_rate_hz(lines: &[&[u8]], delimiter: u8) -> Option<(f64, String)> {
     let split = |line: &[u8]| -> Vec<String> {
         let cells = cells(line, delimiter).unwrap_or_default();
@@ -42,7 +43,8 @@ pub(crate) fn stated_rate_hz(lines: &[&[u8]], delimiter: u8) -> Option<(f64, Str
     places.filter_map(stated).next()
 }
 
-/// Samples a second by a field, if its name says that and its value is a number with or without a unit.
+/// Returns the sample rate from a field, if its name is that of a rate or an interval and its value is a number with or
+/// without a unit.
 fn rate_of(key: &str, value: &str) -> Option<f64> {
     let (key, of_key) = match key.trim().strip_suffix([')', ']']) {
         Some(key) => key.split_once(['(', '['])?,

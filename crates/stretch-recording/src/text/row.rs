@@ -1,8 +1,8 @@
-//! Fields of one line, and the fast way to read rows of numbers.
+//! Parses the fields of one line, with a fast path for rows of numbers.
 
 use stretch_data::shown;
 
-/// What tables write where there is no number.
+/// Words that tables contain in place of a missing number.
 const MISSING: [&str; 5] = ["na", "n/a", "#n/a", "null", "none"];
 
 /// What is wrong with one field or one row, before its place is known.
@@ -25,18 +25,18 @@ pub(crate) enum RowFault {
     Ragged { found: usize, expected: usize },
 }
 
-/// How a column takes part.
+/// Use of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
     /// Must be a finite number.
     Needed,
-    /// NaN where it is none.
+    /// Optional: becomes NaN if it is not a finite number.
     Welcome,
-    /// Not looked at; NaN.
+    /// Not read: always NaN.
     Skipped,
 }
 
-/// The field that starts at `at`: its content, and the place of its delimiter.
+/// One field of a line: its content, and the position of the delimiter after it.
 pub(crate) enum Field<'a> {
     Plain(&'a [u8], usize),
     Quoted(Vec<u8>, usize),
@@ -75,8 +75,8 @@ pub(crate) fn field(line: &[u8], at: usize, delimiter: u8) -> Field<'_> {
     }
 }
 
-/// Reads a row into `out`, one number for each role, if all fields are finite numbers and written plainly; a separator may follow the
-/// last.
+/// Reads a row into `out`, one number for each role. Returns false unless all fields that are read are plainly written
+/// finite numbers. A separator may follow the last field.
 #[inline]
 pub(crate) fn numbers(line: &[u8], delimiter: u8, roles: &[Role], out: &mut [f64]) -> bool {
     let mut at = 0;
@@ -105,12 +105,12 @@ pub(crate) fn numbers(line: &[u8], delimiter: u8, roles: &[Role], out: &mut [f64
     at >= line.len()
 }
 
-/// Whether a whole field spells a finite number. This is cheaper than [`number`], which words what is wrong.
+/// Returns whether a field is a finite number. This is cheaper than [`number`], which describes the fault.
 pub(crate) fn is_finite(content: &[u8]) -> bool {
     fast_float2::parse::<f64, _>(content).is_ok_and(f64::is_finite)
 }
 
-/// The finite number that a whole field spells.
+/// Parses a field as a finite number.
 pub(crate) fn number(content: &[u8]) -> Result<f64, Fault> {
     match fast_float2::parse::<f64, _>(content) {
         Ok(value) if value.is_finite() => Ok(value),

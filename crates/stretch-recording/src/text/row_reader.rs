@@ -1,4 +1,4 @@
-//! Rows of a live stream, each as soon as its line is there.
+//! Reads the rows of a live stream, each as soon as its line is complete.
 
 use std::{io::Read, vec};
 
@@ -15,18 +15,19 @@ use crate::{
     text::top::Top,
 };
 
-/// Reads a stream a row at a time, and goes on after a malformed row.
+/// A reader of the rows of a stream, which continues after a malformed row.
 ///
-/// The header is found as in a file, by the first row of numbers below it; then each line is
-/// answered as soon as it is complete, however slowly the stream comes. Only the time and the required columns are
-/// looked at: whatever else is in a row cannot spoil it. Memory is bounded: a line that
-/// is too long is an error for that line and is skipped.
+/// The header is found as in a file: it is above the first row of numbers. After that, each line is returned as soon as
+/// it is complete, however slow the stream is. Only the time and the required columns are read, so other fields cannot
+/// make a row invalid. Memory is bounded: a line that is too long is an error for that line and is skipped.
 ///
-/// The samples of a stream without a time are counted where the options say how many come a second; malformed rows count.
+/// If a stream has no time and the options give a sample rate, the time is counted in samples. Malformed rows are
+/// included in the count.
 ///
-/// A row whose time does not advance or goes back is an error, too, but the clock goes on from
-/// there: a logger that was restarted is lost for one row, not for good. A caller that keeps a
-/// memory over the rows should reset it when [`RecordingError::is_time`] holds.
+/// A row whose time goes back is also an error, but the clock continues from there: a restarted logger costs one row
+/// only. A time that does not advance is an error only if neither the step of the clock nor an expected rate is known;
+/// otherwise such samples are spread over the step. A caller that keeps state over the rows should reset it if
+/// [`RecordingError::is_time`] returns true.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, RowReader};
@@ -66,7 +67,7 @@ pub struct RowReader<R> {
 /// One row of a [`RowReader`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row<'a> {
-    /// Row as an editor counts it: the header is row 1.
+    /// Line number in the stream, counted from 1.
     pub row: u64,
     /// Seconds.
     pub time_s: f64,
@@ -115,7 +116,7 @@ impl<R: Read> RowReader<R> {
         self.header.names.iter().map(String::as_str)
     }
 
-    /// What was guessed, renamed or repaired since this was asked before.
+    /// Returns the notes on what was guessed, renamed or repaired since the last call.
     pub fn take_notes(&mut self) -> Vec<String> {
         let mut notes = std::mem::take(&mut self.notes);
         notes.append(&mut self.clock.notes);
@@ -124,8 +125,8 @@ impl<R: Read> RowReader<R> {
 
     /// The next row; `None` at the end of the stream. Blank lines are passed over.
     ///
-    /// An error for which [`RecordingError::is_row`] holds is about that row alone. After any
-    /// other (the stream itself failed) the stream has ended.
+    /// If [`RecordingError::is_row`] returns true for an error, it is about that row alone. After any other error the
+    /// stream has ended.
     pub fn next_row(&mut self) -> Option<Result<Row<'_>, RecordingError>> {
         if self.failed {
             return None;
@@ -165,7 +166,7 @@ impl<R: Read> RowReader<R> {
         Some(Ok(Row { row, time_s, values: &self.values }))
     }
 
-    /// Fills `fields` from the next line that is not blank; its row.
+    /// Fills `fields` from the next row, and returns its line number.
     fn read_row(&mut self) -> Result<Option<u64>, RecordingError> {
         loop {
             let ahead = self.ahead.next();

@@ -1,4 +1,4 @@
-//! The header finder: where the table begins in a text, and what its columns are called.
+//! Finds where the table begins in a text, and the names of its columns.
 
 use std::{borrow::Cow, cmp::Reverse, io::Read};
 
@@ -16,33 +16,33 @@ use crate::{
     text::rate::stated_rate_hz,
 };
 
-/// Lines that are searched for the table.
+/// Largest number of lines that are searched for the table.
 const MOST_AHEAD: usize = 256;
-/// Rows below names with a time after which no other table is searched for.
+/// Number of rows below names with a time after which no other table is searched for.
 const SURE: usize = 64;
-/// Rows of a live stream after which names with a time are no longer expected.
+/// Number of rows of a live stream after which the search for names with a time ends.
 const LIVE_ROWS: usize = 8;
-/// Rows of other tables above a block, beyond which a line of names is not the block's.
+/// Largest number of rows of numbers between a block of rows and the line of its names.
 const ROWS_BETWEEN: usize = 3;
-/// Names without a column that a header line may end with.
+/// Largest number of names without a column at the end of a header line.
 const MOST_OPTIONAL: usize = 4;
-/// Separators, the surest first.
+/// Separators, the most certain first.
 const SEPARATORS: [u8; 5] = [b';', b'\t', b'|', b',', BLANKS];
 
-/// What a table begins with.
+/// The beginning of a table.
 pub(crate) struct Top {
     /// Names and separator.
     pub(crate) header: Header,
     /// Lines that were read already, from the table's first row on.
     pub(crate) ahead: Vec<(u64, Vec<u8>)>,
-    /// Samples a second that a field above the table states, and its name.
+    /// Sample rate that a field above the table states, and the name of that field.
     pub(crate) stated_hz: Option<(f64, String)>,
     pub(crate) notes: Vec<String>,
 }
 
 impl Top {
-    /// Reads as far as the table's first row, and further while a better table may follow; a live stream is not read further than it
-    /// must.
+    /// Reads up to the first row of the table, and further while a better table may follow. A live stream is read no
+    /// further than necessary.
     pub(crate) fn read<R: Read>(
         lines: &mut Lines<R>,
         file: &str,
@@ -61,7 +61,8 @@ impl Top {
     }
 }
 
-/// Gives columns names with units in this project's way, and says which; names that are asked for stay.
+/// Rewrites names with units in the project's notation, such as `pos_mm` for `Pos (mm)`, and adds a note. Requested
+/// names stay.
 fn tidy_names(
     names: &[String],
     units: &[String],
@@ -85,30 +86,30 @@ fn tidy_names(
     tidied
 }
 
-/// A line of a text's beginning.
+/// A line at the beginning of a text.
 struct Line {
     row: u64,
     text: Vec<u8>,
     is_comment: bool,
-    /// Whether it was no UTF-8.
+    /// Whether the line was not UTF-8 and was decoded as Windows-1252.
     is_decoded: bool,
     is_row: bool,
 }
 
-/// Rows of numbers that are written in the same way.
+/// Rows of numbers with the same separator and number of cells.
 struct Block {
     delimiter: u8,
-    /// Cells of a row.
+    /// Number of cells in a row.
     cells: usize,
-    /// Cells of its first row up to the last one that is not empty.
+    /// Number of cells in the first row up to the last one that is not empty.
     filled: usize,
-    /// The line of the first row.
+    /// Index of the line of the first row.
     start: usize,
     rows: usize,
-    /// Whether a number begins the first row, as none begins a line such as `X0,0,0`.
+    /// Whether the first row begins with a number. A line such as `X0,0,0` does not.
     is_begun: bool,
     names: Option<Names>,
-    /// Whether another line of names has begun another table.
+    /// Whether a later line of names has begun another table.
     is_closed: bool,
 }
 
@@ -131,7 +132,7 @@ impl Finder<'_> {
     fn is_done(&self, is_live: bool) -> bool {
         let enough = if is_live { 1 } else { SURE };
         let options = self.options;
-        // of a stream without a time, what is asked for is enough
+        // For a live stream without a time, names that include the required columns are enough.
         let is_counted = is_live && options.counted(false, None).is_some();
         let is_asked = |names: &Names| {
             is_counted && options.required().iter().all(|name| names.cells.contains(name))
@@ -165,11 +166,11 @@ impl Finder<'_> {
         Ok(())
     }
 
-    /// The separator and the cells of a line that is a row of numbers.
+    /// Returns the separator and the number of cells of a line, if it is a row of numbers.
     fn shape(&self, line: &[u8]) -> Option<(u8, usize)> {
         let Some(names) = &self.options.columns else {
             let found = self.separator(line, |_| true)?;
-            // Columns may be called by numbers, the time is not.
+            // Columns may have numbers as names. The time may not, and its name shows that the line is a header.
             let is_header = cells(line, found.0)?.iter().any(|cell| self.is_time(cell));
             return (!is_header).then_some(found);
         };
@@ -187,12 +188,13 @@ impl Finder<'_> {
         self.separator(line, fits)
     }
 
-    /// Whether a cell is the name that the time is asked for by, or that it has in this project's own form.
+    /// Returns whether a cell is the requested or the default name of the time.
     fn is_time(&self, cell: &[u8]) -> bool {
         cell == self.options.time.as_bytes() || cell == TIME.as_bytes()
     }
 
-    /// The separator of a row of numbers and how many cells it then has; none if most cells are no numbers.
+    /// Returns the separator of a row of numbers, and its number of cells. Returns `None` if most cells are not
+    /// numbers.
     fn separator(
         &self,
         line: &[u8],
@@ -205,19 +207,20 @@ impl Finder<'_> {
             };
             let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
             let values = cells.iter().filter(|cell| is_number(cell)).count();
-            // `Sample rate,100` above a table is no row of it.
+            // If only half of the cells are numbers, the first must be one: `Sample rate,100` above a table is not a
+            // row.
             let begins = cells.first().is_some_and(|cell| is_number(cell));
             let is_row = 2 * values > filled || (begins && 2 * values >= filled);
             is_row.then_some((delimiter, cells.len(), values as f64 / filled as f64))
         };
         let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {
-            // No number has one of these in it.
+            // These separators never occur in a number.
             let is_sure = matches!(best.0, b';' | b'\t' | b'|');
             if next.2 > best.2 && !is_sure { next } else { best }
         };
         let is_here = |delimiter: &u8| *delimiter == BLANKS || line.contains(delimiter);
         let found = SEPARATORS.into_iter().filter(is_here).filter_map(share).reduce(better);
-        // Bare readings, whose samples are counted, are one column.
+        // If samples are counted, a line with a single number is a row of one column.
         let is_bare = || {
             let cell = line.trim_ascii();
             let is_counted = self.options.counted(false, None).is_some();
@@ -253,7 +256,7 @@ impl Finder<'_> {
         self.blocks.push(block);
     }
 
-    /// Ends the tables of which the newest line cannot be a bad row: it has other names.
+    /// Closes the blocks for which the newest line has other names, so that it is not a bad row of their table.
     fn close(&mut self) {
         let Some((line, above)) = self.lines.split_last() else { return };
         for block in self.blocks.iter_mut().filter(|block| !block.is_closed) {
@@ -263,7 +266,8 @@ impl Finder<'_> {
         }
     }
 
-    /// The nearest line of names above a block that has the time, or else the nearest; with a line of units below it.
+    /// Returns the nearest line of names above a block that contains a time, or else the nearest line of names. A line
+    /// of units, if there is one, is returned with it.
     fn names_above(&self, block: &Block) -> Option<Names> {
         let (mut nearest, mut units, mut rows) = (None, None, 0);
         for (at, line) in self.lines[..block.start].iter().enumerate().rev() {
@@ -275,7 +279,7 @@ impl Finder<'_> {
             let Some(mut cells) = name_cells(text, block).filter(|_| !line.is_row) else {
                 continue;
             };
-            // What is asked for is recorded.
+            // Requested and known columns are recorded, so they cannot be surplus names without a column.
             let is_asked = |cell: &String| {
                 self.options.asked().contains(&cell) || KNOWN.contains(&cell.as_str())
             };
@@ -308,12 +312,12 @@ impl Finder<'_> {
             if has_time {
                 return Some(names);
             }
-            // A comment is the header where it names the time.
+            // A comment is the header only if it names the time or the sample rate is given.
             if nearest.is_none() && (!line.is_comment || self.options.sample_rate_hz.is_some()) {
                 nearest = Some(names);
             }
         }
-        // Columns may be called by units.
+        // If there are no other names, units may be the names of the columns.
         let by_units = || {
             let line = units?;
             let cells = name_cells(&self.lines[line].text, block)?;
@@ -323,7 +327,8 @@ impl Finder<'_> {
         nearest.or_else(by_units)
     }
 
-    /// The table: with a time rather than without one, and then the longest.
+    /// Chooses the table. A block with a time is preferred to one without, then a block that begins with a number, then
+    /// the longest block.
     fn top(mut self, file: &str, is_whole: bool) -> Result<Top, RecordingError> {
         let rank = |(i, block): &(usize, &Block)| {
             let has_time = block.names.as_ref().is_some_and(|names| names.has_time);
@@ -343,12 +348,12 @@ impl Finder<'_> {
                 (lines[names.line].row, names.cells.clone(), names.units.map(|at| &lines[at]))
             }
             (None, None) => match self.options.required() {
-                // Bare readings are the column that is asked for.
+                // Single numbers are the column that is required.
                 [only] if block.cells == 1 => (0, vec![only.clone()], None),
                 _ => return Err(self.no_header(file, &block, is_whole)),
             },
         };
-        // The first rows may be bad ones.
+        // Bad rows may come before the first row of the block.
         if let Some(names) = names.as_ref().filter(|_| self.options.columns.is_none()) {
             let below = names.units.map_or(names.line, |units| units.max(names.line)) + 1;
             let first = lines[below..block.start].iter().position(|line| line.is_row);
@@ -368,7 +373,7 @@ impl Finder<'_> {
         let units = units.and_then(|line| name_cells(&line.text, &block)).unwrap_or_default();
         let cells = tidy_names(&cells, &units, self.options, &mut notes);
         let mut names = Header::named(file, row, &cells, self.options, &mut notes)?;
-        // More names than cells, or more separators behind the last number than one.
+        // There may be more names than cells, or several separators after the last number.
         let named = names.len();
         let recorded = if named > block.cells { block.filled } else { named };
         names.resize(named.max(block.cells.saturating_sub(1)), String::new());
@@ -380,7 +385,7 @@ impl Finder<'_> {
         Ok(Top { header, ahead, stated_hz, notes })
     }
 
-    /// A table of which no row can be read: below names with a time.
+    /// Returns a table of which no row can be read, below a line of names with a time.
     fn without_rows(&self) -> Option<Block> {
         let named = |(start, line): (usize, &Line)| {
             let by = |delimiter| {
@@ -462,20 +467,22 @@ fn text(cell: &[u8]) -> String {
     String::from_utf8_lossy(cell).into_owned()
 }
 
-/// What a line says of each channel if its first cell is a label, as in `ChannelTitle=` and `Unit:`.
+/// Returns the meaning of a line whose first cell is a label, such as `ChannelTitle=` or `Unit:`. The result is empty
+/// for another label.
 fn label(cell: &str) -> Option<&'static str> {
     let label = cell.trim_end().strip_suffix(['=', ':'])?.to_lowercase();
     let known = ["unit", "title", "name"].into_iter().find(|what| label.contains(what));
     known.or(cell.contains('=').then_some(""))
 }
 
-/// Whether a cell of a row has a number in it, or none that is finite.
+/// Returns whether a cell is a number, finite or not, or a time stamp.
 fn is_number(cell: &[u8]) -> bool {
     is_value(cell, BLANKS) || fast_float2::parse::<f64, _>(cell).is_ok()
 }
 
-/// The cells of a line of names for a block: one for each cell of its rows, or up to their last one that is filled; and more of
-/// them where rows may end early. `None` if the line has others.
+/// Splits a line of names for a block. It must have at least as many names as the first row has filled cells. It may
+/// have up to `MOST_OPTIONAL` names more than a row has cells, unless blanks separate the columns. Returns `None` for
+/// any other number.
 fn name_cells(line: &[u8], block: &Block) -> Option<Vec<String>> {
     let split = cells(line, block.delimiter)?;
     let mut names: Vec<String> = Vec::new();

@@ -1,4 +1,4 @@
-//! The published records, read in their original folders.
+//! Readers of the published recordings in their original folders.
 
 use std::{fs, path::Path};
 
@@ -12,20 +12,20 @@ pub(crate) struct Worn {
     pub(crate) trials: Vec<Trial>,
 }
 
-/// What a set of records calls its columns, and how it was recorded.
+/// Sessions of a published set, and the names of its columns.
 pub(crate) struct Set {
     pub(crate) signals: Vec<String>,
     pub(crate) reference: String,
     pub(crate) worn: Vec<Worn>,
 }
 
-/// The authors' regression data: files such as `S1_2_HC45.csv`, sampled at 100 Hz, without a
-/// header. Each file holds two concatenated sessions of one wearer. A session begins where all five
-/// signals are zero, because they are relative to its first sample. If no row is zero, it begins at
-/// the largest jump of all columns together.
+/// Reads the authors' regression data: files such as `S1_2_HC45.csv`, sampled at 100 Hz, without a header. Each file
+/// contains two concatenated sessions of one wearer. A session begins where all five signals are zero, because they are
+/// relative to its first sample. If no row is zero, the second session begins at the largest jump of all columns
+/// together.
 ///
-/// The gains show that both are of one wearer: between the two sessions of a file they differ a
-/// fifth as much as between files of one movement.
+/// The gains show that both sessions of a file are from one wearer: they differ a fifth as much as the gains of
+/// different files of the same movement.
 pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
     let mut worn = Vec::new();
     for path in files(folder)? {
@@ -35,7 +35,7 @@ pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
         let rows = rows(&path)?;
         let cut = boundary(&rows);
         for (session, rows) in [(first, &rows[..cut]), (second, &rows[cut..])] {
-            // half a minute that is not judged, and a minute of reference
+            // The shortest useful session: half a minute that is not judged, and a minute of reference.
             if rows.len() < 9000 {
                 continue;
             }
@@ -58,11 +58,11 @@ pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
     Ok(Set { signals, reference: "angle_deg".into(), worn })
 }
 
-/// One ankle of ten people, 125 Hz: files such as `P001_WALK1_BF.csv`, whose first columns are named in their header. The six
-/// walks of a person barefoot are one session, those in shoes another.
+/// Reads one ankle of ten people, at 125 Hz: files such as `P001_WALK1_BF.csv`, whose first columns are named in their
+/// header. The six barefoot walks of a person are one session, those in shoes another.
 ///
-/// The foot is `L` or `R`; the angle is `FLX` (flexion) or `IEV` (inversion). Signals are those of the feet that are named: the
-/// five of one ankle, or the ten of both.
+/// The foot is `L` or `R`. The angle is `FLX` (flexion) or `IEV` (inversion). The signals are those of the given feet:
+/// five of one ankle, or ten of both.
 pub(crate) fn ankles(folder: &Path, foot: &str, angle: &str, feet: &[&str]) -> anyhow::Result<Set> {
     let places = ["PFX", "INV", "DFX", "EVR", "HEEL"];
     let signals = feet.iter().flat_map(|foot| places.map(|place| format!("{foot}_{place}")));
@@ -113,8 +113,8 @@ pub(crate) fn ankles(folder: &Path, foot: &str, angle: &str, feet: &[&str]) -> a
     Ok(Set { signals, reference: "ankle_deg".into(), worn })
 }
 
-/// The knee sensor of sixteen people, 250 Hz: files such as `P001_WALK1.csv` with stamps, angle and capacitance. The
-/// files of a person are one session, walks first.
+/// Reads the knee sensor of sixteen people, at 250 Hz: files such as `P001_WALK1.csv` with time stamps, angle and
+/// capacitance. The files of a person are one session, in the order of their names.
 pub(crate) fn knees(folder: &Path) -> anyhow::Result<Set> {
     let mut worn: Vec<Worn> = Vec::new();
     for path in files(folder)? {
@@ -184,7 +184,7 @@ fn rows(path: &Path) -> anyhow::Result<Vec<[f64; 6]>> {
     Ok(rows)
 }
 
-/// The first row of the second session.
+/// Returns the first row of the second session.
 fn boundary(rows: &[[f64; 6]]) -> usize {
     let (count, middle) = (rows.len(), rows.len() / 2);
     let is_zero = |i: &usize| rows[*i][1..].iter().all(|x| x.abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Channels that are lost on purpose: how soon they are found, the errors of the others, and how
+//! Simulates lost channels: how soon they are found, the errors of the remaining channels, and how
 //! often a working channel is taken for lost.
 
 use stretch_data::Trial;
@@ -8,11 +8,11 @@ use stretch_sleeve::{
 
 use crate::judge::{Judge, first_seconds};
 
-/// When a channel is lost, s.
+/// Time at which a channel is lost, s.
 const AT_S: f64 = 75.0;
 /// Time within which a loss should be found, s.
 const SOON_S: f64 = 0.1;
-/// A fault matters once the channel is off by this share of its range.
+/// Share of its range by which a channel must be off before a fault matters.
 const MATTERS: f64 = 0.02;
 const FAULTS: [&str; 6] =
     ["cut off", "missing", "sticks", "saturates", "slips", "slips by 0.3 of its session's range"];
@@ -22,7 +22,8 @@ const FAULTS: [&str; 6] =
 struct Found {
     cases: usize,
     soon: usize,
-    /// Cases in which the channel goes off, and of these the ones found in time, from that moment.
+    /// Cases in which the fault matters, and how many of these are found in time from that moment
+    /// on.
     matter: usize,
     soon_once_it_matters: usize,
     another: usize,
@@ -107,7 +108,7 @@ impl Found {
     }
 }
 
-/// Time at which a broken channel is first off by [`MATTERS`], or missing.
+/// Returns the time at which a faulty channel is first off by [`MATTERS`], or missing.
 fn matters_at_s(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Trial,
@@ -140,11 +141,11 @@ fn with_fault(
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     for value in &mut values.values[at..] {
         *value = match fault {
-            // a gauge that is cut off reads as an open divider: far above its range
+            // A gauge that is cut off reads as an open divider, far above its range.
             "cut off" => high + 5.0 * (high - low),
             "missing" => f64::NAN,
             "sticks" => last,
-            // the converter ends where the signal is now
+            // The converter ends at the present value of the signal.
             "saturates" => value.min(last),
             "slips by 0.3 of its session's range" => *value + 0.3 * (most - least),
             _ => *value + 0.3 * (high - low),
@@ -165,7 +166,7 @@ fn rmse(readings: &Readings, trial: &Trial, reference: &str) -> anyhow::Result<f
     Ok((errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
 }
 
-/// The error of the gains without a channel, if the channel is known to be lost from the beginning.
+/// Returns the error of the gains without a channel, if that channel is lost from the beginning.
 fn alone_without(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Trial,

@@ -1,4 +1,4 @@
-//! Calibrations of each session, and their errors after its first minute.
+//! Calibrates each session in several ways, and computes the errors after the seconds of reference.
 
 use stretch_calibrate::{Options, apply, calibrate, choose_model, rank_signals};
 use stretch_core::Calibration;
@@ -29,30 +29,30 @@ impl Row {
 pub(crate) struct Judge {
     pub(crate) set: Set,
     sessions: Vec<Session>,
-    /// Seconds whose reference may be used.
+    /// Duration at the beginning of a session whose reference may be used, s.
     pub(crate) used_s: f64,
     asked: Asked,
 }
 
-/// What is judged in addition to the usual.
+/// Options for additional evaluations.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Asked {
-    /// The model that `auto` chooses.
+    /// Also judge the model that `auto` chooses.
     pub(crate) auto: bool,
-    /// Each sensor with a prior of all others, instead of the best one with a prior of the same
+    /// Judge each sensor with a prior from all other sensors, instead of the best sensor with a prior from the same
     /// sensor.
     pub(crate) leave_sensor: bool,
 }
 
-/// The priors without one wearer: of all channels, if there are several and none is left out, and
-/// of each channel.
+/// The priors without one wearer: one of all channels, if there are several and none is left out, and one of each
+/// channel.
 pub(crate) struct Priors {
     pub(crate) all: Option<Prior>,
     each: Vec<Prior>,
 }
 
-/// Results over all sessions, without those in which a channel was refused, such as a sensor that
-/// falls where it rises elsewhere.
+/// Makes a prior from all sessions except those that are refused, such as those of a sensor that falls when it rises
+/// elsewhere.
 fn of_accepted(
     mut sessions: Vec<Session>,
     make: impl Fn(&[Session]) -> Result<Prior, SleeveError>,
@@ -68,7 +68,7 @@ fn of_accepted(
 }
 
 impl Judge {
-    /// Sums up the sessions; refused sessions are named and left out.
+    /// Creates the judge from the sums of the sessions. Refused sessions are printed and left out.
     pub(crate) fn new(mut set: Set, used_s: f64, asked: Asked) -> Self {
         let mut sessions = Vec::new();
         let (signals, reference) = (set.signals.clone(), set.reference.clone());
@@ -87,7 +87,7 @@ impl Judge {
         Self { set, sessions, used_s, asked }
     }
 
-    /// The wearers, in order.
+    /// Returns the wearers in alphabetical order.
     pub(crate) fn wearers(&self) -> Vec<String> {
         let mut wearers: Vec<String> = self.set.worn.iter().map(|w| w.wearer.clone()).collect();
         wearers.sort();
@@ -109,8 +109,8 @@ impl Judge {
         })
     }
 
-    /// The sessions of one channel from which a prior for the channel is learnt: its own, or those
-    /// of all others.
+    /// Returns the sessions from which a prior for one channel is learnt: those of the channel itself, or those of all
+    /// other channels.
     fn alone(&self, sessions: &[Session], channel: usize) -> anyhow::Result<Vec<Session>> {
         let channels =
             (0..self.set.signals.len()).filter(|k| (*k == channel) != self.asked.leave_sensor);
@@ -152,7 +152,7 @@ impl Judge {
         Ok(rows)
     }
 
-    /// Errors of one session, of the gauge at `place` or of the one that is best on the first seconds.
+    /// Computes the errors of one session, for the gauge at `place` or for the gauge that is best in the first seconds.
     fn row(
         &self,
         index: usize,
@@ -218,7 +218,7 @@ impl Judge {
             ];
             for (who, prior, options) in cases {
                 let Some(prior) = prior else { continue };
-                // a prior of other sensors is of other columns
+                // A prior from other sensors has other column names.
                 let signals = if what == "one" {
                     vec![self.set.signals[place].clone()]
                 } else {
@@ -274,7 +274,7 @@ impl Judge {
         Ok(Row { errors, inside })
     }
 
-    /// Errors after the first minute, one for each sample that has an estimate.
+    /// Returns the errors after the first `used_s` seconds, one for each sample that has an estimate.
     fn differences(
         &self,
         calibration: &SleeveCalibration,
@@ -328,7 +328,7 @@ impl Judge {
     }
 }
 
-/// The first seconds of trials that follow one another.
+/// Returns the first seconds of consecutive trials.
 pub(crate) fn first_seconds(trials: &[Trial], seconds: f64) -> Vec<Trial> {
     let mut left_s = seconds;
     let mut cut = Vec::new();

@@ -1,5 +1,5 @@
-//! Priors and half a minute of reference for sleeves that are put on again or worn by another
-//! person, on published records.
+//! Evaluates priors and half a minute of reference on published recordings of sleeves that are put on again or worn by
+//! another person.
 //!
 //! ```sh
 //! cargo run --release -p stretch-sleeve --features calibrate --example sleeve -- --sleeves FOLDER --knees FOLDER --ankles FOLDER \
@@ -7,18 +7,19 @@
 //! ```
 //!
 //! The first folder is `data/Regression` of github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve (commit
-//! 47369aba, MIT), the others `datasets/Part VIII Knee Dataset/Part VIII Knee Data Preprocessed` and `datasets/Part IX SRS
-//! Prototype Validation Dataset/00-PREPROCESSED-DATA` of github.com/msstate-athlete-engineering/soft-sensors-research
-//! (commit 5f9b7fd3). The project holds none of them.
+//! 47369aba, MIT), the others `datasets/Part VIII Knee Dataset/Part VIII Knee Data Preprocessed` and `datasets/Part IX
+//! SRS Prototype Validation Dataset/00-PREPROCESSED-DATA` of
+//! github.com/msstate-athlete-engineering/soft-sensors-research (commit 5f9b7fd3). The project contains none of these
+//! data.
 //!
-//! Every prior is learnt without the wearer on which it is judged, spreads included; "next session"
-//! then adds the other sessions of the wearer. All errors are root mean squares over what follows
-//! the first minute, from which the reference is taken. The session's own calibration is judged by
-//! cross-validation over sixths. With `--auto` the choice of a model on the same half minute is
-//! also judged. With `--leave sensor` each sensor is judged with priors that have seen all others
-//! and never this one. With `--faults` only lost channels are judged. `--zero` tests whether single
-//! gauges detect that they were put on again. `--simulated` counts how often a working gauge is
-//! taken for lost in hours of simulated ones.
+//! Every prior is learnt, with its covariances, without the wearer on which it is judged. "next session" then adds the
+//! other sessions of the wearer. All errors are root mean squares over the samples after the part from which the
+//! reference is taken: 60 s of sleeves, 20 s of knees, 10 s of ankles. The session's own calibration is judged by
+//! cross-validation.
+//!
+//! `--auto` also judges the automatic choice of a model. `--leave sensor` judges each sensor with priors from all other
+//! sensors. `--faults` judges only lost channels. `--zero` tests whether single gauges detect that they were put on
+//! again. `--simulated` counts how often a working gauge is taken for lost in simulated hours.
 
 mod data;
 mod faults;
@@ -80,7 +81,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Geometric means of errors, and of their ratios with the worst of each.
+/// Prints the geometric means of errors and of their ratios, and the worst ratio.
 fn print(title: &str, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("\n### {title}: {} sessions\n", rows.len());

@@ -1,4 +1,4 @@
-//! Hours of simulated gauges without a fault: how often one is taken for lost.
+//! Counts how often a gauge is taken for lost in hours of simulated gauges without a fault.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -7,17 +7,17 @@ use stretch_sleeve::{ArrayOptions, SleeveCalibration, apply_array, calibrate_arr
 
 const HZ: f64 = 100.0;
 const GAUGES: usize = 5;
-/// Seconds of the calibration, and of each trial that it is then applied to.
+/// Duration of the calibration, and of each trial to which it is then applied, s.
 const CALIBRATED_S: f64 = 120.0;
 const TRIAL_S: f64 = 600.0;
 /// Step of the converter, as a share of a gauge's range of about one.
 const STEP: f64 = 1.0 / 1024.0;
 const SEED: u64 = 20_261_124;
 
-/// A joint that moves from one random angle to the next and rests between, and gauges with memories of their own.
+/// A joint that moves from one random angle to the next and rests in between, and gauges with different memories.
 struct Body {
     random: ChaCha8Rng,
-    /// From where to where, since when, and for how long, s.
+    /// Start and end angle of the movement, its beginning and its duration, s.
     moving: [f64; 4],
     slow: [f64; GAUGES],
     /// Standard deviation of the noise, as a share of the step.
@@ -66,17 +66,17 @@ impl Body {
     fn angle(&mut self, time_s: f64) -> f64 {
         let [_, to, since_s, lasts_s] = self.moving;
         if time_s >= since_s + lasts_s {
-            // half of the movements are rests
+            // Half of the movements are rests.
             let next = if self.random.random() { 90.0 * self.random.random::<f64>() } else { to };
             self.moving = [to, next, since_s + lasts_s, 0.4 + 1.2 * self.random.random::<f64>()];
         }
         let [from, to, since_s, lasts_s] = self.moving;
         let share = ((time_s - since_s) / lasts_s).clamp(0.0, 1.0);
-        // the movement of least jerk (Flash and Hogan 1985)
+        // Minimum-jerk movement (Flash and Hogan 1985).
         from + (to - from) * share.powi(3) * (10.0 - 15.0 * share + 6.0 * share * share)
     }
 
-    /// A normal deviate.
+    /// Draws an approximately normal value.
     fn deviate(&mut self) -> f64 {
         (0..12).map(|_| self.random.random::<f64>()).sum::<f64>() - 6.0
     }

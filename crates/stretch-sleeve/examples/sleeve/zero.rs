@@ -9,20 +9,20 @@ use crate::data::{Set, Worn};
 
 /// Bounds of the classes of mean error, in the reference's unit.
 const LARGE: [f64; 5] = [0.0, 1.5, 3.0, 6.0, f64::INFINITY];
-/// A shift that is added to the second half of a session, in the reference's unit.
+/// Shift that is added to the second half of a session, in the reference's unit.
 const SHIFT: f64 = 8.0;
 
-/// A gauge of one session, on another one.
+/// Result of a gauge that was calibrated in one session and applied to another one.
 struct Case {
     told: bool,
     /// Median of the reported values, if any.
     off: Option<f64>,
     /// Mean error of the estimates.
     bias: f64,
-    /// The added shift and the record's limit, in the reference's unit.
+    /// The added shift and the limit of the calibration, in the reference's unit.
     shift: f64,
     limit: f64,
-    /// Root mean square error, and that of a zero that is followed.
+    /// Root mean square error without and with a followed zero.
     rmse: [f64; 2],
 }
 
@@ -32,7 +32,7 @@ struct Counts {
     gauges: usize,
     silent: usize,
     hours: f64,
-    /// Without a zero that is followed, and with.
+    /// Alarms without and with a followed zero.
     alarms: [usize; 2],
     cases: Vec<Case>,
 }
@@ -71,7 +71,7 @@ pub(crate) fn print(set: &Set) -> anyhow::Result<()> {
 }
 
 fn judge(fitted: &[Trial], trials: &[Trial], options: &Options, shift: f64, counts: &mut Counts) {
-    // sessions that cannot be calibrated at all are no cases
+    // Sessions that cannot be calibrated at all do not count.
     let Ok(made) = calibrate(fitted, options) else { return };
     counts.gauges += 1;
     let Ok(gauge) = calibrate_gauge(made.calibration, fitted, options) else { return };
@@ -105,7 +105,7 @@ fn judge(fitted: &[Trial], trials: &[Trial], options: &Options, shift: f64, coun
     }
 }
 
-/// A trial whose gauge was put on again, higher by so much.
+/// Returns a trial whose gauge was put on again and reads higher by `by`.
 fn moved(trial: &Trial, signal: &str, by: f64) -> Trial {
     let mut own = trial.clone();
     let channel = own.channels.iter_mut().find(|channel| channel.name == signal);
@@ -113,7 +113,7 @@ fn moved(trial: &Trial, signal: &str, by: f64) -> Trial {
     own
 }
 
-/// The middle one; NaN of none.
+/// Returns the median; NaN if there are no values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -1,4 +1,5 @@
-//! Many channels and their memories as the terms of one linear model.
+//! Many channels and their memories as the terms of one linear model. A bank is the set of these
+//! terms.
 //!
 //! The states of a channel `x` are those of a [`HistoryMap`](stretch_core::HistoryMap) with the
 //! time constants of [`BANK`]. The terms of a channel are its products of states; a constant comes
@@ -12,12 +13,12 @@ use nalgebra::DMatrix;
 use stretch_calibrate::toolkit::{StateDesign, TermRows};
 use stretch_core::Interval;
 
-/// States and products of a channel: a cubic, and the change over each time constant, times the
-/// signal up to its square.
+/// States and terms of a channel: a cubic of the signal, and the change over each time constant,
+/// multiplied by powers of the signal up to its square.
 pub(crate) const BANK: StateDesign =
     StateDesign { relaxations_s: &[0.05, 0.3, 2.0, 15.0], radii: &[], degree: 3, memory_degree: 1 };
 
-/// The domains of all states, and the products over them.
+/// The terms of all channels over given domains of their states.
 pub(crate) struct Bank {
     pub(crate) domains: Vec<Vec<Interval>>,
     rows: Vec<TermRows>,
@@ -29,17 +30,17 @@ impl Bank {
         Self { domains, rows }
     }
 
-    /// Terms of one channel, the constant not counted.
+    /// Returns the number of terms of one channel without the constant.
     pub(crate) fn terms_a_channel() -> usize {
         BANK.shape().terms() - 1
     }
 
-    /// Terms of all channels and the constant.
+    /// Returns the number of terms of all channels and the constant.
     pub(crate) fn terms(&self) -> usize {
         1 + self.domains.len() * Self::terms_a_channel()
     }
 
-    /// The row of a sample, of the states of each channel.
+    /// Fills the row of terms of a sample from the states of each channel.
     pub(crate) fn fill<'a>(
         &self,
         states: impl Iterator<Item = &'a [f64]>,
@@ -54,7 +55,8 @@ impl Bank {
         }
     }
 
-    /// The matrix `M` with `row of other = M (row of self)` for states inside both domains.
+    /// Returns the matrix `M` with `row of other = M (row of self)`, for states inside both
+    /// domains.
     pub(crate) fn row_matrix_of(&self, other: &Self) -> DMatrix<f64> {
         let own = Self::terms_a_channel();
         let mut matrix = DMatrix::zeros(other.terms(), self.terms());
@@ -69,9 +71,10 @@ impl Bank {
     }
 }
 
-/// The terms over the states of `theirs`, written in the terms over `mine`.
+/// Returns the matrix that expresses the terms over the domains `theirs` as sums of the terms over
+/// the domains `mine`.
 fn moved(mine: &[Interval], theirs: &[Interval]) -> DMatrix<f64> {
-    // a term is the list of its states, in rising order
+    // A term is represented by the sorted list of the states whose product it is.
     let mut lists: Vec<Vec<usize>> = vec![Vec::new()];
     let mut parents = vec![(0, 0)];
     BANK.shape().each_product(|parent, state| {
@@ -98,7 +101,7 @@ fn moved(mine: &[Interval], theirs: &[Interval]) -> DMatrix<f64> {
             let mut list = lists[k].clone();
             list.push(state);
             list.sort_unstable();
-            // every divisor of a term of the shape is of the shape
+            // Every divisor of a term is a term as well, so the place exists.
             if let Some(&place) = places.get(&list) {
                 out[(term, place)] += factor * weight;
             }
@@ -107,7 +110,7 @@ fn moved(mine: &[Interval], theirs: &[Interval]) -> DMatrix<f64> {
     out
 }
 
-/// `a` and `b` with `scaled over theirs = a (scaled over mine) + b`.
+/// Returns `a` and `b` with `state scaled over theirs = a (state scaled over mine) + b`.
 fn between(mine: Interval, theirs: Interval) -> (f64, f64) {
     let centre = |d: Interval| 0.5 * (d.min + d.max);
     let half = |d: Interval| 0.5 * (d.max - d.min);

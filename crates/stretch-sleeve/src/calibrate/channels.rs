@@ -1,5 +1,5 @@
-//! Several signals and a reference on an even time grid. Calibrations of many channels and priors
-//! are fitted to these.
+//! Several signals and a reference on an even time grid. Calibrations of many channels and priors (distributions learnt
+//! from earlier sessions) are fitted to these.
 
 use stretch_calibrate::{
     CalibrateError, MOST_ROWS,
@@ -13,10 +13,10 @@ use crate::{MAX_CHANNELS, SleeveError};
 
 use super::bank::{BANK, Bank};
 
-/// Channels whose correlation differs from one by less than this are copies.
+/// Channels are copies if their absolute correlation differs from one by less than this.
 const COPY: f64 = 1e-9;
 
-/// A stretch of time without gaps.
+/// A stretch of a trial without gaps in time.
 pub(crate) struct Stretch {
     pub(crate) trial: usize,
     pub(crate) signals: Vec<Vec<f64>>,
@@ -29,12 +29,13 @@ impl Stretch {
         self.reference.len()
     }
 
-    /// The states of each channel at a sample.
+    /// Returns the states of each channel at a sample.
     pub(crate) fn at(&self, sample: usize) -> impl Iterator<Item = &[f64]> {
         self.states.iter().map(move |states| states.at(sample))
     }
 
-    /// The samples after the warm-up, in which the low-passes forget their initial values.
+    /// Returns the samples after the warm-up, which is excluded because the low-passes still depend on their initial
+    /// values.
     pub(crate) fn warmed_up(&self) -> std::ops::Range<usize> {
         SETTLE.min(self.len())..self.len()
     }
@@ -57,7 +58,7 @@ impl Channels {
             return Err(SleeveError::Channels { asked: signals.len(), most: MAX_CHANNELS });
         }
         let first = trials.first().ok_or(CalibrateError::NoTrials)?;
-        // each signal adds its states to a row
+        // Each signal adds its states to a row, so more signals allow fewer rows.
         check_rows(trials, MOST_ROWS / signals.len()).map_err(CalibrateError::from)?;
         let sample_rate = SampleRate::new(sample_rate_hz(first)?)?;
         let mut all = Self { sample_rate, stretches: Vec::new(), notes: Vec::new() };
@@ -72,7 +73,7 @@ impl Channels {
         Ok(all)
     }
 
-    /// Signals without a reference; the first signal takes the reference's position.
+    /// Reads signals without a reference. The first signal is used in place of the reference.
     pub(crate) fn without_reference(
         trials: &[Trial],
         signals: &[String],
@@ -130,7 +131,7 @@ impl Channels {
         Ok(())
     }
 
-    /// Each stretch, and the number of samples in the previous ones.
+    /// Returns each stretch with the number of samples in the previous ones.
     pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &Stretch)> {
         let mut before = 0;
         self.stretches.iter().map(move |stretch| {
@@ -150,7 +151,7 @@ impl Channels {
         self.stretches.iter().flat_map(|s| s.reference.iter().copied())
     }
 
-    /// The bank over the states that were seen.
+    /// Returns the bank over the ranges of the states in these data.
     pub(crate) fn bank(&self) -> Bank {
         let channels = self.stretches.first().map_or(0, |s| s.signals.len());
         let domain = |k: usize| BANK.domain(self.stretches.iter().map(move |s| &s.states[k]));
@@ -158,7 +159,7 @@ impl Channels {
     }
 }
 
-/// A trial up to the last sample that has a reference, and a note if there are samples after it.
+/// Returns a trial up to the last sample with a reference, and a note if there are samples after it.
 fn without_an_open_end(
     trial: &Trial,
     reference: &str,
@@ -181,7 +182,7 @@ fn without_an_open_end(
     Ok((cut, Some(note)))
 }
 
-/// The origin of a calibration: its date, and its trials with the checksums of their columns.
+/// Returns the origin of a calibration: its date, and its trials with the checksums of their columns.
 pub(crate) fn provenance<'a>(
     date: &str,
     trials: &[Trial],
@@ -192,7 +193,7 @@ pub(crate) fn provenance<'a>(
         .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)))
 }
 
-/// Pearson's correlation of two equally long records; zero if one of them is constant.
+/// Returns Pearson's correlation of two equally long sequences; zero if one of them is constant.
 pub(crate) fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
     let mut agreement = Agreement::new();
     for (x, y) in a.zip(b) {
@@ -201,29 +202,28 @@ pub(crate) fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = 
     agreement.correlation().unwrap_or(0.0)
 }
 
-/// Number of independent values that correlated ones count as, and the standard deviation of one,
+/// Returns the equivalent number of independent values for correlated values, and the standard deviation of one value
 /// from their variance about their mean.
 ///
-/// Consecutive values are alike if their correlation `r` is above zero: `n` of them count as `n (1 -
-/// r)/(1 + r)` (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of
-/// first order). Their mean is as accurate as that of so many independent values, and so is their
-/// variance.
+/// Consecutive values are dependent if their correlation `r` is above zero. `n` of them are then equivalent to `n (1 -
+/// r)/(1 + r)` independent values (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of
+/// first order). Their mean and their variance are as accurate as those of so many independent values.
 pub(crate) fn independent(count: f64, variance: f64, alike: f64) -> (f64, f64) {
     let independent = count * (1.0 - alike) / (1.0 + alike);
     (independent, (variance * independent / (independent - 1.0)).sqrt())
 }
 
-/// Consecutive values in stretches.
+/// Statistics of consecutive values in stretches.
 pub(crate) struct Levels {
     pub(crate) mean: f64,
-    /// About the mean, over their count.
+    /// Mean squared deviation from the mean, divided by `count`.
     pub(crate) variance: f64,
     /// Correlation of neighbours.
     pub(crate) alike: f64,
     pub(crate) count: f64,
 }
 
-/// Mean, variance and correlation of values in stretches; `None` without values.
+/// Returns the mean, variance and neighbour correlation of values in stretches; `None` without values.
 pub(crate) fn levels(stretches: &[Vec<f64>]) -> Option<Levels> {
     let all: Vec<f64> = stretches.iter().flatten().copied().collect();
     let count = all.len() as f64;

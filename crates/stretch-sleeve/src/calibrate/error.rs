@@ -1,4 +1,4 @@
-//! Reasons why there is no calibration of a sleeve.
+//! Errors of calibrating several gauges and of priors.
 
 use stretch_calibrate::CalibrateError;
 
@@ -13,7 +13,7 @@ pub enum SleeveError {
     Channels {
         /// Number of named signals.
         asked: usize,
-        /// The most that are possible.
+        /// Largest possible number.
         most: usize,
     },
     /// Two channels are identical.
@@ -26,7 +26,7 @@ pub enum SleeveError {
         /// The second.
         second: String,
     },
-    /// A prior, or a session for one, cannot be used for these data.
+    /// A prior or a session of a prior cannot be used with these data.
     #[error("{file}: {problem}")]
     Prior {
         /// The file, or what it describes.

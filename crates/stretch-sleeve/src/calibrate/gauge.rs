@@ -1,4 +1,4 @@
-//! A calibration of one gauge applied to time-stamped samples, live or from a file, with its zero watched.
+//! Applies a calibration of one gauge to time-stamped samples, live or from a file, and watches the gauge's zero.
 
 use stretch_calibrate::{Applied, CalibrateError, Faults, LiveReceptor, apply, pressure_column};
 use stretch_core::{Design, RateEstimator};
@@ -9,8 +9,8 @@ use crate::{GaugeCalibration, Zero, ZeroMemory, ZeroWatch};
 
 use super::turns::follows_rest;
 
-/// A [`LiveReceptor`] that also watches the zero of its gauge, if the record holds the turning
-/// points of movements.
+/// A [`LiveReceptor`] that also watches the zero of its gauge, if the calibration contains the turning points of
+/// movements.
 #[derive(Debug, Clone)]
 pub struct LiveGauge {
     receptor: LiveReceptor,
@@ -20,7 +20,7 @@ pub struct LiveGauge {
 }
 
 impl LiveGauge {
-    /// A receptor for a calibration whose estimator can run live.
+    /// Creates a receptor for a calibration whose rate estimator can run live.
     ///
     /// # Errors
     /// As [`LiveReceptor::new`].
@@ -33,12 +33,12 @@ impl LiveGauge {
         Ok(Self { receptor, watch, zero: None, last_s: None })
     }
 
-    /// The same receptor, which follows a slow change of the signal's zero and subtracts it from
-    /// the answers.
+    /// Returns the same receptor, which also follows a slow drift of the signal's zero and subtracts it from the
+    /// signal.
     ///
     /// # Errors
-    /// [`CalibrateError::Record`] for a record without turning points of movements, and for a model
-    /// that follows the rest of its signal itself.
+    /// [`CalibrateError::Record`] if the calibration has no turning points of movements, or if its model already
+    /// follows the signal's level at rest.
     pub fn following(self, gauge: &GaugeCalibration) -> Result<Self, CalibrateError> {
         let refused = |problem: &str| {
             Err(CalibrateError::Record { file: "the calibration".into(), problem: problem.into() })
@@ -61,7 +61,7 @@ impl LiveGauge {
     pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
         if time_s.is_finite() && self.last_s.replace(time_s).is_some_and(|last_s| time_s <= last_s)
         {
-            // as the receptor does if a stamp repeats or runs backwards
+            // Restart the watch if a stamp repeats or goes back, as the receptor does.
             self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
         }
         let mut corrected = signal;
@@ -72,8 +72,8 @@ impl LiveGauge {
         self.receptor.step(time_s, corrected)
     }
 
-    /// Zero as seen by the movement that ended with the last sample; `None` during a movement, and
-    /// for a record without turning points of movements.
+    /// Returns the result for the zero from the movement that ended with the last sample. Returns `None` during a
+    /// movement, and if the calibration has no turning points of movements.
     pub fn zero(&self) -> Option<Zero<f64>> {
         self.zero
     }
@@ -84,23 +84,23 @@ impl LiveGauge {
         self.receptor.set_pressure(pressure);
     }
 
-    /// Faults of the time stamps so far.
+    /// Returns the faults of the time stamps so far.
     pub fn faults(&self) -> Faults {
         self.receptor.faults()
     }
 }
 
-/// A trial's readings, and the zero as seen by its movements.
+/// A trial's readings, and the zero that its movements show.
 #[derive(Debug, Clone)]
 pub struct AppliedGauge {
     /// Readings, and the faults of the time stamps.
     pub applied: Applied,
-    /// For each movement with a result, the time of its end and how far the zero is off.
+    /// For each movement with a result: the time of its end, and the deviation of the zero.
     pub zeros: Vec<(f64, Zero<f64>)>,
 }
 
-/// Applies a calibration to a logged trial, sample by sample, as it would run live. With `follow` the receptor follows a
-/// slow change of the signal's zero ([`LiveGauge::following`]).
+/// Applies a calibration to a logged trial, sample by sample, as it would run live. With `follow` the receptor follows
+/// a slow drift of the signal's zero ([`LiveGauge::following`]).
 ///
 /// # Errors
 /// As [`apply`] and [`LiveGauge::following`].
@@ -110,7 +110,7 @@ pub fn apply_gauge(
     follow: bool,
 ) -> Result<AppliedGauge, CalibrateError> {
     let calibration = gauge.calibration();
-    // the paper's central difference looks ahead, which a live receptor cannot do
+    // The central difference of the paper looks ahead, which a live receptor cannot do.
     let is_live = calibration.spec().rate_estimator != RateEstimator::CentralDifference;
     if !follow && (gauge.turns().is_none() || !is_live) {
         return Ok(AppliedGauge { applied: apply(calibration, trial)?, zeros: Vec::new() });

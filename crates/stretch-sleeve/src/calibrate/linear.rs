@@ -1,4 +1,4 @@
-//! A model that is linear in its coefficients, and the records made from it.
+//! A model that is linear in its coefficients, and the calibrations made from it.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use stretch_calibrate::CalibrateError;
@@ -20,11 +20,10 @@ use super::{
     turns::find_turns,
 };
 
-/// Ridge of the regression of a lost channel on the remaining ones, as a share of a term's power.
+/// Ridge penalty of the regression of a lost channel on the remaining ones, as a share of a term's power.
 const RIDGE: f64 = 1e-6;
 
-/// Coefficients of the terms of a [`Bank`], in normalised target, and the data that they were
-/// fitted to.
+/// Coefficients of the terms of a [`Bank`], for the normalised target, and statistics of the fitted data.
 #[derive(Clone)]
 pub(crate) struct Linear {
     pub(crate) signals: Vec<String>,
@@ -35,18 +34,17 @@ pub(crate) struct Linear {
     pub(crate) estimate: Interval,
     pub(crate) domains: Vec<Vec<Interval>>,
     pub(crate) weights: Vec<f64>,
-    /// Mean of `X'X` over a sample.
+    /// `X'X` divided by the number of samples, where each row of `X` contains the terms of a sample.
     pub(crate) gram: DMatrix<f64>,
-    /// Expected mean squared error, in normalised target.
+    /// Expected mean squared error of the normalised target.
     pub(crate) variance: f64,
     pub(crate) samples: u64,
     pub(crate) still: Still,
 }
 
 impl Linear {
-    /// The record, with the turning points of a single gauge if the calibration's channels show
-    /// them. `channels` are the fitted data, if any, and `shifts` the usual differences between
-    /// channels, if known.
+    /// Creates the calibration. For a single gauge it includes the turning points of movements, if the data show them.
+    /// `channels` are the fitted data, if there are any. `shifts` are the usual differences between channels, if known.
     pub(crate) fn record(
         &self,
         channels: Option<&Channels>,
@@ -65,7 +63,8 @@ impl Linear {
         }
     }
 
-    /// The coefficients of a record that was made over the domains of this model; `None` for any other record.
+    /// Returns the coefficients of a calibration that was made over the domains of this model; `None` for any other
+    /// calibration.
     pub(crate) fn weights_of(&self, record: &SleeveCalibration) -> Option<Vec<f64>> {
         let is_near = |a: &[f64], b: &[f64]| {
             a.len() == b.len()
@@ -106,19 +105,19 @@ impl Linear {
         }
     }
 
-    /// `reference = zero + gain * normalised target`.
+    /// Returns `zero` and `gain` of `reference = zero + gain * normalised target`.
     pub(crate) fn zero_and_gain(&self) -> (f64, f64) {
         let gain = self.target_range.span() * self.target.reference_per_target();
         (self.target.to_reference(self.target_range.offset()), gain)
     }
 
-    /// The terms of a channel among all terms.
+    /// Returns the range of a channel's terms among all terms.
     pub(crate) fn terms_of(&self, channel: usize) -> std::ops::Range<usize> {
         let own = Bank::terms_a_channel();
         1 + channel * own..1 + (channel + 1) * own
     }
 
-    /// Variance of the estimate over the samples of the mean of `X'X`.
+    /// Returns the variance of the estimate over the samples in `gram`.
     fn power(&self, weights: &DVector<f64>) -> f64 {
         let moments = &self.gram * weights;
         let mean = moments[0] / self.gram[(0, 0)];
@@ -131,7 +130,8 @@ impl Linear {
         let spec = RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min, max };
         let signal_range = Range::new(spec)?;
         let span = max - min;
-        // the signal is normalised before its states are taken, and states are linear in the signal
+        // The signal is normalised before its states are computed. States are linear in the signal, so their domains
+        // scale with it.
         let end = |f: fn(&Interval) -> f64| {
             let mut ends: Vec<f64> = self.domains[0].iter().map(|d| f(d) / span).collect();
             ends[0] = (f(&domain) - min) / span;
@@ -201,12 +201,11 @@ impl Linear {
         })?)
     }
 
-    /// The coefficients of the remaining channels, and the mean squared error of leaving the others
-    /// out.
+    /// Returns the coefficients of the remaining channels, and the additional mean squared error due to the lost ones.
     ///
-    /// The lost terms `l` are replaced by their regression on the remaining terms `r`, over the
-    /// samples of the mean `G` of `X'X`: `w_r + G_rr^-1 G_rl w_l`, which costs `w_l' (G_ll - G_lr
-    /// G_rr^-1 G_rl) w_l`.
+    /// The lost terms `l` are replaced by their regression on the remaining terms `r`, with `G = X'X/n`. The
+    /// coefficients become `w_r + G_rr^-1 G_rl w_l`, and the mean squared error increases by `w_l' (G_ll - G_lr G_rr^-1
+    /// G_rl) w_l`.
     pub(crate) fn remaining(&self, keep: &[usize]) -> Option<(DVector<f64>, f64)> {
         let terms = self.weights.len();
         let stays =
@@ -233,7 +232,7 @@ impl Linear {
         Some((weights, missed.max(0.0) / self.gram[(0, 0)]))
     }
 
-    /// The gains of some channels, in the reference's unit.
+    /// Returns the gains of some channels, in the reference's unit.
     fn gains(&self, keep: &[usize]) -> Result<ArrayGains<MAX_CHANNELS>, SleeveError> {
         let undetermined = || CalibrateError::Undetermined { model: "array".into() };
         let (weights, missed) = self.remaining(keep).ok_or_else(undetermined)?;
@@ -253,7 +252,7 @@ impl Linear {
     }
 }
 
-/// Inverse of a symmetric positive matrix: a covariance, a precision, a mean of `X'X`.
+/// Returns the inverse of a symmetric positive definite matrix, such as a covariance, a precision or `X'X/n`.
 pub(crate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     cholesky(matrix).map(|factor| symmetric(factor.inverse()))
 }
@@ -267,7 +266,7 @@ pub(crate) fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     (matrix + transposed) * 0.5
 }
 
-/// Correlation of a term with the model's estimate, over the samples of a mean of `X'X`.
+/// Returns the correlation of a term with the model's estimate, over the samples in `gram`.
 pub(crate) fn term_correlation(gram: &DMatrix<f64>, w: &DVector<f64>, term: usize) -> f64 {
     let moments = gram * w;
     let mean = moments[0] / gram[(0, 0)];

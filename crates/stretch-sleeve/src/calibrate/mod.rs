@@ -1,8 +1,8 @@
-//! Calibrations of sleeves from trials, and their files.
+//! Calibrations of sleeves (wearable gauges) from trials, and their files.
 //!
-//! [`calibrate_array`] fits one linear model of all channels and their memories. A [`Prior`], which
-//! is learnt from earlier sessions, gives the same [`Linear`](linear::Linear). [`find_turns`] finds
-//! the turning points of the movements of a single gauge.
+//! [`calibrate_array`] fits one linear model of all channels and their memories. A [`Prior`] is
+//! learnt from earlier sessions and gives the same kind of model, [`Linear`](linear::Linear).
+//! [`find_turns`] finds the turning points of the movements of a single gauge.
 
 mod array;
 mod bank;

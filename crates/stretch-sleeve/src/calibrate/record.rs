@@ -1,4 +1,4 @@
-//! Records of one gauge or of several as files: in JSON under a digest, in postcard for a board.
+//! Files of calibrations of one or several gauges: JSON with a digest, or postcard for a board.
 
 use std::path::Path;
 
@@ -12,27 +12,27 @@ use stretch_data::files::{read_whole, rewrites, write_whole};
 
 use crate::{ArrayCalibration, GaugeCalibration, MAX_CHANNELS, Turns};
 
-/// Capacity for the largest record of several gauges in postcard: for the loss of each of sixteen
-/// gauges, fifteen gains of each remaining one.
+/// Buffer size for the largest calibration of several gauges in postcard. For the loss of each of
+/// sixteen gauges, it has fifteen gains for each remaining gauge.
 const POSTCARD_BYTES: usize = 1 << 16;
 
-/// The end of the name of a record in postcard that holds more than a calibration.
+/// Ending of the name of a postcard file that contains more than a calibration.
 const SLEEVE_ENDING: &str = ".sleeve.postcard";
 
-/// A record: of one gauge, or of several.
+/// A calibration of one gauge or of several.
 ///
-/// In JSON the record of one gauge is that of its calibration plus the field `turns`, which readers
-/// of a calibration skip. In postcard it is the calibration alone, for a board that does not watch
-/// the zero, unless the name ends in `.sleeve.postcard`.
+/// In JSON, that of one gauge is a calibration with the additional field `turns`, which readers of
+/// a calibration skip. In postcard, it is the calibration alone, for a board that does not watch
+/// the zero, unless the file name ends in `.sleeve.postcard`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SleeveCalibration {
-    /// Of one gauge.
+    /// Calibration of one gauge.
     One(Box<GaugeCalibration>),
-    /// Of several gauges.
+    /// Calibration of several gauges.
     Many(Box<ArrayCalibration<MAX_CHANNELS>>),
 }
 
-/// The record of one gauge in text.
+/// The calibration of one gauge as text.
 #[derive(Serialize)]
 struct InText<'a> {
     #[serde(flatten)]
@@ -41,18 +41,19 @@ struct InText<'a> {
     turns: Option<&'a Turns>,
 }
 
-/// What a record in text holds in addition to a calibration.
+/// The fields of a text file in addition to those of a calibration.
 #[derive(Deserialize)]
 struct Beside {
     #[serde(default)]
     turns: Option<Turns>,
 }
 
-/// The record of several gauges in postcard, with its seal. A board of `N` channels loads it as an
-/// `ArrayCalibration<N>`, for any `N` that has room for its channels.
+/// Returns the calibration of several gauges in postcard, with its seal (a checksum). A board of
+/// `N` channels loads it as an `ArrayCalibration<N>`, for any `N` that is at least the number of
+/// its channels.
 ///
 /// # Errors
-/// Never, because the buffer has room for the largest record.
+/// Never, because the buffer has room for the largest calibration.
 ///
 /// ```
 /// use stretch_core::record;
@@ -67,7 +68,7 @@ pub fn array_bytes<const N: usize>(
     stored(calibration)
 }
 
-/// The number under which the record of several gauges is sealed: CRC-32C of [`array_bytes`].
+/// Returns the seal of the calibration of several gauges: CRC-32C of [`array_bytes`].
 ///
 /// # Errors
 /// Never, as [`array_bytes`].
@@ -87,7 +88,8 @@ fn is_sleeve_postcard(path: &Path) -> bool {
 }
 
 impl GaugeCalibration {
-    /// Reads the record of one gauge: postcard if the name ends in `.postcard`, otherwise JSON.
+    /// Reads the calibration of one gauge: postcard if the file name ends in `.postcard`, otherwise
+    /// JSON.
     ///
     /// # Errors
     /// [`CalibrateError::Record`] with the file, the field and its fault.
@@ -102,13 +104,13 @@ impl GaugeCalibration {
             Ok(text) if !is_postcard(path) && !text.is_empty() => {
                 Self::from_json(&text, &path.display().to_string())
             }
-            // a calibration alone; a file that is no record at all gets the error of the most
-            // common kind
+            // The file contains a calibration alone. A file without any calibration gets the error
+            // for this most common kind.
             _ => Ok(Self::new(read_calibration(path)?, None)?),
         }
     }
 
-    /// The record in a JSON text; messages refer to it as `name`.
+    /// Reads the calibration from a JSON text. Messages call it `name`.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -116,7 +118,7 @@ impl GaugeCalibration {
         Self::with_turns_of(text, name, calibration_from_json(text, name)?)
     }
 
-    /// A calibration and the turns in its text.
+    /// Combines a calibration with the turning points in its text.
     fn with_turns_of(
         text: &str,
         name: &str,
@@ -127,7 +129,7 @@ impl GaugeCalibration {
         Self::new(calibration, turns).map_err(|error| unusable(name, error))
     }
 
-    /// The record in JSON, sealed.
+    /// Returns the calibration in JSON, with its digest.
     ///
     /// # Errors
     /// Never, because all of its numbers are finite.
@@ -135,11 +137,11 @@ impl GaugeCalibration {
         digest::seal(&InText { calibration: self.calibration().spec(), turns: self.turns() })
     }
 
-    /// The record as the bytes of a file with that name: the calibration alone if it ends in
-    /// `.postcard`, everything if it ends in `.sleeve.postcard`, otherwise JSON.
+    /// Returns the bytes of a file with this name: the calibration alone if the name ends in
+    /// `.postcard`, everything if it ends in `.sleeve.postcard`, and otherwise JSON.
     ///
     /// # Errors
-    /// Never, because buffers have room for the largest record and all numbers are finite.
+    /// Never, because buffers have room for the largest calibration and all numbers are finite.
     pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, CalibrateError> {
         match path {
             path if is_sleeve_postcard(path) => stored(self),
@@ -148,7 +150,7 @@ impl GaugeCalibration {
         }
     }
 
-    /// Writes the record, whole or not at all.
+    /// Writes the calibration, completely or not at all.
     ///
     /// # Errors
     /// [`CalibrateError::File`] with path and cause.
@@ -159,7 +161,7 @@ impl GaugeCalibration {
 }
 
 impl SleeveCalibration {
-    /// The record as the bytes of a file with that name: postcard if the name ends in `.postcard`,
+    /// Returns the bytes of a file with this name: postcard if the name ends in `.postcard`,
     /// otherwise JSON.
     ///
     /// # Errors
@@ -172,8 +174,8 @@ impl SleeveCalibration {
         }
     }
 
-    /// The number under which the record is sealed: CRC-32C of its bytes in postcard; for one gauge
-    /// those of its calibration.
+    /// Returns the seal: CRC-32C of the bytes in postcard. For one gauge, these are the bytes of
+    /// the calibration alone.
     ///
     /// # Errors
     /// Never, as [`bytes`](Self::bytes).
@@ -184,7 +186,7 @@ impl SleeveCalibration {
         }
     }
 
-    /// Reads a record of one gauge, or of several.
+    /// Reads a calibration of one gauge or of several.
     ///
     /// # Errors
     /// [`CalibrateError::Record`] with the file, the field and its fault.
@@ -193,7 +195,7 @@ impl SleeveCalibration {
         let bytes = read_whole(path).unwrap_or_default();
         if is_postcard(path) {
             let several = record::load(&bytes).map(|several| Self::Many(Box::new(several)));
-            // If it is neither, report the error of the most common kind of record.
+            // If the file contains neither, report the error for the most common kind.
             return several.or_else(|_| one());
         }
         let text = String::from_utf8(bytes).unwrap_or_default();
@@ -205,7 +207,7 @@ impl SleeveCalibration {
         Self::of_several(&object.map_err(|error| unusable(&file, error))?, &file)
     }
 
-    /// The record of several gauges in an object without its digest.
+    /// Reads the calibration of several gauges from a JSON object without its digest.
     fn of_several(object: &str, name: &str) -> Result<Self, CalibrateError> {
         let several = digest::parse(object).map_err(|error| unusable(name, error))?;
         Ok(Self::Many(Box::new(several)))
@@ -222,8 +224,8 @@ fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
     CalibrateError::Record { file: file.to_owned(), problem }
 }
 
-/// Checks a record of one gauge or of several that was edited by hand or has an earlier schema, and
-/// writes the record again under a seal of the current schema. A damaged record in postcard is
+/// Checks a calibration file of one gauge or of several that was edited by hand or has an earlier
+/// schema, and writes it again with a valid seal and the current schema. A damaged postcard file is
 /// refused, because postcard cannot be edited by hand.
 ///
 /// # Errors
@@ -248,18 +250,18 @@ pub fn seal_record(path: &Path) -> Result<SleeveCalibration, CalibrateError> {
     Ok(record)
 }
 
-/// The kind and the seal of a record.
+/// Kind and seal of a calibration file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RecordSummary {
-    /// The model, or the type that reads the record on a board.
+    /// The model, or the type that reads the file on a board.
     pub kind: String,
-    /// CRC-32C of the record's bytes in postcard.
+    /// CRC-32C of the calibration's bytes in postcard.
     pub seal: u32,
     /// Whether the file itself carries a seal. Files of schema 1 carry no seal.
     pub is_sealed: bool,
 }
 
-/// Describes the record of a file: a calibration, or a record that `--fixed` wrote for a board.
+/// Describes a calibration file, or a file that `--fixed` wrote for a board.
 ///
 /// # Errors
 /// As [`SleeveCalibration::read`].

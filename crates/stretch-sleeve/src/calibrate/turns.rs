@@ -1,4 +1,4 @@
-//! Finds the turning points of the movements of a calibration, and the limits for later ones.
+//! Finds the turning points of the movements in a calibration, and the limits for later movements.
 
 use stretch_calibrate::{
     CalibrateError, Options,
@@ -13,30 +13,30 @@ use crate::{GaugeCalibration, TurnFinder, Turns};
 
 use super::channels::{Levels, independent, levels};
 
-/// False alarms per hour, equal to the array's share for a shifted gauge.
+/// False alarms per hour, as many as for a shifted gauge of several.
 const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
-/// Smallest share of the signal's range, without the lowest and highest 5 %, that a movement
-/// covers.
+/// Smallest span of a movement, as a share of the signal's range without the lowest and highest 5 % of the samples.
 const LEAST_SPAN: f64 = 1.0 / 3.0;
-/// Number of bins of the histogram of samples.
+/// Number of bins in the histogram of samples.
 const PARTS: usize = 4096;
-/// Number of standard deviations of the noise below which a change is no movement.
+/// Smallest span of a movement, in standard deviations of the noise.
 const LEAST_NOISES: f64 = 6.0;
-/// Fewest movements, counted as independent ones, because with fewer their correlation is a guess.
+/// Smallest number of independent movements. With fewer, their correlation cannot be estimated.
 const LEAST_MOVEMENTS: f64 = 8.0;
-/// Variance of the median of five normal values over that of one.
+/// Variance of the median of five normal values, divided by that of one value.
 const MEDIAN_VARIANCE: f64 = 0.2868;
-/// A zero is followed at most as fast as the median of five can detect a shift from it.
+/// Largest gain with which a zero is followed. With a larger gain, the median of five could not detect a shift before
+/// the followed zero absorbs it.
 const MOST_FOLLOW: f64 = 0.2;
 /// Time for which a constant signal is held, so that the memory of a model has faded.
 const HELD_S: f64 = 5.0;
-/// Share of a movement over which the slope is taken.
+/// Share of the span of a movement over which the slope is computed.
 const SLOPE_SHARE: f64 = 0.25;
 
-/// A calibration with the turning points of the movements of its fitted trials.
+/// Adds the turning points of the movements in the fitted trials to a calibration.
 ///
 /// # Errors
-/// Those of [`calibrate`](stretch_calibrate::calibrate()) about the trials.
+/// The errors of [`calibrate`](stretch_calibrate::calibrate()) about the trials.
 pub fn calibrate_gauge(
     calibration: Calibration,
     trials: &[Trial],
@@ -48,11 +48,11 @@ pub fn calibrate_gauge(
     Ok(GaugeCalibration::new(calibration, turns)?)
 }
 
-/// Turning points of these signals, each a stretch without a gap; `None` if they hold too few
+/// Finds the turning points in signals, each of which is a stretch without a gap. Returns `None` if there are too few
 /// movements.
 pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns> {
     let finder = TurnFinder::new(LEAST_SPAN * middle_span(signals)?);
-    // noise as large as a movement would be taken for movements
+    // Noise as large as a movement would be mistaken for movements.
     if finder.least_span <= LEAST_NOISES * noise(signals.iter().copied()) {
         return None;
     }
@@ -75,7 +75,7 @@ pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns
     Some(turns).filter(|turns| turns.validate().is_ok())
 }
 
-/// Span of the samples without the lowest and the highest 5 %, to the resolution of the histogram.
+/// Returns the span of the samples without the lowest and the highest 5 %, to the resolution of the histogram.
 fn middle_span(signals: &[&[f64]]) -> Option<f64> {
     let all = || signals.iter().copied().flatten();
     let Interval { min, max } = extent(all().copied());
@@ -85,7 +85,7 @@ fn middle_span(signals: &[&[f64]]) -> Option<f64> {
         counts[(part as usize).min(PARTS - 1)] += 1;
     }
     let count = counts.iter().sum::<u64>();
-    // the bin of the sample of a given rank
+    // Returns the bin of the sample with this rank.
     let part_of = |rank: u64| {
         let mut seen = 0;
         counts.iter().position(|count| {
@@ -97,8 +97,9 @@ fn middle_span(signals: &[&[f64]]) -> Option<f64> {
     (low < high).then(|| (high - low) as f64 / PARTS as f64 * (max - min))
 }
 
-/// Levels of movements in stretches, recorded in so many hours, and their mean ends: all times the
-/// sign of the polarity, and before the least span and the slope of the estimate are known.
+/// Returns the statistics of the levels of movements in stretches, which were recorded in `hours`, and their mean ends.
+/// Signals are multiplied by the sign of the polarity. The fields `least_span` and `reference_per_signal` are still
+/// zero.
 fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [f64; 2])> {
     let all: Vec<(f64, f64)> = movements.iter().flatten().copied().collect();
     let (low, high, high_share) = weighted(&all)?;
@@ -106,14 +107,14 @@ fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [
     let sequences: Vec<Vec<f64>> =
         movements.iter().map(|own| own.iter().map(level).collect()).collect();
     let Levels { mean, variance, alike, count } = levels(&sequences)?;
-    // the estimate of a correlation is low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403)
+    // The estimate of a correlation is too low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403).
     let alike = (alike + (1.0 + 4.0 * alike) / count).clamp(0.0, 0.99);
     let (independent, scatter) = independent(count, variance, alike);
     if !(independent >= LEAST_MOVEMENTS && variance > 0.0) {
         return None;
     }
     let movements_an_hour = count / hours;
-    // half for the median, half for the mean
+    // Half of the alarms are for the median, half for the running mean.
     let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
     let t = critical(share, (independent - 1.0).floor());
     let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
@@ -135,8 +136,8 @@ fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [
     Some((learnt, [low, high]))
 }
 
-/// Mean low and high ends, and the weight of the high end at which levels scatter least: `(v -
-/// c)/(v + w - 2 c)` for the variances `v`, `w` of low and high ends and their covariance `c`.
+/// Returns the mean low and high ends, and the weight of the high end with which levels scatter least. It is `(v -
+/// c)/(v + w - 2 c)` for the variances `v` and `w` of low and high ends and their covariance `c`.
 fn weighted(all: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     let n = all.len() as f64;
     if n < LEAST_MOVEMENTS {
@@ -155,7 +156,8 @@ fn weighted(all: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     Some((low, high, share))
 }
 
-/// The level about which deviations, clipped at `most`, have a mean of zero (Huber, Ann. Math. Stat. 35 (1964) 73).
+/// Returns the level from which the deviations, clipped at `most`, have a mean of zero (Huber, Ann. Math. Stat. 35
+/// (1964) 73).
 fn clipped_mean(sequences: &[Vec<f64>], mean: f64, most: f64) -> f64 {
     let count = sequences.iter().flatten().count() as f64;
     let moved = |level: f64| {
@@ -165,10 +167,10 @@ fn clipped_mean(sequences: &[Vec<f64>], mean: f64, most: f64) -> f64 {
     (0..50).fold(mean, |level, _| moved(level))
 }
 
-/// Deviation of levels that the median of five exceeds with a probability of `share`, whatever the
-/// distribution of levels. On each side `share/2 = 10 q^3` for a level that a share `q` exceeds, up
-/// to terms in `q^4` (David and Nagaraja, Order Statistics, 2003, section 2.1), and the `j`-th of
-/// `n` levels is exceeded by `j/(n + 1)`.
+/// Returns the deviation that the median of five levels exceeds with probability `share`, for any distribution of
+/// levels. If a share `q` of the levels exceeds the deviation on one side, the median does so with probability `share/2
+/// = 10 q^3`, up to terms in `q^4` (David and Nagaraja, Order Statistics, 2003, section 2.1). The `j`-th largest of `n`
+/// levels is exceeded with probability `j/(n + 1)`.
 fn tail(sequences: &[Vec<f64>], mean: f64, share: f64) -> f64 {
     let mut off: Vec<f64> = sequences.iter().flatten().map(|level| level - mean).collect();
     off.sort_by(f64::total_cmp);
@@ -177,8 +179,9 @@ fn tail(sequences: &[Vec<f64>], mean: f64, share: f64) -> f64 {
     off[off.len() - rank].max(-off[rank - 1])
 }
 
-/// Ratio of the variance of the median of five levels to that of one, if neighbours correlate with
-/// `alike`. It grows as that of their mean, `1 + 2 sum (1 - k/5) alike^k`, and is at most 1.
+/// Returns the variance of the median of five levels divided by that of one level, if neighbours have the correlation
+/// `alike`. The ratio grows with the correlation as that of the mean does, by `1 + 2 sum (1 - k/5) alike^k`, and is at
+/// most 1.
 fn median_variance(alike: f64) -> f64 {
     let mut power = 1.0;
     let mut factor = 1.0;
@@ -189,16 +192,15 @@ fn median_variance(alike: f64) -> f64 {
     (MEDIAN_VARIANCE * factor).min(1.0)
 }
 
-/// Steady gain of the scalar Kalman filter of a zero that is a random walk, observed through levels
+/// Returns the steady gain of the scalar Kalman filter of a zero that is a random walk and is observed through levels
 /// with noise.
 ///
-/// With `d1`, `d2` the mean squared differences of levels one and two movements apart, the walk's
-/// variance is `q = d2 - d1` and the noise's `r = d1 - d2/2`. The variance before a level is `p =
-/// (q + sqrt(q^2 + 4 q r))/2` and the gain `p/(p + r)` (Harvey, Forecasting, structural time series
-/// models and the Kalman filter, 1989, section 3.3). For independent levels of variance `v`, `d2 -
-/// d1` has the standard error `v sqrt(8/n)`, and two of these are subtracted from `q`. The gain is
-/// at least `1/n`, because `n` movements cannot distinguish the slower walk with that gain from
-/// none.
+/// `d1` and `d2` are the mean squared differences of levels one and two movements apart. The variance of the walk per
+/// movement is `q = d2 - d1`, and that of the noise is `r = d1 - d2/2`. The variance before a level is `p = (q +
+/// sqrt(q^2 + 4 q r))/2`, and the gain is `p/(p + r)` (Harvey, Forecasting, structural time series models and the
+/// Kalman filter, 1989, section 3.3). For independent levels of variance `v`, `d2 - d1` has the standard error `v
+/// sqrt(8/n)`, and two of these are subtracted from `q`. The gain is at least `1/n`, because `n` movements cannot
+/// distinguish a walk with a smaller gain from no walk.
 fn follow(sequences: &[Vec<f64>], count: f64, variance: f64) -> f64 {
     let apart = |k: usize| {
         let squares: Vec<f64> = sequences
@@ -215,7 +217,7 @@ fn follow(sequences: &[Vec<f64>], count: f64, variance: f64) -> f64 {
     gain.clamp((1.0 / count).min(MOST_FOLLOW), MOST_FOLLOW)
 }
 
-/// Change of the estimate per change of the signal about a level, from two constant signals.
+/// Returns the change of the estimate per change of the signal about a level, from two constant signals.
 fn slope(calibration: &Calibration, level: f64, ends: Interval) -> Option<f64> {
     let unmoved = without_rest(calibration)?;
     let receptor = Receptor::<f64>::new(&unmoved).ok()?;
@@ -230,7 +232,7 @@ fn slope(calibration: &Calibration, level: f64, ends: Interval) -> Option<f64> {
     Some((held(to)? - held(from)?) / (to - from)).filter(|slope| slope.is_finite())
 }
 
-/// The same calibration without a baseline, because a baseline would follow a signal that is held.
+/// Returns the same calibration without a baseline. A baseline would follow a constant signal.
 fn without_rest(calibration: &Calibration) -> Option<Calibration> {
     let mut spec = calibration.clone().into_spec();
     match &mut spec.model {
@@ -242,7 +244,7 @@ fn without_rest(calibration: &Calibration) -> Option<Calibration> {
     Calibration::new(spec).ok()
 }
 
-/// Whether a calibration's model follows the rest of its signal itself.
+/// Returns whether a calibration's model itself follows the level of its signal at rest.
 pub(crate) fn follows_rest(calibration: &Calibration) -> bool {
     without_rest(calibration)
         .is_some_and(|unmoved| unmoved.spec().model != calibration.spec().model)

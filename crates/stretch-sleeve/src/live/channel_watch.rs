@@ -1,4 +1,4 @@
-//! Statistics of one channel of several, sample by sample.
+//! Statistics of one of several channels, sample by sample.
 
 use stretch_core::Real;
 
@@ -6,7 +6,8 @@ use stretch_core::Real;
 pub const JUMP_SAMPLES: u8 = 8;
 const HALF: usize = JUMP_SAMPLES as usize / 2;
 
-/// Samples between two ticks of a [`Jump`]: about 10 ms, and at least one sample.
+/// Returns the number of samples between two ticks of a [`Jump`]: about 10 ms, and at least one
+/// sample.
 ///
 /// ```
 /// use stretch_sleeve::samples_a_tick;
@@ -16,10 +17,11 @@ pub fn samples_a_tick(sample_rate_hz: f64) -> u16 {
     (sample_rate_hz / 100.0 + 0.5).clamp(1.0, f64::from(u16::MAX)) as u16
 }
 
-/// How often one value was repeated recently: a repetition adds one, another value subtracts one,
-/// and at zero a new value is taken (the majority vote of Boyer and Moore 1991).
+/// Count of recent repetitions of one value. A repetition adds one and another value subtracts one.
+/// At a count of one, another value replaces the old one (the majority vote of Boyer and Moore
+/// 1991).
 ///
-/// A channel at the end of its converter leaves it for a sample now and then, so a count of
+/// A channel at the end of its converter leaves that value for a sample now and then. A count of
 /// consecutive repetitions would restart each time.
 ///
 /// ```
@@ -37,13 +39,13 @@ pub struct Repeats<T> {
 }
 
 impl<T: Real> Repeats<T> {
-    /// Nothing repeated yet.
+    /// Creates a count without a value.
     pub fn new() -> Self {
         Self { held: T::nan(), count: 0 }
     }
 
-    /// Takes a sample; returns the count of its value, 1 for a new one. `others_change`: whether
-    /// any channel changed.
+    /// Takes a sample, and returns the count of the held value, which is 1 for a new one.
+    /// `others_change` is whether any channel changed.
     #[inline(always)]
     pub fn step(&mut self, sample: T, others_change: bool) -> u16 {
         if sample == self.held {
@@ -66,10 +68,10 @@ impl<T: Real> Default for Repeats<T> {
     }
 }
 
-/// Lasting jump of a signal: the distance between all of its last four values and all of the
-/// previous four, with its sign; zero if they overlap.
+/// Detector of a lasting jump of a signal. The jump is the signed distance between the range of the
+/// last four values and the range of the four values before them, or zero if the ranges overlap.
 ///
-/// An outlier does not separate them, and a ramp only by its rise in one tick.
+/// An outlier does not separate the ranges. A ramp separates them only by its rise in one tick.
 ///
 /// ```
 /// use stretch_sleeve::Jump;
@@ -84,12 +86,12 @@ pub struct Jump<T> {
 }
 
 impl<T: Real> Jump<T> {
-    /// Only zeros so far.
+    /// Creates a detector whose previous values are all zero.
     pub fn new() -> Self {
         Self { values: [T::zero(); JUMP_SAMPLES as usize] }
     }
 
-    /// Takes a value; returns the jump of the last values.
+    /// Takes a value, and returns the jump in the last eight values.
     #[inline(always)]
     pub fn step(&mut self, value: T) -> T {
         for i in 1..self.values.len() {

@@ -1,4 +1,4 @@
-//! What runs sample by sample, on a board as on a computer.
+//! The parts that run sample by sample, on a board or on a computer.
 
 use stretch_core::Real;
 use stretch_filter::LARGEST_SAMPLE;
@@ -15,7 +15,7 @@ pub use receptor::{ArrayMemory, ArrayReceptor};
 pub use shift_watch::{ShiftMemory, ShiftWatch, Shifts, block_of};
 pub use zero_watch::{TurnFinder, TurnMemory, Zero, ZeroMemory, ZeroWatch};
 
-/// Whether a sample can be used; the comparison is false for NaN as well.
+/// Returns whether a sample can be used. The comparison is also false for NaN.
 #[inline(always)]
 fn is_usable<T: Real>(sample: T) -> bool {
     sample.abs() <= T::from_f64(LARGEST_SAMPLE)
@@ -40,16 +40,16 @@ pub enum ArrayLoss {
 pub struct ArrayReading<T> {
     /// The estimated reference, in its unit.
     pub estimate: T,
-    /// Standard deviation of the estimate, in the same unit, with the remaining channels.
+    /// Standard deviation of the estimate from the remaining channels, in the same unit.
     pub sd: T,
-    /// One bit for each excluded channel, the first channel's the lowest.
+    /// One bit for each excluded channel. The lowest bit is that of the first channel.
     pub lost: u16,
-    /// Whether a state was outside of its domain and was clamped.
+    /// Whether a state was outside its domain and was clamped.
     pub clamped: bool,
 }
 
 impl<T> ArrayReading<T> {
-    /// Whether a channel is left out.
+    /// Returns whether a channel is excluded.
     pub fn is_lost(&self, channel: usize) -> bool {
         channel < 16 && self.lost & (1 << channel) != 0
     }
@@ -61,7 +61,7 @@ impl<T> ArrayReading<T> {
 pub enum ArrayWithheld {
     /// A channel in use has not had a sample yet.
     Warming,
-    /// No channel in use had a sample. A short gap is bridged; after a longer one the signals are forgotten.
+    /// No channel in use had a sample. A short gap is bridged. After a longer one the signals are forgotten.
     Missing,
     /// Every channel is lost.
     AllLost,

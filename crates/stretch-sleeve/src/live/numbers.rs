@@ -1,4 +1,4 @@
-//! Numbers of a record of several gauges, rounded once.
+//! Numbers of a calibration of several gauges, rounded once to the type of the receptor.
 
 use stretch_core::{Real, arithmetic::lag_share};
 use stretch_receptor::numbers::rounded;
@@ -18,23 +18,24 @@ pub struct ArrayNumbers<T, const N: usize> {
     pub relaxations: usize,
     /// Samples between two comparisons of the channels.
     pub samples_a_tick: u16,
-    /// Share of its distance that each low-pass covers in a sample.
+    /// Share of the distance to its input that each low-pass covers in a sample.
     pub shares: [T; ARRAY_RELAXATIONS],
     /// Number of terms of a channel.
     pub terms: usize,
-    /// For every term, the term that is extended (0: the constant), and the state that extends it.
+    /// For every term: the term that it extends (0 for the constant), and the state by which that
+    /// term is multiplied.
     pub products: [(u8, u8); ARRAY_TERMS],
     /// The channels.
     pub of: [ArrayChannelNumbers<T, N>; N],
-    /// Gains of all channels together.
+    /// Gains for all channels together.
     pub all: ArrayGainNumbers<T, N>,
-    /// Gains without each channel in turn.
+    /// Gains for all channels but one, for each channel that can be lost.
     pub without: [ArrayGainNumbers<T, N>; N],
-    /// Gains of each channel alone.
+    /// Gains for each channel alone.
     pub alone: [ArrayGainNumbers<T, 1>; N],
-    /// The least estimate.
+    /// Smallest estimate.
     pub low: T,
-    /// The greatest estimate.
+    /// Largest estimate.
     pub high: T,
 }
 
@@ -45,11 +46,12 @@ pub struct ArrayChannelNumbers<T, const N: usize> {
     pub centre: [T; ARRAY_STATES],
     /// Reciprocal of half of each state's domain.
     pub per_half: [T; ARRAY_STATES],
-    /// The least signal that is possible.
+    /// Smallest possible signal.
     pub least: T,
-    /// The greatest signal that is possible.
+    /// Largest possible signal.
     pub most: T,
-    /// A channel with so many repetitions sticks; 0: repetitions are usual.
+    /// Number of repetitions from which on the channel counts as stuck; 0: repetitions are usual
+    /// and not checked.
     pub still_samples: u16,
     /// Coefficients that predict this channel's movement from that of each other one.
     pub follows: [T; N],
@@ -60,11 +62,11 @@ pub struct ArrayChannelNumbers<T, const N: usize> {
 /// Gains of several channels, or of one alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArrayGainNumbers<T, const N: usize> {
-    /// The estimate where every term is zero.
+    /// The estimate for terms that are all zero.
     pub constant: T,
     /// Standard deviation of the estimate.
     pub sd: T,
-    /// One gain a term, for each channel.
+    /// One gain per term, for each channel.
     pub terms: [[T; ARRAY_TERMS]; N],
 }
 

@@ -1,4 +1,4 @@
-//! The live form of a calibration of several gauges.
+//! The receptor of several gauges: a calibration that is applied live, sample by sample.
 
 use stretch_core::{Design, Real, Stage, arithmetic::lag};
 use stretch_receptor::{MAX_BRIDGED, numbers::held};
@@ -51,11 +51,11 @@ pub struct ArrayReceptor<T, const N: usize>(ArrayNumbers<T, N>);
 pub struct ArrayMemory<T, const N: usize> {
     of: [ChannelMemory<T>; N],
     lost: [Option<ArrayLoss>; N],
-    /// Consecutive samples that no channel in use had.
+    /// Number of consecutive samples for which no channel in use had a value.
     silent: u8,
-    /// Ticks in which the channels were compared.
+    /// Number of ticks in which the channels were compared.
     warmed: u8,
-    /// Samples since the last tick.
+    /// Number of samples since the last tick.
     tick: u16,
 }
 
@@ -70,26 +70,26 @@ struct ChannelMemory<T> {
 }
 
 impl<T: Real, const N: usize> ArrayReceptor<T, N> {
-    /// A receptor for a calibration.
+    /// Creates a receptor for a calibration.
     pub fn new(calibration: &ArrayCalibration<N>) -> Self {
         Self(ArrayNumbers::round(calibration))
     }
 
-    /// The numbers of the step, to implement the step in another language.
+    /// Returns the numbers that a step uses, for an implementation in another language.
     pub fn numbers(&self) -> &ArrayNumbers<T, N> {
         &self.0
     }
 }
 
 impl<T, const N: usize> ArrayMemory<T, N> {
-    /// Why a channel is excluded; `None` for a channel in use.
+    /// Returns why a channel is excluded; `None` for a channel in use.
     pub fn loss(&self, channel: usize) -> Option<ArrayLoss> {
         self.lost.get(channel).copied().flatten()
     }
 }
 
 impl<T: Real, const N: usize> ArrayMemory<T, N> {
-    /// Takes an excluded channel back, as if its next sample were its first.
+    /// Includes an excluded channel again, as if its next sample were its first.
     pub fn readmit(&mut self, channel: usize) {
         if let (Some(lost), Some(own)) = (self.lost.get_mut(channel), self.of.get_mut(channel)) {
             *lost = None;
@@ -112,7 +112,7 @@ impl<T: Real> ChannelMemory<T> {
 }
 
 impl<T: Real> ChannelMemory<T> {
-    /// Takes a sample, or the last one again.
+    /// Updates the low-passes with a sample, which is the last one again if a sample is missing.
     #[inline(always)]
     fn pass(&mut self, x: T, shares: &[T]) {
         if self.last.is_nan() {
@@ -140,7 +140,7 @@ impl<T: Real, const N: usize> Design for ArrayReceptor<T, N> {
 }
 
 impl<T: Real, const N: usize> ArrayReceptor<T, N> {
-    /// Takes a channel's sample; returns why the channel is lost, if it is.
+    /// Takes a channel's sample. Returns the reason if the channel is lost.
     #[inline(always)]
     fn take(
         &self,
@@ -173,9 +173,9 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         &self.0.shares[..self.0.relaxations.min(ARRAY_RELAXATIONS)]
     }
 
-    /// A sample that no channel has: it is bridged, or it is one too many.
+    /// Bridges a sample that is missing in all channels, or clears the signals after too many of them.
     fn silence(&self, memory: &mut ArrayMemory<T, N>) -> Result<ArrayReading<T>, ArrayWithheld> {
-        // changes of channels during this time are no jumps
+        // Changes of the channels during this time are not jumps.
         memory.warmed = 0;
         memory.silent = memory.silent.saturating_add(1);
         let lost = memory.lost;
@@ -194,7 +194,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         self.reading(memory)
     }
 
-    /// The reading with the remaining channels.
+    /// Returns the reading from the remaining channels.
     fn reading(&self, memory: &ArrayMemory<T, N>) -> Result<ArrayReading<T>, ArrayWithheld> {
         let (sum, sd, clamped) = self.estimate(memory).ok_or(ArrayWithheld::AllLost)?;
         let mut lost = 0u16;
@@ -204,7 +204,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         Ok(ArrayReading { estimate: held(sum, self.0.low, self.0.high), sd, lost, clamped })
     }
 
-    /// The channel that slipped, if one did: its difference from what the others predict jumped.
+    /// Returns the channel that slipped, if the difference between a channel and its prediction from the others jumped.
     #[inline(always)]
     fn slipped(&self, memory: &mut ArrayMemory<T, N>) -> Option<usize> {
         let count = self.0.channels;
@@ -223,9 +223,9 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         if exceeds && memory.warmed >= JUMP_SAMPLES { self.cause(&jumps) } else { None }
     }
 
-    /// The channel `k` whose slip explains most of all jumps. A slip changes their shares along `m`
-    /// with `m_k = 1/largest_k` and `m_j = -follows_jk/largest_j`, and explains `(m'r)^2/m'm` of
-    /// their squares.
+    /// Returns the channel `k` whose slip explains most of all jumps. `r` are the jumps as shares of the largest
+    /// allowed jumps. A slip of channel `k` changes them along a vector `m` with `m_k = 1/largest_k` and `m_j =
+    /// -follows_jk/largest_j`. It explains `(m'r)^2/m'm` of their squares.
     fn cause(&self, jumps: &[T; N]) -> Option<usize> {
         let count = self.0.channels;
         let mut most = (T::zero(), None);
@@ -245,7 +245,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         most.1
     }
 
-    /// Compares the channels on every tick of about 10 ms, as long as none is lost.
+    /// Compares the channels at every tick of about 10 ms, as long as no channel is lost.
     #[inline(always)]
     fn watch(&self, memory: &mut ArrayMemory<T, N>) {
         let count = self.0.channels;
@@ -263,7 +263,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         }
     }
 
-    /// The terms of a channel, and whether a state was outside of its domain.
+    /// Returns the terms of a channel, and whether a state was outside its domain.
     #[inline(always)]
     fn made(&self, k: usize, own: &ChannelMemory<T>) -> ([T; ARRAY_TERMS], bool) {
         let of = &self.0.of[k];
@@ -289,7 +289,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         (made, clamped)
     }
 
-    /// The sum over the remaining channels.
+    /// Returns the estimate from the remaining channels, its standard deviation, and whether a state was clamped.
     fn estimate(&self, memory: &ArrayMemory<T, N>) -> Option<(T, T, bool)> {
         let count = self.0.channels;
         let left = (0..count).filter(|&k| memory.lost[k].is_none()).count();
@@ -313,7 +313,7 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         Some((sum, gains.sd, clamped))
     }
 
-    /// A sum plus the terms of one more channel.
+    /// Returns a sum plus the gains times the terms of one more channel.
     #[inline(always)]
     fn plus(&self, mut sum: T, gains: &[T; ARRAY_TERMS], made: &[T; ARRAY_TERMS]) -> T {
         for t in 0..self.0.terms {
@@ -322,9 +322,9 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         sum
     }
 
-    /// For each channel, its estimate alone minus that of all others, in the reference's unit and
-    /// not clipped to the reference's domain; `None` if a channel is lost or has had no sample, and
-    /// for a single channel.
+    /// Returns for each channel the estimate from this channel alone minus the estimate from all others, in the
+    /// reference's unit and not clipped to the reference's domain. Returns `None` if a channel is lost or has had no
+    /// sample, and for a single channel.
     ///
     /// ```
     /// use stretch_core::{Design, Stage};

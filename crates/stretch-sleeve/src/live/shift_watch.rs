@@ -1,4 +1,4 @@
-//! Checks whether a gauge of several still agrees with the others.
+//! Checks whether each of several gauges still agrees with the others.
 
 use stretch_core::{Design, Real};
 use stretch_receptor::numbers::rounded;
@@ -7,23 +7,22 @@ use crate::ArrayCalibration;
 
 use super::receptor::{ArrayMemory, ArrayReceptor};
 
-/// Values per second in a block's mean; movements of a body or a muscle are slower.
+/// Values per second in a block's mean. Movements of a body or a muscle are slower.
 const VALUES_A_SECOND: f64 = 10.0;
 
-/// Reports how far each gauge of several deviates from what the others predict, and whether that is
-/// more than usual.
+/// Detector of gauges that deviate more than usual from the prediction of the others.
 ///
 /// A gauge that was put on again, or whose zero has drifted, gives another estimate than the
-/// others. Its difference is `d = alone - without`, the estimate of this gauge alone minus that of
-/// all others ([`ArrayReceptor::differences`]), taken ten times a second. A block's mean of `d`
-/// minus the usual mean is the deviation of the gauge, in the reference's unit. The gauge has
-/// shifted if this exceeds the limit of the record ([`ArrayShifts`](crate::ArrayShifts)), which
-/// states the rate of false alarms.
+/// others. Its difference is `d = alone - without`: the estimate from this gauge alone minus the
+/// estimate from all others ([`ArrayReceptor::differences`]), taken ten times a second. The
+/// deviation of the gauge is the mean of `d` in a block minus the usual mean, in the reference's
+/// unit. The gauge has shifted if its deviation exceeds the limit in the calibration
+/// ([`ArrayShifts`](crate::ArrayShifts)), which also states the rate of false alarms.
 ///
-/// A gauge that deviates from the first sample of a block on is reported at the block's end, so
-/// that a report takes at most two blocks. The signals alone cannot show a zero shift that all
-/// gauges share, nor which of two gauges has shifted. Cost: ten times a second, the products of an
-/// estimate for each channel.
+/// A gauge that deviates from the first sample of a block on is reported at the end of that block.
+/// A report therefore takes at most two blocks. The signals alone cannot show a zero shift that all
+/// gauges share, nor which of two gauges has shifted. Cost: for each channel, the products of an
+/// estimate, ten times a second.
 ///
 /// ```
 /// use stretch_core::{Design, Stage};
@@ -44,17 +43,17 @@ const VALUES_A_SECOND: f64 = 10.0;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftWatch<T, const N: usize> {
-    /// Gauges.
+    /// Number of gauges.
     pub channels: usize,
-    /// Samples between two values.
+    /// Number of samples between two values.
     pub samples_a_value: u32,
-    /// Values of a block.
+    /// Number of values in a block.
     pub values_a_block: u32,
     /// The usual mean of each gauge's difference.
     pub usual: [T; N],
-    /// Largest deviation of a block's mean from it.
+    /// Largest deviation of a block's mean from the usual mean.
     pub limits: [T; N],
-    /// One over the values of a block.
+    /// Reciprocal of the number of values in a block.
     pub per_block: T,
 }
 
@@ -66,27 +65,29 @@ pub struct ShiftMemory<T, const N: usize> {
     samples: u32,
 }
 
-/// Result of a block of time for every gauge.
+/// Result for every gauge at the end of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shifts<T, const N: usize> {
-    /// Deviation of each gauge from what the others predict, in the reference's unit. It is a lower
-    /// bound, because states outside of their domains are clamped.
+    /// Deviation of each gauge from the prediction of the others, in the reference's unit. It is a
+    /// lower bound, because states outside their domains are clamped.
     pub off: [T; N],
-    /// One bit for each gauge that is off by more than its limit, the first gauge's the lowest.
+    /// One bit for each gauge whose deviation exceeds its limit. The lowest bit is that of the
+    /// first gauge.
     pub shifted: u16,
-    /// The gauge with the largest ratio of deviation to limit. This needs at least three gauges.
+    /// The gauge with the largest ratio of deviation to limit; `None` with fewer than three gauges,
+    /// or if no gauge exceeds its limit.
     pub most: Option<usize>,
 }
 
 impl<T, const N: usize> Shifts<T, N> {
-    /// Whether a gauge is off by more than its limit.
+    /// Returns whether the deviation of a gauge exceeds its limit.
     pub fn has_shifted(&self, channel: usize) -> bool {
         channel < 16 && self.shifted & (1 << channel) != 0
     }
 }
 
-/// Samples between two values of a block, and the number of values of a block, at a rate and for a
-/// block of so many seconds.
+/// Returns the number of samples between two values of a block, and the number of values in a block
+/// of `block_s` seconds.
 ///
 /// ```
 /// assert_eq!(stretch_sleeve::block_of(100.0, 5.0), (10, 50));
@@ -108,7 +109,8 @@ impl<T: Real, const N: usize> Design for ShiftWatch<T, N> {
 }
 
 impl<T: Real, const N: usize> ShiftWatch<T, N> {
-    /// The watch of a record; `None` for a record without the usual differences.
+    /// Creates the detector for a calibration; `None` if the calibration does not contain the usual
+    /// differences.
     pub fn new(calibration: &ArrayCalibration<N>) -> Option<Self> {
         let of = calibration.spec().shifts.as_ref()?;
         let (samples_a_value, values_a_block) =
@@ -123,8 +125,8 @@ impl<T: Real, const N: usize> ShiftWatch<T, N> {
         })
     }
 
-    /// Call after each step of the receptor; returns a result at the end of a block. A block
-    /// restarts if a channel is lost or has no sample.
+    /// Takes the state of the receptor, and returns a result at the end of a block. Call this after
+    /// each step of the receptor. A block restarts if a channel is lost or has no sample.
     pub fn step(
         &self,
         memory: &mut ShiftMemory<T, N>,

@@ -8,11 +8,11 @@ use super::is_usable;
 
 const LEVELS: usize = Turns::MEDIAN_OF;
 
-/// Finds where a signal turns: a movement is a fall and a rise of at least a span, and ends where the signal has fallen
-/// from its high end by that span again.
+/// Detector of movements in a signal. A movement is a fall and a rise by at least `least_span`. It ends when the signal
+/// has fallen from its high end by that span again.
 ///
-/// The signal is the median of the last three samples, so that a spike is no turn. Samples before
-/// the first high end are not a movement, because its beginning is unknown.
+/// The signal is the median of the last three samples, so that a spike is not a turn. Samples before the first high end
+/// are not a movement, because its beginning is unknown.
 ///
 /// ```
 /// use stretch_sleeve::TurnFinder;
@@ -40,18 +40,18 @@ pub struct TurnMemory<T> {
 }
 
 impl<T: Real> TurnFinder<T> {
-    /// A finder of movements of at least a span.
+    /// Creates a detector of movements of at least `least_span`.
     pub fn new(least_span: T) -> Self {
         Self { least_span }
     }
 
-    /// Nothing seen yet.
+    /// Returns the memory before the first sample.
     pub fn memory(&self) -> TurnMemory<T> {
         let zero = T::zero();
         TurnMemory { before: [zero; 2], samples: 0, rises: true, extreme: zero, low: None }
     }
 
-    /// Takes a finite sample; returns the low and the high end at the end of a movement.
+    /// Takes a finite sample. Returns the low and the high end at the end of a movement.
     pub fn step(&self, memory: &mut TurnMemory<T>, sample: T) -> Option<(T, T)> {
         let [first, second] = memory.before;
         memory.before = [second, sample];
@@ -84,24 +84,22 @@ impl<T: Real> TurnFinder<T> {
     }
 }
 
-/// Reports how far the zero of a single gauge deviates from that of its calibration, by the levels
-/// at which its signal turns, and follows a slow change on request.
+/// Detector of a shift of a single gauge's zero from that of its calibration, by the levels at which its signal turns.
+/// On request it also follows a slow drift of the zero.
 ///
-/// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). At the end of
-/// each movement `off` is reported: the median of the last five levels minus the level of the
-/// record. The zero has shifted if `off` exceeds the record's limit, or if the running mean of
-/// levels exceeds its separate limit; the record states the rate of false alarms. A shift beyond
-/// the first limit needs three movements, one beyond the second ten to thirty. The shift is
-/// reported until both values are within half of their limits.
+/// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). At the end of each movement `off`
+/// is reported: the median of the last five levels minus the level in the calibration. The zero has shifted if `off`
+/// exceeds `limit`, or if the running mean of the levels' deviations exceeds `mean_limit`. The calibration states the
+/// rate of false alarms. A shift beyond the first limit needs three movements to be found, one beyond the second ten to
+/// thirty. The shift is reported until both values are within half of their limits.
 ///
-/// A zero `z` that is followed is the state of a scalar Kalman filter at its steady gain `k`: `z +=
-/// k clip(y - level - z)`, with innovations clipped at two standard deviations of levels and `z`
-/// clipped at the limit. A shift is reported if `off - z` exceeds the limit, or if `z` is at the
-/// limit, because the calibration has not seen larger shifts. A zero that has shifted is not
-/// followed.
+/// A followed zero `z` is the state of a scalar Kalman filter with its steady gain `k`: `z += k clip(y - level - z)`.
+/// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit. A shift is reported
+/// if `off - z` exceeds the limit. It is also reported if `z` is at the limit, because the calibration has not seen
+/// larger shifts. A zero that has shifted by more than a limit is not followed.
 ///
-/// This assumes that movements return to the ends that they had in the calibration; a movement that
-/// does not looks like a shift. Without movements nothing is reported.
+/// This assumes that movements return to the ends that they had in the calibration. A movement that does not looks like
+/// a shift. Without movements nothing is reported.
 ///
 /// ```
 /// use stretch_core::{Design, Polarity};
@@ -124,9 +122,9 @@ impl<T: Real> TurnFinder<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroWatch<T> {
-    /// Finds movements in the signal times `sign`.
+    /// Detector of movements in the signal times `sign`.
     pub finder: TurnFinder<T>,
-    /// -1 where the signal falls as the target rises.
+    /// -1 if the signal falls when the target rises, otherwise 1.
     pub sign: T,
     /// Weights of the low and the high end in a level.
     pub shares: [T; 2],
@@ -136,11 +134,11 @@ pub struct ZeroWatch<T> {
     pub limit: T,
     /// Largest deviation of the running mean of levels.
     pub mean_limit: T,
-    /// Weight of the newest level in it.
+    /// Weight of the newest level in the running mean.
     pub mean_share: T,
     /// Limit at which an innovation is clipped.
     pub most: T,
-    /// The share of an innovation by which the zero moves; 0 if it is not followed.
+    /// Share of an innovation by which the zero moves; 0 if the zero is not followed.
     pub follow: T,
     /// Change of the estimate per change of the signal, times `sign`.
     pub reference: T,
@@ -160,20 +158,20 @@ pub struct ZeroMemory<T> {
     since: Option<u32>,
 }
 
-/// Result of a movement for the zero.
+/// Result for the zero at the end of a movement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zero<T> {
     /// Deviation of the zero from that of the calibration, in the signal's unit.
     pub off: T,
-    /// The resulting deviation of the estimate, in the reference's unit, by the slope of the curve
-    /// at the turning points.
+    /// The resulting deviation of the estimate, in the reference's unit, from the slope of the calibration curve at the
+    /// turning points.
     pub off_reference: T,
-    /// How far the zero is followed, in the signal's unit; 0 if it is not.
+    /// Followed part of the deviation, in the signal's unit; 0 if the zero is not followed.
     pub followed: T,
     /// Whether the calibration no longer describes the signal.
     pub has_shifted: bool,
-    /// Samples since the end of the first movement that was off, or since the running mean is on
-    /// that side; 0 if there is none.
+    /// Number of samples since the end of the first movement that deviates, or since the running mean changed its sign;
+    /// 0 without a shift.
     pub since_samples: u32,
 }
 
@@ -196,7 +194,7 @@ impl<T: Real> Design for ZeroWatch<T> {
 }
 
 impl<T: Real> ZeroWatch<T> {
-    /// The watch of a gauge with these turning points, with the polarity of its calibration.
+    /// Creates the detector for a gauge with these turning points and the polarity of its calibration.
     pub fn new(polarity: Polarity, turns: &Turns) -> Self {
         let sign = polarity.sign();
         Self {
@@ -213,20 +211,20 @@ impl<T: Real> ZeroWatch<T> {
         }
     }
 
-    /// The same watch, which also follows a slow change of zero at the rate of `turns`.
+    /// Returns the same detector, which also follows a slow drift of the zero with the gain in `turns`.
     #[must_use]
     pub fn following(self, turns: &Turns) -> Self {
         Self { follow: T::from_f64(turns.follow), ..self }
     }
 
-    /// A sample minus the followed zero: the input for a receptor.
+    /// Returns a sample minus the followed zero, as the input for a receptor.
     #[inline]
     pub fn corrected(&self, memory: &ZeroMemory<T>, sample: T) -> T {
         sample - self.sign * memory.followed
     }
 
-    /// Takes a sample; returns a result at the end of a movement, from the fifth on. A missing
-    /// sample changes nothing.
+    /// Takes a sample. Returns a result at the end of each movement, from the fifth on. A missing sample changes
+    /// nothing but the sample count.
     pub fn step(&self, memory: &mut ZeroMemory<T>, sample: T) -> Option<Zero<T>> {
         memory.samples = memory.samples.wrapping_add(1);
         if !is_usable(sample) {
@@ -250,7 +248,7 @@ impl<T: Real> ZeroWatch<T> {
         if (memory.mean > T::zero()) != (before > T::zero()) {
             memory.turned = memory.samples;
         }
-        // one that has shifted is back within half of the limits
+        // A reported shift ends within half of the limits.
         let share = if memory.since.is_some() { T::from_f64(0.5) } else { T::one() };
         let jumped = whole && (off - memory.followed).abs() > share * self.limit;
         let lasts = whole && memory.mean.abs() > share * self.mean_limit;
@@ -270,8 +268,7 @@ impl<T: Real> ZeroWatch<T> {
         })
     }
 
-    /// The end of the first of the last movements whose level deviates by at least half of the
-    /// median.
+    /// Returns the end of the first of the last movements whose level deviates by at least half as much as the median.
     fn first(&self, memory: &ZeroMemory<T>, off: T) -> u32 {
         let half = T::from_f64(0.5) * off;
         let is_off = |level: &T| (*level - self.level - half) * off >= T::zero();
@@ -280,7 +277,7 @@ impl<T: Real> ZeroWatch<T> {
     }
 }
 
-/// The middle of five.
+/// Returns the median of five levels.
 fn median<T: Real>(mut levels: [T; LEVELS]) -> T {
     for i in 1..LEVELS {
         let mut k = i;

@@ -1,4 +1,4 @@
-//! A calibration of several gauges applied to a logged trial, as it would run live.
+//! Applies a calibration of several gauges to a logged trial, as it would run live.
 
 use stretch_core::{Design, Runner, Seconds, Stage};
 use stretch_data::Trial;
@@ -17,17 +17,17 @@ const JITTER_TOLERANCE: f64 = 0.2;
 /// Readings of a trial, and the channels that were lost.
 #[derive(Debug, Clone)]
 pub struct AppliedArray {
-    /// One answer for each sample.
+    /// One reading for each sample, or the reason why there is none.
     pub readings: Vec<Result<ArrayReading<f64>, ArrayWithheld>>,
     /// For each lost channel: its index, the time, and the reason.
     pub losses: Vec<(usize, f64, ArrayLoss)>,
-    /// For each block of time: the time at which the deviations of the channels from each other
-    /// were reported, and these deviations. `None` if the record does not hold the usual
-    /// deviations.
+    /// For each block of time: the time of the report, and the deviations of the channels from each other. Empty if the
+    /// calibration does not contain the usual deviations.
     pub shifts: Vec<(f64, Shifts<f64, MAX_CHANNELS>)>,
 }
 
-/// Applies a calibration of several gauges to a trial, sample by sample. Missing ticks are stepped as missing samples.
+/// Applies a calibration of several gauges to a trial, sample by sample. A gap in the time stamps is processed as
+/// missing samples.
 ///
 /// # Errors
 /// [`CalibrateError::Data`](stretch_calibrate::CalibrateError::Data) if the trial lacks a channel.
@@ -52,7 +52,7 @@ pub fn apply_array(
     };
     for (i, &time_s) in trial.time_s.iter().enumerate() {
         if let Arrival::Gap { missing } = cadence.step(Seconds(time_s)) {
-            // one sample more than is bridged clears the memory completely
+            // One missing sample more than is bridged clears the signals. Further ones change nothing.
             for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
                 let _ = step(&mut memory, [f64::NAN; MAX_CHANNELS]);
             }

@@ -1,4 +1,5 @@
-//! One model of many channels, with one ridge per channel, chosen on left-out data.
+//! Fits one model of many channels. Each channel has a ridge penalty that is chosen by
+//! cross-validation.
 
 use stretch_calibrate::{
     CalibrateError,
@@ -21,7 +22,7 @@ use super::{
     watch::Still,
 };
 
-/// A note on data that do not show which difference between channels is usual.
+/// Note on data that are too short to show the usual differences between channels.
 const TOO_SHORT: &str = "too little was recorded to say when a gauge has shifted against the others: that takes a minute or more";
 
 /// Options of [`calibrate_array`].
@@ -33,14 +34,14 @@ pub struct ArrayOptions {
     pub reference: String,
     /// Resting length, as [`Options::rest_length`](stretch_calibrate::Options::rest_length).
     pub rest_length: Option<f64>,
-    /// Date of the calibration, as free text for the record.
+    /// Date of the calibration as free text, which is stored with it.
     pub date: String,
 }
 
 /// A calibration of several gauges with its errors.
 #[derive(Debug, Clone)]
 pub struct ArrayFit {
-    /// The record.
+    /// The calibration.
     pub calibration: SleeveCalibration,
     /// The contribution of each channel.
     pub carried: Vec<Carried>,
@@ -53,8 +54,8 @@ pub struct ArrayFit {
 /// Fits one linear model of all channels and their memories.
 ///
 /// Each channel has its own ridge penalty. Penalties are chosen by cross-validation, first one for
-/// all channels, then channel by channel. Each trial is left out in turn; with fewer than three
-/// trials each sixth of a trial is left out. Two seconds next to the part that is left out are
+/// all channels, then channel by channel. Each trial is left out in turn. With fewer than three
+/// trials, each sixth of all data is left out in turn, and two seconds on either side of it are
 /// excluded from the fit as well.
 ///
 /// # Errors

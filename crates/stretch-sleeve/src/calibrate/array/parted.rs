@@ -1,4 +1,4 @@
-//! Rows in parts, each of which is left out in turn.
+//! Cross-validation on rows in parts, each of which is left out in turn.
 
 use nalgebra::DVector;
 use serde::Serialize;
@@ -6,31 +6,32 @@ use stretch_calibrate::toolkit::{LinearFactor, RowAccumulator, leave_one_out};
 
 use crate::calibrate::{bank::Bank, channels::Channels};
 
-/// Ridges that are tried, as shares of a term's power.
+/// Ridge penalties that are tried, as shares of a term's power.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-/// Number of parts into which trials are divided if there are fewer than three.
+/// Number of parts into which the data are divided if there are fewer than three trials.
 const PARTS: usize = 6;
-/// Seconds next to a left-out part that are not fitted either.
+/// Seconds on either side of a left-out part that are not fitted either.
 const GAP_S: f64 = 2.0;
 
-/// Root mean square error on data left out, and the ridges that were chosen.
+/// Root mean square error on left-out data, and the chosen ridge penalties.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeldOut {
     pub(crate) rmse: f64,
     pub(crate) ridges: Vec<f64>,
 }
 
-/// Rows of all trials, in parts, each of which is left out in turn.
+/// Rows of all trials in parts.
 pub(crate) struct Parted {
     pub(crate) terms: usize,
-    /// Factors of the parts' rows, and of each part's with the samples next to it.
+    /// Factor (triangle of a QR decomposition) of all rows, and for each part the factor of the
+    /// rows outside it and its neighbouring samples.
     pub(crate) whole: LinearFactor,
     pub(crate) others: Vec<LinearFactor>,
     pub(crate) places: Places,
     pub(crate) parts: Vec<(f64, LinearFactor)>,
 }
 
-/// Which part a sample is in.
+/// Assignment of samples to parts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Places {
     by_trial: bool,
@@ -39,13 +40,13 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// The part of a sample of a trial, which is the `at`-th of all stretches.
+    /// Returns the part of a sample. `at` is its index among the samples of all stretches.
     pub(crate) fn of(&self, trial: usize, at: usize) -> usize {
         if self.by_trial { trial } else { at * self.count / self.total }
     }
 }
 
-/// The rows in parts; `None` if a part has fewer rows than terms.
+/// Divides the rows into parts.
 pub(crate) fn parted(
     channels: &Channels,
     bank: &Bank,
@@ -56,7 +57,8 @@ pub(crate) fn parted(
     let total: usize = channels.stretches.iter().map(|s| s.len()).sum();
     let count = if trials >= 3 { trials } else { PARTS };
     let gap = if trials >= 3 { 0 } else { (GAP_S * channels.sample_rate.hz()) as usize };
-    // of each part: the rows at its ends that its neighbours' fits leave out, and those within
+    // For each part: its first rows, its middle rows and its last rows. The fits without a
+    // neighbouring part exclude the rows at that end.
     let mut sums: Vec<[RowAccumulator; 3]> =
         (0..count).map(|_| [0; 3].map(|_| RowAccumulator::new(terms))).collect();
     let mut rows = vec![0.0; count];
@@ -90,7 +92,7 @@ pub(crate) fn parted(
     Some(Parted { terms, whole, others, places, parts })
 }
 
-/// The factor of all parts but one and the ends of its neighbours.
+/// Returns the factor of all parts but one, without the neighbouring ends of its neighbours.
 fn without(factors: &[[LinearFactor; 3]], left: usize) -> Option<LinearFactor> {
     let pieces = factors.iter().enumerate().flat_map(|(part, [first, middle, last])| {
         let mut own = Vec::new();
@@ -109,12 +111,13 @@ fn without(factors: &[[LinearFactor; 3]], left: usize) -> Option<LinearFactor> {
 }
 
 impl Parted {
-    /// The terms of a channel.
+    /// Returns the channel of a term.
     fn channel_of(term: usize) -> usize {
         (term - 1) / Bank::terms_a_channel()
     }
 
-    /// Least squares of some channels with their ridges; the coefficients of the others are zero.
+    /// Fits some channels by least squares with their ridge penalties. The coefficients of the
+    /// other channels are zero.
     pub(crate) fn fit(
         &self,
         factor: &LinearFactor,
@@ -136,7 +139,7 @@ impl Parted {
         Some(weights)
     }
 
-    /// Root mean square error on the parts left out.
+    /// Returns the root mean square error on the left-out parts.
     pub(crate) fn held_out(&self, keep: &[usize], ridges: &[f64]) -> Option<f64> {
         let (mut squares, mut count) = (0.0, 0.0);
         for ((rows, part), others) in self.parts.iter().zip(&self.others) {
@@ -148,8 +151,8 @@ impl Parted {
         (count > 0.0).then(|| (squares / count).sqrt())
     }
 
-    /// The ridges with the smallest error on the left-out parts: one for all, then channel by
-    /// channel.
+    /// Returns the ridge penalties with the smallest error on the left-out parts, first one for all
+    /// channels, then channel by channel.
     pub(crate) fn choose(&self, keep: &[usize]) -> Option<HeldOut> {
         let channels = (self.terms - 1) / Bank::terms_a_channel();
         let mut best: Option<HeldOut> = None;
@@ -176,7 +179,8 @@ impl Parted {
     }
 }
 
-/// Contribution of one channel to the estimate: errors on left-out data, in the reference's unit.
+/// Contribution of one channel to the estimate, from errors on left-out data in the reference's
+/// unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Carried {
     /// Column of the channel.
@@ -186,11 +190,11 @@ pub struct Carried {
     /// Root mean square error of all others.
     pub rmse_without: Option<f64>,
     /// Share by which this channel reduces the mean squared error of the others; negative if it
-    /// increases it.
+    /// increases that error.
     pub adds: Option<f64>,
 }
 
-/// The table of all channels, each judged as all together were.
+/// Returns the contributions of all channels. `together` is the error of all channels together.
 pub(crate) fn carried(
     parted: &Parted,
     signals: &[String],

@@ -1,7 +1,7 @@
-//! The limits at which a gauge is reported as shifted against the others.
+//! Limits beyond which a gauge is reported as shifted against the others.
 //!
-//! Estimates of each part of the data come from a fit without that part, so that blocks of the
-//! calibration have the errors of another day with the same sensor.
+//! Each part of the data is estimated by a fit without that part. The errors in a block are
+//! therefore like those of another day with the same sensor.
 
 use nalgebra::{DMatrix, DVector};
 use stretch_calibrate::{CalibrateError, toolkit::LinearFactor};
@@ -19,16 +19,16 @@ use crate::{
 
 use super::parted::Parted;
 
-/// Length of a block: a few movements of a body or a muscle.
+/// Length of a block, s: a few movements of a body or a muscle.
 const BLOCK_S: f64 = 5.0;
-/// False alarms per hour, of all channels together. Together with those of slips and of stuck
-/// channels this makes one.
+/// Rate of false alarms per hour of all channels together. With the alarms for slips and for stuck
+/// channels the sum is one per hour.
 const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
-/// Fewest blocks, counted as independent ones, that is three degrees of freedom.
+/// Smallest number of independent blocks, for three degrees of freedom.
 const LEAST_BLOCKS: f64 = 4.0;
 
-/// The usual difference of each channel from the others; `None` for a single channel or too little
-/// data.
+/// Measures the usual difference of each channel from the others, and its limit. Returns `None` for
+/// a single channel or too little data.
 pub(crate) fn shifts(
     parted: &Parted,
     channels: &Channels,
@@ -46,7 +46,7 @@ pub(crate) fn shifts(
     let gain = linear.zero_and_gain().1;
     let bank = Bank::new(linear.domains.clone());
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-    // for each channel the means of blocks, stretch by stretch
+    // For each channel: the means of blocks, stretch by stretch.
     let mut blocks: Vec<Vec<Vec<f64>>> = vec![Vec::new(); count];
     for (before, stretch) in channels.placed() {
         let samples: Vec<usize> = stretch.warmed_up().step_by(samples_a_value as usize).collect();
@@ -78,8 +78,8 @@ pub(crate) fn shifts(
     }))
 }
 
-/// For each part and each channel, the coefficients of its estimate alone minus those of all
-/// others, fitted without that part.
+/// Returns for each part and each channel the coefficients of the estimate from that channel alone
+/// minus those of the estimate from all others, fitted without that part.
 fn contrasts(parted: &Parted, linear: &Linear, ridges: &[f64]) -> Option<Vec<Vec<DVector<f64>>>> {
     let count = linear.signals.len();
     let everything: Vec<usize> = (0..count).collect();
@@ -98,7 +98,8 @@ fn contrasts(parted: &Parted, linear: &Linear, ridges: &[f64]) -> Option<Vec<Vec
     parted.others.iter().map(of_part).collect()
 }
 
-/// Mean of blocks, and the deviation that a further block exceeds with a probability of `share`.
+/// Returns the mean of the blocks, and the deviation from it that a further block exceeds with
+/// probability `share`.
 fn limit(stretches: &[Vec<f64>], share: f64) -> Option<(f64, f64)> {
     let Levels { mean, variance, alike, count } = levels(stretches)?;
     let (independent, sd) = independent(count, variance, alike.clamp(0.0, 0.99));
@@ -115,8 +116,8 @@ mod tests {
 
     use super::limit;
 
-    /// How often a further block exceeds the limits of this many blocks, with a correlation of
-    /// neighbours.
+    /// Simulates how often a further block exceeds the limits from `blocks` blocks, whose
+    /// neighbours have the correlation `alike`.
     fn exceeds(blocks: usize, share: f64, alike: f64) -> f64 {
         let mut random = Random::new(30);
         let draws = 20_000;
@@ -138,11 +139,11 @@ mod tests {
 
     #[test]
     fn a_further_block_exceeds_the_limit_as_often_as_is_said() {
-        // three binomial standard deviations of 20,000 draws
+        // Tolerance: three binomial standard deviations of 20,000 draws.
         let room = |share: f64| 3.0 * (share * (1.0 - share) / 20_000.0).sqrt();
         for blocks in [6, 12, 60] {
             let share = exceeds(blocks, 0.05, 0.0);
-            // alike by chance only makes limits wider
+            // A correlation by chance only makes the limits wider.
             assert!(share < 0.05 + room(0.05), "{blocks} blocks: {share}");
             assert!(share > 0.02, "{blocks} blocks: {share}");
         }

@@ -1,10 +1,10 @@
-//! Limits at which a channel counts as lost.
+//! Limits beyond which a channel counts as lost.
 //!
-//! A channel is compared with the prediction of the others, by a regression of fast parts, `h = x -
-//! low-pass of x`. The largest jump of this difference within an hour, for a working channel, is a
-//! Gumbel quantile of the largest jumps of seconds (Gumbel 1958; Coles 2001, chapter 3), and at
-//! least [`LEAST_SLIP`]. The minimum is needed because a few dozen seconds do not show how far a
-//! channel jumps once an hour, and a smaller slip does little harm.
+//! A channel is compared with its prediction from the others. The prediction is a regression between the fast parts of
+//! the channels, `h = x - low-pass of x`. The limit is the largest jump of the difference that a working channel has
+//! within an hour. It is a Gumbel quantile of the largest jumps of each second (Gumbel 1958; Coles 2001, chapter 3),
+//! and at least [`LEAST_SLIP`]. The minimum is needed because a few dozen seconds do not show how far a channel jumps
+//! once an hour, and a smaller slip does little harm.
 
 use nalgebra::DVector;
 use stretch_calibrate::CalibrateError;
@@ -22,19 +22,18 @@ use crate::{
 /// Number of memory states whose sum is the fast part of a channel: its change over 0.05 s.
 const FAST_STATES: usize = 1;
 
-/// False alarms an hour, of all channels together.
+/// False alarms per hour for slips, of all channels together.
 const ALARMS_AN_HOUR: f64 = 0.5;
-/// Fewest seconds for a quantile.
+/// Smallest number of seconds from which a quantile is computed.
 const LEAST_BLOCKS: usize = 20;
-/// The smallest slip that is searched, as a share of a channel's range; with too few seconds this
-/// is the limit.
+/// Smallest limit for a slip, as a share of a channel's range. It is the limit itself if there are too few seconds.
 const LEAST_SLIP: f64 = 0.15;
-/// Share of a channel's range by which it may leave that range on either side.
+/// Share of a channel's range by which its samples may leave that range on either side.
 const MARGIN: f64 = 0.5;
-/// Ridge of the regression on the other channels, as a share of their power.
+/// Ridge penalty of the regression on the other channels, as a share of their power.
 const RIDGE: f64 = 1e-3;
 
-/// A channel of a model with its limits; `channels` are the fitted data, if any.
+/// Returns a channel of a model with its limits. `channels` are the fitted data, if there are any.
 pub(crate) fn watched(
     linear: &Linear,
     channels: Option<&Channels>,
@@ -62,14 +61,15 @@ pub(crate) fn watched(
     })
 }
 
-/// The weights of the fast states of a channel in its own unit, as terms of the bank: `(term, half of its domain)`.
+/// Returns the weights with which the fast states of a channel add up in its own unit, as pairs `(term of the bank,
+/// half of the state's domain)`.
 fn fast_terms(linear: &Linear, channel: usize) -> Vec<(usize, f64)> {
     let half = |d: &Interval| 0.5 * (d.max - d.min);
     let first = linear.terms_of(channel).start;
     (1..=FAST_STATES).map(|s| (first + s, half(&linear.domains[channel][s]))).collect()
 }
 
-/// The regression of a channel's fast part on those of the others.
+/// Returns the coefficients of the regression of a channel's fast part on those of the others.
 fn follows(linear: &Linear, k: usize) -> Option<Vec<f64>> {
     let count = linear.signals.len();
     let fast: Vec<_> = (0..count).map(|channel| fast_terms(linear, channel)).collect();
@@ -96,7 +96,7 @@ fn follows(linear: &Linear, k: usize) -> Option<Vec<f64>> {
     Some(follows)
 }
 
-/// The greatest jump of each second.
+/// Returns the largest jump in each second.
 fn greatest_of_seconds(channels: &Channels, follows: &[f64], k: usize) -> Vec<f64> {
     let hz = channels.sample_rate.hz();
     let stride = usize::from(samples_a_tick(hz));
@@ -120,26 +120,27 @@ fn greatest_of_seconds(channels: &Channels, follows: &[f64], k: usize) -> Vec<f6
     greatest
 }
 
-/// The jump that the largest of a second exceeds [`ALARMS_AN_HOUR`] times an hour, shared by
-/// `channels`.
+/// Returns the jump that the largest jump of a second exceeds [`ALARMS_AN_HOUR`] times an hour. The channels share this
+/// rate.
 fn hourly(greatest: &[f64], channels: usize) -> f64 {
     let n = greatest.len() as f64;
     let mean = greatest.iter().sum::<f64>() / n;
     let variance = greatest.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    // moments of Gumbel's distribution: mean = mu + gamma beta, variance = (pi beta)^2/6
+    // Moments of Gumbel's distribution: mean = mu + gamma beta, variance = (pi beta)^2/6.
     let beta = (6.0 * variance).sqrt() / std::f64::consts::PI;
     let mu = mean - 0.577_215_664_901_532_9 * beta;
     let share = ALARMS_AN_HOUR / 3600.0 / channels as f64;
     mu - beta * (-(-share).ln_1p()).ln()
 }
 
-/// False alarms an hour, of all channels together.
+/// False alarms per hour for stuck channels, of all channels together.
 const STILL_ALARMS_AN_HOUR: f64 = 0.25;
-/// Fewest equal samples in a row that count as sticking, and the longest time that they may take.
+/// Smallest number of equal samples in a row that counts as stuck, and the longest time that the samples may take.
 const LEAST_STILL: f64 = 4.0;
 const MOST_STILL_S: f64 = 1.0;
 
-/// The longest runs of equal samples that were seen, from which follows how many in a row indicate a stuck channel.
+/// The longest observed runs of equal samples, from which the number of equal samples that indicates a stuck channel is
+/// derived.
 ///
 /// Samples of a working channel repeat by chance if noise is less than a step of the converter. Of
 /// `n` samples, each a repetition with probability `q`, the longest run of repetitions is about `ln
@@ -152,12 +153,12 @@ const MOST_STILL_S: f64 = 1.0;
 pub(crate) struct Still {
     /// For each channel the largest number of equal samples in a row, 1 if none repeats.
     pub(crate) longest: Vec<u32>,
-    /// Samples of each channel that were looked at.
+    /// Number of samples of each channel that were examined.
     pub(crate) samples: u64,
 }
 
 impl Still {
-    /// The longest runs of channels.
+    /// Finds the longest runs in the channels.
     pub(crate) fn of(channels: &Channels) -> Self {
         let count = channels.stretches.first().map_or(0, |s| s.signals.len());
         let mut longest = vec![1; count];
@@ -176,20 +177,20 @@ impl Still {
         Self { longest, samples }
     }
 
-    /// Both recordings together.
+    /// Combines the runs of two recordings.
     pub(crate) fn and(mut self, other: &Self) -> Self {
         self.longest.iter_mut().zip(&other.longest).for_each(|(own, new)| *own = (*own).max(*new));
         self.samples += other.samples;
         self
     }
 
-    /// Number of equal samples in a row that a channel reaches by chance [`STILL_ALARMS_AN_HOUR`] times
-    /// an hour; 0 if this takes longer than [`MOST_STILL_S`].
+    /// Returns the number of equal samples in a row that a channel reaches by chance [`STILL_ALARMS_AN_HOUR`] times an
+    /// hour; 0 if they take longer than [`MOST_STILL_S`].
     pub(crate) fn limit(&self, channel: usize, sample_rate_hz: f64) -> u16 {
         let repetitions = f64::from(self.longest[channel].max(2) - 1);
         let an_alarm = 3600.0 * sample_rate_hz * self.longest.len() as f64 / STILL_ALARMS_AN_HOUR;
         let longer = (an_alarm.ln() / (self.samples.max(100) as f64).ln()).max(1.0);
-        // one more than these samples bound: the longest is a whole number below ln n / ln(1/q)
+        // Add one, because the longest run in the samples is a whole number below ln n / ln(1/q).
         let limit = (1.0 + ((repetitions + 1.0) * longer).ceil()).max(LEAST_STILL);
         if limit <= MOST_STILL_S * sample_rate_hz { limit as u16 } else { 0 }
     }
@@ -202,7 +203,8 @@ mod tests {
 
     use super::*;
 
-    /// Two hours of repetitions with a probability of 0.07, as on knitted sleeves, learnt from two minutes.
+    /// The limits are learnt from two minutes of repetitions with a probability of 0.07, as in knitted sleeves, and
+    /// tested on two hours.
     #[test]
     fn chance_repeats_reach_the_limit_less_than_once_an_hour() {
         let mut random = ChaCha8Rng::seed_from_u64(30);

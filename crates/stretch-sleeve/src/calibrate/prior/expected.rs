@@ -1,4 +1,4 @@
-//! Errors of a prior on left-out sessions, by seconds of reference.
+//! Errors of a prior on left-out sessions, after different durations of reference.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -10,21 +10,20 @@ use super::{
     tree::{Leaf, Normal},
 };
 
-/// Fewest effective samples, each a second, of a part on which errors are judged.
+/// Smallest number of independent samples, one per second, in a part on which errors are judged.
 const LEAST_COUNT: f64 = 5.0;
 
-/// The error on left-out sessions, after some seconds of reference. Each session is judged on what
-/// follows its first minute. A shorter one is judged on its end (what follows 30, 20 or 10 s), for
-/// the seconds before that.
+/// Expected error after some seconds of reference, measured on left-out sessions. Each session is judged on the samples
+/// after its first minute. A shorter session is judged on its end (after 30, 20 or 10 s), for durations up to the
+/// beginning of that end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
     /// Seconds of reference.
     pub seconds: f64,
-    /// Root mean square error if sessions of the same sensor and wearer were seen, in the
-    /// reference's unit.
+    /// Root mean square error if the prior knows sessions of the same sensor and wearer, in the reference's unit.
     pub rmse_known: Option<f64>,
-    /// Root mean square error if the topmost of sensor and wearer was not seen.
+    /// Root mean square error if the prior does not know the first step of the path (the sensor or wearer).
     pub rmse_new: Option<f64>,
     /// Spread of errors for `rmse_known`.
     pub spread_known: ErrorSpread,
@@ -32,12 +31,11 @@ pub struct Expected {
     pub spread_new: ErrorSpread,
 }
 
-/// Spread of errors on left-out sessions about the model's prediction.
+/// Spread of errors on left-out sessions, relative to the model's prediction.
 ///
-/// The ratio `r` of the mean squared error to the predicted variance is known for each session;
-/// errors of a session are assumed normal. Half of the interval that holds 95 % of single estimates
-/// is the `c` predicted standard deviations for which the mean of `erf(c/sqrt(2 r))` over the
-/// sessions is 0.95.
+/// Each session has a ratio `r` of the mean squared error to the predicted variance. Errors within a session are
+/// assumed to be normal. The 95 % interval of single estimates has a half-width of `c` predicted standard deviations,
+/// where the mean of `erf(c/sqrt(2 r))` over the sessions is 0.95.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorSpread {
@@ -48,10 +46,10 @@ pub struct ErrorSpread {
 }
 
 impl ErrorSpread {
-    /// Values without left-out sessions: errors are as predicted, and normal.
+    /// Values if there are no left-out sessions: errors are as predicted, and normal.
     pub const NORMAL: Self = Self { widening: 1.0, multiple_95: 1.96 };
 
-    /// The spread of sessions with these ratios.
+    /// Returns the spread for sessions with these ratios.
     fn of(ratios: &[f64]) -> Self {
         if ratios.is_empty() {
             return Self::NORMAL;
@@ -60,7 +58,7 @@ impl ErrorSpread {
             ratios.iter().map(|r| f(r.max(f64::MIN_POSITIVE))).sum::<f64>() / ratios.len() as f64
         };
         let inside = |c: f64| mean(&|r| libm::erf(c / (2.0 * r).sqrt()));
-        // no session needs more than the worst one does
+        // The worst session alone gives an upper bound.
         let worst = ratios.iter().copied().fold(0.0, f64::max).sqrt() * 1.96;
         let (mut low, mut high) = (0.0, worst);
         for _ in 0..60 {
@@ -71,15 +69,15 @@ impl ErrorSpread {
     }
 }
 
-/// The mean of `X'X` over a sample of a future session: the prior's and that of some seconds of the
-/// session. A minute has the same weight as the prior on how the session's channels move together.
+/// Returns `X'X/n` for a future session, from that of the prior and that of some seconds of the session. Each row of
+/// `X` contains the terms of a sample. One minute of the session has the same weight as the prior.
 pub(crate) fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64) -> DMatrix<f64> {
     let weight = seconds / 60.0;
     (prior + own * weight) / (1.0 + weight)
 }
 
-/// The table of a prior. `left` holds the prior of each session without it; `gram` is the mean of
-/// `X'X` over a sample and `unit` the value of a normalised target in the reference's unit.
+/// Returns the table of expected errors. `left` holds the prior without each session. `gram` is `X'X/n` of all
+/// sessions, and `unit` is the size of one unit of the normalised target in the reference's unit.
 pub(crate) fn expected(
     parts: &[Vec<Leaf>],
     left: &[[Option<Normal>; 2]],
@@ -101,7 +99,8 @@ pub(crate) fn expected(
     seconds.enumerate().map(one).collect()
 }
 
-/// Mean squared error, and its ratio to the predicted variance for each session, after the first `used` parts.
+/// Returns the mean squared error after the first `used` parts, and for each session its ratio to the predicted
+/// variance.
 fn judged(
     parts: &[Vec<Leaf>],
     left: &[[Option<Normal>; 2]],
@@ -111,7 +110,7 @@ fn judged(
 ) -> (Option<f64>, Vec<f64>) {
     let (mut squares, mut ratios) = (0.0, Vec::new());
     for (parts, left) in parts.iter().zip(left) {
-        // a short session is judged on its end, for as many seconds as there are before it
+        // A short session is judged on its end, after at most as many seconds as come before the end.
         let judged = parts.iter().rposition(|part| part.count >= LEAST_COUNT);
         let (Some(prior), Some(at)) = (&left[which], judged.filter(|at| *at >= used)) else {
             continue;
@@ -123,7 +122,8 @@ fn judged(
         let Some(posterior) = seen else { continue };
         let error = rest.squares_at(&posterior.mean) / rest.count;
         squares += error;
-        // prediction of an update with these seconds, because the ratio multiplies this prediction
+        // The predicted variance is computed as an update with these seconds does, because the ratio multiplies that
+        // variance.
         let count: f64 = parts[..used].iter().map(|part| part.count).sum();
         let sum = parts[..used].iter().fold(gram * 0.0, |sum, part| sum + &part.gram);
         let gram = mixed_gram(gram, &(sum / count.max(1.0)), count);
@@ -133,7 +133,7 @@ fn judged(
     ((count > 0.0).then(|| squares / count), ratios)
 }
 
-/// A distribution after the rows of a part.
+/// Returns the distribution of the coefficients after the rows of a part.
 fn after(normal: &Normal, part: &Leaf, noise: f64) -> Option<Normal> {
     let precision = inverse(&normal.covariance)?;
     let covariance = inverse(&(&precision + &part.gram / noise))?;

@@ -1,4 +1,4 @@
-//! Whether gauges are in the same places, and rise in the same direction, as in the sessions of a prior: by their signals alone.
+//! Checks from the signals alone whether gauges have the same places and directions as in the sessions of a prior.
 
 use nalgebra::{DMatrix, DVector};
 use stretch_calibrate::toolkit::extent;
@@ -11,7 +11,8 @@ use crate::{
 
 use super::learnt::Prior;
 
-/// Signals are taken for exchanged or reversed if they are half as far from those of the sessions without that: a quarter of the square.
+/// Gauges count as exchanged or reversed if this halves the distance of their signals from those of the sessions. The
+/// squared distance is then a quarter.
 const NEARER: f64 = 0.25;
 
 /// Mean and covariance of the signals of several gauges.
@@ -21,7 +22,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// Those of a prior's sessions, from the mean of `X'X`.
+    /// Computes the moments of a prior's sessions from `X'X/n`.
     fn of_prior(prior: &Prior) -> Self {
         let term = |k: usize| 1 + k * Bank::terms_a_channel();
         let count = prior.domains.len();
@@ -45,7 +46,7 @@ impl Moments {
         Self { mean, covariance }
     }
 
-    /// The mean over samples of `(x - m)' C^-1 (x - m)`, `m` and `C^-1` those of a prior.
+    /// Returns the mean over the samples of `(x - m)' C^-1 (x - m)`, with `m` and `C^-1` of a prior.
     fn distance(&self, mean: &DVector<f64>, precision: &DMatrix<f64>) -> f64 {
         let off = &self.mean - mean;
         precision.component_mul(&self.covariance).sum() + off.dot(&(precision * &off))
@@ -69,7 +70,8 @@ impl Moments {
 }
 
 impl Prior {
-    /// A session as it would be with all gauges reversed: about zero, as turned wires do it, and about the middle of each signal.
+    /// Returns the session with all gauges reversed, in two ways: about zero, as exchanged wires do, and about the
+    /// middle of each signal.
     pub(crate) fn mirrored(
         &self,
         trials: &[Trial],
@@ -90,17 +92,18 @@ impl Prior {
         Ok([about(&|_| 0.0)?, about(&|k| ends(k).min + ends(k).max)?])
     }
 
-    /// What is wrong with gauges that are like those of the sessions only if two are exchanged, or one is reversed.
+    /// Returns a description if the gauges resemble those of the sessions only after two are exchanged or one is
+    /// reversed.
     pub(crate) fn misplaced(&self, channels: &Channels) -> Option<String> {
         let prior = Moments::of_prior(self);
         let precision = inverse(&prior.covariance)?;
         let count = self.signals.len();
         let own = Moments::of(channels, count);
         let distance = |of: &Moments, mean: &DVector<f64>| of.distance(mean, &precision);
-        // the zero of a gauge that was reversed is unknown
+        // The zero of a reversed gauge is unknown, so its own mean is used.
         let reversed = (0..count).map(|k| {
             let without = own.reversed(k);
-            // of two gauges it cannot be known which
+            // With two gauges it cannot be known which one is reversed.
             let which =
                 if count == 2 { self.signals.join(" or ") } else { self.signals[k].clone() };
             let says =

@@ -1,4 +1,4 @@
-//! Landmarks of a movement that can be found without a reference: its two ends, and where it rests.
+//! Landmarks of a movement that can be found without a reference: its two ends, and its rest.
 //!
 //! The low and the high end are the 5 % of the samples in which the reference, or its substitute,
 //! is smallest and largest. The rest is the 10 % in which the signals move least.
@@ -9,14 +9,14 @@ use stretch_core::Interval;
 use crate::calibrate::channels::Channels;
 
 pub(crate) const LANDMARKS: usize = 3;
-/// Names, in their order.
+/// Names of the landmarks, in order.
 pub(crate) const NAMES: [&str; LANDMARKS] = ["low end", "high end", "rest"];
 const END_SHARE: f64 = 0.05;
 const STILL_SHARE: f64 = 0.1;
-/// Number of memory states whose sum is the recent movement of a channel: those up to 0.3 s.
+/// Number of memory states whose sum is the change of a channel over the last 0.3 s.
 const MOVED_STATES: usize = 2;
 
-/// A sample: stretch and place.
+/// A sample: the index of its stretch, and its index in that stretch.
 pub(crate) type Place = (usize, usize);
 
 /// The samples after the warm-up.
@@ -25,14 +25,14 @@ pub(crate) fn warmed_up(channels: &Channels) -> Vec<Place> {
     stretches.flat_map(|(i, s)| s.warmed_up().map(move |k| (i, k))).collect()
 }
 
-/// The reference at the landmarks of a session.
+/// Returns the mean reference at each landmark of a session.
 pub(crate) fn at_landmarks(channels: &Channels) -> [f64; LANDMARKS] {
     let reference = |&(i, k): &Place| channels.stretches[i].reference[k];
     let sets = landmarks(channels, reference);
     sets.map(|set| set.iter().map(reference).sum::<f64>() / f64::max(set.len() as f64, 1.0))
 }
 
-/// The samples of the landmarks, where `level` is the reference or its substitute.
+/// Returns the samples at each landmark. `level` is the reference or its substitute.
 pub(crate) fn landmarks(
     channels: &Channels,
     level: impl Fn(&Place) -> f64,
@@ -50,7 +50,7 @@ pub(crate) fn landmarks(
     ]
 }
 
-/// The share of the samples with the smallest values, at least one.
+/// Returns the share of the samples with the smallest values, at least one sample.
 fn least(places: &[Place], share: f64, value: impl Fn(&Place) -> f64) -> Vec<Place> {
     let mut valued: Vec<(f64, Place)> = places.iter().map(|p| (value(p), *p)).collect();
     valued.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -62,7 +62,7 @@ fn span(domain: Interval) -> f64 {
     (domain.max - domain.min).max(f64::MIN_POSITIVE)
 }
 
-/// How often a level passes from its lower third to its upper third or back.
+/// Counts how often a level passes from its lower third to its upper third or back.
 pub(crate) fn passes(levels: impl Iterator<Item = f64> + Clone) -> usize {
     let (low, high) = levels
         .clone()
@@ -81,12 +81,12 @@ pub(crate) fn passes(levels: impl Iterator<Item = f64> + Clone) -> usize {
     passes
 }
 
-/// Mean of a landmark in sessions of a path, and the standard deviation of a new session about it.
+/// Mean of a landmark over sessions, and the standard deviation of a new session about that mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Landmark {
     pub(crate) mean: f64,
     pub(crate) sd: f64,
-    /// Number of sessions that it was computed from.
+    /// Number of sessions from which the mean was computed.
     pub(crate) sessions: usize,
 }
 
@@ -98,8 +98,9 @@ pub(crate) struct Landmarks {
     pub(crate) at: [f64; LANDMARKS],
 }
 
-/// A landmark over the sessions that share most with a path, `sd^2 = v (1 + 1/n)`, where `v` is the
-/// pooled variance of all groups of sessions that share as much.
+/// Returns a landmark over the sessions that share the longest beginning with a path. Its variance
+/// is `sd^2 = v (1 + 1/n)` for `n` such sessions, where `v` is the pooled variance of all groups of
+/// sessions that share equally many steps.
 pub(crate) fn expected(
     sessions: &[Landmarks],
     path: &[String],
@@ -115,8 +116,8 @@ pub(crate) fn expected(
     })
 }
 
-/// The variance within groups of sessions that share the first steps of their paths; `None` if no
-/// group has two.
+/// Returns the variance within groups of sessions that share the first `depth` steps of their
+/// paths; `None` if no group has two sessions.
 fn pooled(sessions: &[Landmarks], depth: usize, landmark: usize) -> Option<f64> {
     let mut groups: std::collections::BTreeMap<&[String], Vec<f64>> = Default::default();
     for Landmarks { path, at } in sessions {
@@ -142,7 +143,7 @@ mod tests {
             .map(|(who, x)| Landmarks { path: path(who), at: [x; LANDMARKS] })
             .into();
         let known = expected(&sessions, &path("b"), 0).unwrap();
-        // two groups of two: v = (2 * 0.02)/2 = 0.02, times 3/2
+        // For two groups of two, v = (2 * 0.02)/2 = 0.02, times 3/2.
         assert!((known.mean - 5.1).abs() < 1e-12 && (known.sd.powi(2) - 0.03).abs() < 1e-12);
         let new = expected(&sessions, &path("c"), 0).unwrap();
         assert!(new.sd > 2.0 && new.sessions == 4, "{new:?}");

@@ -1,4 +1,4 @@
-//! A prior: the distribution of a model's coefficients over sessions.
+//! A prior: the distribution of a model's coefficients over sessions, learnt from earlier sessions.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -22,23 +22,21 @@ use super::{
     tree::{Known, Leaf, Normal, Spread, Tree},
 };
 
-/// Errors of sleeves are correlated over about this time, in seconds: samples within it count as
-/// one.
+/// Correlation time of the errors of sleeves, s. Samples within this time count as one.
 const CORRELATED_S: f64 = 1.0;
-/// The sign of correlations above this can be trusted.
+/// Smallest absolute correlation whose sign can be trusted.
 pub(crate) const CLEAR: f64 = 0.5;
-/// Fewest sessions from which a spread can be learnt.
+/// Smallest number of sessions from which a spread can be learnt.
 const LEAST_SESSIONS: usize = 3;
 
 /// Distribution of the coefficients of a future session, learnt from earlier ones.
 ///
-/// The model is linear in its coefficients. For each channel it has a cubic and, for each of four
-/// time constants, the change of the channel over that time, also multiplied by the channel and by
-/// its square. All terms are defined over the prior's own domains. Sessions vary around their
-/// wearer and wearers around the population (with as many levels as the sessions' paths have), and
-/// each level has its own covariance.
+/// The model is linear in its coefficients. For each channel it has a cubic of the signal. For each of four time
+/// constants it has the change of the channel over that time, and this change multiplied by the signal and by its
+/// square. All terms are defined over the prior's own domains. Sessions vary around their wearer, and wearers vary
+/// around the population, with as many levels as the paths of the sessions have. Each level has its own covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-// messages about a file call it a record
+// Error messages about a file use this name.
 #[serde(deny_unknown_fields, expecting = "struct Record")]
 pub struct Prior {
     pub(crate) schema: u32,
@@ -46,41 +44,41 @@ pub struct Prior {
     pub signals: Vec<String>,
     /// Column of the reference.
     pub reference: String,
-    /// Samples a second.
+    /// Sample rate, Hz.
     pub sample_rate_hz: f64,
-    /// Sessions that it was learnt from.
+    /// Number of sessions from which the prior was learnt.
     pub sessions: usize,
-    /// Its errors, by seconds of reference, on left-out sessions.
+    /// Expected errors after different durations of reference, from left-out sessions.
     pub expected: Vec<Expected>,
     pub(crate) target: Target,
     pub(crate) target_range: Range,
     pub(crate) estimate: Interval,
     pub(crate) domains: Vec<Vec<Interval>>,
-    /// For every path that was seen, the empty one first.
+    /// Distribution for every known path. The first path is empty.
     pub(crate) known: Vec<Known>,
-    /// Covariance of each level below the root.
+    /// Covariance of the coefficients at each level below the root.
     #[serde(with = "triangles")]
     pub(crate) levels: Vec<DMatrix<f64>>,
-    /// Variance of a sample about its session's own coefficients, in normalised target.
+    /// Variance of a sample about the estimate from its session's own coefficients, in normalised target.
     pub(crate) noise: f64,
-    /// Mean of `X'X` over a sample.
+    /// `X'X` divided by the number of samples, where each row of `X` contains the terms of a sample.
     #[serde(with = "triangle")]
     pub(crate) gram: DMatrix<f64>,
-    /// The longest runs of equal samples that were seen.
+    /// The longest observed runs of equal samples, for each channel.
     pub(crate) still_samples: Vec<u32>,
-    /// Samples of each channel that were looked at.
+    /// Number of samples of each channel that were examined.
     pub(crate) still_seen: u64,
-    /// For each session its path and landmarks, in normalised target.
+    /// Path and landmarks of each session, in normalised target.
     pub(crate) landmarks: Vec<Landmarks>,
 }
 
 impl Prior {
-    /// The reference's unit over normalised target, without its sign.
+    /// Returns the size of one unit of the normalised target in the reference's unit, without its sign.
     pub(super) fn unit_of_target(&self) -> f64 {
         self.target_range.span() * self.target.reference_per_target().abs()
     }
 
-    /// The longest runs of equal samples that were seen.
+    /// Returns the longest observed runs of equal samples.
     pub(super) fn still(&self) -> Still {
         Still { longest: self.still_samples.clone(), samples: self.still_seen }
     }
@@ -88,8 +86,8 @@ impl Prior {
     /// Learns a prior from sessions.
     ///
     /// # Errors
-    /// [`SleeveError::Prior`] if there are fewer than three sessions, or a session differs from the
-    /// first in its channels, unit, rate or polarity.
+    /// [`SleeveError::Prior`] if there are fewer than three sessions, if a session is a copy of another, or if a
+    /// session differs from the first in its channels, unit, rate or polarity.
     pub fn learn(sessions: &[Session]) -> Result<Self, SleeveError> {
         let first = check_all(sessions)?;
         let channels = first.signals.len();
@@ -118,8 +116,7 @@ impl Prior {
             sessions.iter().map(|session| leaves(session, &bank, (target, target_range))).collect();
         let parts = parts.ok_or_else(undetermined)?;
         let leaves: Vec<Leaf> = parts.iter().map(|parts| whole(parts)).collect();
-        // Paths of equal depth: a session with a shorter path is its own group at the missing
-        // levels.
+        // All paths get the same depth. A session with a shorter path becomes a separate group at the missing levels.
         let depth = sessions.iter().map(|s| s.path.len()).max().unwrap_or(0);
         let paths: Vec<Vec<String>> = sessions.iter().map(|s| filled(s, depth)).collect();
         let paths = without_single_levels(paths);
@@ -158,9 +155,9 @@ impl Prior {
         })
     }
 
-    /// The same spreads, with the information of these sessions about their wearers and the
-    /// population: for sessions after the prior was learnt. Sessions from which it was learnt count
-    /// only if they are given again.
+    /// Returns a prior with the same covariances and with the knowledge of these sessions about their wearers and the
+    /// population. This is for sessions after the prior was learnt. The sessions from which it was learnt count only if
+    /// they are given again.
     ///
     /// # Errors
     /// As [`Prior::learn`].
@@ -186,12 +183,13 @@ impl Prior {
         unit_of(&self.reference)
     }
 
-    /// The paths that were seen: sensors, their wearers, and activities.
+    /// Returns the known paths: sensors, their wearers, and activities.
     pub fn paths(&self) -> impl Iterator<Item = &[String]> {
         self.known.iter().skip(1).map(|known| known.path.as_slice())
     }
 
-    /// The distribution of the coefficients of a new session of a path, and how much of the path was seen.
+    /// Returns the distribution of the coefficients of a new session with a path, and how many steps of the path are
+    /// known.
     pub(crate) fn of(&self, path: &[String]) -> (Normal, usize) {
         let fits = |seen: &[String]| {
             seen.len() <= path.len() && seen.iter().zip(path).all(|(a, b)| a == b)
@@ -199,7 +197,7 @@ impl Prior {
         let seen = self.known.iter().filter(|known| fits(&known.path));
         let Some(Known { path: seen, mean, covariance }) = seen.max_by_key(|own| own.path.len())
         else {
-            // the empty path is always known
+            // The empty path is always known, so this does not occur.
             return (Normal { mean: DVector::zeros(0), covariance: DMatrix::zeros(0, 0) }, 0);
         };
         let below = &self.levels[seen.len().min(self.levels.len())..];
@@ -208,12 +206,12 @@ impl Prior {
     }
 }
 
-/// Samples that count as one.
+/// Returns the number of samples that count as one.
 pub(crate) fn correlated(sample_rate_hz: f64) -> f64 {
     (CORRELATED_S * sample_rate_hz).max(1.0)
 }
 
-/// The sums of a session's parts in the terms and the target of a prior.
+/// Returns the sums of a session's parts, with the terms and the target of a prior.
 fn leaves(session: &Session, bank: &Bank, (target, range): (Target, Range)) -> Option<Vec<Leaf>> {
     let zero = range.normalise(target.from_reference(0.0));
     let scale = range.normalise(target.from_reference(1.0)) - zero;
@@ -231,18 +229,18 @@ fn leaves(session: &Session, bank: &Bank, (target, range): (Target, Range)) -> O
     Some(session.factors(bank, (scale, zero))?.into_iter().map(one).collect())
 }
 
-/// The landmarks of sessions in normalised target.
+/// Returns the landmarks of sessions in normalised target.
 fn normalised_landmarks(sessions: &[Session], (target, range): (Target, Range)) -> Vec<Landmarks> {
     let normalised = |x: f64| range.normalise(target.from_reference(x));
     let one = |s: &Session| {
         let [low, high, rest] = s.landmarks.map(normalised);
-        // a target may fall where the reference rises
+        // The target may fall when the reference rises.
         Landmarks { path: s.path.clone(), at: [low.min(high), low.max(high), rest] }
     };
     sessions.iter().map(one).collect()
 }
 
-/// The sums of all parts.
+/// Returns the sums over all parts.
 pub(crate) fn whole(parts: &[Leaf]) -> Leaf {
     let mut all = parts[0].clone();
     for part in &parts[1..] {
@@ -254,15 +252,14 @@ pub(crate) fn whole(parts: &[Leaf]) -> Leaf {
     all
 }
 
-/// The path of a session, filled up with its own name.
+/// Returns the path of a session, filled up to `depth` with the session's name.
 fn filled(session: &Session, depth: usize) -> Vec<String> {
     let mut path = session.path.clone();
     path.resize(depth, format!("({})", session.name));
     path
 }
 
-/// Removes levels with one node, or with a node for every session, because a covariance cannot be
-/// learnt from them.
+/// Removes levels with a node for every session, and all levels below, because a covariance cannot be learnt from them.
 fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let depth = paths.first().map_or(0, Vec::len);
     let distinct = |level: usize| {
@@ -271,12 +268,12 @@ fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
         heads.dedup();
         heads.len()
     };
-    // Below a level of single sessions there is only the session itself.
+    // Below a level with a node for every session there is only the session itself.
     let keep = (0..depth).take_while(|&level| distinct(level) < paths.len()).count();
     paths.into_iter().map(|path| path[..keep].to_vec()).collect()
 }
 
-/// Checks sessions against one another; returns the first.
+/// Checks sessions against each other. Returns the first.
 fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
     let few = || SleeveError::Prior {
         file: "prior".into(),
@@ -296,7 +293,7 @@ fn check_all(sessions: &[Session]) -> Result<&Session, SleeveError> {
     Ok(first)
 }
 
-/// That a session is one of those before it, which would count as often as it is given.
+/// Returns a problem if a session is the same as one before it. A copy would count twice.
 fn copy(session: &Session, before: &[Session]) -> Option<String> {
     let is_same = |one: &&Session| one.parts == session.parts && one.domains == session.domains;
     before.iter().find(is_same).map(|one| {
@@ -304,7 +301,7 @@ fn copy(session: &Session, before: &[Session]) -> Option<String> {
     })
 }
 
-/// How a session differs from another one with which it cannot share a prior.
+/// Returns the reason why a session cannot share a prior with another one.
 fn differs(session: &Session, first: &Session) -> Option<String> {
     if session.signals.len() != first.signals.len() {
         return Some(format!(
@@ -360,7 +357,7 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     })
 }
 
-/// The first signal that another list has at another place.
+/// Returns the first signal that has another position in another list.
 pub(crate) fn elsewhere<'a>(signals: &'a [String], others: &[String]) -> Option<&'a str> {
     let differs = |(place, name): &(usize, &String)| {
         others.iter().position(|other| other == *name).is_some_and(|other| other != *place)
@@ -368,23 +365,24 @@ pub(crate) fn elsewhere<'a>(signals: &'a [String], others: &[String]) -> Option<
     signals.iter().enumerate().find(differs).map(|(_, name)| name.as_str())
 }
 
-/// Whether the reference is in another unit, from the correlation of each channel with it and from its change over that of the channel, as a
-/// share of the usual: wearers differ by less than the nearest two units, of which one is ten of the other.
+/// Returns whether the reference is in another unit. The pairs contain the correlation of each channel with the
+/// reference, and the change of the reference per change of the channel relative to the usual. Wearers differ by less
+/// than the factor of ten between the two nearest units.
 pub(crate) fn is_other_unit(channels: impl Iterator<Item = (f64, f64)>) -> bool {
     const USUAL: std::ops::RangeInclusive<f64> = 0.2..=5.0;
     let mut clear = channels.filter(|(correlation, _)| correlation.abs() > CLEAR).peekable();
     clear.peek().is_some() && clear.all(|(_, steeper)| !USUAL.contains(&steeper))
 }
 
-/// How many channels follow the reference in the opposite direction, if they are more than those
-/// that follow it in the expected one; from pairs of found and expected correlations.
+/// Returns the number of channels that follow the reference in the opposite direction, if they outnumber those that
+/// follow it in the expected one. The pairs contain the found and the expected correlations.
 pub(crate) fn turned(pairs: impl Iterator<Item = (f64, f64)>) -> Option<usize> {
     let clear = pairs.filter(|(a, b)| a.abs() > CLEAR && b.abs() > CLEAR);
     let (same, opposite): (Vec<_>, Vec<_>) = clear.partition(|(a, b)| a * b > 0.0);
     (opposite.len() > same.len()).then_some(opposite.len())
 }
 
-/// The names of paths in a sentence.
+/// Lists the names of paths for a message.
 pub(crate) fn paths_in_words(paths: impl Iterator<Item = Vec<String>>) -> String {
     listed(&paths.map(|path| path.join("/")).collect::<Vec<_>>())
 }

@@ -1,10 +1,10 @@
-//! Priors: predictions for a new session from earlier ones.
+//! Priors: distributions that are learnt from earlier sessions and predict a new one.
 //!
-//! [`Session`] sums up a session with a reference. [`Prior`] is learnt from sessions: mean and
-//! covariance of the coefficients of one linear model with a memory, for each sensor and wearer
-//! that was seen and for unseen ones. [`Prior::update`] adds ten seconds to a minute of reference,
-//! or nothing at all. [`Prior::renew`] adds a session without a reference, by the ends and rests of
-//! its movement.
+//! A [`Session`] holds the sums of a session with a reference. A [`Prior`] is learnt from sessions.
+//! It contains the mean and covariance of the coefficients of one linear model with a memory, for
+//! each known sensor and wearer and for unknown ones. [`Prior::update`] adds ten seconds to a
+//! minute of reference, or none at all. [`Prior::renew`] adds a session without a reference, by the
+//! ends and rests of its movement.
 
 mod expected;
 mod gauges;

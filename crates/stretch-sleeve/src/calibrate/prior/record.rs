@@ -1,4 +1,4 @@
-//! Priors as files in JSON, under a digest.
+//! Priors and sessions as JSON files with a digest.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use super::{
     tree::Known,
 };
 
-/// What a file is, and how it is made again.
+/// The kind of a file, and how to make the file again.
 const PRIOR: [&str; 2] = ["prior", "learn it again with stretch sleeve learn"];
 const SESSION: [&str; 2] = ["session", "write it again with stretch calibrate --session"];
 
@@ -54,7 +54,7 @@ impl Prior {
         }
     }
 
-    /// The prior in JSON.
+    /// Returns the prior in JSON.
     ///
     /// # Errors
     /// Never, because all of its numbers are finite.
@@ -63,13 +63,13 @@ impl Prior {
     }
 }
 
-/// An object in JSON with its digest as the last field.
+/// Returns an object in JSON with its digest as the last field.
 fn sealed(what: [&str; 2], record: &impl Serialize, name: &str) -> Result<String, SleeveError> {
     let object = serde_json::to_string(record).map_err(|error| problem(what, name, error))?;
     digest::join(&object).ok_or_else(|| problem(what, name, "it is not a JSON object"))
 }
 
-/// The object of a file whose digest is that of its text.
+/// Reads the object of a file, after a check that the digest is that of its text.
 fn opened<T: for<'d> Deserialize<'d>>(
     what: [&str; 2],
     path: &Path,
@@ -94,7 +94,7 @@ impl Session {
         Ok(session)
     }
 
-    /// The session in JSON.
+    /// Returns the session in JSON.
     ///
     /// # Errors
     /// Never, because all of its numbers are finite.
@@ -111,7 +111,7 @@ pub(crate) mod triangle {
         packed(own).serialize(to)
     }
 
-    /// Empty if the numbers are not those of a triangle.
+    /// Returns an empty matrix if the count of numbers is not that of a triangle.
     pub(crate) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<DMatrix<f64>, D::Error> {
         Vec::deserialize(from).map(|own| mirrored(&own))
     }
@@ -146,7 +146,7 @@ pub(crate) mod list {
     }
 }
 
-/// The symmetric matrix of an upper triangle.
+/// Returns the symmetric matrix with this upper triangle.
 fn mirrored(numbers: &[f64]) -> DMatrix<f64> {
     let columns = (1..=numbers.len()).find(|n| n * (n + 1) / 2 >= numbers.len()).unwrap_or(0);
     let mut upper = unpacked(numbers, columns).unwrap_or_else(|| DMatrix::zeros(0, 0));

@@ -1,10 +1,9 @@
 //! Makes a calibration from a prior and a session without any reference.
 //!
-//! This assumes that the movement has the ends and the rest of earlier ones. The mean rows of the
-//! samples at these [landmarks](super::landmarks) are three more rows of the Bayesian least squares
-//! of [`Prior::update`](super::Prior::update), with the values of earlier sessions as targets and
-//! their spread as noise. Therefore a shift and a scale are believed only as far as earlier
-//! sessions differed.
+//! This assumes that the movement has the same ends and the same rest as earlier ones. The mean rows of the samples at
+//! these [landmarks](super::landmarks) are three additional rows of the Bayesian least squares of
+//! [`Prior::update`](super::Prior::update). Their targets are the values of earlier sessions, and their noise is the
+//! spread of those values. A shift and a scale are therefore accepted only as far as earlier sessions differed.
 
 use std::collections::HashMap;
 
@@ -29,24 +28,24 @@ use super::{
     tree::Normal,
 };
 
-/// The 0.999 quantile of chi-square with three degrees of freedom: a session of the prior's kind is refused once in a
-/// thousand.
+/// The 0.999 quantile of chi-square with three degrees of freedom. One in a thousand sessions like those of the prior
+/// is refused.
 const UNSEEN: f64 = 16.266;
-/// Fewest passes from one end to the other in a movement.
+/// Smallest number of passes from one end to the other in a movement.
 const LEAST_PASSES: usize = 2;
 
 /// Options of [`Prior::renew`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RenewOptions {
-    /// Sensor, wearer and so on, about whom the prior may know more than about others; empty: a new
+    /// Path of the session: sensor, wearer and so on, about which the prior may have knowledge; empty for an unknown
     /// one.
     pub path: Vec<String>,
-    /// Columns of the signals, in the prior's order; empty: those of the prior.
+    /// Columns of the signals in the prior's order; empty for the names in the prior.
     pub signals: Vec<String>,
-    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None`:
-    /// the prior's knowledge of the path.
+    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None` for the prior's
+    /// knowledge of the path.
     pub calibration: Option<SleeveCalibration>,
-    /// Date of the calibration, as free text for the record.
+    /// Date of the calibration as free text, which is stored with it.
     pub date: String,
 }
 
@@ -62,19 +61,19 @@ impl RenewOptions {
 pub struct Renewed {
     /// The calibration.
     pub calibration: SleeveCalibration,
-    /// What was assumed, and the result.
+    /// The assumptions and the result.
     pub summary: RenewSummary,
     /// Notes on the data.
     pub notes: Vec<String>,
 }
 
-/// What a renewal assumed, and how far it went.
+/// Assumptions and result of a renewal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RenewSummary {
     /// The ends and the rest of the movement.
     pub assumed: Vec<Assumed>,
-    /// Squared distance of the signals from what was seen, in standard deviations: chi-square with
-    /// three degrees of freedom.
+    /// Squared distance of the signals from those of earlier sessions, in standard deviations: chi-square with three
+    /// degrees of freedom.
     pub distance: f64,
     /// Shift of the estimate in the middle of the movement, in the reference's unit.
     pub shift: f64,
@@ -84,16 +83,16 @@ pub struct RenewSummary {
     pub expected_rmse: f64,
 }
 
-/// A value of the reference that was assumed.
+/// An assumed value of the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Assumed {
-    /// The landmark: low end, high end, rest.
+    /// Name of the landmark: low end, high end or rest.
     pub landmark: String,
     /// The reference there, in its unit.
     pub reference: f64,
     /// Standard deviation over sessions, in the same unit.
     pub sd: f64,
-    /// Number of sessions that it was computed from.
+    /// Number of sessions from which the value was computed.
     pub sessions: usize,
     /// The estimate before the renewal.
     pub before: f64,
@@ -101,17 +100,17 @@ pub struct Assumed {
     pub after: f64,
 }
 
-/// Mean rows at the landmarks.
+/// Mean rows of terms at the landmarks.
 type Rows = [DVector<f64>; LANDMARKS];
 
-/// What the landmarks of a session make of the coefficients.
+/// The coefficients after the landmarks of a session, with the mean rows and the squared distance.
 struct OnLandmarks {
     after: Normal,
     rows: Rows,
     distance: f64,
 }
 
-/// The note on a movement whose ends and rest are the same from either side.
+/// Note on a movement that fits equally well with all gauges reversed.
 const REVERSED: &str = "it cannot be determined whether all gauges are reversed, because reversed signals would fit the earlier sessions as well: \
                         check that the estimate rises when the measured quantity does, or record ten seconds with a reference \
                         (stretch calibrate --prior)";
@@ -119,15 +118,15 @@ const REVERSED: &str = "it cannot be determined whether all gauges are reversed,
 impl Prior {
     /// Renews a calibration by the ends and the rests of a movement, without any reference.
     ///
-    /// `X` are the mean rows at the landmarks, `y` their values in earlier sessions and `V` the
-    /// variances of these. The coefficients `N(m, S)` become `m + K(y - X m)`, `S - K X S`, `K = S
-    /// X'(X S X' + V)^-1`. The landmarks are found with the estimates of `m`, then again with those
-    /// of the result. A session is refused if `(y - X m)'(X S X' + V)^-1(y - X m)` exceeds the
-    /// 0.999 quantile of chi-square.
+    /// `X` are the mean rows at the landmarks, and `y` are their values in earlier sessions. `V` is diagonal: the
+    /// variances of these values plus that of a sample. The coefficients `N(m, S)` become `m + K(y - X m)`, `S - K X
+    /// S`, with `K = S X'(X S X' + V)^-1`. The landmarks are found with the estimates from `m`, then again with those
+    /// from the result. A session is refused if `(y - X m)'(X S X' + V)^-1(y - X m)` exceeds the 0.999 quantile of
+    /// chi-square.
     ///
     /// # Errors
-    /// [`SleeveError::Prior`] if the data have other channels, rate or unit than the prior, hold no
-    /// complete movement, or differ from all that the prior has seen, with what to do.
+    /// [`SleeveError::Prior`] if the data have other channels, another rate or another unit than the prior, contain no
+    /// complete movement, or differ from all earlier sessions. The error states what to do.
     pub fn renew(&self, trials: &[Trial], options: &RenewOptions) -> Result<Renewed, SleeveError> {
         let signals = if options.signals.is_empty() { &self.signals } else { &options.signals };
         self.refuse_columns(signals, &self.reference)?;
@@ -164,7 +163,7 @@ impl Prior {
         })
     }
 
-    /// The coefficients before the renewal, and the steps of the path that were seen.
+    /// Returns the coefficients before the renewal, and the number of known steps of the path.
     fn before(&self, options: &RenewOptions) -> Result<(Normal, usize), SleeveError> {
         let (normal, known) = self.of(&options.path);
         let Some(calibration) = &options.calibration else { return Ok((normal, known)) };
@@ -175,12 +174,13 @@ impl Prior {
                       instead"
                 .into(),
         })?;
-        // both sessions differ from their wearer, as sessions do
+        // Both the earlier and the new session differ from their wearer by the variance of a session.
         let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);
         Ok((Normal { mean: DVector::from_vec(weights), covariance }, known))
     }
 
-    /// The coefficients after the landmarks, which are found with those before and once more with the result.
+    /// Returns the coefficients after the landmarks. The landmarks are found with the coefficients before, and once
+    /// more with the result.
     fn onto_landmarks(
         &self,
         channels: &Channels,
@@ -196,7 +196,7 @@ impl Prior {
         Some(OnLandmarks { after, rows, distance })
     }
 
-    /// The mean rows at the landmarks that some coefficients find.
+    /// Returns the mean rows at the landmarks that these coefficients give.
     fn rows(&self, bank: &Bank, channels: &Channels, weights: &DVector<f64>) -> Rows {
         let mut row = rows_of(bank, channels);
         let levels: HashMap<Place, f64> =
@@ -208,7 +208,7 @@ impl Prior {
         })
     }
 
-    /// Refuses a session that is shorter than a movement, or has none.
+    /// Refuses a session without a complete movement.
     fn refuse_standing(
         &self,
         bank: &Bank,
@@ -298,7 +298,7 @@ impl Prior {
     }
 }
 
-/// The row of the bank at any sample.
+/// Returns a function that gives the row of terms of a sample.
 fn rows_of<'a>(bank: &'a Bank, channels: &'a Channels) -> impl FnMut(&Place) -> DVector<f64> + 'a {
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
     move |&(i, k)| {
@@ -307,7 +307,7 @@ fn rows_of<'a>(bank: &'a Bank, channels: &'a Channels) -> impl FnMut(&Place) -> 
     }
 }
 
-/// The coefficients after the landmarks, and the squared distance of these from what was expected.
+/// Returns the coefficients after the landmarks, and the squared distance of the landmarks from the expected values.
 fn moved(normal: &Normal, rows: &Rows, values: &[Landmark], noise: f64) -> Option<(Normal, f64)> {
     let x = DMatrix::from_fn(LANDMARKS, normal.mean.len(), |i, j| rows[i][j]);
     let off = DVector::from_fn(LANDMARKS, |i, _| values[i].mean) - &x * &normal.mean;

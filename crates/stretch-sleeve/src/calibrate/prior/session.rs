@@ -1,4 +1,4 @@
-//! A session with a reference, as sums. A prior is learnt from these.
+//! A session with a reference, stored as sums. A prior is learnt from sessions.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use super::landmarks::{LANDMARKS, at_landmarks};
 
 /// The schema of sessions and priors that this release writes and reads.
 pub(crate) const SCHEMA: u32 = 1;
-/// Ends of the parts of a session, in seconds from its beginning; the last part has no end.
+/// Ends of the parts of a session, in seconds from its beginning. The last part is open-ended.
 pub(crate) const PARTS_S: [f64; 4] = [10.0, 20.0, 30.0, 60.0];
 
 /// Identity and columns of a session.
@@ -34,32 +34,32 @@ pub struct SessionOptions {
     pub signals: Vec<String>,
     /// Column of the reference.
     pub reference: String,
-    /// What was measured, from the coarsest to the finest: the sensor, the wearer, the activity.
+    /// Path of the session, from the coarsest to the finest step: the sensor, the wearer, the activity.
     pub path: Vec<String>,
 }
 
 impl SessionOptions {
-    /// Options of a session whose sensor and wearer are unknown.
+    /// Creates options of a session whose sensor and wearer are unknown.
     pub fn new<S: Into<String>>(signals: impl IntoIterator<Item = S>, reference: &str) -> Self {
         let signals = signals.into_iter().map(Into::into).collect();
         Self { signals, reference: reference.to_owned(), path: Vec::new() }
     }
 
-    /// The same, of a sensor and wearer: `left/anna`, as many steps as are known.
+    /// Sets the path of the session, such as `left/anna`, with as many steps as are known.
     #[must_use]
     pub fn of(self, path: &str) -> Self {
         Self { path: parse_path(path), ..self }
     }
 }
 
-/// The steps of a path such as `left/anna`; empty steps are left out.
+/// Splits a path such as `left/anna` into its steps. Empty steps are left out.
 pub(crate) fn parse_path(path: &str) -> Vec<String> {
     let steps = path.split('/').map(str::trim).filter(|step| !step.is_empty());
     steps.map(str::to_owned).collect()
 }
 
-/// A session with a reference: the triangles of its rows. They hold all that a prior needs, and
-/// none of its samples.
+/// A session with a reference, as triangular factors of its rows of terms. They contain everything that a prior needs,
+/// and no samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
@@ -72,33 +72,33 @@ pub struct Session {
     pub signals: Vec<String>,
     /// Column of the reference.
     pub reference: String,
-    /// Samples a second.
+    /// Sample rate, Hz.
     pub sample_rate_hz: f64,
     pub(crate) domains: Vec<Vec<Interval>>,
     pub(crate) reference_range: Interval,
-    /// For each channel the largest number of equal samples in a row, counted while another one
-    /// changes.
+    /// For each channel the largest number of equal samples in a row, counted while another channel changes.
     pub(crate) still_samples: Vec<u32>,
     /// The reference at the [landmarks](super::landmarks).
     pub(crate) landmarks: [f64; LANDMARKS],
     pub(crate) parts: Vec<SessionPart>,
 }
 
-/// The rows between two times of a session, in the terms over the session's own domains.
+/// The rows between two times of a session, with the terms over the session's own domains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SessionPart {
     pub(crate) rows: u64,
-    /// The upper triangle of `[X y]`, row by row, `y` in the reference's unit.
+    /// The upper triangular factor of `[X y]`, row by row, with `y` in the reference's unit.
     pub(crate) triangle: Vec<f64>,
 }
 
 impl Session {
-    /// Sums up a session. Several trials count as one session, in the given order.
+    /// Sums up a session, and returns it with notes on the data. Several trials count as one session, in the given
+    /// order.
     ///
     /// # Errors
-    /// [`SleeveError`], which names the trial and the column: a missing or constant column,
-    /// channels that are copies, different rates.
+    /// [`SleeveError`], which names the trial and the column: a missing or constant column, channels that are copies,
+    /// or different rates.
     pub fn new(
         name: &str,
         trials: &[Trial],
@@ -126,10 +126,10 @@ impl Session {
         Ok((session, channels.notes))
     }
 
-    /// The same session with some of its channels, in that order.
+    /// Returns the same session with some of its channels, in the given order.
     ///
     /// # Errors
-    /// [`SleeveError::Channels`] if there is no such channel, or none is named.
+    /// [`SleeveError::Channels`] if a channel does not exist, or if none is given.
     pub fn of_channels(&self, keep: &[usize]) -> Result<Self, SleeveError> {
         let most = self.signals.len();
         let wrong = || SleeveError::Channels { asked: keep.len(), most };
@@ -155,13 +155,13 @@ impl Session {
         })
     }
 
-    /// The longest runs of equal samples.
+    /// Returns the longest runs of equal samples.
     pub(crate) fn still(&self) -> Still {
         let samples = self.parts.iter().map(|part| part.rows).sum();
         Still { longest: self.still_samples.clone(), samples }
     }
 
-    /// Correlation of each channel with the reference.
+    /// Returns the correlation of each channel with the reference.
     pub(crate) fn correlations(&self) -> Vec<f64> {
         let own = Bank::terms_a_channel();
         let value = 1 + self.signals.len() * own;
@@ -180,19 +180,20 @@ impl Session {
         (0..self.signals.len()).map(|k| one(1 + k * own)).collect()
     }
 
-    /// Seconds of all parts.
+    /// Returns the duration of all parts in seconds.
     pub fn seconds(&self) -> f64 {
         self.parts.iter().map(|part| part.rows as f64).sum::<f64>() / self.sample_rate_hz
     }
 
-    /// The factor of each part in the terms over `bank`, with `scale` and `shift` applied to the reference.
+    /// Returns the number of rows and the factor of each part with the terms over `bank`. The reference is multiplied
+    /// by `scale`, and `shift` is added.
     pub(crate) fn factors(
         &self,
         bank: &Bank,
         (scale, shift): (f64, f64),
     ) -> Option<Vec<(f64, LinearFactor)>> {
         let own = Bank::new(self.domains.clone());
-        // a row over the bank is this matrix times the row over the session's own domains
+        // A row over the bank is the row over the session's own domains times this matrix.
         let matrix = own.row_matrix_of(bank).transpose();
         let terms = own.terms();
         let one = |part: &SessionPart| {
@@ -209,7 +210,7 @@ impl Session {
         self.parts.iter().map(one).collect()
     }
 
-    /// Checks what JSON cannot express.
+    /// Checks the conditions that the format does not express.
     pub(crate) fn check(&self, file: &str) -> Result<(), SleeveError> {
         let problem = |problem: &str| SleeveError::Prior {
             file: file.to_owned(),
@@ -232,7 +233,7 @@ impl Session {
     }
 }
 
-/// The rows of a session, part by part.
+/// Sums up the rows of a session, part by part.
 fn parts(channels: &Channels) -> Vec<SessionPart> {
     let bank = channels.bank();
     let hz = channels.sample_rate.hz();
@@ -255,13 +256,13 @@ fn parts(channels: &Channels) -> Vec<SessionPart> {
     sums.into_iter().map(one).collect()
 }
 
-/// The upper triangle, row by row.
+/// Returns the upper triangle of a matrix, row by row.
 pub(crate) fn packed(matrix: &DMatrix<f64>) -> Vec<f64> {
     let columns = matrix.ncols();
     (0..columns).flat_map(|i| (i..columns).map(move |j| matrix[(i, j)])).collect()
 }
 
-/// The matrix of an upper triangle; `None` if the number of values is wrong.
+/// Returns the matrix with this upper triangle; `None` if the number of values is wrong.
 pub(crate) fn unpacked(numbers: &[f64], columns: usize) -> Option<DMatrix<f64>> {
     if numbers.len() != columns * (columns + 1) / 2 {
         return None;
@@ -301,8 +302,7 @@ mod tests {
         let wider = wider.map(|d| Interval { min: 1.5 * d.min - 0.3, max: 2.0 * d.max + 0.1 });
         let bank = Bank::new(vec![wider.collect()]);
         let weights = DVector::from_fn(bank.terms(), |k, _| 0.3 * (k as f64).cos());
-        // the squares of residuals of any weights show whether the rows are those over the wider
-        // domains
+        // The sum of squared residuals shows for any weights whether the rows are those over the wider domains.
         let channels = Channels::new(&[trial], &["s1".into()], "angle_deg").unwrap();
         let (mut row, mut scratch, mut want) = (Vec::new(), (Vec::new(), Vec::new()), 0.0);
         let stretch = &channels.stretches[0];

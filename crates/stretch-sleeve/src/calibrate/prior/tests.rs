@@ -10,7 +10,7 @@ use crate::{
 
 const HZ: f64 = 50.0;
 
-/// A session of one wearer whose movement is the same from either side.
+/// A session of one wearer whose movement looks the same if all signals are reversed.
 fn session(wearer: usize, number: usize, seconds: f64) -> Trial {
     let swings = |t: f64, phase: f64| {
         45.0 + 30.0 * (1.3 * t + phase).sin() + 10.0 * (0.37 * t * t.sqrt()).sin()
@@ -24,7 +24,8 @@ fn resting(wearer: usize, number: usize, seconds: f64) -> Trial {
     gauged(wearer, number, seconds, rests)
 }
 
-/// Two gauges with gain, zero and a memory of 0.3 s on an angle of a time and a phase.
+/// Two gauges with a gain and a zero, of which the first also has a memory of 0.3 s, on an angle
+/// `moves(time, phase)`.
 fn gauged(wearer: usize, number: usize, seconds: f64, moves: impl Fn(f64, f64) -> f64) -> Trial {
     let gain = 1.0 + 0.2 * (wearer as f64 * 2.3).sin() + 0.02 * number as f64;
     let zero = 0.1 * (wearer as f64 * 1.7).cos() + 0.01 * number as f64;
@@ -104,15 +105,16 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
     let (updated, narrow) = of(10.0, 9, "", &test);
     assert!(updated < 0.3 * alone, "{updated} of {alone}");
     assert!(narrow.half_width_95 < 0.5 * wide.half_width_95);
-    // a wearer far from the mean, in a session that the prior has not seen
+    // A wearer far from the mean, in a session that the prior does not know
     let again = session(2, 3, 60.0);
     let (seen, told) = of(0.0, 2, "w2", &again);
     let (new, _) = of(0.0, 2, "", &again);
     assert!(seen < 0.5 * new && told.known == 1, "{seen} beside {new}");
 }
 
-/// A prior's calibration holds the levels of its own seconds, as any calibration does, and so
-/// detects a gauge that was put on again. Without seconds there are none.
+/// A calibration from a prior contains the levels of its seconds of reference, as any calibration
+/// does, and therefore detects a gauge that was put on again. Without seconds of reference it
+/// contains no levels.
 #[test]
 fn levels_are_those_of_the_seconds_of_reference() {
     let prior = prior(&["s1"]);
@@ -270,7 +272,7 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
     let (before, after) = (rmse(&alone, &test), rmse(&renewed.calibration, &test));
     assert!(after < 0.5 * before, "{after} beside {before}");
     assert!(renewed.summary.assumed.len() == 3 && renewed.summary.distance < 16.0);
-    // from yesterday's calibration of the same wearer
+    // Start from yesterday's calibration of the same wearer.
     let day = |number: usize| session(2, number, 30.0);
     let yesterday = prior.update(&[day(0)], &UpdateOptions::of("w2")).unwrap().calibration;
     let today = session(2, 3, 60.0);
@@ -337,7 +339,8 @@ fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_tol
     const RESTS: Simulated = resting;
     let note = "cannot be determined whether all gauges are reversed";
     let refusal = "they would fit if all gauges were reversed: swap the wires";
-    /// The movement, the signals, what they are subtracted from, and the note or the refusal.
+    /// The movement, the signals, the value from which they are subtracted, and the expected note
+    /// or error.
     type Member<'a> = (Simulated, &'a [&'a str], Option<f64>, Result<Option<&'a str>, &'a str>);
     let members: [Member<'_>; 10] = [
         (ALIKE, &["s1"], None, Ok(Some(note))),

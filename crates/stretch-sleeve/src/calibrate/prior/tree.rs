@@ -1,11 +1,12 @@
-//! Coefficients that vary from branch to branch of a tree: sensors, their wearers, and activities.
+//! Coefficients that vary along a tree of sensors, their wearers, and activities.
 //!
-//! The coefficients of a node are those of its parent plus a deviate, `w = w_parent + v`, `v ~ N(0, S_level)`; those of
-//! the root have a flat prior. A leaf is a session with rows `y = X w + e`, `e ~ N(0, s^2)`, where a row counts as one
-//! over the number of rows within which errors are correlated. Given the covariances, a node's posterior is exact, by
-//! messages up and down the tree (Pearl 1988, chapter 7); the covariances maximise the posterior of an
-//! inverse-Wishart prior with the diagonal of the estimate itself as its scale, by expectation and maximisation
-//! (Dempster, Laird and Rubin 1977; Gelman et al., Bayesian Data Analysis, 3rd ed., section 15.4).
+//! The coefficients of a node are those of its parent plus a deviation, `w = w_parent + v`, `v ~ N(0, S_level)`. Those
+//! of the root have a flat prior. A leaf is a session with rows `y = X w + e`, `e ~ N(0, s^2)`. Each row has the weight
+//! 1/`n`, where `n` is the number of rows within which errors are correlated. For given covariances, message passing up
+//! and down the tree gives the exact posterior of each node (Pearl 1988, chapter 7). The covariances maximise a
+//! posterior whose prior is inverse Wishart, with the diagonal of the estimate itself as scale. They are found by
+//! expectation and maximisation (Dempster, Laird and Rubin 1977; Gelman et al., Bayesian Data Analysis, 3rd ed.,
+//! section 15.4).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -15,17 +16,16 @@ use crate::calibrate::linear::{inverse, symmetric};
 
 use super::record::{list, triangle};
 
-/// Weight of the diagonal in a covariance, in nodes per term, because a term has few nodes to learn
-/// from.
+/// Weight of the diagonal in a covariance, in nodes per term. It is needed because there are few nodes per term.
 const SHRINKAGE: f64 = 0.3;
-/// Covariance of every term of normalised target at the start, and the least one.
+/// Variance of each coefficient at the start, and the smallest variance, in normalised target.
 const FIRST: f64 = 0.05;
 const LEAST: f64 = 1e-7;
 const FIRST_NOISE: f64 = 0.01;
-/// Steps of expectation and maximisation.
+/// Number of steps of expectation and maximisation.
 const STEPS: usize = 25;
 
-/// The sums of a session, with a row counted as a share of one.
+/// The sums of a session, in which each row has the weight 1/`n` (see above).
 #[derive(Debug, Clone)]
 pub(crate) struct Leaf {
     /// `X'X`, `X'y`, `y'y`, count.
@@ -42,7 +42,7 @@ pub(crate) struct Normal {
     pub(crate) covariance: DMatrix<f64>,
 }
 
-/// A path that was seen, and the distribution of its coefficients.
+/// A known path, and the distribution of its coefficients.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Known {
@@ -53,7 +53,8 @@ pub(crate) struct Known {
     pub(crate) covariance: DMatrix<f64>,
 }
 
-/// Message of a node about the coefficients of its parent: precision, and precision times mean.
+/// Message of a node to its parent about the parent's coefficients: `precision` is the inverse of a covariance, and
+/// `pull` is the precision times the mean.
 #[derive(Debug, Clone)]
 struct Message {
     precision: DMatrix<f64>,
@@ -82,31 +83,31 @@ struct Node {
     level: usize,
     parent: Option<usize>,
     leaf: Option<usize>,
-    /// Steps of the path down to it.
+    /// Steps of the path down to the node.
     path: Vec<String>,
 }
 
-/// Covariances of the levels and variance of a row.
+/// Covariances of the levels, and the variance of a row.
 #[derive(Debug, Clone)]
 pub(crate) struct Spread {
     pub(crate) levels: Vec<DMatrix<f64>>,
     pub(crate) noise: f64,
 }
 
-/// The tree of sessions; nodes are ordered such that a parent comes before its children.
+/// The tree of sessions. A parent comes before its children.
 pub(crate) struct Tree<'a> {
     nodes: Vec<Node>,
     leaves: &'a [Leaf],
     terms: usize,
 }
 
-/// The inverse of a node's precision, given its parent, and the pull of its subtree.
+/// The covariance of a node for a given parent, and the pull of the node's subtree.
 type Local = (DMatrix<f64>, DVector<f64>);
 
 /// Result of message passing: for each node the message from below and its posterior.
 struct Passed {
-    /// For each node: the inverse of its level's precision plus that of its subtree, and the pull
-    /// of its subtree.
+    /// For each node: the inverse of the sum of the precisions of its level and of its subtree, and the pull of its
+    /// subtree.
     local: Vec<Local>,
     messages: Vec<Message>,
     root: Message,
@@ -115,7 +116,7 @@ struct Passed {
 }
 
 impl<'a> Tree<'a> {
-    /// The tree of sessions by their paths, all of one depth.
+    /// Creates the tree of sessions from their paths, which all have the same depth.
     pub(crate) fn new(paths: &[Vec<String>], leaves: &'a [Leaf]) -> Self {
         let terms = leaves.first().map_or(0, |leaf| leaf.cross.len());
         let mut nodes: Vec<Node> = Vec::new();
@@ -149,7 +150,7 @@ impl<'a> Tree<'a> {
         Some(spread)
     }
 
-    /// Messages up, posteriors down.
+    /// Passes messages up the tree, and computes the posteriors down the tree.
     fn pass(&self, spread: &Spread) -> Option<Passed> {
         let inverses: Option<Vec<_>> = spread.levels.iter().map(inverse).collect();
         let inverses = inverses?;
@@ -158,7 +159,7 @@ impl<'a> Tree<'a> {
         let mut local = vec![(DMatrix::zeros(0, 0), DVector::zeros(0)); count];
         let mut messages = vec![Message::none(0); count];
         let mut root = Message::none(self.terms);
-        // level by level from below, because nodes of a level do not depend on one another
+        // Nodes of a level do not depend on one another, so each level is computed in parallel.
         for level in (0..self.depth()).rev() {
             let own: Vec<usize> = (0..count).filter(|&n| self.nodes[n].level == level).collect();
             let made: Option<Vec<_>> = own
@@ -187,7 +188,7 @@ impl<'a> Tree<'a> {
         Some(Passed { local, messages, root, posterior, root_posterior })
     }
 
-    /// The inner inverse and pull of a node, and its message to its parent.
+    /// Returns the local values of a node, and its message to its parent.
     fn message(
         &self,
         node: usize,
@@ -245,7 +246,7 @@ impl<'a> Tree<'a> {
         Some(Spread { levels, noise: (squares / f64::max(count, 1.0)).max(LEAST) })
     }
 
-    /// The posterior of every inner node with its path, the root's first, whose path is empty.
+    /// Returns the posterior of every inner node with its path. The first is that of the root, whose path is empty.
     pub(crate) fn known(&self, spread: &Spread) -> Option<Vec<Known>> {
         let passed = self.pass(spread)?;
         let known = |(path, Normal { mean, covariance })| Known { path, mean, covariance };
@@ -254,8 +255,8 @@ impl<'a> Tree<'a> {
         Some([(Vec::new(), passed.root_posterior)].into_iter().chain(inner).map(known).collect())
     }
 
-    /// Prediction of the tree for each session without it: with the rest of its path known, and
-    /// without the whole branch below the root. `None` if nothing is left.
+    /// Returns the tree's predictions for each session without that session: one with the rest of its path known, and
+    /// one without the whole branch below the root. A prediction is `None` if nothing is left.
     pub(crate) fn left_out(&self, spread: &Spread) -> Option<Vec<[Option<Normal>; 2]>> {
         let passed = self.pass(spread)?;
         let mut answers = vec![[None, None]; self.leaves.len()];
@@ -294,17 +295,17 @@ impl<'a> Tree<'a> {
 }
 
 impl Leaf {
-    /// The expected sum of squared residuals under a distribution of the coefficients.
+    /// Returns the expected sum of squared residuals under a distribution of the coefficients.
     pub(crate) fn squares(&self, normal: &Normal) -> f64 {
         self.squares_at(&normal.mean) + self.variance(normal)
     }
 
-    /// The sum of squared residuals of coefficients.
+    /// Returns the sum of squared residuals for these coefficients.
     pub(crate) fn squares_at(&self, w: &DVector<f64>) -> f64 {
         (self.power - 2.0 * w.dot(&self.cross) + w.dot(&(&self.gram * w))).max(0.0)
     }
 
-    /// The part of [`Leaf::squares`] that comes from the uncertainty of the coefficients.
+    /// Returns the part of [`Leaf::squares`] that comes from the uncertainty of the coefficients.
     pub(crate) fn variance(&self, normal: &Normal) -> f64 {
         normal.covariance.component_mul(&self.gram).sum()
     }
@@ -321,7 +322,7 @@ mod tests {
         (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
     }
 
-    /// Twenty wearers with six sessions each, of a line whose two numbers vary.
+    /// Simulates wearers with six sessions each. The model is a straight line whose two coefficients vary.
     fn simulated(random: &mut ChaCha8Rng, wearers: usize) -> (Vec<Vec<String>>, Vec<Leaf>) {
         let (mut paths, mut leaves) = (Vec::new(), Vec::new());
         for wearer in 0..wearers {
@@ -376,7 +377,7 @@ mod tests {
         assert!((&found.mean - &own.mean).amax() < 1e-9);
         let wanted = &own.covariance + &spread.levels[1];
         assert!((&found.covariance - wanted).amax() < 1e-9);
-        // without the whole wearer
+        // Leave out the whole wearer.
         let (rest, others) = (&paths[6..], leaves[6..].to_vec());
         let known = Tree::new(rest, &others).known(&spread).unwrap();
         let found = left[0][1].as_ref().unwrap();

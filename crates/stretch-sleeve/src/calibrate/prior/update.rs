@@ -24,25 +24,25 @@ use super::{
     tree::Normal,
 };
 
-/// Share of the prior's range of the reference that a movement covers.
+/// Smallest range of a movement, as a share of the prior's range of the reference.
 pub(crate) const MOVEMENT: f64 = 0.2;
 
 /// Options of [`Prior::update`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct UpdateOptions {
-    /// Sensor, wearer and so on, about whom the prior may know more than about others; empty: a new
+    /// Path of the session: sensor, wearer and so on, about which the prior may have knowledge; empty for an unknown
     /// one.
     pub path: Vec<String>,
-    /// Columns of the signals, in the prior's order; empty: those of the prior.
+    /// Columns of the signals in the prior's order; empty for the names in the prior.
     pub signals: Vec<String>,
-    /// Column of the reference; empty: that of the prior.
+    /// Column of the reference; empty for the name in the prior.
     pub reference: String,
-    /// Date of the calibration, as free text for the record.
+    /// Date of the calibration as free text, which is stored with it.
     pub date: String,
 }
 
 impl UpdateOptions {
-    /// Options for a session of a path such as `left/anna`.
+    /// Creates options for a session with a path such as `left/anna`.
     pub fn of(path: &str) -> Self {
         Self { path: super::session::parse_path(path), ..Self::default() }
     }
@@ -55,22 +55,21 @@ pub struct Updated {
     pub calibration: SleeveCalibration,
     /// Its expected errors.
     pub summary: UpdateSummary,
-    /// Notes: what the data lack, what was seen of the path.
+    /// Notes on missing data and on the knowledge of the path.
     pub notes: Vec<String>,
 }
 
 /// Expected errors of an updated calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UpdateSummary {
-    /// Seconds of reference that were used.
+    /// Duration of the reference that was used, s.
     pub seconds: f64,
-    /// Steps of the path that the prior had seen.
+    /// Number of steps of the path that the prior knows.
     pub known: usize,
     /// Expected root mean square error, in the reference's unit: the model's prediction, widened by
     /// its errors on left-out sessions.
     pub expected_rmse: f64,
-    /// Half of the interval that held 95 % of single estimates on left-out sessions, in the
-    /// reference's unit.
+    /// Half of the 95 % interval of single estimates, in the reference's unit, from the errors on left-out sessions.
     pub half_width_95: f64,
 }
 
@@ -78,15 +77,14 @@ impl Prior {
     /// Adds a reference of ten seconds to a minute to the prior, by Bayesian least squares. Without
     /// trials the result is the prior.
     ///
-    /// The prior `N(m, S)` of the coefficients becomes the rows `s L^-1` with values `s L^-1 m`,
-    /// above the rows of the data, where `S = L L'` and `s^2` is the variance of a sample. All rows
-    /// are folded into one triangle `R` by Householder reflections. The posterior is `N(R^-1 q, s^2
-    /// (R'R)^-1)`. A sample has weight 1/`n`, where `n` is the number of samples within which
-    /// errors are correlated.
+    /// Let `S = L L'`, and let `s^2` be the variance of a sample. The prior `N(m, S)` of the coefficients is written as
+    /// rows `s L^-1` with values `s L^-1 m`, which come before the rows of the data. All rows are reduced to one
+    /// triangle `R` by Householder reflections. The posterior is `N(R^-1 q, s^2 (R'R)^-1)`, where `q` are the reduced
+    /// values. A sample has weight 1/`n`, where `n` is the number of samples within which errors are correlated.
     ///
     /// # Errors
-    /// [`SleeveError::Prior`] if the data have other channels, another unit, rate or polarity than
-    /// the prior, with what to do.
+    /// [`SleeveError::Prior`] if the data have other channels, another unit, another rate or another polarity than the
+    /// prior. The error states what to do.
     pub fn update(
         &self,
         trials: &[Trial],
@@ -139,7 +137,7 @@ impl Prior {
         })
     }
 
-    /// The model of some coefficients.
+    /// Returns the model with these coefficients.
     pub(crate) fn linear(
         &self,
         weights: &DVector<f64>,
@@ -162,7 +160,7 @@ impl Prior {
         }
     }
 
-    /// The posterior of the coefficients, and the mean of `X'X` over a sample, of the prior's and the data.
+    /// Returns the posterior of the coefficients, and `X'X/n` of the prior and the data together.
     fn posterior(
         &self,
         bank: &Bank,
@@ -205,10 +203,10 @@ impl Prior {
         Ok((Normal { mean, covariance }, mixed))
     }
 
-    /// Spread of errors on left-out sessions after so many seconds.
+    /// Returns the spread of errors on left-out sessions after this duration of reference.
     pub(crate) fn spread(&self, seconds: f64, known: bool) -> ErrorSpread {
         let of = |e: &Expected| if known { e.spread_known } else { e.spread_new };
-        // half a minute whose samples were counted at a measured rate is half a minute
+        // Allow 1 %, because the duration is computed from a measured sample rate.
         let reached = self.expected.iter().rev().find(|e| e.seconds <= 1.01 * seconds);
         reached.or(self.expected.first()).map_or(ErrorSpread::NORMAL, of)
     }
@@ -306,8 +304,7 @@ impl Prior {
         self.misplaced(channels).map_or(Ok(()), problem)
     }
 
-    /// Refuses data in which most channels that clearly follow the reference follow it in the
-    /// opposite direction.
+    /// Refuses data in which most channels that clearly follow the reference do so in the opposite direction.
     fn refuse_polarity(&self, channels: &Channels) -> Result<(), SleeveError> {
         let mean = &self.known[0].mean;
         let sign = self.target.reference_per_target().signum();
@@ -327,7 +324,7 @@ impl Prior {
         Ok(())
     }
 
-    /// A note if the reference hardly moves.
+    /// Returns a note if the reference hardly moves.
     fn too_little(&self, channels: &Channels) -> Option<String> {
         let moved = extent(channels.reference());
         let all = self.unit_of_target();
@@ -340,7 +337,7 @@ impl Prior {
         })
     }
 
-    /// A note on the prior's knowledge of a path.
+    /// Returns a note on the prior's knowledge of a path.
     pub(crate) fn whom(&self, path: &[String], known: usize) -> Option<String> {
         if path.is_empty() || known == path.len() {
             return None;

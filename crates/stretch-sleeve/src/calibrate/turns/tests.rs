@@ -1,4 +1,4 @@
-//! False alarms in simulated hours, and how many shifts are found.
+//! False alarms in simulated hours, and the share of shifts that are found.
 
 use stretch_core::{Design, Polarity};
 use testkit::random::Random;
@@ -6,15 +6,15 @@ use testkit::random::Random;
 use super::*;
 use crate::{Zero, ZeroWatch};
 
-/// Movements an hour of all simulated gauges: one in three seconds.
+/// Movements per hour of all simulated gauges: one in three seconds.
 const AN_HOUR: f64 = 1200.0;
 
-/// How the ends of movements scatter, in mm about a movement of 30 mm.
+/// Distribution of the ends of movements, in mm about a movement of 30 mm.
 #[derive(Debug, Clone, Copy)]
 enum Scatter {
     /// Both ends normal, 1 mm.
     Normal,
-    /// Rests that differ by 0.3 mm, amplitudes from 15 to 45 mm.
+    /// Rests with a scatter of 0.3 mm, amplitudes from 15 to 45 mm.
     Amplitudes,
     /// Movements that begin and end anywhere within 4 mm.
     Uniform,
@@ -22,7 +22,7 @@ enum Scatter {
     Student,
     /// One-sided: exponential, 1 mm.
     OneSided,
-    /// Rests and hard ends within 0.01 mm, and a third that begin or end anywhere within 10 mm of it.
+    /// Rests and end stops within 0.01 mm; about a third of the ends lie anywhere within 10 mm of them.
     Partial,
     /// Normal, with a correlation of 0.5 with the previous movement.
     Alike,
@@ -66,14 +66,14 @@ impl Movements {
     }
 }
 
-/// Student's t of three degrees of freedom, a normal over the root of a mean square of three.
+/// Draws from Student's t with three degrees of freedom: a normal value divided by the root mean square of three normal
+/// values.
 fn student(random: &mut Random) -> f64 {
     let squares: f64 = (0..3).map(|_| random.noise().powi(2)).sum();
     random.noise() / (squares / 3.0).sqrt()
 }
 
-/// Result of so many movements, of 0.02 V per millimetre; `None` if they are too similar for a
-/// result.
+/// Learns turning points from movements with 0.02 V per millimetre; `None` if the movements are too similar.
 fn learn(scatter: Scatter, movements: usize, seed: u64) -> Option<Turns> {
     let mut own = Movements::new(scatter, seed);
     let volts = |(low, high): (f64, f64)| (0.02 * low, 0.02 * high);
@@ -82,7 +82,7 @@ fn learn(scatter: Scatter, movements: usize, seed: u64) -> Option<Turns> {
     Some(Turns { least_span: 0.2, reference_per_signal: -50.0, ..learnt })
 }
 
-/// Output of the watch for so many further movements, each with a zero that is off by `off_mm`.
+/// Returns the output of the watch for further movements, each with a zero that is off by `off_mm`.
 fn told(
     watch: ZeroWatch<f64>,
     mut own: Movements,
@@ -94,7 +94,7 @@ fn told(
     for k in 0..movements {
         let (low, high) = own.next();
         let mut last = None;
-        // three samples of each end, so that a median of three keeps them
+        // Three samples of each end, so that a median of three keeps the ends.
         for end in [low, low, low, high, high, high] {
             last = watch.step(&mut memory, 0.02 * (end + off_mm(k))).or(last);
         }
@@ -103,16 +103,16 @@ fn told(
     all
 }
 
-/// How often a shift begins to be reported.
+/// Counts how often the report of a shift begins.
 fn alarms(told: &[Option<Zero<f64>>]) -> usize {
     let shifted: Vec<bool> = told.iter().map(|zero| zero.is_some_and(|z| z.has_shifted)).collect();
     usize::from(shifted[0]) + shifted.windows(2).filter(|pair| !pair[0] && pair[1]).count()
 }
 
-/// False alarms per hour over calibrations on so many movements, each in two hours, and the number
-/// of calibrations without limits.
+/// Returns the false alarms per hour, over calibrations from `movements` movements of which each is tested in two
+/// hours, and the number of calibrations without limits.
 ///
-/// The zero drifts by a share of the limit in an hour.
+/// The zero drifts by the share `drift` of the limit per hour.
 fn false_alarms(scatter: Scatter, movements: usize, drift: f64, follow: bool) -> (f64, usize) {
     let (draws, hours) = (300, 2.0);
     let (mut alarmed, mut silent) = (0, 0);
@@ -179,7 +179,7 @@ fn a_slow_drift_is_followed_and_no_shift() {
     assert!(squares.sqrt() < 0.3, "{squares}");
 }
 
-/// A gauge that is put on again 8 mm off after 200 movements, and is watched for forty more.
+/// A gauge is put on again 8 mm off after 200 movements, and is watched for forty more.
 #[test]
 fn a_shift_is_found_and_told() {
     for scatter in [
@@ -198,7 +198,7 @@ fn a_shift_is_found_and_told() {
             let own = Movements::new(scatter, 1_000_000 + draw);
             let all = told(watch, own, 240, |k| if k < 200 { 0.0 } else { 8.0 });
             judged += 1;
-            // a movement is reported when the next one begins to fall
+            // A movement is reported when the next one begins to fall.
             let at = (200..240).find(|&k| all[k].is_some_and(|zero| zero.has_shifted));
             found += usize::from(at.is_some());
             late.extend(at.map(|k| k - 200));
@@ -223,7 +223,7 @@ fn a_shift_is_found_and_told() {
 fn what_says_nothing_is_none() {
     assert_eq!(measure_levels(&[], 1.0), None);
     assert_eq!(measure_levels(&[vec![(0.0, 1.0); 30]], 1.0), None);
-    // a walking one has practically one level
+    // A steadily drifting level has practically one independent value.
     let walk: Vec<(f64, f64)> = (0..30).map(|k| (f64::from(k), 100.0 + f64::from(k))).collect();
     assert_eq!(measure_levels(&[walk], 1.0), None);
 }

@@ -1,22 +1,24 @@
-//! A header as a library that the Arduino IDE takes.
+//! A header packed as a library for the Arduino IDE.
 
 use crate::{Form, Header, part::kept};
 
 /// A file of a library folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
-    /// Where it lies in the folder, parts divided by `/`.
+    /// Path in the folder, with `/` between its parts.
     pub path: String,
-    /// What it says.
+    /// Content of the file.
     pub text: String,
 }
 
-/// A library of that name: its properties, the header in `src`, an example that reads A0 (of several gauges, A0 and the
-/// pins after it) at the calibration's sample rate, and the words that the IDE colours.
+/// Returns the files of a library called `name`: its properties, the header in `src`, an example, and the keywords that
+/// the IDE highlights. The example reads pin A0 (for several gauges, A0 and the pins after it) at the calibration's
+/// sample rate.
 ///
-/// The header has the library's name after `stretch_`, so that it hides no header of another library, and so that libraries
-/// of several calibrations can be installed side by side; a sketch includes one of them. Characters that a name may not have become `_`. The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
-/// revision 2.2 (format 1.5).
+/// The header is called `stretch_` and the library's name. It therefore hides no header of another library, and
+/// libraries of several calibrations can be installed together; a sketch includes one of them. Characters that a name
+/// may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook. Source: Arduino library
+/// specification, revision 2.2 (format 1.5).
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;
@@ -38,7 +40,8 @@ pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
     ]
 }
 
-/// A name as the specification allows it: at most 63 letters, digits and `_.-`, with a letter, and a letter or digit first.
+/// Changes a name to one that the specification allows: at most 63 letters, digits and `_.-`, with a letter, and a
+/// letter or digit first.
 fn allowed(name: &str) -> String {
     let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
     let name: String = name.chars().map(|c| if is_allowed(c) { c } else { '_' }).collect();
@@ -56,7 +59,7 @@ fn properties(header: &Header, name: &str) -> String {
         .replace("@NAME@", name)
 }
 
-/// The words that the IDE colours, a tab between a word and its kind: those that the header has.
+/// Returns the keywords that the IDE highlights and that occur in the header. A tab separates a word from its kind.
 fn keywords(header: &Header) -> String {
     let lines = include_str!("arduino/keywords.txt").split_inclusive('\n');
     let is_there = |line: &&str| line.split('\t').next().is_some_and(|w| header.text.contains(w));

@@ -1,4 +1,4 @@
-//! Numbers as C constants, each with what it is.
+//! Numbers as C constants, each with a comment.
 
 use std::fmt::{Display, Write};
 
@@ -12,7 +12,7 @@ pub(crate) trait Literal {
 
 impl Literal for i32 {
     fn c(&self) -> String {
-        // -2147483648 would be minus a number that is too large
+        // C reads -2147483648 as minus a literal that is too large
         if *self == Self::MIN { "(-2147483647 - 1)".into() } else { self.to_string() }
     }
 }
@@ -35,7 +35,7 @@ impl Literal for i64 {
     }
 }
 
-/// The fewest digits that give the same bits back.
+/// The spelling has the fewest digits that give the same bits back.
 impl Literal for f32 {
     fn c(&self) -> String {
         format!("{self:?}f")
@@ -47,14 +47,14 @@ impl Literal for f32 {
 pub(crate) struct Constants(String);
 
 impl Constants {
-    /// The text.
+    /// Returns the text of the constants.
     pub(crate) fn into_text(self) -> String {
         self.0
     }
 
-    /// `#define NAME value`, with what it is.
+    /// Writes `#define NAME value` with a comment.
     pub(crate) fn define(&mut self, name: &str, value: impl Literal, what: &str) -> &mut Self {
-        // a sign would join whatever is before it
+        // without parentheses, a minus sign could join an operator before it
         let value = match value.c() {
             negative if negative.starts_with('-') => format!("({negative})"),
             value => value,
@@ -62,13 +62,13 @@ impl Constants {
         self.word(name, value, what)
     }
 
-    /// `#define NAME word`.
+    /// Writes `#define NAME word`, with a comment unless `what` is empty.
     pub(crate) fn word(&mut self, name: &str, word: impl Display, what: &str) -> &mut Self {
         let comment = if what.is_empty() { String::new() } else { format!(" /* {what} */") };
         self.line(&format!("#define STRETCH_{name} {word}{comment}"))
     }
 
-    /// `static const type stretch_name[n] STRETCH_FLASH = {..}`.
+    /// Writes `static const type stretch_name[n] STRETCH_FLASH = {..}`.
     pub(crate) fn array<L: Literal>(&mut self, kind: &str, name: &str, values: &[L]) -> &mut Self {
         let count = values.len();
         self.line(&format!(
@@ -77,7 +77,7 @@ impl Constants {
         ))
     }
 
-    /// The same with rows of one length.
+    /// Writes a two-dimensional array whose rows have equal lengths.
     pub(crate) fn rows<L: Literal>(
         &mut self,
         kind: &str,
@@ -94,13 +94,14 @@ impl Constants {
         ))
     }
 
-    /// The surfaces with their ranges, one for a line, else one a branch. They are a macro because their type is declared further down.
+    /// Writes the surfaces with their ranges: one for a line, otherwise one per branch. They are a macro because their
+    /// type is declared later in the header.
     pub(crate) fn surfaces(&mut self, surfaces: &[String]) -> &mut Self {
         let rows = surfaces.join(", \\\n        ");
         self.line(&format!("#define STRETCH_SURFACES \\\n    {{ \\\n        {rows} \\\n    }}"))
     }
 
-    /// A line as it is.
+    /// Appends a line unchanged.
     fn line(&mut self, line: &str) -> &mut Self {
         self.0.push_str(line);
         self.0.push('\n');
@@ -108,7 +109,7 @@ impl Constants {
     }
 }
 
-/// `{1, 2, 3}`, in lines of six.
+/// Returns `{1, 2, 3}`, with six values per line.
 fn braced<L: Literal>(values: &[L]) -> String {
     let mut out = String::from("{");
     for (k, value) in values.iter().enumerate() {
@@ -124,7 +125,7 @@ fn braced<L: Literal>(values: &[L]) -> String {
     out
 }
 
-/// A label that cannot end a comment, a string or a line.
+/// Removes the characters of a label that could end a comment, a string or a line.
 pub(crate) fn comment_safe(text: &str) -> String {
     text.chars().filter(|c| !is_hidden(*c) && !"*\\?\"".contains(*c)).collect()
 }

@@ -1,4 +1,4 @@
-//! Why there is no C.
+//! Errors of an export.
 
 use stretch_calibrate::CalibrateError;
 use stretch_core::Label;
@@ -21,10 +21,10 @@ pub enum ExportError {
     /// An integer form was requested, but this model has none.
     #[error("{0}; or export in --form float, which needs no converter")]
     NoFixedForm(#[source] CalibrateError),
-    /// Integers were asked of several gauges.
+    /// Integers were requested for several gauges.
     #[error("several gauges have no form in integers: leave --form away, or give --form float")]
     FixedArray,
-    /// A rate that is written in C for no arithmetic.
+    /// A rate estimator that has no C code in any arithmetic.
     #[error(
         "the rate is {rate}, which has no form in C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"
     )]
@@ -32,10 +32,10 @@ pub enum ExportError {
         /// The estimator.
         rate: String,
     },
-    /// A calibration that gives no receptor.
+    /// A calibration from which no receptor can be created.
     #[error("the calibration gives no receptor: {0}")]
     Receptor(#[from] ReceptorError),
-    /// Single precision, in which a board computes, changes the estimate by more than a tenth of the fit's error.
+    /// In single precision, in which a board computes, the estimate changes by more than a tenth of the fit's error.
     #[error(
         "in 32 bits, which the board computes in, the estimate of {reference} differs from that in 64 bits by {rms:.3} (root mean square), \
          but the calibration itself is off by {error:.3}: calibrate the recordings again, because this release keeps surfaces about the \
@@ -49,10 +49,11 @@ pub enum ExportError {
         /// Column of the reference.
         reference: Label,
     },
-    /// A calibration that is no record.
+    /// A calibration that cannot be serialised.
     #[error(transparent)]
     NoRecord(CalibrateError),
-    /// A record that the computer itself does not run: there are no answers to test against.
+    /// A converted calibration that does not run on the computer, so that there are no answers to test the C code
+    /// against.
     #[error(
         "the record in the form {form} does not run on the computer; there is nothing to hold the C against"
     )]

@@ -1,4 +1,4 @@
-//! From a calibration to a header.
+//! Writes a calibration as a C header.
 
 use std::{fmt, str::FromStr};
 
@@ -23,7 +23,7 @@ use crate::{
 /// The name of the header's file.
 pub const HEADER: &str = "stretch.h";
 
-/// Samples of the self-test.
+/// Number of samples of the self-test.
 pub const SELF_TEST_SAMPLES: usize = self_test::SAMPLES;
 
 /// The arithmetic of a step.
@@ -56,10 +56,10 @@ impl FromStr for Form {
     }
 }
 
-/// What an export is asked for.
+/// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// The arithmetic; `None` takes integers where the model has a form in them, else `float`.
+    /// The arithmetic. `None` selects integers if the model has an integer form, otherwise `float`.
     pub form: Option<Form>,
     /// The board's converter.
     pub adc: Adc,
@@ -70,25 +70,26 @@ pub struct Options {
 pub struct Header {
     /// The text of [`HEADER`].
     pub text: String,
-    /// The arithmetic that it is in.
+    /// The arithmetic of the header.
     pub form: Form,
     /// The model, as `--model` calls it.
     pub model: String,
     /// Whether the program has to set a pressure, by `stretch_set_pressure`.
     pub pressure: bool,
-    /// Gauges of an array, which are sampled together; none of a calibration of one.
+    /// Number of gauges of an array, which are sampled together; `None` for a calibration of a single gauge.
     pub array: Option<usize>,
-    /// In integers, the least step of an estimate with its unit.
+    /// In integers, the resolution of an estimate, with its unit.
     pub step: Option<String>,
     /// Names of the branches: rising or inflation, falling or deflation.
     pub branches: [&'static str; 2],
 }
 
-/// A calibration as a C99 header that compiles as C++11 too.
+/// Writes a calibration as a C99 header that also compiles as C++11.
 ///
 /// # Errors
-/// [`ExportError`] for a model or a rate that has no form in C, integers asked of a model
-/// that has none, floats that change the estimate by more than a tenth of the fit's error, and what [`fixed_record`] says of a converter that does not fit.
+/// [`ExportError`] for a model or a rate that has no form in C, integers requested for a model that has no integer
+/// form, floats that change the estimate by more than a tenth of the fit's error, and a converter that [`fixed_record`]
+/// refuses.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;
@@ -103,8 +104,8 @@ pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, Ex
     one(calibration, None, options)
 }
 
-/// A calibration as [`header`] makes it; in `float` with the watch of the gauge's zero, where the record holds where
-/// movements turn.
+/// Writes a calibration like [`header`]. In `float`, it adds a monitor of the gauge's zero if the calibration contains
+/// the levels at which movements turn.
 ///
 /// # Errors
 /// As [`header`].
@@ -121,7 +122,7 @@ fn one(
         return float(calibration, turns, options);
     }
     match fixed(calibration, options) {
-        // what is missing in integers may be there in floats; a converter that does not fit is another matter
+        // a form that is missing in integers may exist in floats; a converter that does not fit remains an error
         Err(
             none @ ExportError::NoFixedForm(
                 CalibrateError::NoFixedForm { .. }
@@ -143,7 +144,7 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
         RecordNumbers::Observer(numbers) => observer_fixed(numbers),
     };
     let test = self_test::fixed(calibration, &options.adc, &record)?;
-    // what was just stored has a seal
+    // the bytes were just stored, so they have a seal (checksum)
     let seal = stretch_core::record::seal(&record.bytes).ok().flatten().unwrap_or_default();
     Ok(assembled(&Source::of(calibration, seal), options, Form::Fixed, part, &test))
 }
@@ -173,10 +174,12 @@ fn float(
     Ok(assembled(&Source::of(calibration, seal), options, Form::Float, part, &test))
 }
 
-/// A calibration of several gauges as a header like that of [`header`], in `float`: a step takes a sample of each.
+/// Writes a calibration of several gauges as a header in `float`, like that of [`header`]. A step takes one sample of
+/// each gauge.
 ///
 /// # Errors
-/// [`ExportError::NoFixedForm`] for integers, which several gauges have no form in.
+/// `ExportError::FixedArray` if integers are requested, because several gauges have no integer form; also if the
+/// calibration cannot be serialised, or if floats change the estimate too much.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;
@@ -213,7 +216,7 @@ pub fn array_header<const N: usize>(
     Ok(Header { array: Some(names.len()), ..made })
 }
 
-/// What a header says of its calibration.
+/// The facts about a calibration that its header states.
 struct Source<'a> {
     signal: String,
     reference: &'a Label,
@@ -237,7 +240,7 @@ impl<'a> Source<'a> {
 }
 
 impl Source<'_> {
-    /// The least step of an estimate: `0.001 mm`.
+    /// The resolution of an estimate, such as `0.001 mm`; `None` for floats.
     fn step(&self, form: Form) -> Option<String> {
         let unit = comment_safe(self.reference.unit());
         let step = format!("{FIXED_STEP} {unit}");
@@ -245,7 +248,7 @@ impl Source<'_> {
     }
 }
 
-/// The parts in order.
+/// Joins the parts of a header in order.
 fn assembled(
     source: &Source<'_>,
     options: &Options,
@@ -289,7 +292,7 @@ fn assembled(
     Header { text, form, model, pressure, array: None, step: source.step(form), branches }
 }
 
-/// What the file is, for readers who open it.
+/// Returns the opening comment, which describes the file to its readers.
 fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String {
     let signal = comment_safe(&source.signal);
     let reference = comment_safe(source.reference.as_str());
@@ -320,7 +323,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
         .replace("@LIBM@", libm)
 }
 
-/// What a program around the step needs to know.
+/// Returns the constants that a program around the step needs.
 fn frame(source: &Source<'_>, options: &Options) -> String {
     let spec = options.adc.spec();
     let unit = comment_safe(source.reference.unit());
@@ -334,7 +337,7 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
         )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .define("PERIOD_NS", (1e9 * period_s).round() as i64, "from a sample to the next");
-    // below a microsecond there is nothing to count
+    // a period below a microsecond has no useful value in microseconds
     if period_s >= 1e-6 {
         let period_us = (1e6 * period_s).round() as i64;
         constants.word("PERIOD_US", format!("{period_us}L"), "the same, rounded");

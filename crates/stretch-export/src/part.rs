@@ -1,25 +1,26 @@
-//! What a model gives to a header.
+//! The contribution of a model to a header.
 
 use stretch_core::Polarity;
 use stretch_sleeve::{Turns, ZeroWatch};
 
 use crate::constants::Constants;
 
-/// A model in C: its record as constants, and its step over them.
+/// A model in C: its calibration as constants, and the step that uses them.
 #[derive(Debug)]
 pub(crate) struct Part {
-    /// As `linear`, `observer+rest`.
+    /// Name of the model, such as `linear` or `observer+rest`.
     pub(crate) model: String,
-    /// The record.
+    /// The calibration as constants.
     pub(crate) constants: Constants,
-    /// The step, in the order of the file, without what every step of its form begins and ends with.
+    /// The text of the step, in the order of the file, without the beginning and the end that all steps of its form
+    /// share.
     pub(crate) step: Vec<&'static str>,
-    /// What of the step there is, where it has parts: the words behind its `@if`.
+    /// The words for which `@if` keeps a block of the step.
     pub(crate) has: Vec<&'static str>,
 }
 
 impl Part {
-    /// The same in `float`, with the watch of the gauge's zero behind the step.
+    /// Adds the monitor of the gauge's zero behind the step, in `float`.
     pub(crate) fn with_zero(mut self, polarity: Polarity, turns: &Turns) -> Self {
         let watch = ZeroWatch::<f32>::new(polarity, turns);
         let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
@@ -41,9 +42,10 @@ impl Part {
     }
 }
 
-/// The lines of a text that there are: between `@if this that` and its `@end` if one of those is in `has`.
+/// Returns a text without the blocks that do not apply: the lines between `@if this that` and its `@end` are kept if
+/// `has` contains one of the words.
 pub(crate) fn kept(text: &str, has: &[&str]) -> String {
-    // whether each block that is open is there
+    // for each open block, whether it is kept
     let mut open: Vec<bool> = Vec::new();
     let mut out = String::new();
     for line in text.split_inclusive('\n') {

@@ -1,4 +1,4 @@
-//! Samples and the computer's answers, for the board to repeat.
+//! The self-test of a header: samples, and the computer's answers, which the board must repeat.
 
 use std::fmt::Write;
 
@@ -12,17 +12,17 @@ use stretch_sleeve::{ArrayCalibration, ArrayReceptor, ArrayWithheld};
 
 use crate::{ExportError, Form, part::kept};
 
-/// How many.
+/// Number of samples.
 pub(crate) const SAMPLES: usize = 200;
-/// Larger than any sample: one that did not come (`STRETCH_NO_VOLTS`).
+/// The value of a missing sample (`STRETCH_NO_VOLTS`), larger than any real sample.
 const NO_VOLTS: f32 = 2e18;
-/// What the flags hold in addition to the status.
+/// C expression of the flags without the status.
 const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
-/// Up and down once in this many samples.
+/// Number of samples in one cycle up and down.
 const PERIOD: usize = 70;
 
-/// Signals that go up and down, a tenth beyond both ends of the calibrated range, with one, three and
-/// five samples lost: all that a step can meet.
+/// Returns signals that go up and down, a tenth beyond both ends of the calibrated range, with one, three and five
+/// samples lost. They cover every case of a step.
 fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     let (min, max) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
     (0..SAMPLES).map(move |n| {
@@ -31,15 +31,15 @@ fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     })
 }
 
-/// Where in the calibrated range a sample lies: from -0.1 to 1.1 and back.
+/// Position of a sample in the calibrated range: from -0.1 to 1.1 and back.
 fn share(n: usize) -> f64 {
-    // smooth at both ends, by products alone: the same numbers on every computer
+    // smooth at both ends, and only products, so that every computer gives the same numbers
     let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
     let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
     1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1
 }
 
-/// How far the estimates in 32 bits, which a board gives, are from those in 64 bits.
+/// Difference between the estimates in 32 bits, which a board gives, and those in 64 bits.
 #[derive(Default)]
 struct Rounding {
     squares: f64,
@@ -47,7 +47,7 @@ struct Rounding {
 }
 
 impl Rounding {
-    /// Root mean square difference, as a share of the error of the fit, beyond which there is no header.
+    /// Largest root mean square difference, as a share of the fit's error, for which a header is written.
     const MOST: f64 = 0.1;
 
     fn add(&mut self, single: f32, double: f64) {
@@ -55,7 +55,8 @@ impl Rounding {
         self.count += 1;
     }
 
-    /// Refuses a calibration that loses more than a tenth of `error`, in the unit of `reference`, in 32 bits.
+    /// Refuses a calibration whose estimates in 32 bits differ by more than a tenth of `error`, in the unit of
+    /// `reference`.
     fn check(&self, error: f64, reference: &Label) -> Result<(), ExportError> {
         let rms = (self.squares / self.count.max(1) as f64).sqrt();
         if rms <= Self::MOST * error {
@@ -65,7 +66,7 @@ impl Rounding {
     }
 }
 
-/// Status, branch and domain as the C packs them. Of a sample without a reading the branch is the last one.
+/// Packs status, branch and domain like the C code. For a sample without a reading, the branch is the last one.
 fn flags<E>(answer: &Result<(E, Branch, u8), Withheld>, branch: &mut Branch) -> u8 {
     let (status, domain) = match answer {
         Ok((_, now, domain)) => {
@@ -112,7 +113,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     for (n, signal) in signals(calibration).enumerate() {
         let mut row = Vec::new();
         if let Some(Crosstalk { scale, .. }) = crosstalk {
-            // nothing to its scale, out of step with the signal
+            // from zero to the scale of the pressure, with another period than the signal
             let pressure = (scale * (n % 90) as f64 / 90.0) as f32;
             memory.set_pressure(pressure);
             exact_memory.set_pressure(pressure.into());
@@ -120,7 +121,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         }
         let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
         let answer = receptor.step(&mut memory, Volts(volts));
-        // at the edge of the dead band the two may choose different branches, which is no error of either
+        // at the edge of the dead band the two may choose different branches, which is not an error
         match (answer, exact.step(&mut exact_memory, Volts(signal.unwrap_or(f64::NAN)))) {
             (Ok(single), Ok(double)) if single.branch == double.branch => {
                 rounding.add(single.estimate, double.estimate);
@@ -145,9 +146,9 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
 }
 
-/// Up and down through the calibrated range and beyond it. The recorder is silent for one sample and for five, the
-/// first gauge slips, the second is cut off, the third misses its samples, the fourth sticks, and at last all are cut
-/// off.
+/// Returns samples that go up and down through the calibrated range and beyond it. The recorder delivers nothing for
+/// one sample and for five. The first gauge slips, the second is cut off, the third misses its samples, the fourth
+/// repeats one value, and at last all gauges are cut off.
 fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32; N] {
     let mut out = [NO_VOLTS; N];
     if n == 24 || (30..35).contains(&n) {
@@ -212,7 +213,7 @@ pub(crate) fn array<const N: usize>(
     Ok(kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[]))
 }
 
-/// Whether a number of a reading is not that of a row.
+/// Returns the C condition that a number of a reading differs from that of a row.
 fn differs(number: &str) -> String {
     format!("reading.{number} < sample->{number} || reading.{number} > sample->{number}")
 }
@@ -238,8 +239,9 @@ impl Rows {
         self.line.clear();
     }
 
-    /// The table and the test: the fields of a row, that which is the input, what of a reading is in the flags
-    /// in addition to its status, and what must not hold.
+    /// Returns the table and the test in C. `fields` are the fields of a row, `input` names the field that is the
+    /// input, `flags` is the expression of the flags without the status, and `differs` is a condition that must not
+    /// hold.
     fn text(mut self, fields: &str, input: &str, flags: &str, differs: &str) -> String {
         self.end_line();
         include_str!("c/self_test.h")

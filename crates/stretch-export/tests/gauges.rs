@@ -1,4 +1,4 @@
-//! The C of several gauges gives the bits of the Rust receptor, whatever is lost.
+//! The C code of several gauges gives the same bits as the Rust receptor, whatever samples are lost.
 
 mod compilers;
 
@@ -26,7 +26,8 @@ fn options(form: Option<Form>) -> Options {
     Options { form, adc: parse_adc("12,0,3.3").unwrap() }
 }
 
-/// A calibration of so many gauges, with so many time constants, of this degree; gains and ranges drawn.
+/// Returns a calibration with random gains and ranges, with given numbers of gauges and time constants and a given
+/// degree.
 fn drawn(
     runner: &mut TestRunner,
     channels: usize,
@@ -77,7 +78,7 @@ fn drawn(
         let values: Vec<f64> = (0..channels).map(|_| draw(from, to)).collect();
         Values::new("shifts", &values).unwrap()
     };
-    // blocks of a fifth of a second, whose means are off by less or more
+    // blocks of a fifth of a second; some of their means differ from the usual ones by more than the limits
     let shifts = (channels > 1).then(|| ArrayShifts {
         block_s: 0.2,
         false_alarms_an_hour: 0.25,
@@ -102,16 +103,17 @@ fn drawn(
     .unwrap()
 }
 
-/// What is done to the gauges.
+/// One input of the harness.
 #[derive(Debug, Clone)]
 enum Row {
-    /// A sample of each, as a share of its range; NaN for one that did not come.
+    /// A sample of each gauge, as a share of its range; NaN for a missing sample.
     Samples(Vec<f64>),
-    /// This one is taken back.
+    /// The gauge of this index is readmitted.
     Readmit(usize),
 }
 
-/// A motion that all share, with every fault now and then, gaps of one gauge and of the recorder, and gauges taken back.
+/// Returns a motion that all gauges share, with every fault now and then, gaps of one gauge and of the recorder, and
+/// readmitted gauges.
 fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
     let mut below = |n: usize| (0..n).new_tree(runner).unwrap().current();
     let mut out = Vec::new();
@@ -145,7 +147,7 @@ fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
     out
 }
 
-/// What the harness reads, and what it should print.
+/// Returns the input of the harness and its expected output.
 fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (String, String) {
     let receptor = ArrayReceptor::<f32, N>::new(calibration);
     let mut memory = receptor.memory();
@@ -253,12 +255,12 @@ fn every_kind(compilers: &[Compiler]) {
     }
     let rows = rows(&mut runner, 2);
     seen += &holds("the example", &example_array(), &rows, compilers);
-    // the rows are of no use if they do not bring about all that there is
+    // the rows must produce every status, every number of shifts and every loss
     for status in 0..4 {
         let told = seen.lines().filter(|line| line.starts_with(&status.to_string())).count();
         assert!(told > 5, "status {status}: {told}");
     }
-    // blocks of which none, one or several gauges are off
+    // blocks in which no gauge, one gauge or several gauges have shifted
     for shifted in ["shifts 0 ", "shifts 1 ", "shifts 3 "] {
         assert!(seen.contains(shifted), "{shifted}");
     }

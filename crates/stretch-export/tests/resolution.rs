@@ -1,4 +1,4 @@
-//! What an estimate in integers and a period resolve.
+//! The resolution of estimates in integers, and of sample periods.
 
 use stretch_calibrate::{CalibrateError, fixed_record, parse_adc, read_calibration};
 use stretch_core::{Calibration, CalibrationSpec, Label, SampleRate, Target};
@@ -15,7 +15,7 @@ fn changed(calibration: Calibration, change: impl FnOnce(&mut CalibrationSpec)) 
     Calibration::new(spec).unwrap()
 }
 
-/// One of every model that has integers, of a length in millimetres.
+/// A calibration of every model with an integer form, for a length in millimetres.
 fn in_millimetres() -> impl Iterator<Item = Calibration> {
     ["linear", "poly13", "observer", "observer-rest"].into_iter().map(|name| {
         let root = env!("CARGO_MANIFEST_DIR");
@@ -49,7 +49,7 @@ fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_f
         }
         let error = fixed_record(&metres, &options(None).adc).unwrap_err();
         assert!(matches!(error, CalibrateError::FixedStep { .. }), "{error}");
-        // where no form is asked for, the one that resolves it is taken
+        // if no form is requested, the form with enough resolution is chosen
         let float = header(&metres, &options(None)).unwrap();
         assert_eq!((float.form, float.step), (Form::Float, None));
     }

@@ -1,4 +1,4 @@
-//! The C gives the bits of the Rust receptor, whatever compiles it and whatever comes in.
+//! The C code gives the same bits as the Rust receptor, for every compiler and every input.
 
 mod compilers;
 
@@ -25,14 +25,14 @@ fn firmware(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware/data").join(name)
 }
 
-/// What the board replays: `u16::MAX` for a sample that did not come.
+/// Returns the codes that the board replays; -1 for a missing sample, which is `u16::MAX` in the file.
 fn trial() -> Vec<i32> {
     let bytes = fs::read(firmware("trial.u16le")).unwrap();
     let codes = bytes.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]]));
     codes.map(|code| if code == u16::MAX { -1 } else { code.into() }).collect()
 }
 
-/// Walks, jumps to anywhere, numbers that are no codes, and gaps of every length to seven.
+/// Returns random walks, jumps, numbers that are not codes, and gaps of up to seven samples.
 fn erratic() -> Vec<i32> {
     let mut seed = 0x9e37_79b9_7f4a_7c15u64;
     let mut below = move |n: i32| {
@@ -55,7 +55,7 @@ fn erratic() -> Vec<i32> {
     codes
 }
 
-/// A code in volts; what is no code becomes each thing that is no sample.
+/// Converts a code to volts. Numbers that are not codes become unusable or extreme voltages.
 fn volts(code: i32) -> f32 {
     match code {
         0..=4095 => code as f32 * (3.3 / 4095.0),
@@ -67,7 +67,7 @@ fn volts(code: i32) -> f32 {
     }
 }
 
-/// A pressure that comes with a sample: most go up and down, some are none, one is absurd.
+/// Returns the pressure of a sample: a sawtooth with some unusable and some absurd values.
 fn pressure(n: usize) -> f32 {
     match n % 97 {
         13 => f32::NAN,
@@ -82,7 +82,7 @@ fn takes_pressure(calibration: &Calibration) -> bool {
     matches!(&calibration.spec().model, Model::Diagnosed(map) if map.crosstalk.is_some())
 }
 
-/// What the harness should print.
+/// Returns the expected output of the harness.
 fn expected(calibration: &Calibration, turns: Option<&Turns>, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
     match form {
@@ -124,7 +124,7 @@ fn expected(calibration: &Calibration, turns: Option<&Turns>, form: Form, codes:
     text
 }
 
-/// A line of the harness.
+/// Returns the line of the harness for an answer.
 fn answer(answer: Result<(u8, u8, [u32; 3]), Withheld>) -> String {
     match answer {
         Ok((branch, domain, [estimate, rate, sd])) => {
@@ -134,7 +134,7 @@ fn answer(answer: Result<(u8, u8, [u32; 3]), Withheld>) -> String {
     }
 }
 
-/// What the harness says of a zero.
+/// Returns the line of the harness for a zero.
 fn told(zero: Zero<f32>) -> String {
     let [off, reference, followed] =
         [zero.off, zero.off_reference, zero.followed].map(f32::to_bits);
@@ -142,7 +142,7 @@ fn told(zero: Zero<f32>) -> String {
     format!("zero {off:08x} {reference:08x} {followed:08x} {since} {shifted}\n")
 }
 
-/// The samples as the harness reads them.
+/// Returns the samples in the format that the harness reads.
 fn input(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
     for (n, &code) in codes.iter().enumerate() {
@@ -192,7 +192,7 @@ fn holds_with(
     }
 }
 
-/// Holds each line that was found against that which is expected; how many there are.
+/// Compares the lines that were found with those that are expected. Returns the number of lines found.
 fn same(what: &str, found: &str, expected: &str) -> usize {
     for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
         assert_eq!(found, expected, "{what}: sample {n}");
@@ -229,7 +229,7 @@ fn with_avr_gcc_an_uno_gives_the_same_bits() {
 /// Flash and RAM of an Uno: 32 KB less the bootloader, and 2 KB.
 const UNO_BYTES: [usize; 2] = [32_256, 2_048];
 
-/// Bytes of flash and of RAM without stack: those of the records that `firmware/c.sh` exports.
+/// Counts the bytes of flash, of RAM without stack, and of stack, for the calibrations that `firmware/c.sh` exports.
 #[test]
 #[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
 fn with_avr_gcc_every_form_fits_an_uno() {
@@ -371,7 +371,7 @@ fn shapes_and_signs_give_the_same_bits() {
     let compilers = strict_c();
     for (name, calibration) in [
         ("a straight line of 21", rate(&poly13, 21, 1)),
-        // the sums of this one leave 32 bits, and are rounded
+        // the sums of this window exceed 32 bits and are rounded
         ("a window of 31", rate(&linear, 31, 2)),
         ("falling", falling),
         ("a falling observer", falling_observer),
@@ -395,7 +395,8 @@ fn shapes_and_signs_give_the_same_bits() {
     holds("a curve of degree 5", &curve, Form::Float, &compilers);
 }
 
-/// A zero that is reported and followed: within a limit that the samples stay in now and then, and one that they reach.
+/// A zero that is reported and followed, with a narrow limit, within which the levels stay now and then, and with a
+/// wide limit, which they reach.
 #[test]
 fn a_zero_gives_the_same_bits() {
     zeros(&strict_c());
@@ -428,7 +429,7 @@ fn zeros(compilers: &[Compiler]) {
     ] {
         holds_with(name, calibration, Some(turns), Form::Float, compilers);
     }
-    // integers have no watch
+    // integers have no monitor of the zero
     holds_with("integers", &poly13, Some(turns), Form::Fixed, compilers);
 }
 
@@ -448,7 +449,7 @@ fn knee(at: f64) -> Option<Knee> {
     Some(Knee { at, width: 0.02 })
 }
 
-/// Nothing but a curve.
+/// Removes the defects of the example, so that only the curve is left.
 fn none(map: &mut DiagnosedMap) {
     (map.slip, map.relaxation) = (None, None);
 }

@@ -1,4 +1,4 @@
-//! One time line over restarts of a board and the wrap of its clock.
+//! One continuous time line across restarts of a board and wraps of its clock.
 
 use crate::{Event, Frame};
 
@@ -41,14 +41,14 @@ struct Last {
 const APART_S: f64 = 2e-3;
 
 impl TimeLine {
-    /// A time line of samples that are `period_s` apart, s; the same distance is the minimum when
-    /// the board restarts.
+    /// Creates a time line for samples that are `period_s` seconds apart. This is also the minimum
+    /// step when the board restarts.
     pub fn new(period_s: f64) -> Self {
         Self { period_s, last: None }
     }
 
-    /// Seconds from the first frame to that of `event`, which was received at `now_s` of the
-    /// receiver's clock, s. `None` for an event without a frame, and for a frame at which the
+    /// Returns the seconds from the first frame to the frame of `event`. `now_s` is the time of
+    /// arrival on the receiver's clock, s. Returns `None` for an event without a frame, and if the
     /// board's clock has stopped.
     pub fn time_s(&mut self, event: &Event, now_s: f64) -> Option<f64> {
         let Frame { time_ms: board_ms, .. } = event.frame()?;

@@ -1,26 +1,26 @@
-//! From bytes to frames, whatever happened to the bytes.
+//! Decodes frames from a byte stream that may be damaged.
 
 use crate::{Frame, frame::Refused, recent::Recent};
 
-/// What a byte completed.
+/// The result of a byte that completes or breaks off a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
-    /// A frame, each once, in the order of the counter.
+    /// The next frame in the order of the counter. Each frame is given once.
     Frame(Frame),
-    /// A frame after `lost` others that never came.
+    /// A frame after `lost` frames that did not arrive.
     AfterGap {
-        /// How many.
+        /// Number of lost frames.
         lost: u32,
         /// The frame.
         frame: Frame,
     },
-    /// The first frame of a board that started again.
+    /// The first frame of a board that restarted.
     Restarted(Frame),
     /// A frame that was already given; skipped.
     Repeated,
-    /// A line that is no frame; skipped.
+    /// A line that is not a frame; skipped.
     Damaged,
-    /// A sound frame of another version than [`Frame::VERSION`]; skipped.
+    /// A valid frame of another version than [`Frame::VERSION`]; skipped.
     OtherVersion,
 }
 
@@ -36,30 +36,30 @@ impl Event {
     }
 }
 
-/// What came and what did not.
+/// Counts of received, lost and skipped frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Frames that were given.
+    /// Frames that were decoded and returned.
     pub frames: u64,
-    /// Frames missing from the counter's sequence, damaged ones among them.
+    /// Frames missing from the counter's sequence, including damaged frames.
     pub lost: u64,
-    /// Lines, and pieces of lines, that are no frame.
+    /// Lines, and parts of lines, that are not frames.
     pub damaged: u64,
-    /// Frames that came once more.
+    /// Frames that arrived again.
     pub repeated: u64,
-    /// Times that the counter or the clock went back: the board started again.
+    /// Restarts of the board: the counter or the clock went back.
     pub restarts: u64,
-    /// Sound frames of another version.
+    /// Valid frames of another version.
     pub other_version: u64,
 }
 
 /// A streaming decoder.
 ///
 /// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a new one. A counter
-/// that steps ahead gives the number of lost frames. A frame that equals one of the last
-/// [`REPLAYED`](Self::REPLAYED), to the last field, is a repetition, alone or in a block that came
-/// twice. Any other step back of the counter or of the board's clock means that the board
-/// restarted, and so does any step back to the counter 0.
+/// that steps ahead gives the number of lost frames. A frame whose fields all equal those of one of
+/// the last [`REPLAYED`](Self::REPLAYED) frames is a repetition, whether it arrives alone or in a
+/// block that was received twice. Any other step back of the counter or of the board's clock means
+/// that the board restarted, and so does any step back to the counter 0.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     line: [u8; Frame::LONGEST],
@@ -70,14 +70,14 @@ pub struct Decoder {
     counts: Counts,
 }
 
-/// A step of a wrapping number beyond it is a step back.
+/// A step of a wrapping number that is larger than this is a step back.
 const HALF: u32 = u32::MAX / 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// Between frames; nothing unknown was seen.
+    /// Between frames, without unknown bytes.
     Idle,
-    /// Bytes that belong to no frame.
+    /// Among bytes that belong to no frame.
     Noise,
     /// Inside a frame.
     Frame,
@@ -90,10 +90,10 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Number of stored frames: a block of so many that arrives again is skipped.
+    /// Number of stored frames. A block of up to this many frames that arrives again is skipped.
     pub const REPLAYED: usize = Recent::MOST;
 
-    /// A decoder that has seen nothing.
+    /// Creates a decoder that has received no bytes.
     pub fn new() -> Self {
         Self {
             line: [0; Frame::LONGEST],
@@ -105,12 +105,12 @@ impl Decoder {
         }
     }
 
-    /// What came and what did not, so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Takes the next byte; says what it completed.
+    /// Processes the next byte. Returns the event that it completes.
     pub fn push(&mut self, byte: u8) -> Option<Event> {
         match byte {
             b'$' => {
@@ -124,7 +124,7 @@ impl Decoder {
                 Some(self.line(length))
             }
             b'\n' => self.abandon(),
-            // what some terminals add to a newline
+            // some terminals add this to a newline
             b'\r' => None,
             _ if self.state == State::Frame && self.length < self.line.len() => {
                 self.line[self.length] = byte;
@@ -140,7 +140,8 @@ impl Decoder {
         }
     }
 
-    /// The stream ended or broke off (a cable was pulled), so no byte completes the current frame.
+    /// Ends the stream (for example when a cable was pulled), so that no byte completes the current
+    /// frame.
     ///
     /// A frame that lacks only its newline is complete, because the checksum is its last field.
     pub fn disconnected(&mut self) -> Option<Event> {
@@ -179,7 +180,7 @@ impl Decoder {
         }
     }
 
-    /// The position of a sound frame in the sequence.
+    /// Classifies a valid frame by its position in the sequence, and counts it.
     fn place(&mut self, frame: Frame) -> Event {
         let event = match self.last {
             None => Event::Frame(frame),

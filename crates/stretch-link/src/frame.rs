@@ -1,4 +1,4 @@
-//! One frame: what the board says about one sample.
+//! One frame: the text line that a board sends for one sample.
 
 use core::fmt;
 
@@ -8,23 +8,23 @@ use stretch_receptor::{Domain, Withheld, code::CodeReading};
 
 use crate::text::{Writer, number};
 
-/// Without a table: a kilobyte of flash for a few hundred instructions a sample.
+/// CRC without a table, which saves a kilobyte of flash and costs a few hundred instructions per sample.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
-/// What a board says about one sample.
+/// The content of the line that a board sends for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// 0 after a reset, then one more a sample; wraps.
+    /// Sample counter: 0 after a reset, then one more per sample; wraps.
     pub counter: u32,
     /// The board's clock, in milliseconds; wraps.
     pub time_ms: u32,
-    /// The converter's code; -1 for a sample that did not come.
+    /// The converter's code; -1 for a missing sample.
     pub code: i32,
-    /// What the receptor answered.
+    /// The answer of the receptor.
     pub answer: Answer,
 }
 
-/// What the receptor answered.
+/// The answer of the receptor for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// An estimate.
@@ -33,18 +33,18 @@ pub enum Answer {
         thousandths: i32,
         /// The branch that was evaluated.
         branch: Branch,
-        /// Whether the inputs lay where the calibration was fitted.
+        /// Whether the inputs lay in the calibrated domain.
         domain: Domain,
     },
     /// The rate estimator has not seen enough samples.
     Warming,
-    /// The sample did not come.
+    /// The sample is missing.
     Missing,
 }
 
 impl fmt::Display for Answer {
-    /// The last cells of a row of a recording: estimate in the reference's unit, branch and domain; or two empty cells and why
-    /// there is no estimate.
+    /// Writes the last cells of a row of a recording: estimate in the reference's unit, branch and domain, or two empty
+    /// cells and the reason why there is no estimate.
     ///
     /// ```
     /// use stretch_link::Answer;
@@ -82,13 +82,13 @@ impl From<Result<CodeReading<i32>, Withheld>> for Answer {
 }
 
 impl Frame {
-    /// Bytes of the longest line, its newline included.
+    /// Size of a buffer that holds the longest line, including its newline.
     pub const LONGEST: usize = 64;
 
     /// The version that this release writes and reads.
     pub const VERSION: u8 = 1;
 
-    /// Writes the frame as one line, `$` first and newline last; gives what was written.
+    /// Writes the frame as one line, with `$` first and newline last. Returns the bytes of the line.
     pub fn encode<'a>(&self, line: &'a mut [u8; Self::LONGEST]) -> &'a [u8] {
         let mut writer = Writer::new(line);
         writer.byte(b'$');
@@ -141,7 +141,7 @@ impl Frame {
             return Err(Refused::OtherVersion);
         }
         let frame = Self::fields(&body[3..]).ok_or(Refused::Damaged)?;
-        // only what `encode` writes: no leading zeros, no plus sign
+        // accept only the spelling of `encode`: no leading zeros, no plus sign
         let mut again = [0; Self::LONGEST];
         let mut writer = Writer::new(&mut again);
         frame.body(&mut writer);
@@ -177,7 +177,7 @@ impl Frame {
     }
 }
 
-/// Why a line is no frame.
+/// The reason why a line is not a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refused {
     Damaged,

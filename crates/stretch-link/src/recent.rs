@@ -1,8 +1,8 @@
-//! The frames that came last.
+//! The most recent frames.
 
 use crate::{Answer, Frame};
 
-/// What is remembered, in order of age round a ring.
+/// A ring buffer of the most recent frames.
 #[derive(Debug, Clone)]
 pub(crate) struct Recent {
     frames: [Frame; Self::MOST],
@@ -11,8 +11,9 @@ pub(crate) struct Recent {
 }
 
 impl Recent {
-    /// Frames in 4096 bytes, the block that a host reads at once: none is shorter than 24 bytes
-    /// (`$S1,0,0,0,,W,*00000000` and the newline).
+    /// Frames in 4096 bytes, the block that a host reads at once, at 24 bytes per frame. Only a
+    /// frame in which all numbers have one digit is shorter (`$S1,0,0,0,,W,*00000000` and the
+    /// newline).
     pub(crate) const MOST: usize = 4096 / 24;
 
     pub(crate) const fn new() -> Self {

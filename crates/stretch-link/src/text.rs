@@ -1,8 +1,8 @@
-//! Decimal and hexadecimal numbers without the formatting machinery, which would
-//! be most of a small firmware.
+//! Decimal and hexadecimal numbers without `core::fmt`, which would be most of the code of a small
+//! firmware.
 
-/// A line under construction; what does not fit is dropped, which the length of
-/// [`Frame::LONGEST`](crate::Frame::LONGEST) excludes.
+/// A line that is being written. Bytes that do not fit are dropped; a buffer of
+/// [`Frame::LONGEST`](crate::Frame::LONGEST) bytes is always long enough.
 pub(crate) struct Writer<'a> {
     bytes: &'a mut [u8],
     length: usize,
@@ -57,7 +57,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The number that a field spells; strictness is the caller's, who writes it again.
+/// Parses a field as a number. The caller encodes the number again to refuse other spellings.
 pub(crate) fn number<T: core::str::FromStr>(field: &[u8]) -> Option<T> {
     core::str::from_utf8(field).ok()?.parse().ok()
 }

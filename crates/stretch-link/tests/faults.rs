@@ -1,4 +1,4 @@
-//! The link under faults: nothing that comes out was not sent.
+//! The link under faults: every frame that is decoded was sent.
 
 use proptest::{collection::vec, prelude::*};
 use stretch_core::Branch;
@@ -36,7 +36,7 @@ fn frames() -> impl Strategy<Value = Vec<Frame>> {
     )
 }
 
-/// What the way does to a line.
+/// A transmission fault of one line.
 #[derive(Debug, Clone)]
 enum Fault {
     None,
@@ -153,7 +153,7 @@ fn after_reset(counter: u32) -> Frame {
 
 #[test]
 fn a_block_that_comes_twice_counts_once() {
-    // as far back as is remembered, from one frame to all
+    // repeated blocks from one frame to all the frames that are remembered
     for block in [1, 2, 3, 64, Decoder::REPLAYED as u32] {
         let sent: Vec<Frame> =
             (1..=200).chain(201 - block..=200).chain(201..203).map(after_reset).collect();

@@ -1,15 +1,15 @@
-//! A rising line between evenly spaced knots, forwards and backwards.
+//! A rising piecewise linear curve with evenly spaced knots, and its inverse.
 
 use stretch_core::{Interval, MAX_KNOTS, Real};
 
 use crate::fold::{held, rounded};
 
-/// A rising line of signals over evenly spaced drives.
+/// A rising piecewise linear curve from drives (inputs of the curve) to signals, with evenly spaced knots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve<T> {
     /// Number of knots.
     pub knots: usize,
-    /// Signed signals at the knots.
+    /// Signals at the knots, negated if the signal falls as the target rises.
     pub values: [T; MAX_KNOTS],
     /// The drive of the first knot.
     pub low: T,
@@ -20,7 +20,7 @@ pub struct Curve<T> {
 }
 
 impl<T: Real> Curve<T> {
-    /// The curve through signed values at evenly spaced drives of a domain.
+    /// Creates the curve through signals at evenly spaced drives over a domain.
     pub(crate) fn new(values: impl ExactSizeIterator<Item = f64>, domain: Interval) -> Self {
         let knots = values.len();
         let step = (domain.max - domain.min) / (knots - 1) as f64;

@@ -4,13 +4,13 @@ use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, arithmetic::la
 
 use crate::fold::held;
 
-/// Distance of a soft knee from its bound at the bound, in widths: ln 2.
+/// Distance, in widths, of a soft knee from its bound where the input equals the bound: ln 2.
 const LN_2: f64 = core::f64::consts::LN_2;
 
 /// The defects of a [`DiagnosedMap`] in the order in which they act, with their rates folded to one sample.
 ///
-/// The parts that are linear in the target within a sample are computed once, so that the drives of several targets
-/// cost little more than their plays.
+/// The parts that do not depend on the target are computed once per sample, so that the drives (inputs of the curve) of
+/// several targets cost little more than their plays (backlash operators).
 ///
 /// ```
 /// use stretch_receptor::{Defects, example_diagnosed};
@@ -36,19 +36,20 @@ pub struct Defects<T> {
     pub slip: Option<Played<T>>,
     /// Coefficients of the pressure and of its square.
     pub crosstalk: Option<[T; 2]>,
-    /// The gauge takes another way back.
+    /// The gauge follows another path on the way back.
     pub hysteresis: Option<Played<T>>,
     /// The gauge relaxes or overshoots.
     pub relaxation: Option<Relaxing<T>>,
-    /// The gauge softens.
+    /// The gauge's response weakens with travel.
     pub worn: Option<Wearing<T>>,
-    /// The amplifier's lower end.
+    /// Lower limit of the amplifier's output.
     pub floor: Option<Bound<T>>,
-    /// The amplifier's upper end.
+    /// Upper limit of the amplifier's output.
     pub ceiling: Option<Bound<T>>,
-    /// The amplifier is slow: for each of two poles, weights of the last output, of the last input and of the input.
+    /// Low-pass of the amplifier: for each of two poles, the weights of the previous output, of the previous input and
+    /// of the current input.
     pub poles: Option<[[T; 3]; 2]>,
-    /// The plays' state at a target of zero, and the change of that state per target.
+    /// Initial hysteresis state of the plays at a target of zero, and the change of that state per unit of target.
     pub initial_hysteresis: [T; 2],
 }
 
@@ -66,7 +67,7 @@ pub struct DefectsMemory<T> {
     poles: [T; 2],
 }
 
-/// The linear parts of one sample.
+/// The parts of one sample's drive that do not depend on its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Poised<T> {
     pressed: T,
@@ -80,20 +81,20 @@ pub(crate) struct Poised<T> {
 pub struct Bound<T> {
     /// The bound on the drive.
     pub at: T,
-    /// 4 (w ln 2)^2.
+    /// Rounding of the knee, 4 (w ln 2)^2, with the knee's width w.
     pub round: T,
 }
 
-/// Three plays.
+/// Three plays with equal weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Played<T> {
     /// Half-widths of the plays.
     pub radii: [T; 3],
-    /// A third of the share.
+    /// Weight of each play: a third of their share.
     pub each: T,
 }
 
-/// Three lags.
+/// Three first-order lags.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxing<T> {
     /// Share of each lag's contribution that remains after a sample.
@@ -102,7 +103,7 @@ pub struct Relaxing<T> {
     pub taken: [T; 3],
     /// Each lag's contribution at rest, per drive.
     pub settled: [T; 3],
-    /// Total weight of the drive of the sample itself.
+    /// Total weight of the current sample's drive.
     pub own: T,
 }
 
@@ -122,12 +123,12 @@ pub struct Wearing<T> {
 }
 
 impl<T: Copy> DefectsMemory<T> {
-    /// Travel of the gauge, in drive.
+    /// Total travel of the gauge, in units of drive.
     pub fn travelled(&self) -> T {
         self.travelled
     }
 
-    /// The same memory with the travel of another.
+    /// Returns the same memory with the travel of another memory.
     pub(crate) fn as_worked(self, other: &Self) -> Self {
         Self { travelled: other.travelled, ..self }
     }
@@ -139,7 +140,7 @@ impl<T: Real> Bound<T> {
         Self { at: T::from_f64(sign * knee.at), round: T::from_f64(inside * inside) }
     }
 
-    /// The drive bounded from below; a ceiling is evaluated with both signs changed.
+    /// Returns the drive bounded from below. For a ceiling, the caller changes the signs of input and output.
     #[inline(always)]
     fn hold(&self, u: T) -> T {
         let above = u - self.at;
@@ -159,7 +160,7 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
-    /// Distance of a play behind u: u - play(at, u, radius) without the two ends.
+    /// Returns the distance of a play behind u: u - play(at, u, radius), computed without the two ends of the play.
     #[inline(always)]
     fn apart(&self, i: usize, at: T, u: T) -> T {
         let (behind, radius) = (u - at, self.radii[i]);
@@ -190,7 +191,7 @@ impl<T: Real> Played<T> {
         out
     }
 
-    /// The plays at a drive of u, in the hysteresis state `initial`.
+    /// Returns the positions of the plays at a drive u, in the hysteresis state `initial`.
     fn begin(&self, initial: T, u: T) -> [T; 3] {
         self.radii.map(|radius| u - initial * radius)
     }
@@ -198,8 +199,8 @@ impl<T: Real> Played<T> {
 
 impl<T: Real> Relaxing<T> {
     fn new(fading: Fading, period_s: f64) -> Self {
-        // z' = a z + b x + c x' is p + c x' with p = a z + b x, which holds the past in one number and moves on by p'
-        // = a p + (a c + b) x'
+        // the lag z' = a z + b x + c x' is p + c x' with p = a z + b x; p holds the past in one number, and its update
+        // is p' = a p + (a c + b) x'
         let exact = fading.taus_s.map(|tau| lag_weights(period_s, tau));
         let now: f64 = exact.iter().map(|w| w[2]).sum();
         let each = -fading.share / 3.0;
@@ -230,13 +231,14 @@ impl<T: Real> Relaxing<T> {
 }
 
 impl<T: Real> Wearing<T> {
-    /// Share of the response that is left after a travel.
+    /// Returns the share of the response that is left after a travel.
     #[inline(always)]
     fn left(&self, travelled: T) -> T {
         T::one() - self.m * travelled / (self.n + travelled)
     }
 
-    /// Adds to the travel. Turns smaller than a reversal do not count, because noise alone would add much travel.
+    /// Adds the movement to `u` to the travel. Turns smaller than `reversal` do not count, because noise alone would
+    /// add much travel.
     #[inline(always)]
     fn go(&self, memory: &mut DefectsMemory<T>, u: T) {
         let moved = u - memory.reached;
@@ -285,7 +287,7 @@ impl<T: Real> Defects<T> {
         self.crosstalk.is_some()
     }
 
-    /// The memory of a target that has rested at `y`.
+    /// Returns the memory of a gauge whose target has rested at `y`.
     pub fn begin(&self, y: T, pressure: T) -> DefectsMemory<T> {
         let zero = T::zero();
         let mut memory = DefectsMemory {
@@ -310,8 +312,8 @@ impl<T: Real> Defects<T> {
         memory
     }
 
-    /// The memory at the beginning of a further trial of the same session: the target went straight to `y` and
-    /// rested.
+    /// Returns the memory at the beginning of a further trial of the same session. The target is assumed to have gone
+    /// straight to `y` and rested there.
     pub fn carry(&self, before: &DefectsMemory<T>, y: T, pressure: T) -> DefectsMemory<T> {
         let mut memory = self.begin(y, pressure);
         let u = self.taut(y);
@@ -338,18 +340,18 @@ impl<T: Real> Defects<T> {
         memory
     }
 
-    /// The memory of poles that have rested at a drive.
+    /// Returns the state of the poles after a rest at a drive of `u`.
     fn settled(&self, u: T) -> [T; 2] {
         self.poles.map_or([T::zero(); 2], |poles| poles.map(|[a, b, _]| (a + b) * u))
     }
 
-    /// Hysteresis state of the plays where a stream begins at a target of `y`.
+    /// Returns the hysteresis state of the plays for a stream that begins at a target of `y`.
     pub(crate) fn initial_hysteresis_at(&self, y: T) -> T {
         held(self.initial_hysteresis[0] + self.initial_hysteresis[1] * y, -T::one(), T::one())
     }
 
-    /// Hysteresis state of the plays at a target, as the mean over the plays: 1 as if the target had come up from far
-    /// below, -1 as if from far above; `None` without plays.
+    /// Returns the hysteresis state at a target, as the mean over the plays: 1 if the target came up from far below, -1
+    /// if it came down from far above; `None` without plays.
     pub fn hysteresis_state(&self, memory: &DefectsMemory<T>, y: T, pressure: T) -> Option<T> {
         let u = self.taut(y);
         let slipped = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
@@ -374,7 +376,7 @@ impl<T: Real> Defects<T> {
         self.crosstalk.map_or(T::zero(), |[a, b]| pressure * (a + b * pressure))
     }
 
-    /// The stretch that a target gives to a sleeve that may go slack.
+    /// Returns the stretch of a sleeve that may go slack, at a target.
     #[inline(always)]
     fn taut(&self, y: T) -> T {
         between(self.slack_low, self.slack_high, y)
@@ -385,7 +387,7 @@ impl<T: Real> Defects<T> {
         between(self.floor, self.ceiling, u)
     }
 
-    /// The linear parts of the next sample.
+    /// Returns the parts of the next sample's drive that do not depend on its target.
     #[inline(always)]
     pub(crate) fn poise(&self, memory: &DefectsMemory<T>, pressure: T) -> Poised<T> {
         let [first, second] = memory.poles;
@@ -398,7 +400,7 @@ impl<T: Real> Defects<T> {
         }
     }
 
-    /// The drive of a target in the next sample.
+    /// Returns the drive of a target in the next sample.
     #[inline(always)]
     pub(crate) fn drive(&self, memory: &DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
         let u = self.taut(y);
@@ -411,14 +413,14 @@ impl<T: Real> Defects<T> {
         self.poles.map_or(u, |[first, second]| second[2] * (first[2] * u) + poised.passed)
     }
 
-    /// Moves the memory on by a sample at a target, and gives the drive.
+    /// Advances the memory by a sample at a target, and returns the drive.
     #[inline(always)]
     pub fn advance(&self, memory: &mut DefectsMemory<T>, y: T, pressure: T) -> T {
         let poised = self.poise(memory, pressure);
         self.follow(memory, &poised, y)
     }
 
-    /// Moves the memory on by a sample whose linear parts are known, and gives the drive.
+    /// Advances the memory by a sample whose target-independent parts are known, and returns the drive.
     #[inline(always)]
     pub(crate) fn follow(&self, memory: &mut DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
         let mut u = self.taut(y);

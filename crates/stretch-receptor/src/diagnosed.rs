@@ -15,15 +15,15 @@ use crate::{
 
 /// Least length of a secant, as a share of the distance between knots.
 pub const LEAST_RUN: f64 = 0.01;
-/// Least slope of the drive over the target: a smaller slope would not determine the target.
+/// Least slope of the drive over the target. With a smaller slope, the signal would not determine the target.
 pub const LEAST_ANSWER: f64 = 0.05;
-/// Share s of a sample in the smoothed signal. The smoothed signal keeps the share s/(2 - s) of the noise's variance.
+/// Weight s of a new sample in the smoothed signal, which keeps the share s/(2 - s) of the noise's variance.
 pub const SMOOTH: f64 = 0.33;
 const SHOWN: f64 = 0.2;
-/// A sleeve has turned when the smoothed signal has come back by this many of its standard deviations.
+/// A sleeve counts as reversed when the smoothed signal has come back by this many of its standard deviations.
 const TURN_DEVIATIONS: f64 = 6.0;
-/// Greatest standard deviation of a target, in multiples of the mean standard deviation that one signal gives over
-/// the whole curve.
+/// Greatest standard deviation of a target, in multiples of the one that a single noisy signal gives at the mean slope
+/// of the curve.
 const WIDEST: f64 = 4.0;
 /// The estimate exceeds the fitted targets by at most this share of their range.
 const BEYOND: f64 = 0.003;
@@ -31,17 +31,18 @@ const BEYOND: f64 = 0.003;
 /// A receptor for [`Model::Diagnosed`].
 ///
 /// For each sample:
-/// 1. target and rate are predicted, with a rate that decays within `steady_s`; their covariance grows;
-/// 2. the drive of the predicted target is compared with the drive at which the curve has the signal; the drive of a
-///    second target is computed where the difference would vanish;
+/// 1. target and rate are predicted, with a rate that decays with the time constant `steady_s`; their covariance grows;
+/// 2. the drive (the input of the gauge's curve) of the predicted target is compared with the drive at which the curve
+///    has the signal. A second target is the predicted one moved by the difference, and its drive is computed as well;
 /// 3. the secant between the two targets is the slope of a Kalman step;
-/// 4. the defects follow the estimated target. Of a sleeve that slips the filter estimates the sleeve's own position:
-///    the muscle is ahead of the sleeve in the direction of the last certain movement.
+/// 4. the defects are advanced with the estimated target. If the sleeve slips on the muscle, the filter estimates the
+///    position of the sleeve, and the muscle is taken to be ahead of the sleeve in the direction of the last certain
+///    movement.
 ///
-/// The motion therefore determines a target that a play, a clipped end or a delay hides, and [`Reading::sd`] gives
-/// the standard deviation. A skew is compensated by prediction, so that the estimate is that of the present. There is
-/// an estimate from the first sample on. Where the map has a crosstalk, set the pressure with
-/// [`ReceptorMemory::set_pressure`] before a sample.
+/// The motion therefore determines the target while a play, a clipped end or a delay hides it. [`Reading::sd`] is the
+/// standard deviation of the estimate. A skew (delay of the signal) is compensated by prediction, so that the estimate
+/// is that of the present. There is an estimate from the first sample on. If the map has a crosstalk, set the pressure
+/// with [`ReceptorMemory::set_pressure`] before a sample.
 ///
 /// ```
 /// use stretch_core::{Design, Stage, Volts};
@@ -58,9 +59,9 @@ pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
 /// The model of a [`DiagnosedReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Diagnosed<T> {
-    /// Factor of the signal: -1 where the signal falls as the target rises.
+    /// Factor of the signal: -1 if it falls as the target rises, otherwise 1.
     pub sign: T,
-    /// The baseline, where a baseline is followed.
+    /// The tracker of the baseline (the drifting signal at rest), if the calibration has one.
     pub rest: RestLevel<T>,
     /// The defects between target and curve.
     pub defects: Defects<T>,
@@ -68,7 +69,7 @@ pub struct Diagnosed<T> {
     pub curve: Curve<T>,
     /// Seconds from a sample to the next.
     pub period_s: T,
-    /// Share of a rate that is left after a sample.
+    /// Factor by which the rate decays in a sample.
     pub kept: T,
     /// Square of `kept`.
     pub kept_twice: T,
@@ -82,15 +83,15 @@ pub struct Diagnosed<T> {
     pub low: T,
     /// The greatest target.
     pub high: T,
-    /// Seconds by which the estimate is ahead of the signal, shortened for the decay of the rate.
+    /// Seconds by which the estimate is ahead of the signal, shortened because the rate decays.
     pub ahead_s: T,
-    /// Reference units per standard deviation that the filter finds.
+    /// Factor from the filter's standard deviation to the one that is reported, in reference units.
     pub spread: T,
     /// Half-width of the sleeve's slip.
     pub slip: T,
-    /// A sleeve has turned when the signal has come back by more than this.
+    /// A sleeve counts as reversed when the signal has come back by more than this.
     pub turn_threshold: T,
-    /// Variance of a target that may be anywhere in the slip.
+    /// Variance of the muscle's position if it may be anywhere in the slip.
     pub slip_variance: T,
     /// Share of that variance that a sample adds.
     pub slip_variance_share: T,
@@ -98,13 +99,14 @@ pub struct Diagnosed<T> {
     pub gain: T,
     /// The reference at a target of zero.
     pub zero: T,
-    /// The largest rate of the target that keeps the branch.
+    /// Dead band: the largest magnitude of the target's rate at which the branch does not change.
     pub dead_band: T,
-    /// The signal of a target at rest with settled memory.
+    /// The signal of a target that rests at its low end, with settled memory.
     pub at_rest: T,
 }
 
-/// What a [`DiagnosedReceptor`]'s model remembers: target and rate with their covariance, the defects, the baseline, the pressure.
+/// The state of a [`DiagnosedReceptor`]'s model: target and rate with their covariance, the defects, the baseline, the
+/// pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiagnosedMemory<T> {
     /// NaN before the first sample.
@@ -115,14 +117,14 @@ pub struct DiagnosedMemory<T> {
     defects: DefectsMemory<T>,
     baseline: Baseline<T>,
     pressure: T,
-    /// Variance of the target that a play hides.
+    /// Variance of the target because the muscle's position in the slip is unknown.
     hidden: T,
     /// Distance of the muscle ahead of its sleeve.
     slipped: T,
     /// Furthest point of the sleeve in the direction of its last movement, in signal.
     reached: T,
-    /// The smoothed signal that the sleeve would give without memory. The filter's own target is not used, because a
-    /// filter with a rate overshoots where the motion stops.
+    /// The smoothed signal that the sleeve would give without memory. Reversals are detected in it, not in the filter's
+    /// own target, because a filter with a rate overshoots where the motion stops.
     shown: T,
 }
 
@@ -170,10 +172,11 @@ impl<T: Real> Diagnosed<T> {
         // a slow amplifier delays a ramp by the sum of its time constants
         let slow: f64 = map.lowpass_s.into_iter().flatten().sum();
         let (skew, steady) = (map.skew_s + slow, map.steady_s);
-        // distance that a decaying rate goes in that time; into the past the rate is taken as constant
+        // distance that a decaying rate covers in that time, per unit of rate; for a negative skew the rate is taken as
+        // constant
         let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
         let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
-        // the filter estimates the sleeve; the sleeve's turns determine the position of the muscle inside
+        // the filter estimates the sleeve; its reversals determine the position of the muscle inside
         let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
         let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
@@ -205,11 +208,11 @@ impl<T: Real> Diagnosed<T> {
         Ok(Self { at_rest: at_rest.0, ..model })
     }
 
-    /// Begins with the target that would rest at a signal, and with the memory of its defects.
+    /// Begins with the target that would give the signal at rest, and with the defects settled at that target.
     fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
         let (to, _) = self.curve.inverse(signal);
         let mut target = held(to, self.low, self.high);
-        // plays offset the drive by a constant; the repetitions take the bends
+        // plays offset the drive by a constant; the repetitions account for nonlinear defects
         for _ in 0..3 {
             let defects = self.defects.begin(target, memory.pressure);
             let poised = self.defects.poise(&defects, memory.pressure);
@@ -228,7 +231,7 @@ impl<T: Real> Diagnosed<T> {
         memory.covariance = [tenth * tenth, T::zero(), span * span];
     }
 
-    /// Moves target, rate and covariance on by a sample.
+    /// Predicts target, rate and covariance one sample ahead.
     #[inline(always)]
     fn predict(&self, memory: &mut DiagnosedMemory<T>) {
         let (dt, kept) = (self.period_s, self.kept);
@@ -249,7 +252,7 @@ impl<T: Real> Diagnosed<T> {
         self.hold(memory);
     }
 
-    /// Holds the target to its range, and the rate to zero or inwards at an end.
+    /// Limits the target to its range. At an end, a rate that points outwards becomes zero.
     #[inline(always)]
     fn hold(&self, memory: &mut DiagnosedMemory<T>) {
         if memory.target < self.low {
@@ -262,7 +265,7 @@ impl<T: Real> Diagnosed<T> {
         }
     }
 
-    /// Shift of the signal that memory causes for a target at rest now.
+    /// Returns the shift that memory would cause now in the signal of a target at rest.
     #[inline(always)]
     fn rest_shift(&self, memory: &DiagnosedMemory<T>) -> T {
         if memory.target.is_nan() {
@@ -273,14 +276,14 @@ impl<T: Real> Diagnosed<T> {
         self.curve.forward(drive).0 - self.at_rest
     }
 
-    /// Takes in a signed signal above its baseline; answers whether the signal lay on the curve.
+    /// Corrects the states with a signed signal above its baseline. Returns whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut DiagnosedMemory<T>, signal: T) -> bool {
         let poised = self.defects.poise(&memory.defects, memory.pressure);
         let here = memory.target;
         let drive = self.defects.drive(&memory.defects, &poised, here);
         let (predicted, tangent) = self.curve.forward(drive);
-        // a spike counts as a signal at most one whole curve beyond the end
+        // a spike is limited to one whole span of the curve beyond its end
         let (first, last) = self.curve.ends();
         let span = last - first;
         let bounded = held(signal, first - span, last + span);
@@ -294,7 +297,8 @@ impl<T: Real> Diagnosed<T> {
         let probe = if far { run } else { toward * least };
         let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
         let answer = greater(moved / probe, T::from_f64(LEAST_ANSWER));
-        // the slope of the curve, so that a flat end of the curve does not move the estimate far
+        // the slope of the curve: the greater of secant and tangent, so that a flat end of the curve does not move the
+        // estimate far
         let secant = if far { surprise / run } else { tangent };
         let slope = answer * greater(secant, tangent);
         let [yy, yr, rr] = memory.covariance;
@@ -306,7 +310,7 @@ impl<T: Real> Diagnosed<T> {
         memory.covariance = [yy - gain_y * by_y, yr - gain_y * by_r, rr - gain_r * by_r];
         self.hold(memory);
         if self.slip > T::zero() {
-            // the signal of a gauge that remembers nothing
+            // the signal of a gauge without memory
             let (bare, _) = self.curve.forward(here);
             let shown = bare + surprise;
             memory.shown = lag(memory.shown, shown, T::from_f64(SMOOTH));
@@ -389,7 +393,7 @@ impl<T: Real> Live for Diagnosed<T> {
         })
     }
 
-    /// Bridges by the predicted motion.
+    /// Bridges a missing sample with the predicted motion.
     fn bridge(&self, memory: &mut DiagnosedMemory<T>, _: u8) -> bool {
         let begun = !memory.target.is_nan();
         if begun {

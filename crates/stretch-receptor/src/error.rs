@@ -1,18 +1,19 @@
-//! Why a calibration gives no receptor.
+//! The error of creating a receptor.
 
 use core::fmt;
 
 use stretch_core::DesignError;
 use stretch_filter::FilterError;
 
-/// Why a calibration gives no receptor.
+/// The reason why no receptor can be created from a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReceptorError {
     /// The calibration holds another model, or a number that the receptor cannot hold.
     Calibration(DesignError),
-    /// The rate estimator that the calibration names needs later samples, which only a log has.
+    /// The rate estimator that the calibration names needs later samples, which a live stream does
+    /// not have.
     LooksAhead,
 }
 
@@ -26,7 +27,7 @@ impl From<FilterError> for ReceptorError {
     fn from(error: FilterError) -> Self {
         match error {
             FilterError::Design(error) => Self::Calibration(error),
-            // errors of logs do not come from a design
+            // the other errors concern recordings; a design does not cause them
             _ => Self::LooksAhead,
         }
     }

@@ -1,4 +1,4 @@
-//! The calibration that the documentation's examples run with.
+//! The calibrations that the documentation's examples use.
 
 use stretch_core::{
     BranchSurface, Calibration, CalibrationSpec, DesignError, DiagnosedMap, Fading, FitSummary,
@@ -6,10 +6,10 @@ use stretch_core::{
     RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
 };
 
-/// The paper's published surfaces (section 3.2) as a calibration record, for an
-/// 180 mm muscle and a bridge that rises from 1.24 V by 1 V over the stroke.
+/// The paper's published surfaces (section 3.2) as a calibration, for an 180 mm muscle and a bridge that rises from
+/// 1.24 V by 1 V over the stroke.
 ///
-/// The calibration is for examples and tests. The paper prints no ranges, so that the ranges here are plausible, not
+/// The calibration is for examples and tests. The paper prints no ranges, so the ranges here are plausible, not
 /// published.
 ///
 /// ```

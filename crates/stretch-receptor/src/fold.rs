@@ -1,18 +1,18 @@
-//! Numbers that every receptor folds out of a calibration.
+//! Numbers that every receptor derives from a calibration.
 
 use stretch_core::{Calibration, Range, Real};
 use stretch_filter::RateFilter;
 
 use crate::ReceptorError;
 
-/// Reference units per normalised target, and the reference at a target of zero.
+/// Returns the reference units per unit of normalised target, and the reference at a target of zero.
 pub(crate) fn output(calibration: &Calibration) -> (f64, f64) {
     let range: Range = calibration.spec().target_range;
     let target = calibration.spec().target;
     (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
 }
 
-/// The dead band as a rate of the reference, by the ratio of the two ranges.
+/// Returns the dead band as a rate of the reference, converted by the ratio of the two ranges.
 pub(crate) fn reference_dead_band(calibration: &Calibration) -> f64 {
     let (gain, _) = output(calibration);
     calibration.spec().dead_band * (gain / calibration.spec().signal_range.span()).abs()
@@ -25,7 +25,7 @@ pub(crate) fn estimator<T: Real>(
     Ok(RateFilter::new(calibration.spec().rate_estimator, calibration.spec().sample_rate_hz)?)
 }
 
-/// Values in the receptor's precision, filled up with zeros.
+/// Converts values to the receptor's precision, and fills up with zeros.
 pub fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>) -> [T; N] {
     let mut out = [T::zero(); N];
     for (place, value) in out.iter_mut().zip(values) {
@@ -34,7 +34,7 @@ pub fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>) -> [T
     out
 }
 
-/// The number x held to low .. high; low where x is not a number.
+/// Limits the number x to low .. high; returns low if x is not a number.
 ///
 /// The function uses two comparisons, because `max` and `min` are calls on a board without such instructions.
 #[inline(always)]
@@ -43,7 +43,7 @@ pub fn held<T: Real>(x: T, low: T, high: T) -> T {
     if x < high { x } else { high }
 }
 
-/// The greater of both; the second where the first is not a number.
+/// Returns the greater number; the second if the first is not a number.
 #[inline(always)]
 pub(crate) fn greater<T: Real>(x: T, y: T) -> T {
     if x > y { x } else { y }

@@ -12,7 +12,7 @@ pub const MAX_BRIDGED: u8 = 3;
 pub trait Live: Design {
     /// The input: volts, or a converter's code.
     type Sample;
-    /// A sample that can be used.
+    /// The value of a usable sample.
     type Signal: Copy;
     /// The form in which the branch is stored.
     type Side: Side;
@@ -22,7 +22,7 @@ pub trait Live: Design {
     /// The value of a sample; `None` for a missing sample.
     fn signal(&self, sample: Self::Sample) -> Option<Self::Signal>;
 
-    /// Takes a usable sample in and updates the branch; `None` while the model warms up.
+    /// Processes a usable sample and updates the branch; `None` while the model warms up.
     fn read(
         &self,
         memory: &mut Self::Memory,
@@ -30,10 +30,10 @@ pub trait Live: Design {
         signal: Self::Signal,
     ) -> Option<Self::Reading>;
 
-    /// Bridges the `nth` missing sample in a row; answers whether the model can bridge it.
+    /// Bridges the `nth` missing sample in a row. Returns whether the model can bridge it.
     fn bridge(&self, memory: &mut Self::Memory, nth: u8) -> bool;
 
-    /// Forgets the state that a long gap makes invalid: everything, unless a model overrides this.
+    /// Forgets the state that a long gap makes invalid. By default this is the whole state.
     fn forget(&self, memory: &mut Self::Memory) {
         *memory = self.memory();
     }
@@ -74,17 +74,16 @@ impl Side for Branch {
 
 /// A receptor: a model `M` behind the part that all models share.
 ///
-/// - A missing sample (a NaN, an infinity, a size beyond [`LARGEST_SAMPLE`], a code that the converter does not have)
-///   is answered with [`Withheld::Missing`] and never enters the memory. Up to [`MAX_BRIDGED`] missing samples in a row
-///   the model goes on by its own prediction; after a further missing sample the model forgets the stream, but not the
+/// - A missing sample (a NaN, an infinity, a magnitude beyond [`LARGEST_SAMPLE`], a code that the converter does not
+///   have) gives [`Withheld::Missing`] and never enters the memory. For up to [`MAX_BRIDGED`] missing samples in a row
+///   the model continues by its own prediction. After a further missing sample the model forgets its state, but not the
 ///   branch.
-/// - Until the model can answer, a sample is answered with [`Withheld::Warming`].
-/// - The branch before the first movement is [`Branch::Inflation`] unless
-///   [`ReceptorMemory::starting_on`] says otherwise; it turns when a rate leaves
-///   the dead band.
+/// - Until the model can answer, a sample gives [`Withheld::Warming`].
+/// - The branch before the first movement is [`Branch::Inflation`] unless [`ReceptorMemory::starting_on`] sets another.
+///   It changes when a rate leaves the dead band.
 ///
 /// The aliases of this type are [`StretchReceptor`](crate::StretchReceptor),
-/// [`HistoryReceptor`](crate::HistoryReceptor), [`ObserverReceptor`](crate::ObserverReceptor),
+/// [`HistoryReceptor`](crate::HistoryReceptor), [`ObserverReceptor`](crate::ObserverReceptor), `DiagnosedReceptor`,
 /// [`Receptor`](crate::Receptor) for any of them, and in [`code`](mod@crate::code)
 /// [`CodeReceptor`](crate::code::CodeReceptor) and [`FixedObserver`](crate::code::FixedObserver).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,24 +91,23 @@ pub struct Front<M> {
     pub(crate) model: M,
 }
 
-/// What a receptor remembers: the memory of its model, the branch, and how many
-/// samples are missing.
+/// The memory of a receptor: the memory of its model, the branch, and the number of missing samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReceptorMemory<M, S = Branch> {
     pub(crate) model: M,
     side: S,
-    /// Missing samples in a row; [`MAX_BRIDGED`] where there is nothing to predict from.
+    /// Missing samples in a row; [`MAX_BRIDGED`] if there is nothing to predict from.
     missing: u8,
 }
 
 impl<M, S: Side> ReceptorMemory<M, S> {
-    /// The same memory, on another branch: for a stream known to begin contracted.
+    /// Returns the same memory on another branch, for a stream that is known to begin contracted.
     #[must_use]
     pub fn starting_on(self, branch: Branch) -> Self {
         Self { side: S::of(branch), ..self }
     }
 
-    /// The branch that the next sample begins on.
+    /// The branch on which the next sample begins.
     pub fn branch(&self) -> Branch {
         self.side.branch()
     }
@@ -172,7 +170,7 @@ pub(crate) fn usable<T: Real>(signal: T) -> Option<T> {
 pub struct Direction<T> {
     /// The branch of a positive rate.
     pub rising: Branch,
-    /// The largest rate that keeps the branch.
+    /// The largest magnitude of the rate at which the branch does not change.
     pub dead_band: T,
 }
 

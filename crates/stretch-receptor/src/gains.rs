@@ -1,31 +1,32 @@
-//! The stationary gains of a Kalman filter, slope by slope.
+//! The stationary gains of a Kalman filter, one set for each of several slopes of the curve.
 
 use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, arithmetic::lag_share};
 
 /// Number of states: the target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
-/// Number of slopes of the curve with gains of their own, evenly spaced in ratio from the flattest to the steepest
+/// Number of slopes of the curve for which gains are computed, evenly spaced in ratio from the flattest to the steepest
 /// slope. Twice and eight times as many gave the same errors.
 pub(crate) const SLOPES: usize = 12;
 /// Most doublings; `n` doublings give the filter after `2^n` samples.
 const DOUBLINGS: usize = 30;
-/// A change of the covariance below this share ends the doubling.
+/// The doubling ends when the covariance changes by less than this share.
 const SETTLED: f64 = 1e-12;
 
 pub(crate) type Square = [[f64; STATES]; STATES];
 
-/// The gains for each slope, and the slopes between which each gain is the nearest.
+/// The gains for each slope, and the limits between the slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gains {
-    /// Below `ends[k]` and not below `ends[k - 1]` the gains are `of[k]`; the last gains have no end.
+    /// The gains `of[k]` apply to slopes below `ends[k]` and not below `ends[k - 1]`; the last gains have no upper
+    /// limit.
     pub(crate) ends: [f64; SLOPES - 1],
-    /// Gains as state per signal, for target, rate and relaxations.
+    /// Gains as change of the state per unit of signal, for target, rate and relaxations.
     pub(crate) of: [[f64; STATES]; SLOPES],
 }
 
 impl Gains {
-    /// The gains of `map` at `period_s`, for a curve whose steps have slopes from
-    /// `flattest` to `steepest` in signal per drive.
+    /// Computes the gains of `map` at `period_s`, for a curve whose segments have slopes from `flattest` to `steepest`
+    /// in signal per drive.
     pub(crate) fn new(
         map: &ObserverMap,
         period_s: f64,
@@ -64,7 +65,7 @@ fn settled(map: &ObserverMap, period_s: f64, slope: f64) -> [f64; STATES] {
         (a[0][2 + i], a[1][2 + i], a[2 + i][2 + i]) = (share, share * period_s, 1.0 - share);
     }
     a[1][0] = period_s;
-    // an unused state would keep its variance
+    // the transition of an unused state is set to zero, because the state would keep its variance
     for unused in 2 + map.relaxations_s.len()..STATES {
         a[unused][unused] = 0.0;
     }

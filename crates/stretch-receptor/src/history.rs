@@ -13,20 +13,19 @@ use crate::{
     front::{Direction, Live, over_volts},
 };
 
-/// A receptor for [`Model::History`]: low-passes and plays of the signal, then
-/// one polynomial.
+/// A receptor for [`Model::History`], a polynomial of the signal and of its low-passes and plays (backlash operators).
 ///
 /// For each sample:
-/// 1. the baseline, where one is followed;
-/// 2. the states of [`HistoryMap`], each moved into its domain
-///    ([`Reading::domain`] says so);
-/// 3. the polynomial gives the estimate, held to the fitted range;
-/// 4. the estimator `R` gives the rate of the estimate, whose sign gives the branch, outside the dead band converted
-///    to the reference.
+/// 1. the baseline (the drifting signal at rest) is updated, if the calibration has one;
+/// 2. the states of [`HistoryMap`] are computed and clamped to their domains ([`Reading::domain`] shows whether one was
+///    outside);
+/// 3. the polynomial gives the estimate, limited to the fitted range;
+/// 4. the estimator `R` gives the rate of the estimate. Outside the dead band, which is converted to the reference, the
+///    sign of the rate gives the branch.
 ///
-/// Every state begins settled at the first sample. Warm-up, missing samples and branch are those of every [`Front`]:
-/// a short gap is bridged by the last sample, and after a longer gap the model forgets everything except branch and
-/// baseline.
+/// Every state begins settled at the first sample. Warm-up, missing samples and branch are handled as in every
+/// [`Front`]. A short gap is bridged with the last sample; after a longer gap the model forgets everything except
+/// branch and baseline.
 ///
 /// Cost: a product and a sum for each term, a product for each state.
 pub type HistoryReceptor<T, R = RateFilter<T>> = Front<History<T, R>>;
@@ -46,7 +45,7 @@ pub struct History<T, R> {
     centre: [T; MAX_STATES],
     per_half: [T; MAX_STATES],
     terms: usize,
-    /// For every term beyond the constant, the term that is extended, and the state that extends it.
+    /// For every term beyond the constant, the indices of the earlier term and of the state whose product it is.
     products: [(u8, u8); MAX_HISTORY_TERMS],
     coefficients: [T; MAX_HISTORY_TERMS],
     low: T,
@@ -54,7 +53,7 @@ pub struct History<T, R> {
     direction: Direction<T>,
 }
 
-/// What a [`HistoryReceptor`]'s model remembers.
+/// The state of a [`HistoryReceptor`]'s model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryMemory<T, M> {
     rate: M,
@@ -132,8 +131,8 @@ impl<T: Real, R> HistoryReceptor<T, R> {
 }
 
 impl<T: Real, R> History<T, R> {
-    /// The states of a usable sample, each scaled to -1..1, and whether the
-    /// signal and any memory had to be moved into their domains.
+    /// Returns the states of a usable sample, each scaled to -1..1, and whether the signal and any memory state had to
+    /// be moved into their domains.
     #[inline(always)]
     fn states<M>(
         &self,
@@ -226,7 +225,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
         Some(Reading { estimate, rate, branch: *branch, domain, sd: None })
     }
 
-    /// Bridges by the last sample: the memory moves on, and there is no answer.
+    /// Bridges a missing sample with the last sample: the memory is updated, and there is no reading.
     fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
         let begun = memory.last.is_finite();
         if begun {

@@ -32,7 +32,7 @@ pub use one::Receptor;
 pub use reading::{Domain, Reading, Withheld};
 pub use receptor::StretchReceptor;
 
-/// The Rust of the tutorial for firmware, which runs as a test.
+/// The Rust code of the firmware tutorial, which runs as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../../../book/src/tutorials/firmware.md")]
 struct FirmwareTutorial;

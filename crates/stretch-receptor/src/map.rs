@@ -1,4 +1,4 @@
-//! A calibration folded into as few operations as a sample needs.
+//! A calibration folded into as few operations per sample as possible.
 //!
 //! Normalisation, denormalisation and the target's unit are affine, so their
 //! scales are multiplied into the coefficients once. Each sample then costs one subtraction for each input and the
@@ -34,7 +34,7 @@ impl<T: Real> DomainEnds<T> {
         Self { min: T::from_f64(interval.min), max: T::from_f64(interval.max) }
     }
 
-    /// The nearest value inside, and whether the value was outside.
+    /// Returns the nearest value inside, and whether the value was outside.
     #[inline(always)]
     fn clamp(&self, x: T) -> (T, bool) {
         let low = if x < self.min { self.min } else { x };
@@ -71,7 +71,8 @@ pub struct RangedSurface<T, S> {
     pub surface: S,
 }
 
-/// A folded calibration, over the signal and the signal's own rate, whose sign does not depend on the polarity.
+/// A folded calibration over the signal and the rate of the signal as measured. The sign of the polarity is folded into
+/// the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum Map<T> {

@@ -1,4 +1,4 @@
-//! The models behind the receptors, and what they remember between samples.
+//! The models behind the receptors, and the memory that each keeps between samples.
 //!
 //! A receptor is a [`Front`](crate::Front) around one of these. Their names are needed to write down the type of a
 //! receptor or of its memory; their numbers serve an implementation of a step in another language.

@@ -1,7 +1,8 @@
-//! The numbers of the steps, for an implementation of a step in another language.
+//! The numbers that a receptor's step computes with, for an implementation of the step in another language.
 //!
-//! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts (see [`model`](crate::model));
-//! those of a receptor that takes codes are in [`code`](mod@crate::code) (`FixedNumbers`, `IntegerObserver`).
+//! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts (see
+//! [`model`](crate::model)). The numbers of a receptor that takes codes are in [`code`](mod@crate::code)
+//! (`FixedNumbers`, `IntegerObserver`).
 //!
 //! ```
 //! use stretch_receptor::{StretchReceptor, example_calibration, numbers::Map};

@@ -29,20 +29,20 @@ const LEAST_RUN: f64 = 0.01;
 /// can follow. The slope is the greater of the tangent at the prediction and of the secant to the drive at which the
 /// curve has the signal, so that a flat end of the curve does not move the estimate far.
 ///
-/// A followed baseline is compared with the signal that a target at rest would give now, memory included, so that an
-/// undershoot after a fast release is not taken for drift.
+/// The tracker of the baseline compares the signal with the one that a target at rest would give now, memory included.
+/// Therefore an undershoot after a fast release is not taken for drift.
 pub type ObserverReceptor<T> = Front<Observer<T>>;
 
 /// The model of an [`ObserverReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer<T> {
-    /// Multiplies the signal: -1 where it falls as the target rises.
+    /// Factor of the signal: -1 if it falls as the target rises, otherwise 1.
     pub sign: T,
-    /// The baseline, where a baseline is followed.
+    /// The tracker of the baseline (the drifting signal at rest), if the calibration has one.
     pub rest: RestLevel<T>,
     /// Number of knots of the curve.
     pub knots: usize,
-    /// Signed signals at the knots, rising.
+    /// Signals at the knots, rising; negated if the signal falls as the target rises.
     pub curve: [T; MAX_KNOTS],
     /// The drive of the first knot.
     pub drive_low: T,
@@ -52,21 +52,21 @@ pub struct Observer<T> {
     pub per_step: T,
     /// Number of relaxations.
     pub relaxations: usize,
-    /// Share of its distance that each relaxation covers in a sample.
+    /// Share of its distance to the target that each relaxation (first-order lag) covers in a sample.
     pub shares: [T; MAX_OBSERVER_RELAXATIONS],
     /// Weight of each relaxation in the drive.
     pub amplitudes: [T; MAX_OBSERVER_RELAXATIONS],
-    /// Seconds by which the signal leads.
+    /// Seconds by which the signal leads the target.
     pub lead_s: T,
     /// Number of plays.
     pub plays: usize,
-    /// Half-widths of the plays.
+    /// Half-widths of the plays (backlash operators).
     pub radii: [T; MAX_OBSERVER_PLAYS],
     /// Weight of each play in the drive.
     pub play_weights: [T; MAX_OBSERVER_PLAYS],
     /// A slope below `ends[k]` and not below `ends[k - 1]` has the gains `gains[k]`.
     pub ends: [T; SLOPES - 1],
-    /// Gains as state (target, rate, relaxations) per signal.
+    /// Gains as change of the state (target, rate, relaxations) per unit of signal.
     pub gains: [[T; STATES]; SLOPES],
     /// Seconds from a sample to the next.
     pub period_s: T,
@@ -78,13 +78,13 @@ pub struct Observer<T> {
     pub gain: T,
     /// The reference at a target of zero.
     pub zero: T,
-    /// The largest rate of the target that keeps the branch.
+    /// Dead band: the largest magnitude of the target's rate at which the branch does not change.
     pub dead_band: T,
-    /// The signal of a target at rest with settled memory.
+    /// The signal of a target that rests at its low end, with settled memory.
     pub at_rest: T,
 }
 
-/// What an [`ObserverReceptor`]'s model remembers: its states, the plays, the baseline.
+/// The state of an [`ObserverReceptor`]'s model: the filter's states, the plays, the baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverMemory<T> {
     /// Target, rate and relaxations, normalised. The target is NaN before the first sample.
@@ -147,7 +147,7 @@ impl<T: Real> ObserverReceptor<T> {
 }
 
 impl<T: Real> Observer<T> {
-    /// The drive at which the curve has the signal, and the signal held to the curve.
+    /// Returns the drive at which the curve has the signal, and the signal clamped to the curve.
     #[inline(always)]
     fn inverse(&self, signal: T) -> (T, T) {
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
@@ -163,7 +163,7 @@ impl<T: Real> Observer<T> {
         (self.drive_low + place * self.drive_step, held)
     }
 
-    /// The signal at a drive, the slope at that drive, and the drive held to the fitted curve.
+    /// Returns the signal at a drive, the slope at that drive, and the drive clamped to the fitted curve.
     #[inline(always)]
     fn forward(&self, drive: T) -> (T, T, T) {
         let most = T::from_f64((self.knots - 1) as f64);
@@ -183,7 +183,7 @@ impl<T: Real> Observer<T> {
         memory.plays = [target; MAX_OBSERVER_PLAYS];
     }
 
-    /// Moves the states on by a sample.
+    /// Predicts the states one sample ahead.
     #[inline(always)]
     fn predict(&self, memory: &mut ObserverMemory<T>) {
         let x = &mut memory.states;
@@ -207,7 +207,7 @@ impl<T: Real> Observer<T> {
         drive
     }
 
-    /// Shift of the signal that memory causes for a target at rest now.
+    /// Returns the shift that memory would cause now in the signal of a target at rest.
     #[inline(always)]
     fn rest_shift(&self, memory: &ObserverMemory<T>) -> T {
         if memory.states[0].is_nan() {
@@ -216,19 +216,19 @@ impl<T: Real> Observer<T> {
         self.forward(self.drive_at(memory, self.low)).0 - self.at_rest
     }
 
-    /// Takes in a signed signal above its baseline; answers whether the signal lay on the curve.
+    /// Corrects the states with a signed signal above its baseline. Returns whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut ObserverMemory<T>, signal: T) -> bool {
         let drive = self.drive_at(memory, memory.states[0]) + self.lead_s * memory.states[1];
         let (predicted, tangent, from) = self.forward(drive);
         let (to, held) = self.inverse(signal);
         let run = to - from;
-        // over a very small distance rounding would determine the secant
+        // over a very small distance, the secant would be dominated by rounding
         let far = run.abs() > T::from_f64(LEAST_RUN) * self.drive_step;
         let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
-        // a spike counts as a signal at most one whole curve beyond the end
+        // a spike is limited to one whole span of the curve beyond its end
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
         let span = last - first;
         let surprise = signal.max(first - span).min(last + span) - predicted;
@@ -240,7 +240,7 @@ impl<T: Real> Observer<T> {
         held == signal
     }
 
-    /// Index of the gains for a slope, by bisection.
+    /// Returns the index of the gains for a slope, by bisection.
     #[inline(always)]
     fn nearest(&self, slope: T) -> usize {
         let (mut from, mut to) = (0, SLOPES - 1);
@@ -251,7 +251,7 @@ impl<T: Real> Observer<T> {
         from
     }
 
-    /// Holds the target to its range, and the rate to zero or inwards at an end.
+    /// Limits the target to its range. At an end, a rate that points outwards becomes zero. Then moves the plays.
     #[inline(always)]
     fn hold(&self, memory: &mut ObserverMemory<T>) {
         if memory.states[0] < self.low {
@@ -309,7 +309,7 @@ impl<T: Real> Live for Observer<T> {
         })
     }
 
-    /// Bridges by the predicted motion.
+    /// Bridges a missing sample with the predicted motion.
     fn bridge(&self, memory: &mut ObserverMemory<T>, _: u8) -> bool {
         let begun = !memory.states[0].is_nan();
         if begun {

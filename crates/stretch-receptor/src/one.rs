@@ -34,11 +34,11 @@ pub type Receptor<T, R = RateFilter<T>> = Front<AnyModel<T, R>>;
 pub enum AnyModel<T, R> {
     /// The model of a [`StretchReceptor`].
     Surfaces(Surfaces<T, R>),
-    /// Of a [`HistoryReceptor`].
+    /// The model of a [`HistoryReceptor`].
     History(History<T, R>),
-    /// Of an [`ObserverReceptor`].
+    /// The model of an [`ObserverReceptor`].
     Observer(Observer<T>),
-    /// Of a [`DiagnosedReceptor`].
+    /// The model of a [`DiagnosedReceptor`].
     Diagnosed(Diagnosed<T>),
 }
 
@@ -48,11 +48,11 @@ pub enum AnyModel<T, R> {
 pub enum AnyMemory<T, M> {
     /// The memory of a [`StretchReceptor`].
     Surfaces(SurfacesMemory<T, M>),
-    /// Of a [`HistoryReceptor`].
+    /// The memory of a [`HistoryReceptor`].
     History(HistoryMemory<T, M>),
-    /// Of an [`ObserverReceptor`].
+    /// The memory of an [`ObserverReceptor`].
     Observer(ObserverMemory<T>),
-    /// Of a [`DiagnosedReceptor`].
+    /// The memory of a [`DiagnosedReceptor`].
     Diagnosed(DiagnosedMemory<T>),
 }
 
@@ -97,7 +97,7 @@ impl<T: Real, R> Receptor<T, R> {
 }
 
 impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
-    /// Sets the pressure of the samples to come, for a [`DiagnosedReceptor`] with a crosstalk; other models ignore
+    /// Sets the pressure of the following samples, for a [`DiagnosedReceptor`] with a crosstalk. Other models ignore
     /// the pressure.
     pub fn set_pressure(&mut self, pressure: T) {
         if let AnyMemory::Diagnosed(memory) = &mut self.model {
@@ -106,7 +106,7 @@ impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
     }
 }
 
-/// Evaluates `answer` with the model and its memory; `else` where the memory is that of another model.
+/// Evaluates `answer` with the model and its memory, or `else` if the memory belongs to another model.
 macro_rules! with_its_own {
     ($model:expr, $memory:expr, |$own:ident, $its:ident| $answer:expr, $else:expr) => {
         match ($model, $memory) {

@@ -10,8 +10,9 @@ use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
 pub struct Reading<T = f64> {
     /// The estimated reference, in the unit of the reference (millimetres of a muscle, degrees of a joint).
     pub estimate: T,
-    /// Rate of the estimate, in that unit per second: the local slope of the calibration times the rate of the
-    /// signal; 0 while a model that needs no rate has seen too few samples for one.
+    /// Rate of the estimate, in that unit per second. For a line or a surface: the local slope of the calibration times
+    /// the rate of the signal, and 0 while a model that needs no rate has seen too few samples for one. Other models
+    /// estimate the rate themselves.
     pub rate: T,
     /// The branch that was evaluated.
     pub branch: Branch,
@@ -80,8 +81,8 @@ impl fmt::Display for Domain {
 pub enum Withheld {
     /// The rate estimator has not seen enough samples yet, and the model needs a rate.
     Warming,
-    /// The sample was missing or not a number. A short gap is bridged inside;
-    /// a longer one starts the warm-up again.
+    /// The sample was missing, not a number or too large. The receptor bridges a short gap; a longer gap starts the
+    /// warm-up again.
     Missing,
 }
 

@@ -16,21 +16,19 @@ use crate::{
 /// For each sample, in volts (or the unit of the calibration's signal):
 /// 1. the rate of the signal, by the estimator `R`;
 /// 2. the branch, from the sign of that rate outside the dead band;
-/// 3. inputs outside the calibrated domain are clamped, and [`Reading::domain`] says so;
-/// 4. the branch's surface gives the estimate in the reference's unit, and the slope of the surface times the rate of
-///    the signal gives the estimate's rate (the derivative leaves out the surface's dependence on the rate, which would
-///    need the second derivative of a noisy signal).
+/// 3. inputs outside the calibrated domain are clamped, and [`Reading::domain`] shows this;
+/// 4. the branch's surface gives the estimate in the reference's unit. The slope of the surface times the rate of the
+///    signal gives the estimate's rate. This derivative leaves out the surface's dependence on the rate, which would
+///    need the second derivative of a noisy signal.
 ///
 /// **Warm-up**: a calibration that [needs the signal only](stretch_core::Model::needs_signal_only), a line or one curve
 /// for both branches, answers from the first sample on. The rate of such a reading is 0 until the rate estimator has
 /// seen enough samples.
 ///
-/// **Missing samples, branch**: see [`Front`]. A short gap is bridged by
-/// the last sample moved on by the last rate, so that one lost sample costs one
-/// reading and not a warm-up.
+/// **Missing samples, branch**: see [`Front`]. A short gap is bridged by the last sample, extrapolated at the last
+/// rate, so that one lost sample costs one reading and not a warm-up.
 ///
-/// **Reset**: a fresh [`Design::memory`], which a
-/// [`Runner`](stretch_core::Runner) does in `reset`.
+/// **Reset**: start from a fresh [`Design::memory`]; the `reset` of a [`Runner`](stretch_core::Runner) does this.
 ///
 /// ```
 /// use stretch_core::{Runner, Volts, Design};
@@ -80,7 +78,7 @@ impl<T: Real, R> Surfaces<T, R> {
     }
 }
 
-/// What a [`StretchReceptor`]'s model remembers: the estimator's memory and the last sample.
+/// The state of a [`StretchReceptor`]'s model: the estimator's memory and the last sample with its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacesMemory<T, M> {
     rate: M,
@@ -91,9 +89,8 @@ pub struct SurfacesMemory<T, M> {
 impl<T: Real> StretchReceptor<T> {
     /// A receptor for `calibration`, with the rate estimator that it names.
     ///
-    /// The estimator's shape is a run-time value here; where it is known to the
-    /// compiler, [`with_rate`](Self::with_rate) takes an
-    /// [`SgRate`](stretch_filter::SgRate) and is smaller and faster.
+    /// The estimator's shape is a run-time value here. If the compiler knows the shape, [`with_rate`](Self::with_rate)
+    /// takes an [`SgRate`](stretch_filter::SgRate) and is smaller and faster.
     ///
     /// # Errors
     /// [`ReceptorError`] when the estimator cannot run live or cannot be designed,
@@ -127,8 +124,8 @@ impl<T: Real, R> StretchReceptor<T, R> {
         Ok(Self { model })
     }
 
-    /// The reading of a signal at a known rate, on a known branch. No memory is involved, so that samples may come in
-    /// any order. `R` can be `()`.
+    /// Returns the reading of a signal at a known rate, on a known branch. No memory is involved, so samples may come
+    /// in any order. `R` can be `()`.
     ///
     /// ```
     /// use stretch_core::Branch;
@@ -185,7 +182,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for Surfaces<T, R> {
         Some(self.reading(*branch, rate, signal))
     }
 
-    /// Bridges by the last sample, moved on by the last rate.
+    /// Bridges a missing sample by the last sample, extrapolated at the last rate.
     fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
         let bridged = memory.last + memory.last_rate * self.period_s;
         if bridged.is_finite() {

@@ -1,4 +1,4 @@
-//! The receptor over converter codes against the one over volts, in `f64`.
+//! The receptor over converter codes against the receptor over volts, in `f64`.
 
 use approx::abs_diff_eq;
 use proptest::{collection::vec, prelude::*};
@@ -34,7 +34,7 @@ fn exact(calibration: &Calibration) -> Exact {
     StretchReceptor::with_rate(calibration, rate).unwrap()
 }
 
-/// What a comparison of two receptors found.
+/// Result of a comparison of two receptors.
 #[derive(Debug, Default)]
 struct Compared {
     readings: usize,
@@ -42,8 +42,8 @@ struct Compared {
     worst: f64,
 }
 
-/// Runs both over `codes` and checks everything but the size of the error,
-/// which it returns, in thousandths; `scale` makes thousandths of an estimate.
+/// Runs both receptors over `codes` and checks everything but the size of the error, which it
+/// returns, in thousandths. `thousandths` converts an estimate to thousandths.
 fn compare<A: CodeArithmetic>(
     calibration: &Calibration,
     adc: &Adc,
@@ -66,7 +66,7 @@ fn compare<A: CodeArithmetic>(
             (ours, theirs) => return Err(format!("sample {n}: {:?} {theirs:?}", ours.is_ok())),
         };
         if ours.branch != theirs.branch {
-            // on the very edge of the dead band the float one rounds to either side
+            // on the very edge of the dead band the float receptor rounds to either side
             let tie = rate.is_some_and(|r| (r.abs() - calibration.spec().dead_band).abs() < 1e-9);
             return if tie { Ok(found) } else { Err(format!("sample {n}: branch")) };
         }
@@ -81,8 +81,8 @@ fn compare<A: CodeArithmetic>(
     Ok(found)
 }
 
-/// Whether an input lies on an end of the domain but for a rounding of `f64`: the
-/// integers are exact there and the floats may fall on either side.
+/// Whether an input lies on an end of the domain within the rounding of `f64`. The integers are
+/// exact there, and the floats may fall on either side.
 fn at_an_end(
     calibration: &Calibration,
     branch: Branch,
@@ -165,19 +165,20 @@ fn floats_over_codes_agree_as_well() {
         }
     }
     println!("f32 {narrow_worst} um, f64 {wide_worst} um");
-    // a few roundings of 2^-24 of 180 mm; ends of the domain that lie between two integers
+    // the errors are a few roundings of 2^-24 of 180 mm, and those of domain ends between two
+    // integers
     assert!(narrow_worst <= 0.05, "{narrow_worst} um");
     assert!(wide_worst <= 1e-3, "{wide_worst} um");
 }
 
-/// Calibrations that name the eleven-point parabola, linear or poly13.
+/// Calibrations, linear or poly13, whose rate estimator is the eleven-point parabola.
 fn calibration() -> impl Strategy<Value = Calibration> {
     let surface = || strategies::surface_of(stretch_core::Degree::POLY13);
     (strategies::paper_calibration(), surface(), surface(), 60.0..400.0).prop_map(
         |(calibration, up, down, rest_length)| {
             let mut spec = calibration.into_spec();
             spec.rate_estimator = RateEstimator::SAVGOL_11_2;
-            // thousandths are made for millimetres and degrees
+            // thousandths suit millimetres and degrees
             spec.target = Target::Contraction { rest_length };
             if let Model::Surfaces { inflation, deflation } = &mut spec.model {
                 (inflation.surface, deflation.surface) = (up, down);
@@ -193,7 +194,7 @@ fn adc() -> impl Strategy<Value = Adc> {
     })
 }
 
-/// Codes that drift, jump, stick at the ends, and sometimes are none.
+/// Codes that drift, jump, stick at the ends, and sometimes are not codes.
 fn codes(bits: u8, lost: bool) -> impl Strategy<Value = Vec<i32>> {
     let full = 1i32 << bits;
     let wander = move |start: i32, steps: Vec<i32>| -> Vec<i32> {

@@ -1,4 +1,4 @@
-//! What named defects make of a target is what their equations say.
+//! Named defects act on a target as their equations state.
 
 use approx::assert_abs_diff_eq;
 use proptest::prelude::*;

@@ -1,4 +1,5 @@
-//! A gauge with named defects, forwards as the operators have it, and backwards with what it says of itself.
+//! A gauge with named defects: the forward model agrees with the operators of the effects, and the receptor inverts it
+//! with a realistic standard deviation.
 
 use approx::assert_relative_eq;
 use proptest::prelude::*;
@@ -36,10 +37,10 @@ fn calibration(map: DiagnosedMap) -> Calibration {
         .expect("a map that holds together")
 }
 
-/// Moves at several speeds, rests and turns; from rest.
+/// Returns a motion from rest at several speeds, with rests and turns.
 fn motion() -> Vec<f64> {
     let sum = |t: f64| 0.4 - 0.25 * (1.1 * t).cos() - 0.15 * (2.7 * t).cos();
-    // there, a rest, and back the same way
+    // forwards, a rest, and back the same way
     let one = |i: usize| match i % 3000 {
         n if n < 1100 => sum(0.01 * n as f64),
         n if n < 1500 => sum(11.0),
@@ -49,7 +50,7 @@ fn motion() -> Vec<f64> {
     (0..4500).map(one).collect()
 }
 
-/// What the operators of the effects make of a motion.
+/// Returns the result of the effects' operators for a motion.
 fn by_operators(map: &DiagnosedMap, motion: &[f64]) -> Vec<f64> {
     let grid = Grid::samples(DT_S).unwrap();
     let span = Span::whole(&grid);
@@ -97,7 +98,8 @@ fn forwards_it_is_the_operators() {
     }
 }
 
-/// Root mean square error in target, and of the error in standard deviations that the reading says.
+/// Returns the root mean square of the error in target, and of the error in multiples of the reading's standard
+/// deviation.
 fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
     let calibration = calibration(map);
     let receptor = DiagnosedReceptor::<f64>::new(&calibration).unwrap();
@@ -133,9 +135,10 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
     ((squares / count).sqrt(), (apart / count).sqrt())
 }
 
-/// A bare gauge with this noise errs by 0.002 of the stroke. What no defect hides comes back about as well; a play or a delay costs what
-/// it hides: a slip of 0.02 is wrong until the sleeve is seen to turn, a skew is predicted over. What a filter says of itself
-/// leaves out what its defects remember wrongly: a fit measures by how much ([`DiagnosedMap::spread`]), here it is 1.
+/// A gauge without defects errs by 0.002 of the stroke with this noise. Defects that hide nothing are inverted about as
+/// well. A play or a delay costs as much as it hides: after a reversal, a slip of 0.02 causes an error until the sleeve
+/// is seen to turn, and a skew is predicted over. The filter's standard deviation leaves out errors in the memory of
+/// its defects. A fit measures their share ([`DiagnosedMap::spread`]), which is 1 here.
 #[test]
 fn every_defect_is_inverted() {
     let knee = |at| Some(Knee { at, width: 0.01 });
@@ -219,7 +222,7 @@ fn lost_samples_are_predicted_over_and_wrong_models_refused() {
     for _ in 0..10 {
         let _ = receptor.step(&mut other, Volts(f64::NAN));
     }
-    // a long gap forgets the motion: the next sample counts alone
+    // after a long gap the motion is forgotten, and the next sample counts alone
     assert!(receptor.step(&mut other, Volts(1.4)).unwrap().rate.abs() < 1e3);
     let refused = DiagnosedReceptor::<f32>::new(&example_observer()).unwrap_err();
     assert!(refused.to_string().contains("diagnosed"), "{refused}");
@@ -228,7 +231,8 @@ fn lost_samples_are_predicted_over_and_wrong_models_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
-    /// Whatever comes and whatever is felt: finite, within the targets that were fitted and 2 % more, and sure of itself in numbers.
+    /// For any stream and any pressure, rate and standard deviation are finite, and the estimate stays within the
+    /// fitted targets and 2 % more.
     #[test]
     fn no_stream_makes_it_leave_its_domain(
         calibration in stretch_core::strategies::diagnosed_calibration(),

@@ -1,4 +1,4 @@
-//! No finite sample gives a reading that is not, whatever record was accepted.
+//! Every reading for a finite sample is finite, for every calibration that is accepted.
 
 use proptest::{collection::vec, prelude::*, sample::Index};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use stretch_receptor::{
     code::{Adc, AdcCode, AdcSpec, CodeCalibration, CodeReceptor},
 };
 
-/// Sizes from the least to the largest that is a number, and what lies around the bounds.
+/// Numbers of all magnitudes that a float can have, and the bounds of the checks.
 fn number() -> impl Strategy<Value = f64> {
     let power = prop_oneof![-12.0..12.0, -40.0..40.0, -300.0..308.0f64];
     let bound = prop::sample::select(vec![0.0, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9, 1e12, 1e308]);
@@ -16,7 +16,8 @@ fn number() -> impl Strategy<Value = f64> {
         .prop_map(|(x, is_negative)| if is_negative { -x } else { x })
 }
 
-/// The numbers of a record, by their path; what was counted is no part of an answer.
+/// Collects the paths of the numbers in a serialised calibration, except those that do not enter a
+/// reading.
 fn numbers(value: &Value, path: String, found: &mut Vec<String>) {
     match value {
         Value::Number(_) => found.push(path),
@@ -31,9 +32,9 @@ fn numbers(value: &Value, path: String, found: &mut Vec<String>) {
     }
 }
 
-/// A record of any kind with some of its numbers replaced, where it is still one.
+/// A calibration of any kind with some of its numbers replaced; `None` if it is no longer valid.
 fn spoilt() -> impl Strategy<Value = Option<Calibration>> {
-    // scaled, replaced, or scaled all at once as in other units
+    // a number is scaled or replaced, or all signals are scaled at once, as by a change of units
     let change = (any::<Index>(), number(), any::<bool>());
     (strategies::calibration(), vec(change, 0..5), prop::option::of(-9i32..9)).prop_map(
         |(calibration, changes, units)| {
@@ -65,7 +66,7 @@ fn spoilt() -> impl Strategy<Value = Option<Calibration>> {
     )
 }
 
-/// What a stream may bring; a usual sample is a share of the calibrated range.
+/// A sample of a stream: a share of the calibrated range (`true`), or any number (`false`).
 fn sample() -> impl Strategy<Value = (bool, f64)> {
     prop_oneof![
         6 => (-0.2..1.2).prop_map(|share| (true, share)),
@@ -96,7 +97,7 @@ fn stays_finite<T: Real>(
 }
 
 proptest! {
-    // PROPTEST_CASES asks for more
+    // the variable PROPTEST_CASES sets a larger number
     #![proptest_config(ProptestConfig::with_cases(ProptestConfig::default().cases.max(4000)))]
 
     #[test]

@@ -1,4 +1,4 @@
-//! The firmware's data files and golden checksums are those of this code on this host.
+//! The firmware's data files and golden checksums equal those that this code makes on this host.
 //!
 //! After a change that is meant to alter them, write them anew with
 //! `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-receptor --test it firmware`.
@@ -127,7 +127,7 @@ fn with(model: Model) -> Calibration {
 
 const REST: RestTracker = RestTracker { level: 1.105, catch_up_s: 0.5, leak: 0.001 };
 
-/// A map of the largest shape that `stretch calibrate` may choose: what a step costs depends on the shape, hardly on
+/// A map of the largest shape that `stretch calibrate` may choose. The cost of a step depends on the shape, hardly on
 /// the numbers.
 fn history(rest: Option<RestTracker>) -> Calibration {
     let (relaxations_s, radii, degree) = ([0.1, 0.4], [0.15], 5);
@@ -152,7 +152,7 @@ fn history(rest: Option<RestTracker>) -> Calibration {
     }))
 }
 
-/// Name of the model, of its record, and its calibration.
+/// Name of the model, name of its file, and its calibration.
 fn histories() -> [(&'static str, &'static str, Calibration); 2] {
     let (plain, followed) = (history(None), history(Some(REST)));
     [("history", "history", plain), ("history+rest", "history-rest", followed)]
@@ -254,7 +254,7 @@ fn the_golden_checksums_are_these() {
     for (model, checksum) in golden {
         writeln!(text, "model={model} checksum={checksum}").unwrap();
     }
-    // the last line is that of the same test of stretch-sleeve
+    // the last line comes from the same test of stretch-sleeve
     let found = fs::read_to_string(folder().join("golden.txt")).unwrap();
     found.lines().filter(|line| line.starts_with("model=gauges ")).for_each(|line| {
         writeln!(text, "{line}").unwrap();

@@ -1,5 +1,5 @@
-//! The observer in integers against the one in `f64`: the same answers to a
-//! share of a micrometre-scale bound, no overflow on any stream, whole records.
+//! The observer in integers against the observer in `f64`: the same answers within a bound, no overflow on any stream,
+//! and serialisation without loss.
 
 use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use stretch_core::{Calibration, Runner, Stage, Volts};
@@ -13,7 +13,7 @@ fn adc() -> Adc {
     Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).expect("a converter")
 }
 
-/// Both on the same codes: what each answers.
+/// Returns the answers of both observers to the same codes.
 fn both(
     calibration: &Calibration,
     codes: &[AdcCode],
@@ -30,9 +30,10 @@ fn both(
     codes.iter().map(step).collect()
 }
 
-/// Rounding may choose the neighbour of a gain where a slope lies between two: the estimates part for a moment and meet again. Where a
-/// gauge remembers for seconds the moment is long: of random calibrations one in some thousands has more than a tenth of its
-/// answers apart, here at most two of 256, the same ones on every machine.
+/// Where a slope lies between two gains, rounding may choose the neighbouring gain. The estimates then differ for a
+/// moment and meet again. If a gauge remembers for seconds, the difference lasts as long: one random calibration in
+/// some thousands has more than a tenth of its answers apart. Here at most two of 256 do, the same ones on every
+/// machine.
 #[test]
 fn integers_answer_as_floats_do() {
     let mut runner = TestRunner::deterministic();
@@ -93,7 +94,7 @@ proptest! {
         prop_assert_eq!(postcard::from_bytes::<FixedObserver>(bytes).unwrap(), fixed);
     }
 
-    /// Whatever bytes come: a record that is refused, or one whose steps are sound.
+    /// Damaged bytes are refused, or give an observer whose steps do not panic.
     #[test]
     fn spoilt_records_never_panic(
         place in 0usize..400, byte in any::<u8>(), codes in proptest::collection::vec(0..4096i32, 50),
@@ -111,7 +112,7 @@ proptest! {
     }
 }
 
-/// A smooth motion and its signal: the difference is that of rounding.
+/// For the signal of a smooth motion, the observers differ by rounding only.
 #[test]
 fn a_smooth_motion_differs_by_rounding() {
     let codes: Vec<AdcCode> = (0..4000)

@@ -1,9 +1,10 @@
-//! Proofs by interval arithmetic that the steps in integers cannot overflow: one a record, over every code and every state.
+//! Proofs by interval arithmetic that the steps in integers cannot overflow: one proof per calibration, over every code
+//! and every state.
 //!
-//! The step is written once more, over intervals of integers that are wide enough for any of its numbers (128 bits). Each
-//! intermediate result is bounded and compared with the type that the step keeps it in. For an observer the state is
-//! bounded first, the step shown to lead from any such state and any code to such a state again, and a receptor begins in
-//! one: induction does the rest. What a run of the step really gives is then looked for inside of what was proved.
+//! The step is written once more, over intervals of 128-bit integers, which hold any of its numbers. Each intermediate
+//! result is bounded and compared with the type that the step keeps it in. For an observer the proof is by induction.
+//! The state is bounded, a receptor begins within the bounds, and a step from any such state with any code leads to
+//! such a state again. Finally, results of real steps are checked against the proven bounds.
 
 use std::ops::{Add, Mul, Shr, Sub};
 
@@ -41,7 +42,7 @@ fn both(x: impl Into<i128>) -> Between {
 type Proof<T = Between> = Result<T, String>;
 
 impl Between {
-    /// The same, where a signed integer of so many bits holds it.
+    /// Returns the interval if a signed integer of this many bits holds it.
     fn fits(self, bits: u32, what: &str) -> Proof {
         let most = 1i128 << (bits - 1);
         let holds = -most <= self.lo && self.hi < most;
@@ -100,11 +101,11 @@ impl Shr<u32> for Between {
     }
 }
 
-/// What the accumulator of a surface holds: a value of 32 bits, and 32 bits below.
+/// The accumulator of a surface: a value of 32 bits, and 32 bits below it.
 #[derive(Clone, Copy)]
 struct Sum(Between);
 
-/// Any bits that a product left below.
+/// Returns the interval of the 32 bits that a product can leave below the value.
 fn rest() -> Between {
     of(0, u32::MAX)
 }
@@ -131,7 +132,7 @@ impl Sum {
     }
 }
 
-/// What a surface with ranges gives over the whole of its domain, in thousandths.
+/// Returns the bounds of a surface over the whole of its domain, in thousandths.
 fn surface(
     of_eval: impl Fn(Between, Between) -> Proof,
     thousandths: i32,
@@ -147,9 +148,9 @@ fn surface(
     (product >> 32).fits(32, "estimate")
 }
 
-/// Everything between a code and an estimate: the bounds of the estimate.
+/// Proves every step from a code to an estimate. Returns the bounds of the estimate.
 fn prove_surfaces(numbers: &FixedNumbers) -> Proof {
-    // the largest that a 16-bit sample can be away from a centre, moved up
+    // the largest distance of a 16-bit sample from a centre, shifted left
     (both(u16::MAX) * just(1 << 15)).fits(32, "signal from the centre")?;
     match numbers.surfaces {
         CodeMap::Line(CodeSurface { signal, rate, surface: line, .. }) => {
@@ -207,7 +208,7 @@ fn box_of(o: &IntegerObserver) -> State {
     State {
         target,
         rate: both(FASTEST),
-        // it begins at a target
+        // a relaxation begins at a target
         slow: both(FURTHEST).join(target),
         plays: (0..usize::from(n.plays)).map(play).collect(),
         baseline: both(n.rest.furthest),
@@ -235,7 +236,7 @@ fn drive(o: &IntegerObserver, state: &State, y: Between, rate: Between) -> Proof
     Ok((y + (sum >> WEIGHT_BITS)).fits(64, "drive")?.clamp(-MOST_DRIVE, MOST_DRIVE))
 }
 
-/// The signal at any drive.
+/// Returns the bounds of the signal at any drive.
 fn forward(o: &IntegerObserver, drive: Between) -> Proof {
     let n = &o.numbers;
     let last = usize::from(n.knots) - 1;
@@ -247,7 +248,7 @@ fn forward(o: &IntegerObserver, drive: Between) -> Proof {
         let rise = (just(n.curve[k + 1]) - just(n.curve[k])).fits(32, "rise")?;
         let risen = (rise * of(0, 1 << PLACE_BITS)).fits(64, "risen")? >> PLACE_BITS;
         all = all.join((just(n.curve[k]) + risen).fits(32, "signal at a drive")?);
-        // and back
+        // the inverse of the curve
         let part = (of(0, rise.hi) * just(o.recips[k])).fits(64, "share of a segment")?;
         let share = (part >> o.recip_bits).fits(32, "place in a segment")?;
         (just(i128::try_from(k).unwrap_or(0) << PLACE_BITS) + share).fits(32, "place by signal")?;
@@ -255,7 +256,7 @@ fn forward(o: &IntegerObserver, drive: Between) -> Proof {
     Ok(all)
 }
 
-/// From any state and any code to a state of the same kind: the bounds of the estimate.
+/// Proves that any state and any code lead to a state within the same bounds. Returns the bounds of the estimate.
 fn prove_observer(o: &IntegerObserver) -> Proof {
     let n = &o.numbers;
     let state = box_of(o);
@@ -273,28 +274,28 @@ fn prove_observer(o: &IntegerObserver) -> Proof {
         let held = excess.clamp(-rest.most, rest.most);
         let away = (held - state.excess).fits(32, "from the mean excess")?;
         part(away, rest.average)?;
-        // a share of the way leads between both, rounded by less than one
+        // the new mean lies between both, with a rounding of less than one
         let mean = state.excess.join(held).clamp(state.excess.lo, state.excess.hi);
         let down = part(of(mean.lo, 0), rest.pull)?;
         let wanted = down.join(just(rest.leak));
         (state.baseline + wanted).fits(32, "baseline")?;
-        // below zero the baseline takes up a share of it, above it rises by the leak
+        // if the mean is below zero the baseline takes up a share of it, otherwise the baseline rises by the leak
         of(mean.lo, 1)
             .join(of(-i128::from(rest.leak), mean.hi))
             .inside(state.excess, "mean excess")?;
         signal = (raw - state.baseline).fits(32, "signal above its baseline")?;
     }
-    // begun: the drive at a place
+    // the first sample: the drive at a position on the curve
     let places = of(0, i128::from(n.knots) << PLACE_BITS);
     ((places * just(1i128 << 32)).fits(64, "place")? + just(n.drive_low)).fits(64, "drive")?;
-    // predicted
+    // prediction
     (state.target + state.rate).fits(32, "target moved on")?;
     for i in 0..usize::from(n.relaxations) {
         let away = (state.target - state.slow).fits(32, "from a relaxation")?;
         let step = part(away, n.shares[i])?;
         (state.slow + step).fits(32, "relaxation moved on")?;
     }
-    // corrected
+    // correction
     let predicted = forward(o, drive(o, &state, state.target, state.rate)?)?;
     let last = usize::from(n.knots) - 1;
     let held = signal.clamp(n.curve[0], n.curve[last]);
@@ -315,7 +316,7 @@ fn prove_observer(o: &IntegerObserver) -> Proof {
         let half = (1i128 << n.gain_bits) >> 1;
         (just(*gain) * surprise + just(half)).fits(64, "pull")?;
     }
-    // states are clamped to the box: what saturates before cannot leave it
+    // states are clamped to their bounds, so a value that saturates before cannot leave them
     for radius in &n.radii {
         (state.target + both(radius.unsigned_abs())).fits(32, "edge of a play")?;
     }
@@ -350,7 +351,7 @@ proptest! {
         }
     }
 
-    /// Records as they come from flash: any integers that its checks let through.
+    /// Damaged serialised data, as they may come from flash, with any integers that pass the checks.
     #[test]
     fn every_record_that_loads_is_proved(
         place in any::<prop::sample::Index>(), bytes in vec(any::<u8>(), 1..9), observer: bool,
@@ -416,8 +417,8 @@ fn numbers_beyond_the_checks_are_not_proved() {
     assert_eq!(proved.collect::<Vec<_>>(), Vec::<usize>::new());
 }
 
-/// Every code of a converter of 12 bits, at 1,025 rates over the domain and beyond: the surface is that in real numbers
-/// within its stated rounding, and the line at every code.
+/// At every code of a 12-bit converter and 1,025 rates over the domain, the surface equals the surface in real numbers
+/// within its stated rounding.
 #[test]
 fn every_code_at_a_grid_of_rates_is_within_its_rounding() {
     let calibration = example_calibration();
@@ -441,6 +442,6 @@ fn every_code_at_a_grid_of_rates_is_within_its_rounding() {
         }
     }
     assert_eq!(seen, 2 * 4096 * 1025);
-    // its coefficients are those in integers: what their rounding may cost, 1.375 bits of it, is not in
+    // the exact surface has the rounded coefficients, so the 1.375 bits for their rounding are not included
     assert!(worst <= stretch_core::fixed::FixedPoly13::ROUNDING - 1.375, "{worst}");
 }

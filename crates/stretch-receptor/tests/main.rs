@@ -1,4 +1,5 @@
-//! The tests of stretch-receptor from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-receptor, in one program because linking takes longer than most
+//! tests.
 
 mod code;
 mod defects;

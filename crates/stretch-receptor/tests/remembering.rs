@@ -1,5 +1,5 @@
-//! Receptors that remember: finite whatever comes, the same in both precisions,
-//! and an observer that inverts the gauge it describes.
+//! Receptors with memory: readings are finite for any stream, both precisions agree, and an
+//! observer inverts the gauge that it describes.
 
 use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
@@ -85,7 +85,7 @@ proptest! {
     ) {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
-        // a length of the normalised targets 0..1, and what rounding may add
+        // the lengths of the normalised targets 0..1, with a margin for rounding
         let inside = |x: f64| !matches!(calibration.spec().model, Model::History(_) | Model::Observer(_))
             || (150.0..180.1).contains(&x);
         for &volts in &stream {
@@ -101,8 +101,8 @@ proptest! {
         }
     }
 
-    /// Every model, in both precisions; and a fresh memory answers as the first did:
-    /// nothing of a stream stays in the design.
+    /// Every model gives finite readings in both precisions. After a reset it answers as before,
+    /// because nothing of a stream stays in the design.
     #[test]
     fn any_calibration_on_any_stream(
         calibration in stretch_core::strategies::calibration(),
@@ -152,8 +152,8 @@ proptest! {
         prop_assert_eq!(&calibration, &back);
     }
 
-    /// The gauge of the observer's own description, without noise: a muscle that
-    /// moves smoothly is found to a share of its stroke.
+    /// The signal is that of the observer's gauge model, without noise. The filter finds a smooth
+    /// motion to a share of its stroke.
     #[test]
     fn an_observer_inverts_its_gauge(amplitude in -0.3..0.6f64, turns in 0.1..0.6f64) {
         let calibration = observer(None, amplitude);

@@ -1,4 +1,5 @@
-//! Long streams with everything that a sensor, a cable and a converter do: nothing drifts, nothing ends, nothing grows.
+//! Long streams with the faults of sensors, cables and converters: no estimate drifts, readings do not end, and no
+//! memory grows.
 
 use std::fmt::Debug;
 
@@ -15,7 +16,7 @@ use stretch_receptor::{
     example_calibration, example_diagnosed, example_observer,
 };
 
-/// What a stream is made of: a muscle that moves, now and then something that is no motion.
+/// Source of a stream: a muscle that moves, with occasional samples that are not motion.
 struct Faults {
     seed: u64,
     phase: f64,
@@ -61,7 +62,7 @@ impl Faults {
     }
 }
 
-/// A clean motion over the whole range: the sample after so many.
+/// Sample `n` of a clean motion over the whole range.
 ///
 /// At 100 Hz it moves by [`CLEAN_RATE`] of the range a second.
 fn clean(n: u32) -> f64 {
@@ -69,15 +70,16 @@ fn clean(n: u32) -> f64 {
     0.05 + 1.8 * (phase - 0.5).abs()
 }
 
-/// Clean samples after which a memory must have forgotten what was wrong: the slowest time constants are of minutes.
+/// Clean samples after which a memory must have forgotten the faults. The slowest time constants are of minutes.
 const FORGOTTEN: u32 = 100_000;
 
 /// Rate of the clean motion, in ranges a second.
 const CLEAN_RATE: f64 = 0.45;
 
-/// Clean samples after which a receptor of this record must have forgotten; `None` if it never does.
+/// Clean samples after which a receptor of this calibration must have forgotten the faults; `None` if it never does.
 ///
-/// A dead band wider than the rate of the motion keeps the branch of the last fault. A baseline falls to a lower level of rest at once, and comes back by its leak alone, over at most twice its furthest shift.
+/// A dead band wider than the rate of the motion keeps the branch of the last fault. A baseline falls to a lower level
+/// of rest at once. It returns by its leak alone, over at most twice its furthest shift.
 fn clean_samples(calibration: &Calibration) -> Option<u32> {
     if calibration.spec().dead_band >= CLEAN_RATE * calibration.spec().signal_range.span() {
         return None;
@@ -94,8 +96,8 @@ fn clean_samples(calibration: &Calibration) -> Option<u32> {
     (back < 1e8).then(|| FORGOTTEN + back as u32)
 }
 
-/// Steps a receptor through `samples` faulty ones, then together with a fresh one through clean ones; by how much the two
-/// differ then.
+/// Steps a receptor through `samples` faulty samples, then together with a fresh receptor through clean samples.
+/// Returns the final difference between the two estimates.
 fn soak<D, S, O>(
     design: D,
     (samples, clean_samples): (u64, u32),
@@ -104,7 +106,7 @@ fn soak<D, S, O>(
 ) -> f64
 where
     D: Design + Stage<S, Out = Result<O, Withheld>> + Copy,
-    // what is copied bit by bit owns nothing that could grow
+    // a type that is copied bit by bit owns nothing that could grow
     D::Memory: Copy + Debug,
 {
     let (mut receptor, mut faults) = (Runner::new(design), Faults::new());
@@ -128,7 +130,7 @@ where
     apart
 }
 
-/// Records of every model; the same in every run.
+/// Returns calibrations of every model; the same in every run.
 fn records() -> Vec<(String, Calibration)> {
     let mut runner = TestRunner::deterministic();
     let mut all = vec![
@@ -149,10 +151,12 @@ fn records() -> Vec<(String, Calibration)> {
     all
 }
 
-/// Share of the range that a soaked receptor may differ by from a fresh one that saw the same clean samples since.
+/// Largest difference, as a share of the range, between a soaked receptor and a fresh one that saw the same clean
+/// samples since.
 ///
-/// None for what remembers a window of samples: it was all replaced. Filters that forget exponentially come as close as
-/// rounding lets them; where two states answer the same signal, as plays do, they stay apart by what is never swept.
+/// A receptor that remembers a window of samples differs by rounding only, because the window was replaced. Filters
+/// that forget exponentially come as close as rounding lets them. Plays give two states with the same signal, and these
+/// stay apart by the part that the motion never sweeps.
 fn allowed(calibration: &Calibration, rounding: f64) -> f64 {
     match &calibration.spec().model {
         Model::Linear(_) | Model::Surfaces { .. } => rounding,
@@ -186,7 +190,7 @@ fn soak_floats<T: Real>(samples: u64, rounding: f64) {
 
 fn soak_codes(samples: u64) {
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
-    // what is no number becomes a code that no converter has
+    // a value that is not a number becomes a code that no converter has
     let code = |share: f64| {
         if share.abs() < 10.0 { AdcCode((4095.0 * share) as i32) } else { AdcCode(-1) }
     };
@@ -201,7 +205,7 @@ fn soak_codes(samples: u64) {
     assert!(apart <= 2.0);
 }
 
-/// So many samples a receptor as `STRETCH_SAMPLES` says: 100000000 take minutes in a release build.
+/// The variable `STRETCH_SAMPLES` sets the number of samples per receptor; 100000000 take minutes in a release build.
 #[test]
 #[ignore = "a million samples a receptor; ./ci.sh runs it"]
 fn streams_with_faults_leave_nothing_behind() {

@@ -16,7 +16,7 @@ fn receptor() -> Runner<StretchReceptor<f64>> {
     Runner::new(StretchReceptor::new(&example_calibration()).unwrap())
 }
 
-/// The pipeline written out as the paper has it: nothing folded.
+/// The pipeline as the paper describes it, without folding.
 fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> (f64, bool) {
     let signal = calibration.spec().signal_range;
     let (normalised, inside) = match &calibration.spec().model {

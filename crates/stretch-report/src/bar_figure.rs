@@ -104,10 +104,10 @@ pub fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) 
         .live(bars_json(GAP, &bar_rows(rows, &[], x_label)))
 }
 
-/// Link of the plots over time in which a bar shows its samples.
+/// Name of the link between bars and the plots over time that mark a bar's samples.
 pub(crate) const GAP: &str = "gap";
 
-/// The place and the text of every row, with the samples that belong to the row.
+/// Returns the place and the text of every row, with the samples that belong to the row.
 fn bar_rows(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     let mut y = 2.0;
     let mut one = |(index, row): (usize, &Row)| {
@@ -128,7 +128,7 @@ fn bar_rows(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     rows.iter().enumerate().map(&mut one).collect()
 }
 
-/// A narrow figure whose bars show their samples.
+/// Draws a narrow figure whose bars mark their samples in the linked plots.
 pub(crate) fn picking_figure(
     description: &str,
     rows: &[Row],

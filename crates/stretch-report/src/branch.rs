@@ -7,7 +7,7 @@ use stretch_core::{Branch, Calibration, Model, Polarity, RateSource, Target};
 
 use super::thin::{extent, quantile, sorted};
 
-/// A fit's samples and surface, brought back from normalised numbers.
+/// A fit's samples and surface, converted from normalised numbers to the units of the data.
 pub(crate) struct BranchView<'a> {
     /// The fit.
     pub(crate) fit: &'a FitReport,

@@ -26,7 +26,7 @@ use super::{
 /// Most trials whose curves are drawn; the tables hold all trials.
 const DRAWN: usize = 4;
 
-/// The words of a report, in addition to the numbers.
+/// Names and sentences of a report, in addition to its numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
     /// Heading of the page.
@@ -51,7 +51,7 @@ pub struct Judged<'a> {
     pub calibrated: &'a [(&'a str, &'a Calibrated)],
     /// Errors of the calibrations.
     pub evaluation: &'a Evaluation,
-    /// The words, in addition to the numbers.
+    /// Names and sentences, in addition to the numbers.
     pub context: &'a Context,
 }
 
@@ -62,11 +62,11 @@ pub fn calibration_page(judged: &Judged<'_>) -> String {
     page.finish()
 }
 
-/// The sections of the report, as a page of their own or as a part of a longer page.
+/// Adds the sections of the report to a page, which may have other parts.
 pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
-    // the picture first: what the numbers below it mean is seen there
+    // pictures come first, because they show what the numbers below mean
     let liveliest = with_most_motion(&evaluation.trials);
     over_time(page, evaluation, liveliest, &names);
     loops(page, calibrated, evaluation, liveliest, &names);
@@ -84,7 +84,7 @@ pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluatio
     first.map_or_else(String::new, |trial| closest_look(evaluation, trial, &names).standalone())
 }
 
-/// How far the best calibration is off, in one sentence.
+/// Returns one sentence with the error of the best calibration.
 pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let Judged { calibrated, evaluation, context } = *judged;
     let names = method_names(calibrated, evaluation);
@@ -95,7 +95,7 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
             let remembers = kind().is_some_and(|k| matches!(k, ModelKind::Remembering { .. }));
             match (remembers, name.split_once(" (")) {
                 (true, _) => "the calibration with memory".to_owned(),
-                // which of them it is says the table
+                // the table names the model
                 (false, Some((words, _))) => format!("the {words} calibration"),
                 (false, None) => format!("the {name} calibration"),
             }
@@ -146,7 +146,7 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     let caption = "All test recordings together";
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
     if !context.kinds.is_empty() {
-        // on a phone each of them is four screens
+        // folded, because each of these tables fills four screens of a phone
         page.folded("By kind of recording", |page| {
             for (kind, methods) in &context.kinds {
                 page.table(&method_table(kind, methods, names, &evaluation.unit));
@@ -225,7 +225,7 @@ fn over_time(page: &mut Page, evaluation: &Evaluation, liveliest: Option<usize>,
     }
 }
 
-/// The loop of the sensor, with the best calibration over it.
+/// Draws reference against signal (the loop of the sensor), with the estimates of the best calibration.
 fn loops(
     page: &mut Page,
     calibrated: &[(&str, &Calibrated)],
@@ -356,7 +356,7 @@ fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) 
     }
 }
 
-/// Names of recordings in a sentence.
+/// Returns the names of recordings as a part of a sentence.
 fn recordings(names: &[String]) -> String {
     match names {
         [] => "data that are not named".to_owned(),
@@ -367,12 +367,12 @@ fn recordings(names: &[String]) -> String {
     }
 }
 
-/// The report of a demonstration as one HTML file: a calibration, and the diagnosis of the difference between simulator and rig. Each part has the
-/// content of its own page.
+/// Returns the report of a demonstration as one HTML file: a calibration, and the diagnosis of the difference between
+/// simulator and rig. Each part has the content of its separate report.
 pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
     let worded = in_words(subject.diagnosis);
     let subject = &Subject { diagnosis: &worded, ..*subject };
-    // where the second part begins
+    // id of the second part
     let diagnosis = "diagnosis";
     let both = format!("{} {}", calibration_verdict(judged), headline(subject));
     let mut page = Page::new(&judged.context.title, &both);

@@ -33,7 +33,7 @@ pub(crate) fn method_names(
     evaluation.pooled.iter().map(|errors| name(&errors.method)).collect()
 }
 
-/// The calibration with the least RMSE. The raw signal does not take part, because the reference itself scales it.
+/// Returns the calibration with the least RMSE. The raw signal is left out, because its scale comes from the reference.
 pub(crate) fn best(methods: &[MethodErrors]) -> Option<usize> {
     let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite() && m.method != RAW);
     finite.min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse)).map(|(i, _)| i)

@@ -1,4 +1,4 @@
-//! An SVG backend for plotters whose colours are names, not numbers.
+//! An SVG backend for plotters that writes colours as class names, not as numbers.
 //!
 //! Every shape carries a class (`ink-raw`), so that one figure serves light
 //! and dark pages and paper. Dots of one colour are one path, so that a cloud of a thousand dots costs ten kilobytes,
@@ -68,12 +68,12 @@ impl Ink {
         [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth][index % 5]
     }
 
-    /// The class that the style sheet colours.
+    /// CSS class of the ink.
     pub(crate) fn class(self) -> &'static str {
         Self::ALL.iter().find(|(ink, _)| *ink == self).map_or("ink-text", |(_, class)| class)
     }
 
-    /// The colour that plotters carries to the backend in place of the ink.
+    /// Encodes the ink as a colour, which plotters passes to the backend.
     pub fn color(self) -> RGBColor {
         let index = Self::ALL.iter().position(|(ink, _)| *ink == self).unwrap_or(0);
         RGBColor(index as u8, 0, 0)
@@ -85,7 +85,7 @@ impl Ink {
     }
 }
 
-/// The class of the ink behind a colour from plotters.
+/// Returns the CSS class of the ink that a colour from plotters encodes.
 fn class(color: BackendColor) -> &'static str {
     Ink::ALL.get(usize::from(color.rgb.0)).map_or("ink-text", |(_, class)| class)
 }

@@ -42,7 +42,7 @@ pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
     format!("{}: simulator against rig", subject.name)
 }
 
-/// The sections of the report, as a page of their own or as a part of a longer page.
+/// Adds the sections of the report to a page, which may have other parts.
 pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
     left_over(page, subject);
@@ -62,18 +62,18 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     numbers(page, diagnosis);
 }
 
-/// Description of the figure of varied parameters.
+/// Caption of the figure in which a reader can vary the parameters of an effect.
 const TURNED: &str = "What is left on the test trials as each number of the effect is turned, all else as it was fitted: the dot is \
     the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
     once the changes are added.";
 
-/// The first picture, which shows what the headline says.
+/// Adds the first picture, which shows the evidence for the headline.
 fn left_over(page: &mut Page, subject: &Subject<'_>) {
     let stage = subject.diagnosis.location.worst().unwrap_or(0);
     let Some(shown) = shown(subject, stage) else { return };
     let channel = &subject.simulator.stages()[stage].channel;
     page.figure(
-        // curves that nearly coincide show less than what is left between them
+        // the residual shows more than two curves that nearly coincide
         &trace_figures(subject, stage, &shown).1,
         &format!(
             "What is left of {channel} in {}, the eight seconds with the largest gap: within two multiples of the noise it is noise.",
@@ -82,7 +82,7 @@ fn left_over(page: &mut Page, subject: &Subject<'_>) {
     );
 }
 
-/// Whether the runs agree, where that was asked.
+/// Adds the comparison of the runs, if it was requested.
 fn agreeing(page: &mut Page, subject: &Subject<'_>) {
     let Some(by_trial) = subject.by_trial else { return };
     page.section(
@@ -138,7 +138,7 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     );
 }
 
-/// The equations of the named effects, in the names of their parameters.
+/// The equations of the named effects, written with the names of their parameters.
 fn formulas<'a>(subject: &'a Subject<'_>) -> impl Iterator<Item = &'a str> {
     subject.implementations.iter().map(|one| one.formula.as_str())
 }
@@ -196,7 +196,8 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     slices(page, subject);
 }
 
-/// The samples of a slice, from the slice's name; `None` for a slice that a plot of one trial cannot show.
+/// Returns the selection of a slice's samples, from the name of the slice; `None` for a slice that a plot of one trial
+/// cannot show.
 fn pick(by: &str, slice: &str, [falling, rising]: &[&str; 2]) -> Option<Pick> {
     let sides = |from: f64, to: f64| Some(Pick { by: "rate", from, to, size: false });
     let most = 1e300;
@@ -313,7 +314,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
             "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
         ),
     ]);
-    // effects of one set belong together, so that a rival is only an effect that may replace one of them
+    // effects of one set belong together, so only an effect outside the set is a rival
     let rivals: Vec<String> =
         d.ambiguous.iter().filter(|name| !d.named.contains(name)).cloned().collect();
     if !rivals.is_empty() && !d.named.is_empty() {
@@ -329,7 +330,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
     });
 }
 
-/// The named effects as code for a simulator.
+/// Adds the named effects as code for a simulator.
 fn implemented(page: &mut Page, subject: &Subject<'_>) {
     if subject.implementations.is_empty() {
         return;
@@ -387,7 +388,7 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     }
 }
 
-/// What would have been named.
+/// Adds the detection limits: the strength from which each effect would have been named.
 fn detectable(page: &mut Page, d: &Diagnosis) {
     if d.detection_limits.is_empty() {
         return;

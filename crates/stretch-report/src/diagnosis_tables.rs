@@ -42,7 +42,7 @@ fn effects(candidate: &Candidate) -> String {
     }
 }
 
-/// A table of every candidate: how probable it is, and what it closes.
+/// A table of every candidate with its probability and the share of the gap that it closes.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
         vec![
@@ -63,8 +63,8 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
     .highlight((!candidates.is_empty()).then_some(0))
 }
 
-/// A table of the numbers that were fitted, a row for each effect of each candidate, and of the stability of the effect. Sets are counted as in
-/// [`candidate_table`].
+/// A table of the fitted numbers, with one row per effect of each candidate, and of the stability of the effect. Sets
+/// are numbered in the order of [`candidate_table`].
 pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectStability]) -> Table {
     let value = |p: &EffectValue| {
         let unit = shown_unit(&p.unit);
@@ -75,7 +75,7 @@ pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectSt
         let known = stabilities.iter().find(|s| s.effect == *effect);
         known.map_or_else(|| NONE.to_owned(), |s| fixed(s.stability, 2))
     };
-    // nothing and unknown have no numbers
+    // the candidates for no effect and for an unknown effect have no numbers
     let own = (1..).zip(candidates).filter(|(_, c)| !c.parameters.is_empty());
     let rows = own.flat_map(|(set, c)| {
         c.effects.iter().map(move |effect| {
@@ -109,7 +109,7 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
     (!d.parameters.is_empty()).then_some(table)
 }
 
-/// A table of the cost of the gap for a calibration.
+/// A table of the cost of the gap: errors of calibrations trained on measured trials and in the simulator.
 pub fn transfer_table(transfer: &Transfer) -> Table {
     let rows = [(LINE, transfer.linear), (SURFACE, transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
@@ -151,7 +151,8 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
     (!rows.is_empty()).then(|| Table::new(caption, &head, rows))
 }
 
-/// A table of how strong each effect would have to be to be named, with the parameter that says so.
+/// A table of the detection limits: the strength at which each effect would be named, with the parameter that measures
+/// it.
 ///
 /// ```
 /// use stretch_gap::DetectionLimit;
@@ -216,15 +217,15 @@ pub fn difference_table(by_trial: &ByTrial) -> Table {
     Table::new("Whether the runs agree", &head, rows.collect::<Vec<_>>())
 }
 
-/// Difference of two errors, in percent of full scale, below which the errors count as equal.
+/// Largest difference of two errors, in percent of full scale, at which the errors count as equal.
 const ALIKE: f64 = 0.05;
 
 /// The calibrations that a transfer tries, `linear` and `poly13`.
 const LINE: &str = "linear";
 const SURFACE: &str = "non-linear";
 
-/// What the effect costs a calibration where its table does not say it: that it is too small to matter to any, or why a calibration errs more with
-/// the better simulator; `None` where the table says it all.
+/// Explains the cost of the effect for a calibration where its table does not: either the cost is too small to matter
+/// to any calibration, or a calibration errs more with the better simulator. `None` if the table needs no explanation.
 pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     let kinds = [(LINE, &transfer.linear), (SURFACE, &transfer.poly13)];
     let gain = |e: &TransferError| e.sim - e.sim_with_effect;

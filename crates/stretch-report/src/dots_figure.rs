@@ -42,7 +42,8 @@ pub(crate) struct Shared<'a> {
     pub(crate) most: f64,
     /// Most dots of a panel.
     pub(crate) dots: usize,
-    /// Link of the figures in which a brush picks samples, and the key by which it picks.
+    /// Name of the group of figures in which a brush (a drag over the figure) picks samples, and the key by which it
+    /// picks.
     pub(crate) brush: (&'a str, Option<&'a str>),
 }
 
@@ -97,7 +98,7 @@ fn draw(area: &Area<'_>, against: &Shared<'_>, panel: &Dots, is_last: bool) -> D
     })
 }
 
-/// Dots from every part of the axis, because most samples of a log are at rest, in one place.
+/// Picks dots from every part of the axis, because most samples of a recording are at rest, in one place.
 fn spread_over(points: &[(f64, f64)], against: &Shared<'_>) -> Vec<(f64, f64)> {
     let x = &against.x;
     let width = (x.end - x.start) / SLOTS as f64;

@@ -15,7 +15,7 @@ use super::{
 /// Length of the window of [`closest_look`], in seconds.
 const WINDOW_S: f64 = 8.0;
 
-/// A trial over its whole time; `names` are the names of the methods.
+/// Draws a trial over its whole time; `names` are the names of the methods.
 pub(crate) fn estimate_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -28,7 +28,7 @@ pub(crate) fn estimate_figure(
     }
 }
 
-/// Some seconds of a trial in which the reference moves most.
+/// Draws the seconds of a trial in which the reference moves most.
 pub(crate) fn closest_look(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -41,8 +41,8 @@ pub(crate) fn closest_look(
     }
 }
 
-/// The curves of a trial for the script: the closer look holds them, and the figure of the whole recording marks the
-/// shown window.
+/// Returns the curves of a trial for the page's script. The closer look holds the curves; the figure of the whole
+/// recording marks the window that is shown.
 fn live(
     evaluation: &Evaluation,
     trial: &TrialErrors,

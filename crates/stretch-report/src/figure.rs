@@ -23,7 +23,7 @@ pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 /// Axes with a place for the data.
 pub type Chart<'a, 'b> = ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// The result of drawing, which fails only for a fault in the figure itself.
+/// The result of drawing. Drawing fails only for a fault in the figure itself.
 pub type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
 
 /// Pixels as steps of the drawing grid.
@@ -168,7 +168,7 @@ pub struct Axes {
     pub x: Range<f64>,
     /// Vertical span.
     pub y: Range<f64>,
-    /// Label below the right end of the horizontal axis; empty for an axis whose numbers another panel bears.
+    /// Label below the right end of the horizontal axis; empty if another panel shows the numbers of the axis.
     pub x_label: String,
     /// Label above the vertical axis.
     pub y_label: String,
@@ -187,7 +187,8 @@ impl Axes {
 /// A line over time: its ink, its width in pixels, and its values.
 pub(crate) type Line<'a> = (Ink, f64, &'a [f64]);
 
-/// Lines over time in two frames of these heights, the frame for phones first, on axes that hold all lines; `missing` where there is no number.
+/// Draws lines over time in two frames of these heights, the frame for phones first. The axes span all lines. `missing`
+/// is shown if the lines have no number.
 pub(crate) fn lines_figure(
     description: &str,
     (x, pad, labels): (&Range<f64>, f64, [&str; 2]),
@@ -279,7 +280,7 @@ pub fn plot<'b>(
     area.draw(&Text::new(axes.x_label.clone(), corner, below))
 }
 
-/// A span that is finite and not empty for any data.
+/// Replaces a span that is not finite or that is empty, so that any data can be drawn.
 fn spread(span: &Range<f64>) -> Range<f64> {
     let (low, high) = (span.start, span.end);
     if !(low.is_finite() && high.is_finite()) {

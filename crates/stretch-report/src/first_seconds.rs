@@ -10,14 +10,15 @@ use super::{
     subject::Subject,
 };
 
-/// The first words of a page: what is missing, if the answer is a name; what it closes and how sure it is follows right below.
+/// Returns the headline of a page. If the diagnosis names effects, it states that they are missing; their probability
+/// and the share of the gap that they close follow below.
 pub(crate) fn headline(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     match &d.answer {
         Some(Answer::Missing { .. }) => {
             format!("{}The simulator lacks {}.", d.preface(), to_add(&d.named, &d.tied))
         }
-        // a probability holds among the candidates, and is reported as such
+        // a probability holds only among the candidates, and its condition is added
         _ => d.in_sentences(&|p| format!("{} {GIVEN}", percent(p))).replace(" %", "\u{a0}%"),
     }
 }
@@ -68,7 +69,7 @@ fn to_do(d: &Diagnosis) -> String {
     }
 }
 
-/// Four short answers.
+/// Returns four short answers: the change, its certainty, its gain, and the next step.
 pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     let best = d.candidates.first();
     let gain = best.map_or_else(String::new, |c| {
@@ -158,7 +159,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// The gain of a calibration, where it is large enough to be mentioned.
+/// Returns a sentence on the gain of a calibration if its error falls by more than a tenth, otherwise nothing.
 fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
@@ -177,7 +178,7 @@ fn moved(d: &Diagnosis) -> Vec<String> {
     far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
 }
 
-/// Every named effect in words; its numbers are where it is implemented.
+/// Returns a sentence for every named effect. The numbers of an effect are in the section with its code.
 pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
     let d = subject.diagnosis;
     let one = |name: &String| {

@@ -46,11 +46,11 @@ pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
 pub(crate) struct Shown {
     /// Name of the trial.
     pub(crate) name: String,
-    /// Samples of the trial among those of all trials end to end.
+    /// Indices of the trial's samples in the concatenation of all trials.
     pub(crate) samples: Range<usize>,
     /// Times of these samples, s.
     pub(crate) time_s: Vec<f64>,
-    /// First view of the trial, s.
+    /// The time window that is shown first, s.
     pub(crate) window: Range<f64>,
 }
 

@@ -1,8 +1,9 @@
 //! The data of a figure for the script of a page, as compact JSON.
 //!
-//! A curve is given on an even grid of time, once over the whole recording and once on a finer grid around the first view.
-//! Where a slot of the grid holds several samples, the slot gives the least and the greatest in their order, so that no
-//! peak is lost. Values are whole multiples of `q` above `o`, each given as the step from the value before.
+//! A curve is given on an even grid of time, once over the whole recording and once on a finer grid around the first
+//! view. If a slot of the grid holds several samples, it gives the least and the greatest of them in their order, so
+//! that no peak is lost. Values are whole multiples of `q` above `o`. Each value is given as the difference from the
+//! value before.
 
 use std::ops::Range;
 
@@ -18,7 +19,7 @@ use super::{
 const COARSE: usize = 600;
 /// Slots around the first view.
 const FINE: usize = 800;
-/// Steps of a value over the span of its curve.
+/// Number of quantisation steps over the span of a curve.
 const FINENESS: f64 = 2000.0;
 
 /// A curve on an even grid.
@@ -40,14 +41,14 @@ struct Series<'a> {
     levels: Vec<Packed>,
 }
 
-/// The samples that belong to a bar.
+/// The condition by which the samples of a bar are selected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Pick {
-    /// `level`, `rate` or `time`.
+    /// The key that is compared: `level`, `rate` or `time`.
     pub(crate) by: &'static str,
-    /// Least value of the samples.
+    /// Least value of the key.
     pub(crate) from: f64,
-    /// Greatest value of the samples.
+    /// Greatest value of the key.
     pub(crate) to: f64,
     /// Whether magnitudes are compared, without the sign.
     pub(crate) size: bool,
@@ -56,7 +57,7 @@ pub(crate) struct Pick {
 /// A plot over time.
 #[derive(Debug)]
 pub(crate) struct TimePlot<'a> {
-    /// Plots of one name zoom together.
+    /// Name of the group of plots that zoom together.
     pub(crate) link: String,
     /// Labels of the horizontal and the vertical axis.
     pub(crate) labels: [&'a str; 2],
@@ -117,7 +118,7 @@ pub(crate) fn change(time: &[f64], values: &[f64], view: &Range<f64>) -> Vec<Pac
     levels(time, values, [&span, view], mean)
 }
 
-/// From the samples of a slot to the slot's two values.
+/// A function from the samples of a slot to the slot's two values.
 type SlotValues = fn(&[(f64, f64)]) -> Option<[f64; 2]>;
 
 /// The least and the greatest sample of a slot, in the order of time.
@@ -190,7 +191,7 @@ fn packed(
     steps(t, dt, &values_at)
 }
 
-/// Values as whole steps.
+/// Quantises values, and encodes each as the difference from the value before.
 fn steps(t: f64, dt: f64, values: &[Option<f64>]) -> Packed {
     let real = values.iter().flatten().copied().filter(|y| y.is_finite());
     let span = extent(real).unwrap_or(0.0..0.0);
@@ -251,7 +252,7 @@ impl Panel {
     }
 }
 
-/// A scatter as JSON: a brush over it picks by `by`.
+/// Returns a scatter plot as JSON. `by` is the key by which a brush (a drag over the plot) picks samples.
 pub(crate) fn scatter_json(
     link: &str,
     by: Option<&str>,

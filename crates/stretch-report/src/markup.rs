@@ -83,12 +83,12 @@ fn minus(text: String) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// What an axis shows and in what unit; that may be empty.
+/// Returns the label of an axis from a name and a unit, which may be empty.
 pub(crate) fn labelled(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
-/// A unit as it is shown: that of a number without unit, `1`, is empty.
+/// Returns a unit as it is shown: nothing for `1`, the unit of a number without unit.
 pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }

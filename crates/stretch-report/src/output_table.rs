@@ -1,4 +1,5 @@
-//! What is missing in each output of a simulator with several, such as the joints of an arm.
+//! The table of the outputs of a simulator with several outputs, such as the joints of an arm, and of the effects that
+//! are missing in each.
 
 use stretch_gap::{Diagnosis, ParameterShift, Simulator};
 
@@ -7,13 +8,14 @@ use super::{
     page::Table,
 };
 
-/// Parameters of an output that are shown: those that moved most.
+/// Number of parameters that are shown for an output: those that moved most.
 const MOVED: usize = 3;
-/// Standard deviations from which on a parameter counts as moved.
+/// A parameter counts as moved from this many standard deviations on.
 const LEAST_MOVED: f64 = 1.0;
 
-/// A row an output: what is left in it, the effects that act in it with their values, and the parameters that moved most; none for a
-/// simulator of one output. `called` gives the name by which the diagnosis calls an effect of the simulator's list.
+/// Returns a table with one row per output: the residual, the effects that act in the output with their values, and the
+/// parameters that moved most. `None` for a simulator with one output. `called` maps an effect of the simulator's list
+/// to its name in the diagnosis.
 pub fn output_table(
     d: &Diagnosis,
     simulator: &dyn Simulator,
@@ -73,7 +75,7 @@ pub fn output_table(
     ))
 }
 
-/// Values of an effect that are more than its form, in the most probable set that holds it.
+/// Returns the values of an effect without its form parameters, in the most probable set that contains the effect.
 fn values(d: &Diagnosis, name: &String) -> Vec<String> {
     let holds = d.candidates.iter().find(|c| c.effects.contains(name));
     let own =
@@ -120,7 +122,7 @@ mod tests {
                     *y = held;
                 });
             }
-            // noise that no generator is needed for
+            // deterministic noise, without a random generator
             let noise = |i: usize| 0.02 * (((i * 7919 + 31 * trial) % 1000) as f64 / 288.7 - 1.732);
             angle.iter_mut().enumerate().for_each(|(i, y)| *y += noise(i));
             channels.push(Channel { name: format!("u{joint}_V"), values: u });

@@ -1,12 +1,12 @@
-//! The frame of every report: one file, no network, light and dark, phone and paper.
+//! The frame of every report: one HTML file that needs no network, for light and dark screens, phones and paper.
 
 use std::fmt::Write as _;
 
 use super::{canvas::Ink, figure::Figure, live::embedded, markup::escape, script};
 
-/// Least number of columns from which a row is a card on a phone.
+/// In tables with at least this many columns, each row becomes a card on a phone.
 const CARDS: usize = 4;
-/// Least number of letters from which the text of a cell wraps.
+/// The text of a cell wraps if it has more letters than this.
 const WORDS: usize = 24;
 
 /// The style of the page: colours, fonts, and rules for phones and printers.
@@ -26,7 +26,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table none of whose rows is highlighted.
+    /// Creates a table without a highlighted row.
     pub fn new(
         caption: impl Into<String>,
         head: &[&str],
@@ -36,7 +36,7 @@ impl Table {
         Self { caption: caption.into(), head, rows: rows.into_iter().collect(), highlight: None }
     }
 
-    /// The same, with the row to look at first.
+    /// Returns the table with a row to look at first.
     #[must_use]
     pub fn highlight(self, row: impl Into<Option<usize>>) -> Self {
         Self { highlight: row.into(), ..self }
@@ -62,7 +62,7 @@ impl Page {
         Self { title: title.to_owned(), body, in_section: false }
     }
 
-    /// Begins a part of a report that has several: its own title and sentence. [`Page::jump`] leads to its `id`.
+    /// Begins a part of a report with several parts, with a title and a sentence. [`Page::jump`] links to its `id`.
     pub fn part(&mut self, id: &str, title: &str, verdict: &str) -> &mut Self {
         self.close();
         self.put(&format!(
@@ -73,7 +73,7 @@ impl Page {
         ))
     }
 
-    /// A way to a part further down.
+    /// Adds a link to a part further down.
     pub fn jump(&mut self, id: &str, words: &str) -> &mut Self {
         self.put(&format!("<p><a href=\"#{}\">{}</a></p>\n", escape(id), escape(words)))
     }
@@ -86,22 +86,22 @@ impl Page {
         if intro.is_empty() { self } else { self.text(intro) }
     }
 
-    /// A heading within the open section.
+    /// Adds a heading within the open section.
     pub fn heading(&mut self, heading: &str) -> &mut Self {
         self.put(&format!("<h2>{}</h2>\n", escape(heading)))
     }
 
-    /// A paragraph.
+    /// Adds a paragraph.
     pub fn text(&mut self, text: &str) -> &mut Self {
         self.put(&format!("<p>{}</p>\n", escape(text)))
     }
 
-    /// A block of code.
+    /// Adds a block of code.
     pub fn code(&mut self, code: &str) -> &mut Self {
         self.put(&format!("<pre>{}</pre>\n", escape(code)))
     }
 
-    /// Notes, one on each line; no element when there are none.
+    /// Adds a list of notes; no element if there are none.
     pub fn list(&mut self, items: &[String]) -> &mut Self {
         if items.is_empty() {
             return self;
@@ -113,7 +113,7 @@ impl Page {
         self.put("</ul>\n")
     }
 
-    /// Short answers side by side, each under its question.
+    /// Adds short answers side by side, each under its question.
     pub fn facts(&mut self, facts: &[(&str, String)]) -> &mut Self {
         self.put("<dl class=\"facts\">\n");
         for (question, answer) in facts {
@@ -123,7 +123,7 @@ impl Page {
         self.put("</dl>\n")
     }
 
-    /// A figure over the whole width.
+    /// Adds a figure over the whole width.
     pub fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
         self.put("<figure>");
         if !figure.legend.is_empty() {
@@ -145,7 +145,7 @@ impl Page {
         self.put(&format!("<figcaption>{}</figcaption></figure>\n", escape(caption)))
     }
 
-    /// Figures side by side where there is room, one above the other on a phone.
+    /// Adds figures, side by side where there is room, and one above the other on a phone.
     pub fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
         self.put("<div class=\"side\">\n");
         for (figure, caption) in figures {
@@ -154,7 +154,7 @@ impl Page {
         self.put("</div>\n")
     }
 
-    /// A table that scrolls in its own frame when it is too wide.
+    /// Adds a table, which scrolls in a frame if it is too wide.
     pub fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
         let cards = if table.head.len() >= CARDS { " class=\"cards\"" } else { "" };
@@ -188,14 +188,14 @@ impl Page {
         self.put("</tbody></table></div>\n")
     }
 
-    /// Content behind a line that opens it.
+    /// Adds content that is folded behind a summary line.
     pub fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
         self.put(&format!("<details><summary>{}</summary>\n", escape(summary)));
         content(self);
         self.put("</details>\n")
     }
 
-    /// The whole file: HTML that is also well-formed XML.
+    /// Returns the whole file, HTML that is also well-formed XML.
     pub fn finish(mut self) -> String {
         self.close();
         let title = escape(&self.title);
@@ -223,7 +223,7 @@ impl Page {
     }
 }
 
-/// A swatch and its name.
+/// Returns the HTML of a colour swatch and its name.
 fn legend_entry(ink: Ink, name: &str) -> String {
     format!("<span><i class=\"{}\"></i>{}</span>\n", ink.class(), escape(name))
 }

@@ -1,4 +1,5 @@
-//! The report of a prediction: new recordings, measured and simulated with a fix and without.
+//! The report of a prediction: new recordings, measured and simulated with and without a fix of the
+//! simulator.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! The page's own script, and the policy under which nothing else runs.
+//! The script of a page, and the policy under which no other script runs.
 
 use sha2::{Digest, Sha256};
 

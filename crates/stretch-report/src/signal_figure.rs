@@ -21,8 +21,8 @@ const POINTS: usize = 600;
 /// Samples slower than this share of the fastest rate are at rest: they have no direction.
 pub(crate) const AT_REST: f64 = 0.05;
 
-/// Reference over signal for the moving samples of all trials, coloured by direction, and the estimates of one method for
-/// the liveliest seconds of the trial `shown`.
+/// Draws the reference over the signal for the moving samples of all trials, coloured by direction. Adds the estimates
+/// of one method for the seconds with the most motion of the trial `shown`.
 pub(crate) fn signal_figure(
     evaluation: &Evaluation,
     shown: Option<&TrialErrors>,
@@ -79,7 +79,8 @@ fn directions(trials: &[TrialErrors]) -> [Vec<(f64, f64)>; 2] {
     [rising, falling]
 }
 
-/// Estimates of a method over the signal in the liveliest seconds of a trial, or in all of a short trial, as unbroken pieces.
+/// Returns the estimates of a method over the signal, as unbroken pieces, in the seconds of a trial with the most
+/// motion or in the whole of a short trial.
 fn line(trial: &TrialErrors, method: usize) -> Vec<Vec<(f64, f64)>> {
     let seconds = liveliest(trial);
     let is_shown = |t: &f64| seconds.as_ref().is_none_or(|seconds| seconds.contains(t));

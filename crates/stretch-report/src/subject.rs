@@ -18,7 +18,7 @@ pub struct Subject<'a> {
     pub implementations: &'a [Implementation],
     /// The simulator with its measurements.
     pub simulator: &'a dyn Simulator,
-    /// Every run fitted by itself, where that was asked for.
+    /// The fits of every run by itself, if they were requested.
     pub by_trial: Option<&'a ByTrial>,
 }
 
@@ -30,7 +30,7 @@ impl<'a> Subject<'a> {
         Self { name, diagnosis, evidence, implementations, simulator, by_trial: None }
     }
 
-    /// The same, with every run fitted by itself.
+    /// Returns the subject with the fits of every run by itself.
     #[must_use]
     pub fn by_trial(self, by_trial: Option<&'a ByTrial>) -> Self {
         Self { by_trial, ..self }

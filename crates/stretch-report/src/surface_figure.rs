@@ -75,10 +75,10 @@ fn live(view: &BranchView<'_>, ink: Ink) -> String {
     .to_string()
 }
 
-/// Range of heights that are drawn, because a polynomial may leave the box where samples are few.
+/// Range of heights that are drawn. It is limited because a polynomial may leave the box where samples are few.
 const INSIDE: std::ops::RangeInclusive<f64> = -0.15..=1.15;
 
-/// From the unit cube to the page: signal to the right, rate to the left, target up.
+/// Projection of the unit cube onto the page: signal to the right, rate to the left, target up.
 #[derive(Clone, Copy)]
 struct View {
     cos: f64,
@@ -267,7 +267,7 @@ fn floor(area: &Area<'_>, view: &BranchView<'_>, eye: &View) -> Drawn {
     text(format!("{signal} \u{2198}"), (396.0, 337.0), HPos::Right, VPos::Bottom)
 }
 
-/// Three or four round numbers inside a span.
+/// Returns two to five round numbers inside a span.
 fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     let rough = (high - low) / 4.0;
     let ten = 10f64.powf(rough.log10().floor());

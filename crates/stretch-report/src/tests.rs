@@ -39,7 +39,7 @@ struct Made {
 }
 
 impl Made {
-    /// Judged on one recording, which most tests need.
+    /// Returns calibrations that were judged on one recording, for most tests.
     fn on_tuesday() -> &'static Self {
         static MADE: OnceLock<Made> = OnceLock::new();
         MADE.get_or_init(|| Self::new(&[recording("tuesday", 1.3, 3000)]))
@@ -89,8 +89,8 @@ fn context(tested_on: &str) -> Context {
     }
 }
 
-/// Checks that tags nest, attributes are quoted and once each, and text holds
-/// no bare `<` or `&`; gives the names of all elements.
+/// Checks that tags nest, attributes are quoted and once each, and text holds no bare `<` or `&`.
+/// Returns the names of all elements.
 fn elements(document: &str) -> Vec<String> {
     let document = &without_program(document);
     let text = document.strip_prefix("<!DOCTYPE html>\n").unwrap_or(document);
@@ -162,7 +162,7 @@ fn a_page_needs_no_network_and_runs_its_own_script_alone() {
     for reach in ["http:", "https:", "//", "url(", "@import", "<link", "src=", "href="] {
         assert!(!page.contains(reach), "{reach}");
     }
-    // its own script and data, and a policy that knows the one and lets nothing else run
+    // only the page's script and data, and a policy that allows this script and nothing else
     let scripts = page.matches("<script").count();
     assert_eq!(page.matches("<script type=\"application/json\">").count() + 1, scripts);
     assert!(page.contains("default-src 'none'; script-src 'sha256-"));
@@ -211,7 +211,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
             deg(raw)
         )
     );
-    // judged on what it was fitted to, it says so, whatever the caller claims
+    // a page about the data of the fit states this, whatever the caller claims
     let same = Made::new(&[recording("monday", 1.1, 4000)])
         .page(&Context { tested_on: Vec::new(), ..context("") });
     assert!(sentence(&same).starts_with("On the very data of the fit"));
@@ -264,7 +264,7 @@ fn data_without_a_number_give_notes_and_no_panic() {
         vec![trial(2000, 1e300), trial(2000, -1e300)],
     ];
     for trials in cases {
-        // a rate takes eleven samples
+        // a rate needs eleven samples
         let nothing = |t: &TrialErrors| t.reference.iter().filter(|x| x.is_finite()).count() < 11;
         let notes = trials.iter().all(nothing);
         let (comparisons, unit) = (Vec::new(), String::new());
@@ -401,7 +401,7 @@ fn a_thinned_curve_keeps_its_peaks_and_its_holes() {
     assert!(points.contains(&(time[3_333], 7.0)));
     assert!(points.windows(2).all(|w| w[0].0 < w[1].0));
     assert!(points.iter().all(|(t, _)| !(time[6_000]..time[6_200]).contains(t)));
-    // a leap in time is a hole too
+    // a jump in time is a hole too
     let leap = [0.0, 0.01, 0.02, 9.0, 9.01, 9.02].map(|t: f64| t);
     let dense: Vec<f64> = (0..400).map(|n| n as f64 * 0.01).chain(leap.map(|t| t + 50.0)).collect();
     assert_eq!(thin::curve(&dense, &vec![1.0; dense.len()], &(0.0..60.0), 50).len(), 3);

@@ -122,7 +122,7 @@ pub(crate) fn binned(points: &[(f64, f64)], span: &Range<f64>, bins: usize) -> V
         .collect()
 }
 
-/// At most about `most` of the items, in their order, the ends among them.
+/// Returns at most about `most` of the items in their order, including both ends.
 pub(crate) fn sample_in_order<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     let step = items.len().div_ceil(most.max(1)).max(1);
     items.iter().step_by(step).chain(items.last()).copied().collect()

@@ -1,4 +1,5 @@
-//! Reports of diagnoses of every kind, each built from values; the sentences are those that stretch-gap makes of such answers.
+//! Reports of diagnoses of every kind, each built from values. The sentences are those that stretch-gap writes for such
+//! answers.
 
 use std::sync::{Arc, OnceLock};
 
@@ -21,7 +22,7 @@ const PLAY: &str = "lag.output.backlash";
 const LOOP: &str = "lag.output.bouc_wen";
 const LAG: &str = "line.input.lag";
 
-/// A line with a lag behind it, which have nothing but their noise, and what a diagnosis gathers of them.
+/// A line and a lag behind it, which differ from their recordings by noise only, and the evidence of their diagnosis.
 fn line_and_lag() -> &'static (Problem, Evidence) {
     static GATHERED: OnceLock<(Problem, Evidence)> = OnceLock::new();
     GATHERED.get_or_init(|| {
@@ -77,7 +78,7 @@ fn lagging(trial: usize) -> Vec<f64> {
 }
 
 fn trial(trial: usize) -> SessionTrial {
-    // noise that no generator is needed for
+    // deterministic noise, without a random generator
     let noise = |i: usize| 0.02 * (((i * 7919 + 31 * trial) % 1000) as f64 / 288.7 - 1.732);
     let noisy = |y: Vec<f64>| y.into_iter().enumerate().map(|(i, y)| y + noise(i)).collect();
     let channel = |name: &str, values| Channel { name: name.into(), values };
@@ -93,7 +94,7 @@ fn trial(trial: usize) -> SessionTrial {
     SessionTrial { start_s: 60.0 * trial as f64, split, ..SessionTrial::new(recorded) }
 }
 
-/// What stretch-gap says of such an answer: its value, the sentence and the notes.
+/// Returns an answer of stretch-gap by its name: its value, its sentence and its notes.
 fn said(name: &str) -> (Value, String, Vec<String>) {
     let answers: Value = serde_json::from_str(ANSWERS).expect("JSON");
     let mut blocks = SENTENCES.split("# ").map(str::lines);
@@ -104,7 +105,7 @@ fn said(name: &str) -> (Value, String, Vec<String>) {
     (answers[name].clone(), sentence, notes.collect())
 }
 
-/// An answer without names.
+/// A diagnosis that names no effect.
 fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
     let (value, sentence, notes) = said(name);
     let agrees = matches!(verdict, VerdictKind::NoGap | VerdictKind::Parameters);
@@ -142,7 +143,7 @@ fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
     .expect("a diagnosis")
 }
 
-/// A set that closes a share of a gap of three times the noise.
+/// A candidate that closes a share of a gap of three times the noise.
 fn candidate(effects: &[&str], probability: f64, closed: f64, values: Value) -> Value {
     let left = 8.0 * (1.0 - closed);
     json!({
@@ -160,7 +161,7 @@ fn strings(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
 }
 
-/// An answer that names effects, with rivals that are nearly as probable.
+/// A diagnosis that names effects, with rivals that are nearly as probable.
 fn naming(verdict: VerdictKind, name: &str, named: &[&str], rivals: &[&str]) -> Diagnosis {
     let closed = if verdict == VerdictKind::Partial { 0.8 } else { 0.999 };
     let probability = if rivals.is_empty() { 0.97 } else { 0.55 };
@@ -176,7 +177,7 @@ fn naming(verdict: VerdictKind, name: &str, named: &[&str], rivals: &[&str]) -> 
     }
 }
 
-/// One effect is missing, and everything that a report may say of it is there.
+/// A diagnosis of one missing effect, with everything that a report can contain.
 fn one_missing() -> Diagnosis {
     let errors =
         |real: f64, sim: f64, with: f64| json!({"real": real, "sim": sim, "sim_with_effect": with});
@@ -218,7 +219,7 @@ fn wrong(name: &str, gross: Value) -> Diagnosis {
     }
 }
 
-/// Every kind of answer, by the name of its sentence.
+/// Diagnoses with every kind of answer, by the name of the sentence.
 fn answers() -> Vec<(&'static str, Diagnosis)> {
     use VerdictKind::{Effect, NoGap, Parameters, Partial, Unknown};
     let mut fits_worse = naming(Effect, "one missing, fits worse than it tests", &[PLAY], &[]);

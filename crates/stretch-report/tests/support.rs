@@ -28,7 +28,7 @@ fn without(html: &str, element: &str) -> String {
     first + &rest.collect::<String>()
 }
 
-/// A section of a page as it is written, without its figures.
+/// Returns a section of a page as HTML, without its figures.
 pub(crate) fn section(page: &str, heading: &str) -> String {
     let body = body(page);
     let (_, rest) = body.split_once(&format!("<h2>{heading}</h2>\n")).expect("a section");
@@ -36,14 +36,15 @@ pub(crate) fn section(page: &str, heading: &str) -> String {
     format!("<h2>{heading}</h2>\n{section}")
 }
 
-/// What is read on a page before its first section, captions of figures apart.
+/// Returns the text of a page before its first section, without the captions of figures.
 pub(crate) fn first_seconds(page: &str) -> String {
     let body = body(page);
     let first = body.split_once("<section>").map_or(&*body, |(first, _)| first);
     text_of(&without(first, "figure"))
 }
 
-/// What is read on a page, without its drawings: `#` begins a heading, `>` what is folded, and `|` parts the cells of a table.
+/// Returns the text of a page without its drawings. `#` begins a heading, `>` a folded part, and `|` separates the
+/// cells of a table.
 pub(crate) fn text(page: &str) -> String {
     text_of(&body(page))
 }

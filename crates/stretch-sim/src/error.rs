@@ -37,7 +37,7 @@ pub enum SimError {
         min: f64,
         /// Largest allowed value.
         max: f64,
-        /// Unit of the three.
+        /// Unit of value, minimum and maximum.
         unit: String,
     },
     /// A required parameter is missing.
@@ -57,24 +57,24 @@ pub enum SimError {
         name: String,
         /// The value that was given.
         value: f64,
-        /// What it must be.
+        /// The condition that the value must meet.
         needs: &'static str,
     },
     /// The same effect was given twice.
     #[error("effect `{name}` is given twice")]
     RepeatedEffect {
-        /// Its name.
+        /// Name of the effect.
         name: String,
     },
     /// The effect does not act in this kind of rig.
     #[error("effect `{name}` needs {needs}, which this rig does not have")]
     NotHere {
-        /// Its name.
+        /// Name of the effect.
         name: String,
-        /// What it needs.
+        /// The equipment that the effect needs.
         needs: &'static str,
     },
-    /// The bridge would relax to nothing: the sleeve is slack within the stroke.
+    /// The sleeve would be slack within the stroke, so the bridge would not respond.
     #[error(
         "the sleeve goes slack: gauge strain {strain} at full contraction, at least {least} is needed"
     )]
@@ -125,13 +125,13 @@ pub enum SimError {
     Column {
         /// The column.
         name: String,
-        /// What is wrong with it, and what would be valid.
+        /// The problem, and the values that would be valid.
         problem: String,
     },
     /// Slices that must have the same (or a derived) length do not.
     #[error("`{name}` has {found} values where {expected} are needed")]
     Length {
-        /// What is too short or too long.
+        /// Name of the slice.
         name: &'static str,
         /// Values needed.
         expected: usize,
@@ -141,14 +141,14 @@ pub enum SimError {
     /// A number that has to be finite and positive is not.
     #[error("{name} = {value} must be finite and positive")]
     NotPositive {
-        /// What it is.
+        /// Name of the number.
         name: &'static str,
         /// The number.
         value: f64,
     },
 }
 
-/// The words that offer a suggestion, empty when there is none.
+/// Returns the words that offer a suggestion; empty without one.
 fn suggestion(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
 }
@@ -162,13 +162,13 @@ pub(crate) fn nearest<'a>(
 }
 
 impl SimError {
-    /// That none of these effects has that name.
+    /// Returns the error for a name that none of the known effects has.
     pub(crate) fn unknown_effect(name: &str, known: &[&Effect]) -> Self {
         let nearest = nearest(name, known.iter().map(|e| e.name));
         Self::UnknownEffect { name: name.to_owned(), nearest }
     }
 
-    /// A name that its owner does not know.
+    /// Returns the error for a name that its owner does not know.
     pub(crate) fn unknown_parameter(owner: &str, name: &str, nearest: Option<String>) -> Self {
         Self::UnknownParameter { owner: owner.to_owned(), name: name.to_owned(), nearest }
     }

@@ -1,4 +1,5 @@
-//! A gauge alone: any stretch sensor with a reference is a rig of one stage.
+//! A gauge alone: any stretch sensor with a reference, simulated as a rig of one stage without
+//! valves and muscle.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ use crate::{
     stages::{Memory, Reference, Sites, check_length, pick},
 };
 
-/// The nominal gauge: y = offset + gain e, e = (x - zero)/span.
+/// The nominal gauge, with signal y and reference x: y = offset + gain e, e = (x - zero)/span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaugeSpec {
     /// Reference at e = 0: its minimum over the fit trials.
@@ -32,10 +33,10 @@ pub struct GaugeSpec {
     pub pressure_scale: Option<f64>,
 }
 
-/// A gauge alone, prepared. The effects of `sensing` act on e instead of the strain, on 1 + (y -
-/// offset)/gain instead of the resistance, and on (y - offset)/gain instead of the voltage. The
-/// effects of `reference` act on e as it is measured, and are undone before it drives the gauge.
-/// `amplifier_saturation` is not used, nor is `pressure_crosstalk` without a pressure.
+/// A gauge alone, prepared to run. The effects of `sensing` act on e instead of the strain, on 1 +
+/// (y - offset)/gain instead of the resistance, and on (y - offset)/gain instead of the voltage.
+/// The effects of `reference` act on e as it is measured; they are undone before e drives the
+/// gauge. `amplifier_saturation` is not used; `pressure_crosstalk` is used only with a pressure.
 #[derive(Debug)]
 pub struct Gauge {
     spec: GaugeSpec,
@@ -57,18 +58,18 @@ impl Gauge {
             }
     }
 
-    /// The catalogue's unit of a parameter in units of e and of y's span.
+    /// The catalogue's unit of a parameter, in units of e or of the span of y.
     pub fn unit(parameter: &EffectParameter) -> f64 {
         1.0 / Self::stroke(parameter)
     }
 
-    /// The whole stroke in the unit of a parameter; 1 in others.
+    /// The whole stroke in the unit of a parameter; 1 for a unit that does not measure the stroke.
     fn stroke(parameter: &EffectParameter) -> f64 {
         let mut strokes = Surroundings::STROKES.iter();
         strokes.find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1)
     }
 
-    /// Where an effect is searched in a gauge alone.
+    /// Returns the ranges and the starts of the search for an effect in a gauge alone.
     pub fn search(effect: &Effect, alone: &Alone) -> Search {
         let units: Vec<f64> = effect.fitted().map(Self::unit).collect();
         let mut search = Search::of(effect, &Extent::between(0.0, 1.0)).times(&units);
@@ -88,7 +89,7 @@ impl Gauge {
         (parameter.min / stroke, parameter.max / stroke, parameter.typical / stroke)
     }
 
-    /// Prepares a gauge for records sampled every `dt_s`.
+    /// Prepares a gauge for recordings sampled every `dt_s`.
     ///
     /// # Errors
     /// A span or gain that is zero or not finite, a sample time that is not positive, an effect
@@ -129,7 +130,7 @@ impl Gauge {
         Surroundings::of_gauge(spec.pressure_scale, grid)
     }
 
-    /// A memory for it.
+    /// Creates a memory for this gauge.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.sites.record.end())
     }
@@ -216,9 +217,9 @@ pub struct GaugeRig {
 }
 
 impl GaugeRig {
-    /// The gauge that a file of `kind = "gauge"` describes. Offset and gain are exact unless they
-    /// have a tolerance, as every parameter of a rig file. A gauge has no stock values, so every
-    /// number is required.
+    /// Returns the gauge that a file of `kind = "gauge"` describes. Offset and gain are exact
+    /// unless they have a tolerance, like every parameter of a rig file. A gauge has no stock
+    /// values, so every number is required.
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -275,7 +276,7 @@ impl GaugeRig {
         for entry in &file.effects {
             effects.insert_in(entry, Gauge::unit)?;
         }
-        // refuse a gauge that cannot run here, not at the first trial
+        // refuses a gauge that cannot run now, not at the first trial
         Gauge::new(spec, &effects, 0.01)?;
         let tolerance = |name: &str| table.get(name).map_or(Tolerance::Exact, Tolerance::of);
         Ok(Self { spec, offset: tolerance("offset"), gain: tolerance("gain"), effects })

@@ -58,7 +58,7 @@ impl Tolerance {
 /// Description of one nominal parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterInfo {
-    /// Which one.
+    /// Key of the parameter.
     pub key: Key,
     /// Name in a rig file.
     pub name: &'static str,
@@ -72,7 +72,7 @@ pub struct ParameterInfo {
     pub tolerance: Tolerance,
     /// Whether zero is allowed (it is for noise; everything else is strictly positive).
     pub zero_allowed: bool,
-    /// What it is.
+    /// Meaning of the parameter.
     pub meaning: &'static str,
 }
 
@@ -131,7 +131,7 @@ parameters! {
 }
 
 impl Key {
-    /// Its description.
+    /// Description of the parameter.
     pub fn info(self) -> &'static ParameterInfo {
         &PARAMETERS[self as usize]
     }

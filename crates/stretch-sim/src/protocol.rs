@@ -4,7 +4,7 @@ use stretch_data::{Channel, Split, Trial, TrialKind};
 
 use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
 
-/// Samples a second of every protocol of the paper.
+/// Samples per second of every protocol of the paper.
 pub const RATE_HZ: f64 = 100.0;
 /// Openings of the paper's ramps.
 pub const OPENINGS: [f64; 6] = [0.0025, 0.125, 0.25, 0.5, 0.75, 1.0];
@@ -24,18 +24,18 @@ pub struct TrialPlan {
     pub kind: TrialKind,
     /// The opening that is held, if there is only one.
     pub opening: Option<f64>,
-    /// Its use.
+    /// Whether the trial is for fitting or for testing.
     pub split: Split,
     /// Whether the chamber starts full (settled at the supply pressure); otherwise it starts
     /// vented.
     pub full: bool,
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: f64,
-    /// Inlet, one value a sample.
+    /// Opening of the inlet, one value per sample.
     pub inlet: Vec<f64>,
-    /// Outlet, one value a sample.
+    /// Opening of the outlet, one value per sample.
     pub outlet: Vec<f64>,
-    /// Excitation of the bridge, a share of the rig's.
+    /// Excitation of the bridge, as a share of the rig's.
     pub excitation: f64,
     /// Length that is imposed from outside (clamped, or held by gauge blocks), mm, one value per
     /// sample; `None` if the muscle moves freely.
@@ -48,7 +48,7 @@ pub struct TrialPlan {
     pub start_s: Option<f64>,
 }
 
-/// Columns of a trial that describe the excitation, in addition to the valve openings.
+/// Columns of a trial with inputs other than the valve openings.
 const EXCITATION: &str = "excitation_share";
 const SET_LENGTH: &str = "set_length_mm";
 const SHUNT: &str = "shunt_share";
@@ -72,22 +72,22 @@ impl TrialPlan {
         }
     }
 
-    /// From atmospheric pressure: rest, then the inlet held at an opening; 15 s.
+    /// Plans an inflation from atmospheric pressure: 1 s of rest, then the inlet held at an opening; 15 s in total.
     pub fn inflation(opening: f64) -> Self {
         let mut plan = Self::new(ramp_file("inflation", opening), TrialKind::Inflation, RAMP_S);
         plan.inlet[REST..].fill(opening);
         Self { opening: Some(opening), ..plan }
     }
 
-    /// From full contraction: rest, then the outlet held at an opening; 15 s.
+    /// Plans a deflation from full contraction: 1 s of rest, then the outlet held at an opening; 15 s in total.
     pub fn deflation(opening: f64) -> Self {
         let mut plan = Self::new(ramp_file("deflation", opening), TrialKind::Deflation, RAMP_S);
         plan.outlet[REST..].fill(opening);
         Self { opening: Some(opening), full: true, ..plan }
     }
 
-    /// Segments of 0.15 .. 1.5 s, each inflating, deflating or holding (0.42, 0.42, 0.16) at a random opening of
-    /// 0.125 .. 1; 60 s. `number` chooses the file's name and an independent stream of the seed.
+    /// Plans 60 s of random segments of 0.15 .. 1.5 s. Each inflates, deflates or holds (with probabilities 0.42, 0.42,
+    /// 0.16) at a random opening of 0.125 .. 1. `number` chooses the file's name and an independent stream of the seed.
     pub fn arbitrary(number: usize, seed: u64) -> Self {
         let mut plan = Self::new(format!("arbitrary_{number}.csv"), TrialKind::Arbitrary, LONG_S);
         let mut random = Random::new(seed, stream(number, 0));
@@ -107,8 +107,9 @@ impl TrialPlan {
         plan
     }
 
-    /// Pairs of pulses: 0.25 s of full inlet each, the gap between (outlet open) falling from 1.4 s by 18 % a pair to
-    /// 0.15 s and starting over; after a pair the outlet stays open for 1 s, then both are shut for 0.3 .. 1 s; 60 s.
+    /// Plans 60 s of pairs of pulses. A pulse opens the inlet fully for 0.25 s. In the gap between the two pulses of a
+    /// pair the outlet is open; the gap begins at 1.4 s, falls by 18 % per pair to 0.15 s, and starts over. After a
+    /// pair the outlet stays open for 1 s, then both valves are shut for 0.3 .. 1 s.
     pub fn pulses(number: usize, seed: u64) -> Self {
         let mut plan = Self::new(format!("pulses_{number}.csv"), TrialKind::Pulses, LONG_S);
         let mut random = Random::new(seed, stream(number, 1));
@@ -161,10 +162,11 @@ impl TrialPlan {
     /// | `set_length_mm` | the length is imposed from outside, mm |
     /// | `shunt_share` | a shunt lowers the trim of the bridge by this share; only at an imposed length |
     /// | another `set_...` or `..._share` | refused: this rig cannot do it |
-    /// | any other | ignored: it was recorded |
+    /// | any other | ignored, because it is a recorded channel |
     ///
-    /// A first pressure above half of `supply_kpa` starts the replay full; without a pressure
-    /// column it starts vented.
+    /// The replay starts full if the first `pressure_kpa` is above half of the rig's supply pressure or, without a
+    /// pressure column, if the first `length_mm` is below the length at half of the full contraction. Without both
+    /// columns it starts vented.
     ///
     /// # Errors
     /// A missing `inlet` or `outlet`, an opening outside 0..1, fewer than two samples, time that is
@@ -244,8 +246,8 @@ impl TrialPlan {
     }
 }
 
-/// The stream of random commands of a numbered trial of its kind; beyond 2^40 trials streams
-/// repeat.
+/// Returns the random stream of the commands of a numbered trial of a kind. Beyond 2^39 trials these streams overlap
+/// those of the noise.
 fn stream(number: usize, kind: u64) -> u64 {
     Random::PROTOCOL.wrapping_add((number as u64).wrapping_mul(2)).wrapping_add(kind)
 }

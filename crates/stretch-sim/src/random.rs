@@ -13,12 +13,12 @@ pub(crate) struct Random {
 impl Random {
     /// Stream of a drawn rig.
     pub(crate) const RIG: u64 = 1 << 40;
-    /// First stream of protocols, one a trial.
+    /// First stream of protocols, one per trial.
     pub(crate) const PROTOCOL: u64 = 2 << 40;
-    /// First stream of noise, one a trial and channel.
+    /// First stream of noise, one per trial and channel.
     pub(crate) const NOISE: u64 = 3 << 40;
 
-    /// One of many independent streams of a seed.
+    /// Creates the generator of one of many independent streams of a seed.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut bits = ChaCha8Rng::seed_from_u64(seed);
         bits.set_stream(stream);

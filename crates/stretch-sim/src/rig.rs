@@ -14,9 +14,9 @@ use crate::{
     random::Random,
 };
 
-/// Smallest gauge strain over the stroke of a rig whose sleeve stays stretched.
+/// The gauge strain of a valid rig exceeds this over the whole stroke, so that its sleeve stays stretched.
 pub const LEAST_STRAIN: f64 = 0.004;
-/// Table of a rig file that says how a simulation was run.
+/// Table of a rig file that records how a simulation was run.
 const SIMULATION: &str = "simulation";
 
 /// Parameters, how far each may be wrong, and the effects that are on.
@@ -68,8 +68,8 @@ impl Rig {
     /// | only a value | the file's | exact: it is not re-tuned |
     /// | nothing for the parameter | the stock rig's | the stock rig's |
     ///
-    /// Its effects are part of the rig. The table `[simulation]`, in which a simulation says how it
-    /// was run, is read by [`RunSettings::from_file`] and ignored here.
+    /// The effects of the file are part of the rig. The table `[simulation]`, which records how a simulation was run,
+    /// is read by [`RunSettings::from_file`] and ignored here.
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -118,7 +118,7 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Whether every parameter is within its physical limits.
+    /// Checks that every parameter is within its physical limits.
     ///
     /// # Errors
     /// The first parameter that is not, or [`SimError::SlackSleeve`].
@@ -167,17 +167,17 @@ impl Rig {
         Bridge::new(&self.params).strain(self.params[Key::L0] * (1.0 - k))
     }
 
-    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value,
-    /// but at least a hundredth of it.
+    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value, with a lower bound of
+    /// at least a hundredth of the value.
     pub fn bounds(&self, key: Key) -> (f64, f64) {
         let value = self.params[key];
         let sd = self.tolerances[key as usize].sd(value);
         ((value - 3.0 * sd).max(0.01 * value), value + 3.0 * sd)
     }
 
-    /// Another copy of this rig as it might be built: every parameter is drawn from its tolerance,
-    /// a Gaussian cut at 2.5 sd and at 0.2 of the value, and redrawn until the sleeve stays
-    /// stretched. `None` if it never does.
+    /// Draws a variant of this rig as it might be built. Every parameter is drawn from its tolerance, a Gaussian cut at
+    /// 2.5 sd and at 0.2 of the value. The rig is redrawn until the sleeve stays stretched and every parameter is
+    /// valid; `None` after 1000 draws.
     pub fn draw(&self, seed: u64) -> Option<Self> {
         let mut random = Random::new(seed, Random::RIG);
         (0..1000).find_map(|_| {
@@ -195,7 +195,7 @@ impl Rig {
         })
     }
 
-    /// The rig as a file; `run` adds how a simulation was made, so that it can be repeated.
+    /// Returns the rig as a file. `run` adds how a simulation was run, so that it can be repeated.
     pub fn to_file(&self, run: Option<&RunSettings>) -> RigFile {
         let mut stages: BTreeMap<String, BTreeMap<String, Parameter>> = BTreeMap::new();
         for info in &PARAMETERS {
@@ -316,7 +316,7 @@ pub fn default_rig_text() -> String {
 /// | inflation and deflation differ | `muscle_hysteresis` h = 0.22, s = 0.01 |
 /// | the curves bend at the end of the stroke | `pressure_crosstalk` c = -0.045, `gauge_nonlinearity` c = -0.09 |
 /// | a resting voltage of about -0.18 of the range | the bridge trimmed off balance, beta = 0.92 |
-/// | ramps that last | valves of about 0.35e-9 m3/(s Pa) |
+/// | slow ramps | valves of about 0.35e-9 m3/(s Pa) |
 /// | residual floors of 2 to 3 % | noise of 1 % of the voltage's range |
 ///
 /// Models fitted to twelve ramps (seed 3) as published; the paper's figures are in parentheses:
@@ -343,12 +343,11 @@ pub fn paper_preset() -> Result<Rig, SimError> {
     Ok(rig)
 }
 
-/// The rig of the demonstration: that of [`paper_preset`] with effects that its own recordings can
-/// distinguish.
+/// The rig of the demonstration: the rig of [`paper_preset`] with effects that recordings of this rig can distinguish.
 ///
-/// It has no cross-talk, because on ramps this compensates for the gauge's nonlinearity, and it has
-/// c = -0.06 of the latter, within the catalogue's range. Therefore a diagnosis can be right, and a
-/// second one, of the simulator with the named effects, finds nothing.
+/// It has no cross-talk, because on ramps cross-talk compensates for the gauge's nonlinearity. The nonlinearity is c =
+/// -0.06, within the catalogue's range. Therefore a diagnosis can be right, and a second diagnosis, of the simulator
+/// with the named effects, finds nothing.
 ///
 /// ```
 /// let rig = stretch_sim::demo_preset()?;

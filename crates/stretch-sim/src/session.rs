@@ -1,4 +1,4 @@
-//! A session: trials one after the other, with all states that last from one to the next.
+//! A session: trials one after the other, with all states that continue from one trial to the next.
 
 use stretch_data::{Channel, Trial, TrialEntry};
 
@@ -208,7 +208,8 @@ impl Session {
         Ok(on)
     }
 
-    /// Adds noise, and lets the converters clip and round.
+    /// Adds noise to the three channels, rounds the length to its converter's steps, and clips and
+    /// rounds the bridge voltage.
     fn record(&self, out: &mut [Vec<f64>; 3]) {
         let params = &self.rig.params;
         let levels = libm::exp2(params[Key::Bits]) - 1.0;

@@ -15,7 +15,8 @@ fn every_effect_is_described() {
             assert!(!text.is_empty(), "{}", effect.name);
         }
         assert!(effect.parameters[0].off().is_some(), "{}: a strength comes first", effect.name);
-        // Forms may be omitted at the end; their record-dependent values come last.
+        // Trailing form parameters may be left out; parameters that are found from the recording
+        // come last.
         let rank = |role: Role| match role {
             Role::Strength { .. } => 0,
             Role::Shape => 1,

@@ -154,7 +154,7 @@ fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
     }
 }
 
-/// Arguments of a call, the records by name and the rest as the row's columns.
+/// Returns the arguments of a call: recorded channels by name, the others as columns of the row.
 fn arguments(sketch: &Sketch, row: &str) -> String {
     let one = |(i, input): (usize, &Quantity)| match input.is_record {
         true => "record".to_owned(),
@@ -163,7 +163,7 @@ fn arguments(sketch: &Sketch, row: &str) -> String {
     sketch.inputs.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Which column the state begins at.
+/// Returns the column whose first value begins the state.
 fn first(sketch: &Sketch, row: &str) -> String {
     let begins = |input: &Quantity| sketch.state.iter().any(|c| c.begins == input.name);
     let at = sketch.inputs.iter().position(begins);
@@ -201,7 +201,7 @@ fn python_program(sketch: &Sketch, name: &str) -> String {
 
 fn octave_program(sketch: &Sketch, name: &str) -> String {
     let call = arguments(sketch, "rows(i, #)");
-    // Columns are numbered from 1 there.
+    // Octave numbers columns from 1.
     let call = (0..sketch.inputs.len())
         .rev()
         .fold(call, |call, i| call.replace(&format!("(i, {i})"), &format!("(i, {})", i + 1)));
@@ -215,7 +215,7 @@ fn octave_program(sketch: &Sketch, name: &str) -> String {
     )
 }
 
-/// What a command prints, fed with the rows.
+/// Returns the numbers that a command prints for the rows.
 fn output(command: &mut Command, rows: &str) -> Vec<f64> {
     let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = command.spawn().expect("it starts");
@@ -226,7 +226,8 @@ fn output(command: &mut Command, rows: &str) -> Vec<f64> {
     text.lines().map(|line| line.trim().parse().unwrap()).collect()
 }
 
-/// Runs the code of every effect in a language; `command` takes the folder and the effect's name.
+/// Compares the code of every effect in a language with its operator; `command` takes the folder
+/// and the effect's name.
 fn agrees(
     language: Language,
     prepare: fn(&Sketch, &str) -> String,
@@ -258,7 +259,7 @@ fn agrees(
     }
 }
 
-/// A sketch, and what the operator makes of its inputs.
+/// A sketch (portable source code), and the operator's output for its inputs.
 struct Case {
     name: &'static str,
     which: usize,
@@ -304,7 +305,7 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
     let beside: Vec<f64> = course.iter().rev().map(|x| 1.6 * x - 0.7).collect();
     let load: Vec<f64> = course.iter().map(|x| 5.0 * x * x - 2.0).collect();
     let span = Span { strain: &beside, load: &load, ..Span::whole(&grid) };
-    // A travel begins at its own value, a signal at the signal's.
+    // The state of a travel begins at the second channel, that of a signal at the signal.
     let begins_beside = sketch.state.iter().any(|cell| ["e", "p"].contains(&cell.begins));
     let first = if begins_beside { beside[0] } else { x[0] };
     let expected = run(&*(kind.operator)(values, extent, &grid), &span, first, &x);

@@ -32,7 +32,7 @@ fn trials() -> Vec<(&'static str, Vec<f64>, Vec<f64>, f64)> {
     ]
 }
 
-/// How far halving the step moves a channel, as a share of its full scale, and where.
+/// Returns how far halving the step moves a channel, as a share of its full scale, and where.
 fn moved(params: &RigParams, effects: &EffectSet) -> (f64, String) {
     let mut worst = (0.0, String::new());
     for (trial, inlet, outlet, initial) in trials() {
@@ -90,7 +90,8 @@ fn every_effect() {
     let mut failures = Vec::new();
     for effect in CATALOGUE {
         let parameters = effect.parameters;
-        // Strengths and shapes at their extremes have neutral forms; forms go to their own at typical strengths.
+        // Strengths and shapes take extreme values with neutral forms; forms take extreme values with typical
+        // strengths.
         let is_form = |i: usize| matches!(parameters[i].role, Role::Form { .. });
         let corner = |pick: &dyn Fn(usize) -> f64| {
             let value = |i| if is_form(i) { parameters[i].typical } else { pick(i) };

@@ -1,4 +1,5 @@
-//! The tests of stretch-sim from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-sim, in one program because linking takes longer than most
+//! tests.
 
 mod catalogue;
 mod code;

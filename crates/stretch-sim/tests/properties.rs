@@ -132,7 +132,8 @@ proptest! {
         let params = RigParams::default();
         let shut = vec![0.0; 100 * seconds];
         let [p, _, _] = simulate(&params, &EffectSet::new(), &shut, &shut, kpa);
-        // Gauge pressure is a difference of absolute ones.
+        // The rounding is that of absolute pressures, because gauge pressure is a difference of
+        // them.
         prop_assert!(p.iter().all(|x| abs_diff_eq!(*x, kpa, epsilon = 1e3 * F64_ROUNDING)));
         // With a volume that follows the muscle, p V is constant while the muscle moves.
         let mut set = one("chamber_volume", &[("g", g)]);
@@ -195,7 +196,7 @@ proptest! {
         let mut length = vec![0.0; SAMPLES];
         stage.run(&mut stage.memory(), Start::Settled, openings, 0.0, &mut out, &mut length).unwrap();
         prop_assert_eq!((&out, &length), (&p, &l));
-        // A chamber that follows the muscle has no independent pressure.
+        // The pressure of a chamber whose volume follows the muscle cannot be computed alone.
         let half = stage.run_pressure(&mut stage.memory(), Start::Settled, openings, 0.0, &mut Vec::new());
         prop_assert!(half.is_err());
     }
@@ -213,7 +214,7 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// As [`one`], beyond the plausible range.
+/// Like [`one`], with values beyond the plausible range.
 fn extreme(name: &str, values: &[f64]) -> EffectSet {
     let mut set = EffectSet::new();
     set.push(stretch_sim::effect_named(name).unwrap(), values).unwrap();

@@ -50,11 +50,11 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
     }
 }
 
-/// What each channel's samples are compared with, and how they become terms.
+/// Writes the limits for each channel's samples, and the numbers that turn samples into terms.
 fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let of = &numbers.of[..numbers.channels];
     let states = 1 + numbers.relaxations;
-    // a count of repetitions never comes so far
+    // no count of repeated samples reaches this number
     let still = |samples: u16| if samples == 0 { i32::MAX } else { i32::from(samples) };
     let (parents, extends): (Vec<u8>, Vec<u8>) =
         numbers.products[..numbers.terms].iter().copied().unzip();
@@ -68,7 +68,7 @@ fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f3
         .array("uint8_t", "extends", &extends);
 }
 
-/// What the channels are compared with, in addition to each other.
+/// Writes the numbers for the comparison of the channels with each other.
 fn watched<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let count = numbers.channels;
     let of = &numbers.of[..count];
@@ -78,7 +78,7 @@ fn watched<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32
         .array("float", "per_slip", &each(of, |c| c.per_slip));
 }
 
-/// Gains of all channels, of all but each one, and of each one alone.
+/// Writes the gains of all channels together, of all channels but one, and of each channel alone.
 fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let (count, terms) = (numbers.channels, numbers.terms);
     let rows = |gains: &ArrayGainNumbers<f32, N>| {
@@ -104,7 +104,7 @@ fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, 
         .define("HIGH", numbers.high, "the greatest");
 }
 
-/// What is usual of the differences between the channels.
+/// Writes the usual values and the limits of the differences between the channels.
 fn shifts<const N: usize>(constants: &mut Constants, watch: &ShiftWatch<f32, N>) {
     let count = watch.channels;
     constants

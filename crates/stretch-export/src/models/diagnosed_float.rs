@@ -10,7 +10,8 @@ use stretch_receptor::{
 use super::observer::define_rest;
 use crate::{ExportError, constants::Constants, part::Part};
 
-/// The constants and the step of a gauge with named defects: of those that it has.
+/// The constants and the step of a gauge with named defects, without the defects that it does not
+/// have.
 pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = DiagnosedReceptor::<f32>::new(calibration)?;
     let model = receptor.model();
@@ -50,7 +51,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     })
 }
 
-/// Curve, filter and output.
+/// Writes the constants of curve, filter and output.
 fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
     let curve = &model.curve;
     let span = model.high - model.low;
@@ -85,7 +86,7 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
         .define("SPREAD", model.spread, "the same per standard deviation of the filter");
 }
 
-/// The defects that act at once, and what remembers.
+/// Writes the constants of the defects, first those without memory, then those with memory.
 fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Defects<f32>) {
     let mut knee = |word: &'static str,
                     name: &str,
@@ -93,7 +94,7 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
                     bound: Option<Bound<f32>>| {
         let Some(Bound { at, round }) = bound else { return };
         has.extend(["knee", group, word]);
-        // a ceiling is asked with both signs turned
+        // the step evaluates a ceiling with the signs of input and output changed
         constants.define(name, at, "a bound").define(&format!("{name}_ROUND"), round, "its knee");
     };
     knee("slack_low", "SLACK_LOW", "slack", defects.slack_low);
@@ -132,5 +133,5 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
             .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
             .define("WORN_TRAVELLED", worn.travelled, "the way that it had gone before");
     }
-    // A slow amplifier is predicted over as a skew: the live step has no poles.
+    // The delay of a slow amplifier is part of the skew, so the live step has no poles.
 }

@@ -1,6 +1,7 @@
-//! One file a model: from its numbers to its constants and step, in integers and in `float`.
+//! One file per model: it turns the model's numbers into constants and selects the step, in integers and in `float`.
 //!
-//! A further model is a file here, its step in `../c`, and an arm in `../export.rs`. Several gauges are a model of their own.
+//! To add a model, add a file here, its step in `../c`, and an arm in `../export.rs`. Several gauges count as a
+//! separate model.
 
 mod array_float;
 mod diagnosed_float;

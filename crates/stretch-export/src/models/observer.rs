@@ -67,7 +67,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     }
 }
 
-/// A secant is taken over at least this share of the way between knots, as in the receptor.
+/// Least length of a secant, as a share of the distance between knots; the same as in the receptor.
 const LEAST_RUN: f32 = 0.01;
 
 /// The constants and the step of an observer.
@@ -113,7 +113,8 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
     })
 }
 
-/// What the gauge remembers. C has no arrays of nothing: those that are not used stay, as zeros.
+/// Writes the constants of the gauge's memory. Unused arrays are written as zeros, because C has no
+/// empty arrays.
 fn define_memory<L: Literal>(
     constants: &mut Constants,
     kind: &str,
@@ -129,7 +130,7 @@ fn define_memory<L: Literal>(
         .array(kind, "play_weights", play_weights);
 }
 
-/// The baseline that is followed at rest.
+/// Writes the constants of the tracker of the baseline.
 pub(super) fn define_rest<L: Literal>(constants: &mut Constants, at_rest: L, rest: RestLevel<L>) {
     let RestLevel { level, pull, leak, average, furthest, most } = rest;
     constants

@@ -76,7 +76,7 @@ fn span(span: &Span) -> String {
 /// The surface of one branch with its ranges.
 fn poly13_fixed(ranged: &CodeSurface<Scaled<FixedPoly13>>) -> String {
     let Scaled { of, thousandths } = ranged.surface;
-    // all of them integers of 32 bits: nothing is lost
+    // the coefficients are integers of 32 bits, so the casts lose nothing
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = of.coefficients();
     let ordered = [p11, p12, p10, p00, p02, p03, p01].map(|p| p as i32);
     let ordered = ordered.map(|p| p.c()).join(", ");

@@ -25,12 +25,13 @@ pub(crate) fn compiler(
     Compiler { program, arguments: [first, &WARNINGS, then].concat() }
 }
 
-/// The compiler that Rust links with, strict and with sanitizers: it is there wherever these tests are built.
+/// The C compiler that Rust links with, strict and with sanitizers. It exists wherever these tests are built.
 pub(crate) fn strict_c() -> [Compiler; 1] {
     [compiler("cc", &["-std=c99", "-O1"], &SANITIZERS)]
 }
 
-/// Strict C++11 with sanitizers; and as a board's build tool calls it, where the processor would offer to fuse products and sums.
+/// Strict C++11 with sanitizers, and C as a board's build tool compiles it. If the processor can fuse products and
+/// sums, the compilers are also asked to do so.
 pub(crate) fn gcc_and_gxx() -> Vec<Compiler> {
     let mut all = vec![
         compiler("g++", &["-x", "c++", "-std=c++11", "-O1"], &SANITIZERS),
@@ -54,7 +55,7 @@ fn fuses() -> bool {
     false
 }
 
-/// Compiles the harness around a header; the program.
+/// Compiles the harness around a header. Returns the path of the program.
 pub(crate) fn compiled(
     folder: &Path,
     harness: &str,
@@ -72,7 +73,7 @@ pub(crate) fn compiled(
     program
 }
 
-/// As the Arduino IDE calls its compiler for an Uno, and as C.
+/// The compilers for an Uno: C++ as the Arduino IDE calls it, and C.
 pub(crate) fn uno() -> [Compiler; 2] {
     let uno = ["-mmcu=atmega328p", "-Os", "-DF_CPU=16000000", "-Wno-overlength-strings"];
     [
@@ -81,18 +82,18 @@ pub(crate) fn uno() -> [Compiler; 2] {
     ]
 }
 
-/// What a program for an Uno sends through its serial port, in the simulator.
+/// Returns the text that a program for an Uno sends through its serial port, in the simulator.
 pub(crate) fn simulated(program: &Path) -> String {
     let mut command = Command::new("simavr");
     let output =
         command.args(["-m", "atmega328p", "-f", "16000000"]).arg(program).output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
-    // it colours every line, and shows the end of a line as a dot
+    // the simulator colours every line, and shows the end of a line as a dot
     let sent = text.split("\u{1b}[32m").skip(1).map(|line| line.split('\u{1b}').next().unwrap());
     sent.map(|line| format!("{}\n", line.trim_end_matches(['.', '\n']))).collect()
 }
 
-/// What a harness on an Uno answers to as many lines of the input as its flash has room for, and how many those are.
+/// Returns the output of a harness on an Uno, for as many lines of the input as its flash has room for.
 pub(crate) fn on_uno(
     folder: &Path,
     harness: &str,
@@ -109,7 +110,7 @@ pub(crate) fn on_uno(
     simulated(&compiled(folder, &sources, defined, compiler))
 }
 
-/// What the program prints for this input.
+/// Returns the output of a program for an input.
 pub(crate) fn run(program: &Path, input: &str) -> String {
     let mut command = Command::new(program);
     let mut child = command

@@ -16,10 +16,10 @@ impl AdcCode {
     pub const MISSING: Self = Self(-1);
 }
 
-/// The meaning of a converter's codes.
+/// Resolution and voltage range of a converter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdcSpec {
-    /// Bits of a code, 1 to 24; integer arithmetic takes up to 16.
+    /// Bits of a code, 1 to 24. The receptors of this module accept up to 16.
     pub bits: u8,
     /// Volts at code 0 (below zero for a bipolar converter).
     pub zero_v: f64,
@@ -27,7 +27,7 @@ pub struct AdcSpec {
     pub full_scale_v: f64,
 }
 
-/// Most bits of a code that arithmetic in integers of 32 bits takes.
+/// Largest converter resolution, in bits, that 32-bit integer arithmetic can hold.
 pub const FIXED_BITS: u8 = 16;
 
 /// A checked [`AdcSpec`].
@@ -72,17 +72,18 @@ impl Adc {
         (1 << self.0.bits) - 1
     }
 
-    /// The factor that moves a code to the upper end of 16 bits.
+    /// Returns the factor that left-aligns a code in 16 bits.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] for a converter of more than 16 bits, which arithmetic in 32 bits does not hold.
+    /// [`DesignError::OutOfRange`] if the converter has more than 16 bits, because its codes would overflow 32-bit
+    /// arithmetic.
     pub(super) fn align(&self) -> Result<u16, DesignError> {
         let bits = self.0.bits;
         DesignError::check("adc.bits", bits.into(), bits <= FIXED_BITS)?;
         Ok(1 << (FIXED_BITS - bits))
     }
 
-    /// Volts from one code to the next.
+    /// Voltage of one code step (LSB).
     pub fn volts_per_code(&self) -> f64 {
         (self.0.full_scale_v - self.0.zero_v) / f64::from(self.largest())
     }
@@ -94,8 +95,7 @@ impl Adc {
         (0..=self.largest()).contains(&code.0).then_some(volts)
     }
 
-    /// The code that the converter gives for a voltage: the nearest code, which beyond an end is that end;
-    /// [`AdcCode::MISSING`] for NaN.
+    /// Returns the code nearest to a voltage, limited to the converter's range; [`AdcCode::MISSING`] for NaN.
     pub fn code(&self, volts: f64) -> AdcCode {
         if volts.is_nan() {
             return AdcCode::MISSING;

@@ -10,19 +10,21 @@ use super::{
 pub(super) mod sealed {
     use super::*;
 
-    /// Lines and surfaces over spread integers.
+    /// Operations on lines and surfaces whose inputs are spread integers: integers scaled by a power of two so that
+    /// they fill 32 bits.
     pub trait Arithmetic: Sized + Copy + core::fmt::Debug + PartialEq {
         type Line: Copy + core::fmt::Debug + PartialEq;
         type Surface: Copy + core::fmt::Debug + PartialEq;
         type Estimate: Copy + core::fmt::Debug + PartialEq;
 
         fn round(folded: &Folded) -> Result<CodeMap<Self::Line, Self::Surface>, DesignError>;
-        /// The largest error in thousandths; `None` for the rounding of a float.
+        /// Returns the largest rounding error in thousandths of the reference's unit; `None` for floats.
         fn worst_case(
             surfaces: &CodeMap<Self::Line, Self::Surface>,
             rate_rounding: f64,
         ) -> Option<f64>;
-        /// The line that the step evaluates: a float takes the factor of the span into its coefficients.
+        /// Returns the line in the form that a step evaluates. Floats multiply the factor of the span into the
+        /// coefficients.
         fn line_over(line: Self::Line, signal: &Span) -> Self::Line;
         fn surface_over(surface: Self::Surface, signal: &Span, rate: &Span) -> Self::Surface;
         /// Evaluates a line at a signal inside its span.

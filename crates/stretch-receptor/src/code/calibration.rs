@@ -15,15 +15,15 @@ use super::{
 };
 use crate::{ReceptorError, fold::output};
 
-/// The schema of the records that this release writes, and the newest it reads.
+/// The schema version of the converted calibrations that this release writes, and the newest that it reads.
 pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
-/// A [`Calibration`] over the codes of one converter, in the arithmetic `A`,
-/// with a Savitzky-Golay rate of `WINDOW`, `DEGREE` and `DELAY`.
+/// A [`Calibration`] converted for the codes of one converter, in the arithmetic `A`, with a Savitzky-Golay rate
+/// estimator of shape `WINDOW`, `DEGREE` and `DELAY`.
 ///
-/// Everything affine (volts per code, both normalisations, the target's unit,
-/// the sample rate, the polarity) is folded into the coefficients. A board carries the serialised form (feature
-/// `serde`) in flash: about 100 bytes, checked when loaded, and without a floating-point design on the board.
+/// Everything affine (volts per code, both normalisations, the target's unit, the sample rate, the polarity) is folded
+/// into the coefficients. The serialised form (feature `serde`) takes about 100 bytes of a board's flash. It is checked
+/// when it is loaded, and the board does no conversion in floating point.
 ///
 /// ```
 /// use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration};
@@ -43,9 +43,9 @@ pub struct CodeCalibration<
 > {
     pub(super) bits: u8,
     pub(super) sample_rate: SampleRate,
-    /// The target falls as the signal rises.
+    /// Whether the target falls as the signal rises.
     pub(super) falling: bool,
-    /// The largest rate that keeps the branch.
+    /// Dead band: the largest magnitude of the rate at which the branch does not change.
     pub(super) dead_band: i32,
     pub(super) surfaces: CodeMap<A::Line, A::Surface>,
 }
@@ -59,13 +59,13 @@ pub type FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY:
 pub struct FixedNumbers {
     /// Bits of the converter.
     pub adc_bits: u8,
-    /// The target falls as the signal rises.
+    /// Whether the target falls as the signal rises.
     pub falling: bool,
-    /// The largest integer rate that keeps the branch.
+    /// Dead band: the largest magnitude of the integer rate at which the branch does not change.
     pub dead_band: i32,
-    /// A line, or a surface a branch.
+    /// One line, or one surface per branch.
     pub surfaces: CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>,
-    /// The rate.
+    /// The integers of the Savitzky-Golay rate estimator.
     pub rate: FixedSgIntegers,
 }
 
@@ -99,7 +99,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             bits: adc.spec().bits,
             sample_rate: calibration.spec().sample_rate_hz,
             falling: calibration.spec().polarity == Polarity::Falling,
-            // the cast saturates: no rate is beyond 32 bits
+            // the cast saturates; this loses nothing, because no rate exceeds 32 bits
             dead_band: dead_band as i32,
             surfaces,
         })
@@ -132,7 +132,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         same("rate.delay", delay, DELAY)
     }
 
-    /// Largest rounding of the integer rate, in its unit.
+    /// Largest rounding error of the integer rate, in units of that integer.
     fn rate_rounding() -> f64 {
         if FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::SHIFT == 0 { 0.0 } else { 0.5 }
     }
@@ -141,7 +141,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     FixedCalibration<WINDOW, DEGREE, DELAY>
 {
-    /// The integers, without the shape in their type, for an implementation of the step in another language.
+    /// Returns the integers in a type without shape parameters, for an implementation of the step in another language.
     pub fn numbers(&self) -> FixedNumbers {
         FixedNumbers {
             adc_bits: self.bits,
@@ -152,17 +152,15 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
         }
     }
 
-    /// The most that an estimate can differ from the calibration in real
-    /// numbers on the same codes, in thousandths of the reference's unit
-    /// (micrometres for a reference in millimetres).
+    /// Returns the largest difference between an estimate and the calibration evaluated in real numbers on the same
+    /// codes, in thousandths of the reference's unit (micrometres for a reference in millimetres).
     ///
     /// ```text
     /// 1/2 + roundings of the surface + steepest slopes times roundings of the inputs
     /// ```
     ///
-    /// over the whole domain and beyond its ends, for every stream without a
-    /// missing sample. A bridged sample is rounded to 1/65536 of the converter's
-    /// full scale, as a converter of 16 bits would.
+    /// The bound holds over the whole domain and beyond its ends, for every stream without missing samples. A bridged
+    /// (predicted) sample is rounded to 1/65536 of the converter's full scale, as by a 16-bit converter.
     pub fn worst_case_error_um(&self) -> f64 {
         worst_case(&self.surfaces, Self::rate_rounding())
     }

@@ -1,13 +1,13 @@
-//! A branch's surface over integers, and the bounds of its domain.
+//! The surface of a branch over integer inputs, and the bounds of its domain.
 
 use stretch_core::DesignError;
 
 use crate::Domain;
 
-/// Bits by which a converter's code is shifted up from its 16-bit place for the comparison with the domain's ends.
+/// Number of bits by which a 16-bit sample is shifted left before it is compared with the ends of the domain.
 pub(super) const COARSE_BITS: u32 = 15;
 
-/// Ends of a domain in integers, and the factor that spreads the domain over 32 bits.
+/// Integer ends of a domain, and the factor that scales (spreads) values inside the domain so that they fill 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
@@ -20,15 +20,15 @@ pub struct Span {
 }
 
 impl Span {
-    /// From `min` to `max`, spread as far as both ends allow.
+    /// Creates the span from `min` to `max` with the largest factor that keeps both ends within 32 bits.
     pub(super) fn new(min: i32, max: i32) -> Self {
         let size = min.unsigned_abs().max(max.unsigned_abs()).max(1);
-        // an end of exactly 2^31 has no factor but 1
+        // an end of magnitude 2^31 allows only the factor 1
         let factor = 1 << size.leading_zeros().saturating_sub(1).min(30);
         Self { min, width: max.wrapping_sub(min) as u32, factor }
     }
 
-    /// Whether both ends fit 32 bits when spread.
+    /// Whether both ends fit 32 bits after multiplication by the factor.
     #[cfg(feature = "serde")]
     fn holds(&self) -> bool {
         let max = i64::from(self.min) + i64::from(self.width);
@@ -36,14 +36,14 @@ impl Span {
         self.factor > 0 && fits(self.min.into()) && fits(max)
     }
 
-    /// The nearest value inside, and 1 where the value was outside.
+    /// Returns the nearest value inside the span, and 1 if the value was outside or 0 if it was inside.
     #[inline(always)]
     fn clamp(&self, x: i32) -> (i32, u8) {
         // one comparison is enough, because below the lower end the difference wraps to a large number
         if x.wrapping_sub(self.min) as u32 <= self.width { (x, 0) } else { self.nearest_end(x) }
     }
 
-    /// A value inside, spread over 32 bits.
+    /// Multiplies a value inside the span by the factor.
     #[inline(always)]
     pub(super) fn spread(&self, inside: i32) -> i32 {
         inside.wrapping_mul(self.factor)
@@ -61,22 +61,22 @@ impl Span {
 pub struct CodeSurface<S> {
     /// The code, aligned to 16 bits, about which the surface is expanded.
     pub centre: u16,
-    /// Range to which the signal is clamped, in `2^-15` of a 16-bit sample from the centre.
+    /// Range to which the signal is clamped, as a distance from the centre in `2^-15` of a 16-bit step.
     pub signal: Span,
     /// Range to which the integer rate is clamped.
     pub rate: Span,
-    /// The surface over spread signal and rate.
+    /// The surface over signal and rate, each multiplied by the factor of its span.
     pub surface: S,
 }
 
 impl<S> CodeSurface<S> {
-    /// Whether both domains fit 32 bits when spread.
+    /// Whether both domains fit 32 bits after multiplication by their factors.
     #[cfg(feature = "serde")]
     pub(super) fn holds(&self) -> bool {
         self.signal.holds() && self.rate.holds()
     }
 
-    /// Signal and rate inside the domain, not yet spread.
+    /// Returns signal and rate clamped to the domain but not yet spread, and which of them was outside.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
         let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));
@@ -84,7 +84,7 @@ impl<S> CodeSurface<S> {
         (volts, rate, domain(signal_outside | rate_outside << 1))
     }
 
-    /// The signal alone, for a line.
+    /// Returns the clamped signal alone, for a line.
     #[inline(always)]
     pub(super) fn input(&self, sample: u16) -> (i32, Domain) {
         let (volts, outside) = self.signal.clamp(self.coarse(sample));
@@ -98,7 +98,7 @@ impl<S> CodeSurface<S> {
     }
 }
 
-/// The domain from a bit for the signal and a bit for the rate.
+/// Converts flags (bit 0: signal outside, bit 1: rate outside) to a domain.
 #[inline(always)]
 fn domain(outside: u8) -> Domain {
     match outside & 3 {

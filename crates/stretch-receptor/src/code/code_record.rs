@@ -1,4 +1,4 @@
-//! A converted calibration as a record, checked while it loads.
+//! The serialised form of a converted calibration, which is checked while it loads.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use stretch_core::{DesignError, SampleRate};
@@ -11,9 +11,9 @@ use super::{
 
 #[derive(Serialize, Deserialize)]
 struct CodeRecord<L, P> {
-    /// Schema of the record. The field is first, so that a newer record is refused before the rest is read.
+    /// Schema version. This field is first, so that a newer schema is refused before the rest is read.
     schema: u32,
-    /// Window, degree and delay of the rate.
+    /// Window, degree and delay of the rate estimator.
     shape: (u16, u8, u16),
     adc_bits: u8,
     sample_rate_hz: SampleRate,

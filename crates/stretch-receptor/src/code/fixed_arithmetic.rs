@@ -15,7 +15,8 @@ use super::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fixed {}
 
-/// A fixed-point line or surface in `2^-bits` thousandths, half a thousandth included for rounding.
+/// A fixed-point line or surface in units of `2^-bits` thousandths. Its constant term includes half a thousandth, so
+/// that truncation rounds to the nearest thousandth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scaled<S> {
@@ -31,15 +32,15 @@ impl<S> Scaled<S> {
         DesignError::check("fixed.thousandths", self.thousandths.into(), holds).map(|_| ())
     }
 
-    /// Converts least bits to thousandths; the half for rounding is already included.
+    /// Converts a value in units of `2^-bits` thousandths to thousandths. The half for rounding is already included.
     #[inline(always)]
     fn finish(&self, bits: i32) -> i32 {
         ((i64::from(bits) * i64::from(self.thousandths)) >> 32) as i32
     }
 }
 
-/// Bits behind the thousandths: with more bits the half for rounding would cost more range than it gains precision,
-/// and with fewer bits the half would not fit.
+/// Numbers of fraction bits behind the thousandths that are tried. With more bits, the half for rounding would cost
+/// more range than the bits gain in precision. With fewer bits, the factor `2^(32 - bits)` would not fit an `i32`.
 const BITS: core::ops::RangeInclusive<u8> = 2..=16;
 
 impl CodeArithmetic for Fixed {}
@@ -48,7 +49,7 @@ impl sealed::Arithmetic for Fixed {
     type Surface = Scaled<FixedPoly13>;
     type Estimate = i32;
 
-    /// The surfaces with the most bits behind the thousandths that fit.
+    /// Rounds the surfaces with the largest number of fraction bits that fits.
     fn round(folded: &Folded) -> Result<CodeMap<Self::Line, Self::Surface>, DesignError> {
         let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
         for bits in BITS.rev() {
@@ -140,7 +141,7 @@ pub(super) fn worst_case(
         CodeMap::Poly13(both) => {
             let each = both.map(|ranged| {
                 let p = ranged.surface.of.coefficients();
-                // the steepest slope of the surface for inputs within a half
+                // bounds on the slopes of the surface for inputs in -1/2 .. 1/2
                 let by_rate = p.p10.abs() + 0.5 * p.p11.abs() + 0.25 * p.p12.abs();
                 let by_signal = p.p01.abs()
                     + p.p02.abs()
@@ -156,5 +157,5 @@ pub(super) fn worst_case(
     }
 }
 
-/// Largest rounding error of `f64` in a sample's place, in samples.
+/// Largest rounding error of `f64` in the position of a sample, in steps of a 16-bit sample.
 const SIGNAL_F64: f64 = 1e-9;

@@ -1,4 +1,4 @@
-//! Floats over integers: for a board with a floating-point unit.
+//! Surfaces in floating point over integer inputs, for boards with a floating-point unit.
 
 use stretch_core::{DesignError, Poly13, Real};
 
@@ -24,8 +24,8 @@ macro_rules! float {
                 None
             }
 
-            // a factor is a power of two, so that the bits are the same whether the factor multiplies an input or a
-            // coefficient
+            // the factor is a power of two, so multiplying the coefficients by it gives the same bits as multiplying
+            // the inputs
             fn line_over([intercept, slope]: Self::Line, signal: &Span) -> Self::Line {
                 [intercept, slope * signal.factor as $float]
             }
@@ -65,12 +65,12 @@ macro_rules! float {
 float!(f32, f64);
 
 fn finite<T: Real>(coefficients: &[T]) -> Result<(), DesignError> {
-    // so that no sum of products of two 2^31 leaves the range of f32
+    // the limit keeps a coefficient times up to three inputs of 2^31, and sums of these, within the range of f32
     let check = |c: &T| DesignError::check("surface", c.as_f64(), c.abs().as_f64() <= 1e9);
     coefficients.iter().try_for_each(|c| check(c).map(|_| ()))
 }
 
-/// The coefficients over integers instead of halves, rounded.
+/// Rescales the coefficients from inputs in -1/2 .. 1/2 to inputs in 32-bit integers, and rounds them.
 fn float<T: Real>(folded: &Folded) -> Result<CodeMap<[T; 2], Poly13<T>>, DesignError> {
     let round = |c: f64, powers: i32| T::from_f64(libm::ldexp(c, -32 * powers));
     folded.try_map(

@@ -13,10 +13,11 @@ pub(super) type Folded = CodeMap<[f64; 2], Poly13>;
 
 /// Units of the integers.
 pub(super) struct Units {
-    /// Volts at an aligned sample of 0, and volts per step of the sample.
+    /// Volts at a left-aligned sample of 0, and volts per step of that sample.
     pub zero_v: f64,
     pub step_v: f64,
-    /// Volts a second per unit of the integer rate, and the most units there can be.
+    /// Volts per second per unit of the integer rate, and the largest magnitude of the integer
+    /// rate.
     pub rate_v_per_s: f64,
     pub largest_rate: i32,
 }
@@ -37,11 +38,12 @@ impl Units {
 /// Tolerance for the rounding of `f64` at an end of a domain, in integers.
 const SLACK: f64 = 1.0 / 1024.0;
 
-/// The integers inside `min ..= max`, at most `most` in magnitude.
+/// Returns the span of the integers inside `min ..= max`, limited to the magnitude `most`.
 fn span(min: f64, max: f64, most: i32) -> Span {
     let end = |x: f64| x.clamp(-f64::from(most), f64::from(most)) as i32;
     let (min, max) = (end(libm::ceil(min - SLACK)), end(libm::floor(max + SLACK)));
-    // an interval between two integers, or wholly outside, becomes the nearest integer
+    // an interval that contains no integer, or that is wholly beyond `most`, becomes a single
+    // integer
     Span::new(min, max.max(min))
 }
 
@@ -56,7 +58,7 @@ pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, D
     }
 }
 
-/// Centre, domain, and the volts that the spread signal counts at 1.
+/// Returns the centre code, the domain, and the voltage of 1 in the spread signal.
 fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
     let aligned = |volts: f64| (volts - units.zero_v) / units.step_v;
     let (low, high) = (aligned(domain.min), aligned(domain.max));
@@ -68,7 +70,7 @@ fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
     (centre, span, volts)
 }
 
-/// Normalised signal at the centre, and its change over the spread signal's 1.
+/// Returns the normalised signal at the centre, and its change per 1 of the spread signal.
 fn normalised(calibration: &Calibration, centre: u16, volts: f64, units: &Units) -> (f64, f64) {
     let range = calibration.spec().signal_range;
     let centre_v = units.zero_v + f64::from(centre) * units.step_v;
@@ -104,7 +106,7 @@ fn fold_surface(
     let (at, per) = normalised(calibration, centre, volts, units);
     let (still, moving) =
         (branch.rate_range.normalise(0.0), sign * per_s / branch.rate_range.span());
-    // the terms of the rate, then the cubic at a rate of zero
+    // the terms that contain the rate, then the terms without the rate
     let by_rate = shifted([p.p10, p.p11, p.p12, 0.0], at, per);
     let at_rest = shifted([p.p00, p.p01, p.p02, p.p03], at, per);
     let rest = |j: usize| gain * (at_rest[j] + still * by_rate[j]);
@@ -121,7 +123,7 @@ fn fold_surface(
     Ok(CodeSurface { centre, signal, rate, surface })
 }
 
-/// The cubic `c` in `at + per x`, as a cubic in x.
+/// Returns the cubic `c`, evaluated at `at + per x`, as a cubic in x.
 fn shifted(c: [f64; 4], at: f64, per: f64) -> [f64; 4] {
     let [c0, c1, c2, c3] = c;
     [

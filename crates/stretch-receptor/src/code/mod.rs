@@ -1,20 +1,19 @@
-//! Converter codes in, estimates out: the receptor for a board.
+//! Receptors for boards: converter codes in, estimates out.
 //!
-//! An analogue-to-digital converter gives integers, and a Savitzky-Golay rate of
-//! integers is an integer: up to the surface nothing has to be rounded and no
-//! floating-point number is needed. [`CodeReceptor`] works that way. It answers
-//! like [`StretchReceptor`](crate::StretchReceptor) (branch, domain, warm-up,
-//! missing samples) and evaluates the surface
+//! A converter gives integers, and a Savitzky-Golay rate of integers is an integer. No
+//! floating-point number is needed before the surface, and for window shapes in common use nothing
+//! is rounded before it. [`CodeReceptor`] handles branch, domain, warm-up and missing samples like
+//! [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface
 //!
 //! - in 32-bit fixed point ([`FixedReceptor`]): thousandths of the reference's
 //!   unit, about 100 instructions on any Cortex-M; or
 //! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)): six products and six
 //!   sums, the reference's unit.
 //!
-//! [`FixedObserver`] is the receptor of this kind for a model that remembers.
+//! [`FixedObserver`] is the integer receptor for the observer, a model with memory.
 //!
-//! A calibration is converted once, on a computer, by [`CodeCalibration::new`], and
-//! travels as a record of about 100 bytes.
+//! [`CodeCalibration::new`] converts a calibration once, on a computer. The result serialises to
+//! about 100 bytes.
 #![doc = include_str!("board.md")]
 
 mod adc;

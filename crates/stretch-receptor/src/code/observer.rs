@@ -1,4 +1,4 @@
-//! The observer over converter codes, in integers.
+//! The observer (a gauge model that a Kalman filter inverts) over converter codes, in integers.
 
 use stretch_core::{
     Branch, Calibration, Design, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, arithmetic::play,
@@ -12,25 +12,25 @@ use super::{
 };
 use crate::{Domain, Front, ReceptorError, front::Live, gains::SLOPES};
 
-/// The fastest rate: a whole range in a sample.
+/// Largest rate: the whole target range in one sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
-/// Marks a memory without a target: the value is beyond every target that a record may allow.
+/// Target of a memory that has seen no sample. The value is below every target that a calibration may allow.
 const UNBEGUN: i32 = i32::MIN;
 /// Largest magnitude of a relaxation.
 const FURTHEST: i32 = 8 << TARGET_BITS;
-/// Largest magnitude of a drive.
+/// Largest magnitude of a drive, the input of the gauge's curve.
 const MOST_DRIVE: i32 = 1 << 30;
-/// Least length of a secant, as a share of the distance between knots.
+/// Least length of a secant of the curve, as a share of the distance between knots.
 const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 
 /// An [`ObserverReceptor`](crate::ObserverReceptor) for converter codes, in
 /// 32-bit integers: the same filter with the same table of gains, codes in,
 /// thousandths of the reference's unit out (micrometres for millimetres).
 ///
-/// [`FixedObserver::new`] converts a calibration once, on a computer; with the feature `serde` the observer travels
-/// as a record of about 400 bytes. No step can overflow: numbers whose sums could overflow are refused, and states
-/// are clamped to their ranges. A code that the converter does not have is a missing sample; at most
-/// [`MAX_BRIDGED`](crate::MAX_BRIDGED) of them in a row are bridged by prediction.
+/// [`FixedObserver::new`] converts a calibration once, on a computer. With the feature `serde` the observer serialises
+/// to about 400 bytes. No step can overflow: numbers whose sums could overflow are refused, and states are clamped to
+/// their ranges. A code that the converter does not have is a missing sample; up to [`MAX_BRIDGED`](crate::MAX_BRIDGED)
+/// missing samples in a row are bridged by prediction.
 ///
 /// ```
 /// use stretch_core::Runner;
@@ -47,9 +47,9 @@ pub type FixedObserver = Front<IntegerObserver>;
 /// The model of a [`FixedObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerObserver {
-    /// The numbers of the record.
+    /// The serialised numbers.
     pub numbers: ObserverNumbers,
-    /// Places per signal inside each segment, times `2^recip_bits`.
+    /// Change of the position on the curve per unit of signal in each segment, times `2^recip_bits`.
     pub recips: [i32; KNOTS],
     /// Bits behind the point of `recips`.
     pub recip_bits: u32,
@@ -59,7 +59,7 @@ pub struct IntegerObserver {
     pub at_rest: i32,
 }
 
-/// What a [`FixedObserver`]'s model remembers.
+/// The state of a [`FixedObserver`]'s model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerMemory {
     /// [`UNBEGUN`] before the first sample.
@@ -80,7 +80,7 @@ impl IntegerMemory {
 }
 
 impl FixedObserver {
-    /// The observer of a calibration over the codes of `adc`.
+    /// Converts a calibration for the codes of `adc`.
     ///
     /// # Errors
     /// [`ReceptorError`] when the calibration is of another model or a number does
@@ -118,7 +118,7 @@ impl IntegerObserver {
         out
     }
 
-    /// The place, in knots, at which the curve has the signal, and the signal held to the curve.
+    /// Returns the position, in knots, at which the curve has the signal, and the signal clamped to the curve.
     #[inline(always)]
     fn inverse(&self, signal: i32) -> (i32, i32) {
         let last = usize::from(self.numbers.knots) - 1;
@@ -134,7 +134,8 @@ impl IntegerObserver {
         (((below as i32) << PLACE_BITS) + share, held)
     }
 
-    /// The signal at a drive, the index of its segment, and its place clamped to the ends of the curve.
+    /// Returns the signal at a drive, the index of the drive's segment, and the drive's position clamped to the ends of
+    /// the curve.
     #[inline(always)]
     fn forward(&self, drive: i32) -> (i32, usize, i32) {
         let last = i32::from(self.numbers.knots) - 1;
@@ -148,7 +149,7 @@ impl IntegerObserver {
         (self.numbers.curve[below] + risen as i32, below, place)
     }
 
-    /// The drive of a target that is at `y` and moves by `rate` a sample.
+    /// Returns the drive for a target that is at `y` and moves by `rate` per sample.
     #[inline(always)]
     fn drive(&self, memory: &IntegerMemory, y: i32, rate: i32) -> i32 {
         let mut sum = i64::from(self.numbers.lead) * i64::from(rate);
@@ -172,7 +173,7 @@ impl IntegerObserver {
         }
     }
 
-    /// Takes in a signal above its baseline; answers whether the signal lay on the curve.
+    /// Corrects the states with a signal above its baseline. Returns whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut IntegerMemory, signal: i32) -> bool {
         let drive = self.drive(memory, memory.target, memory.rate);
@@ -181,7 +182,7 @@ impl IntegerObserver {
         let mut place = usize::from(self.tangents[segment]);
         let (run, change) = ((to - from).abs(), (held - predicted).abs());
         if run > LEAST_RUN {
-            // the slope is at least an end where change/run >= end, tested without a division
+            // compares the secant's slope, change/run, with each end without a division
             let change = i64::from(change) << PLACE_BITS;
             while place < SLOPES - 1
                 && change >= i64::from(self.numbers.ends[place]) * i64::from(run)
@@ -221,7 +222,7 @@ impl IntegerObserver {
         }
     }
 
-    /// Moves the baseline on, and gives the signal above it.
+    /// Updates the baseline, and returns the signal above it.
     #[inline(always)]
     fn above_rest(&self, memory: &mut IntegerMemory, signal: i32) -> i32 {
         let rest = &self.numbers.rest;
@@ -278,7 +279,7 @@ impl Live for IntegerObserver {
 
     #[inline(always)]
     fn signal(&self, code: AdcCode) -> Option<i32> {
-        // a negative number is a large unsigned one
+        // as an unsigned number, a negative code is too large as well
         ((code.0 as u32) < self.numbers.codes()).then(|| self.numbers.signal(code))
     }
 
@@ -305,7 +306,7 @@ impl Live for IntegerObserver {
         })
     }
 
-    /// Bridges by the predicted motion.
+    /// Bridges a missing sample with the predicted motion.
     fn bridge(&self, memory: &mut IntegerMemory, _: u8) -> bool {
         let begun = memory.begun();
         if begun {
@@ -321,7 +322,7 @@ impl Live for IntegerObserver {
     }
 }
 
-/// A share of a number, rounded to the nearest integer.
+/// Multiplies a number by a share and rounds to the nearest integer.
 #[inline(always)]
 fn part(x: i32, share: i32) -> i32 {
     ((i64::from(x) * i64::from(share) + (1 << (SHARE_BITS - 1))) >> SHARE_BITS) as i32

@@ -1,4 +1,4 @@
-//! The integers of an observer: converted from a calibration, or checked as a record.
+//! The integers of an observer, converted from a calibration or checked after deserialisation.
 
 use stretch_core::{
     Calibration, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Model, RestTracker,
@@ -13,33 +13,33 @@ use crate::{
 
 /// The most knots of a curve in fixed point.
 pub(super) const KNOTS: usize = 32;
-/// Bits behind the point of targets, drives, and rates a sample.
+/// Bits behind the point of targets, drives, and rates per sample.
 pub(super) const TARGET_BITS: u32 = 26;
 /// Bits behind the point of weights in the drive.
 pub(super) const WEIGHT_BITS: u32 = 20;
-/// Bits behind the point of a place between knots.
+/// Bits behind the point of a position between knots.
 pub(super) const PLACE_BITS: u32 = 16;
 /// Bits behind the point of shares.
 pub(super) const SHARE_BITS: u32 = 31;
 /// Bits by which a 16-bit sample is shifted up.
 pub(super) const SIGNAL_BITS: u32 = 12;
-/// Largest magnitudes, with which no sum of a step leaves 32 bits and no product 63 bits.
+/// Largest magnitudes. Within them, no sum in a step exceeds 32 bits and no product exceeds 63 bits.
 const MOST_SIGNAL: i32 = 1 << 28;
 const MOST_TARGET: i32 = 4 << TARGET_BITS;
 const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
 const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 
-/// Everything that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in
-/// `2^-12` of a 16-bit sample, signed by polarity; targets, drives and rates a sample have 26
-/// bits behind the point, weights 20, places between knots 16, shares 31.
+/// The integers that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in `2^-12` of a 16-bit step,
+/// negated if the signal falls as the target rises. Targets, drives and rates per sample have 26 bits behind the point,
+/// weights 20, positions between knots 16, and shares 31.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ObserverNumbers {
-    /// Schema of the record. The field is first, so that a newer record is refused before the rest is read.
+    /// Schema version. This field is first, so that a newer schema is refused before the rest is read.
     pub schema: u32,
     /// Bits of the converter.
     pub adc_bits: u8,
-    /// The signal falls as the target rises.
+    /// Whether the signal falls as the target rises.
     pub falling: bool,
     /// Number of knots of the curve.
     pub knots: u8,
@@ -47,15 +47,15 @@ pub struct ObserverNumbers {
     pub curve: [i32; KNOTS],
     /// The drive of the first knot.
     pub drive_low: i32,
-    /// Places per drive, times `2^(32 + PLACE_BITS - TARGET_BITS)`.
+    /// Knots per unit of drive, times `2^(32 + PLACE_BITS - TARGET_BITS)`.
     pub per_step: i32,
-    /// Share of its distance that each relaxation covers in a sample.
+    /// Share of its distance to the target that each relaxation (first-order lag) covers in a sample.
     pub shares: [i32; MAX_OBSERVER_RELAXATIONS],
     /// Weight of each relaxation in the drive.
     pub amplitudes: [i32; MAX_OBSERVER_RELAXATIONS],
-    /// Samples by which the signal leads.
+    /// Samples by which the signal leads the target.
     pub lead: i32,
-    /// Half-widths of the plays.
+    /// Half-widths of the plays (backlash operators).
     pub radii: [i32; MAX_OBSERVER_PLAYS],
     /// Weight of each play in the drive.
     pub play_weights: [i32; MAX_OBSERVER_PLAYS],
@@ -63,9 +63,9 @@ pub struct ObserverNumbers {
     pub relaxations: u8,
     /// Number of plays.
     pub plays: u8,
-    /// Signal per place between gains.
+    /// Slopes, in signal per knot, between which the row of `gains` changes.
     pub ends: [i32; SLOPES - 1],
-    /// State per signal, times `2^gain_bits`.
+    /// Kalman gains as change of the state per unit of signal, times `2^gain_bits`; one row per slope.
     pub gains: [[i32; STATES]; SLOPES],
     /// Bits behind the point of `gains`.
     pub gain_bits: u8,
@@ -73,19 +73,20 @@ pub struct ObserverNumbers {
     pub low: i32,
     /// The greatest target.
     pub high: i32,
-    /// The largest rate that keeps the branch.
+    /// Dead band: the largest magnitude of the rate at which the branch does not change.
     pub dead_band: i32,
-    /// Thousandths at a target of 0, with a half for rounding, times `2^output_bits`.
+    /// Thousandths of the reference's unit at a target of 0, plus a half for rounding, times `2^(TARGET_BITS +
+    /// output_bits)`.
     pub zero: i64,
-    /// Thousandths per target, times `2^output_bits`.
+    /// Thousandths of the reference's unit per unit of target, times `2^output_bits`.
     pub gain: i32,
-    /// Bits behind the point of `zero` and `gain`.
+    /// Bits behind the point of `gain`; `zero` has `TARGET_BITS` more.
     pub output_bits: u8,
-    /// The baseline, which is followed only where `pull` is above zero.
+    /// The tracker of the baseline, which runs only if `pull` is above zero.
     pub rest: RestNumbers,
 }
 
-/// The baseline's numbers.
+/// The numbers of the tracker of the baseline, which is the drift of the resting signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestNumbers {
@@ -96,15 +97,15 @@ pub struct RestNumbers {
     pub pull: i32,
     /// Rise of the baseline in a sample whose mean excess is not negative.
     pub leak: i32,
-    /// Share of a sample in the running mean of the excess.
+    /// Weight of a new sample in the running mean of the excess.
     pub average: i32,
-    /// Largest magnitude of an excess in the mean.
+    /// Limit on the magnitude of an excess that enters the mean.
     pub most: i32,
     /// Largest magnitude of the baseline.
     pub furthest: i32,
 }
 
-/// The schema of the records that this release writes, and the newest it reads.
+/// The schema version of the serialised observers that this release writes, and the newest that it reads.
 pub(super) const SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
 impl ObserverNumbers {
@@ -134,7 +135,7 @@ impl ObserverNumbers {
             slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
         DesignError::check("rise of observer.curve", flattest, flattest > 0.0)?;
         let gains = Gains::new(map, period_s, flattest, steepest)?;
-        // state per signal; the rate a sample, not a second
+        // change of the state per unit of integer signal, with the rate per sample instead of per second
         let of = gains.of.map(|mut of| {
             of[1] *= period_s;
             of.map(|gain| gain / per_volt * f64::from(1 << TARGET_BITS))
@@ -255,12 +256,12 @@ impl ObserverNumbers {
         Ok(Self { schema: SCHEMA, ..self })
     }
 
-    /// The least number that is no code.
+    /// Returns the number of codes, which is the smallest number that is not a code.
     pub(super) fn codes(&self) -> u32 {
         1 << self.adc_bits
     }
 
-    /// A code of the converter as a signed signal.
+    /// Converts a code to a signal, negated if the signal falls as the target rises.
     #[inline(always)]
     pub(super) fn signal(&self, code: AdcCode) -> i32 {
         let aligned = code.0 << (16 - u32::from(self.adc_bits) + SIGNAL_BITS);
@@ -283,7 +284,7 @@ fn each<const N: usize>(
     Ok(out)
 }
 
-/// Number of bits behind the point with which `largest` fits 31 bits.
+/// Returns the number of bits behind the point with which `largest` fits 31 bits.
 fn bits_for(largest: f64) -> u32 {
     let (mut bits, mut scaled) = (0, largest);
     while bits < 60 && 2.0 * scaled < f64::from(i32::MAX) {

@@ -8,8 +8,8 @@ use crate::Domain;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CodeReading<E> {
-    /// The estimated reference: in thousandths of the reference's unit for [`Fixed`](super::Fixed) (micrometres for a
-    /// reference in millimetres), else in the unit.
+    /// The estimated reference. In [`Fixed`](super::Fixed) arithmetic it is in thousandths of the reference's unit
+    /// (micrometres for a reference in millimetres), otherwise in that unit.
     pub estimate: E,
     /// The branch that was evaluated.
     pub branch: Branch,

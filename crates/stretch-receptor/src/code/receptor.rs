@@ -1,4 +1,4 @@
-//! The live pipeline over converter codes.
+//! The receptor for lines and surfaces over converter codes, one sample at a time.
 
 use stretch_core::{Branch, Design, Stage};
 use stretch_filter::{FixedSgMemory, FixedSgRate};
@@ -56,12 +56,12 @@ pub struct CodeSurfaces<
     const DEGREE: usize,
     const DELAY: usize,
 > {
-    /// The least number that is no code.
+    /// The number of codes, which is the smallest number that is not a code.
     codes: u32,
-    /// Factor that shifts a code to the upper end of 16 bits.
+    /// Factor that left-aligns a code in 16 bits.
     align: i32,
     dead_band: i32,
-    /// All ones where a rising signal means a falling target, else zero.
+    /// All bits set if the target falls as the signal rises, otherwise zero.
     mirror: i32,
     surfaces: CodeMap<A::Line, A::Surface>,
 }
@@ -70,11 +70,11 @@ pub struct CodeSurfaces<
 pub type FixedReceptor<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     CodeReceptor<Fixed, WINDOW, DEGREE, DELAY>;
 
-/// What a [`CodeReceptor`]'s model remembers.
+/// The state of a [`CodeReceptor`]'s model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeMemory<const WINDOW: usize> {
     window: FixedSgMemory<u16, WINDOW>,
-    /// The last sample before the gap.
+    /// The last sample before the current gap of missing samples.
     last: u16,
     /// The rate at that sample.
     last_rate: i32,
@@ -102,7 +102,7 @@ impl Side for SideBit {
 impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     CodeReceptor<A, WINDOW, DEGREE, DELAY>
 {
-    /// The receptor of a calibration.
+    /// Creates the receptor of a converted calibration.
     pub fn new(calibration: CodeCalibration<A, WINDOW, DEGREE, DELAY>) -> Self {
         let CodeCalibration { bits, falling, dead_band, surfaces, .. } = calibration;
         let bits = u32::from(bits.min(16));
@@ -126,7 +126,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 {
     const RATE: FixedSgRate<u16, WINDOW, DEGREE, DELAY> = FixedSgRate::new();
 
-    /// The side that a rate chooses.
+    /// Returns the branch for a rate: the current branch inside the dead band, otherwise the branch that the sign of
+    /// the target's rate gives.
     #[inline(always)]
     fn side(&self, current: SideBit, rate: i32) -> SideBit {
         let band = self.dead_band;
@@ -160,7 +161,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 
     #[inline(always)]
     fn signal(&self, code: AdcCode) -> Option<u16> {
-        // a negative number is a large unsigned one
+        // as an unsigned number, a negative code is too large as well
         ((code.0 as u32) < self.codes).then(|| code.0.wrapping_mul(self.align) as u16)
     }
 
@@ -195,7 +196,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         Some(CodeReading { estimate, branch, domain })
     }
 
-    /// Bridges by the last sample before the gap, moved on by the rate at that sample, inside the converter's range.
+    /// Bridges a missing sample: extrapolates the last sample before the gap at its rate, within the converter's range.
     fn bridge(&self, memory: &mut CodeMemory<WINDOW>, nth: u8) -> bool {
         if nth == 1 {
             memory.last = memory.window.newest();

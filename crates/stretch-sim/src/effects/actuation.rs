@@ -68,7 +68,7 @@ pub(super) static VALVE_DELAY: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// The command of a valve at a time.
+/// Returns the sketch (portable source code) of the delay: it looks up a valve's command at a time.
 fn delay_sketch(delay_s: f64, dt_s: f64) -> Sketch {
     let body = "let k = floor((t - DELAY) / DT)
         var y = 0
@@ -108,8 +108,8 @@ pub(super) static VALVE_DEADBAND: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Hard and gradual bands, different valves, and a gate that lets the slowest ramp through as
-/// pulses.
+/// Returns start values of a fit: hard and gradual bands, different valves, and a gate that lets the slowest ramp
+/// through as pulses.
 fn dead_band_starts() -> Vec<Vec<f64>> {
     let mut all = each([0.001, 0.01, 0.04]);
     all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
@@ -118,13 +118,14 @@ fn dead_band_starts() -> Vec<Vec<f64>> {
     all
 }
 
-/// Inlet and outlet, of which the outlet's band is `outlet` times the effect's, and the inlet's 2 - `outlet` times.
+/// Returns the dead bands of inlet and outlet. The outlet's band is `outlet` times the effect's, the inlet's 2 -
+/// `outlet` times.
 fn valves(values: &[f64], least: f64) -> [DeadBand; 2] {
     let [u_db, softness, gate, outlet] = [0, 1, 2, 3].map(|i| values[i]);
     [2.0 - outlet, outlet].map(|share| DeadBand { u_db: share * u_db, softness, gate, least })
 }
 
-/// One function for both valves, with a state for each.
+/// Returns the sketch (portable source code): one function for both valves, with a state for each.
 fn dead_band_sketch(valves: &[DeadBand; 2]) -> Sketch {
     let DeadBand { softness, gate, least, .. } = valves[0];
     let shifted = match softness {
@@ -212,8 +213,8 @@ impl Law for Leak {
         if p <= 0.0 {
             return self.c * p;
         }
-        // A power without a transcendental function: two terms that agree at zero and at full
-        // pressure.
+        // An approximation of the power without a transcendental function. Its flow agrees with the power law at zero
+        // and at full pressure.
         let x = p / AT_PA;
         let shape = if self.excess >= 0.0 {
             1.0 + self.excess * (x - 1.0)

@@ -1,5 +1,5 @@
-//! The catalogue of the rig's effects: those inside its differential equation are defined here, the
-//! others are kinds at its places.
+//! The catalogue of the rig's effects. Effects of supply, valves, chamber and muscle are defined here; effects of the
+//! gauge come from `stretch_effects`.
 
 use stretch_effects::{Effect, GAUGE};
 
@@ -22,7 +22,7 @@ static ACTUATION: [&Effect; 8] = [
     &actuation::CROSSBEAM_INERTIA,
 ];
 
-/// Every effect, in the order in which several of one stage act: those of the actuation, then those of the gauge.
+/// Every effect: actuation first, then the gauge. Several effects of one stage act in this order.
 pub static CATALOGUE: &[&Effect] = &joined();
 
 const fn joined() -> [&'static Effect; ACTUATION.len() + GAUGE.len()] {
@@ -45,7 +45,7 @@ pub fn effect_named(name: &str) -> Option<&'static Effect> {
     CATALOGUE.iter().copied().find(|e| e.name == name)
 }
 
-/// Effects that a diagnosis knows.
+/// The effects that a diagnosis can find.
 ///
 /// ```
 /// use stretch_sim::{Catalogue, Effect};
@@ -67,7 +67,7 @@ impl Default for Catalogue {
 }
 
 impl Catalogue {
-    /// With one more effect, after the others.
+    /// Adds an effect after the others.
     ///
     /// # Errors
     /// An effect with that name exists.
@@ -79,7 +79,7 @@ impl Catalogue {
         Ok(self)
     }
 
-    /// Without effects of these names.
+    /// Removes the effects with these names.
     ///
     /// # Errors
     /// An unknown name.
@@ -94,12 +94,12 @@ impl Catalogue {
         Ok(self)
     }
 
-    /// The effect called `name`, if it is in.
+    /// The effect called `name`, if the catalogue contains it.
     pub fn named(&self, name: &str) -> Option<&'static Effect> {
         self.effects.iter().copied().find(|e| e.name == name)
     }
 
-    /// All of them.
+    /// Iterates over the effects.
     pub fn iter(&self) -> impl Iterator<Item = &'static Effect> {
         self.effects.iter().copied()
     }

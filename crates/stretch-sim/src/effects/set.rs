@@ -14,12 +14,12 @@ pub struct ActiveEffect {
 }
 
 impl ActiveEffect {
-    /// The row of the catalogue.
+    /// The effect's entry in the catalogue.
     pub fn effect(&self) -> &'static Effect {
         self.effect
     }
 
-    /// Its name.
+    /// Name of the effect.
     pub fn name(&self) -> &'static str {
         self.effect.name
     }
@@ -29,7 +29,7 @@ impl ActiveEffect {
         &self.values
     }
 
-    /// Its action with its values.
+    /// The effect's action with these values.
     pub fn action(&self, around: &Surroundings<'_>) -> Action {
         self.effect.action(&self.values, around)
     }
@@ -69,12 +69,12 @@ impl EffectSet {
         Self::default()
     }
 
-    /// Adds an effect of the catalogue by name. Missing shapes take their typical value, missing
-    /// forms their neutral one.
+    /// Adds an effect of the catalogue by name. Missing shape parameters take their typical value,
+    /// missing form parameters their neutral value.
     ///
     /// # Errors
-    /// An unknown name or parameter, a missing strength, a value outside its range, an effect that
-    /// is already in.
+    /// An unknown name or parameter, a missing strength, a value outside its range, or an effect
+    /// that the set contains already.
     pub fn insert(&mut self, name: &str, given: &[(&str, f64)]) -> Result<(), SimError> {
         let effect = known(name)?;
         let values = resolve(effect, given, |_| 1.0)?;
@@ -86,8 +86,9 @@ impl EffectSet {
         self.push(effect, &values)
     }
 
-    /// As [`insert`](Self::insert) in other units, where `unit` gives the unit of each parameter.
-    /// Ranges belong to the rig and are not enforced.
+    /// Like [`insert`](Self::insert), with values in other units. `unit` gives the catalogue's unit
+    /// of each parameter in the other unit and converts the defaults. Ranges are not enforced,
+    /// because they belong to the rig.
     pub(crate) fn insert_in(
         &mut self,
         entry: &EffectEntry,
@@ -125,9 +126,9 @@ impl EffectSet {
         self.iter().map(entry).collect()
     }
 
-    /// Adds any effect, of the catalogue or of a user, with the values of its parameters; forms at
-    /// their end may be left out. Ranges are plausible values, not limits: they are not enforced
-    /// here.
+    /// Adds any effect, of the catalogue or of a user, with the values of its parameters. Trailing
+    /// form parameters may be left out. Ranges are plausible values, not limits, so they are not
+    /// enforced here.
     ///
     /// # Errors
     /// An effect with that name exists, there are too few or too many values, or one is not finite.
@@ -158,7 +159,7 @@ impl EffectSet {
         Ok(())
     }
 
-    /// The effect called `name`, if it is in.
+    /// The effect called `name`, if the set contains it.
     pub fn find(&self, name: &str) -> Option<&ActiveEffect> {
         self.entries.iter().find(|e| e.name() == name)
     }
@@ -175,18 +176,18 @@ impl EffectSet {
         Self { entries: wanted.cloned().collect() }
     }
 
-    /// All of them, in the order in which they act.
+    /// Iterates over the effects in the order in which they act.
     pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect> {
         self.entries.iter()
     }
 
-    /// The effects that are not off in the stage.
+    /// Iterates over the effects of the stage whose values are not off.
     pub fn acting_in(&self, stage: RigStage) -> impl Iterator<Item = &ActiveEffect> {
         self.entries.iter().filter(move |e| stage.holds(e.effect.stage) && !e.is_off())
     }
 
-    /// Time steps for trials sampled every `dt_s`: none longer than `max_step_s`, split where a
-    /// delayed switch falls.
+    /// Returns the time steps for trials sampled every `dt_s`. No step is longer than `max_step_s`,
+    /// and a step is split where a delayed valve command takes effect.
     ///
     /// # Errors
     /// Times that are not positive.
@@ -207,7 +208,7 @@ impl EffectSet {
         self.entries.len()
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -235,8 +236,8 @@ fn given(entry: &EffectEntry) -> Vec<(&str, f64)> {
     entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect()
 }
 
-/// Values in the effect's order from names and values; a missing value is the default in the
-/// catalogue's unit times `unit`.
+/// Returns the values in the order of the effect's parameters. A missing value is the default in
+/// the catalogue's unit times `unit`.
 fn resolve(
     effect: &Effect,
     given: &[(&str, f64)],

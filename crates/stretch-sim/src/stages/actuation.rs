@@ -1,12 +1,12 @@
-//! Stage `actuation`: openings to pressure and length, both stages as one.
+//! Stage `actuation`: the stages `pneumatics` and `muscle` as one, from valve openings to pressure and length.
 
 use stretch_effects::{Grid, Start};
 
 use super::{Memory, Muscle, Openings, Pneumatics, check_length, pick, pneumatics::Drive};
 use crate::{SimError, effects::EffectSet, params::RigParams};
 
-/// Valves, chamber and muscle, prepared: in sequence, or coupled if the chamber's volume follows
-/// the muscle.
+/// Valves, chamber and muscle, prepared to run: in sequence, or coupled if the chamber's volume depends on the muscle's
+/// contraction.
 #[derive(Debug)]
 pub struct Actuation {
     pneumatics: Pneumatics,
@@ -24,12 +24,12 @@ impl Actuation {
         Ok(Self { pneumatics, muscle })
     }
 
-    /// A memory for it.
+    /// Creates a memory for this stage.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.muscle.end())
     }
 
-    /// Steps of time.
+    /// The time steps.
     pub fn grid(&self) -> &Grid {
         self.pneumatics.grid()
     }
@@ -39,7 +39,7 @@ impl Actuation {
         self.pneumatics.is_coupled()
     }
 
-    /// Gauge pressure in kPa and length in mm at every sample, from `initial_kpa` at the first.
+    /// Computes gauge pressure in kPa and length in mm at every sample, from `initial_kpa` at the first.
     ///
     /// # Errors
     /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not
@@ -68,9 +68,9 @@ impl Actuation {
         done
     }
 
-    /// Gauge pressure in kPa at every node of the grid, from `initial_kpa` at the first, if it does
-    /// not depend on the contraction. This is the first half of [`run`](Self::run), for callers
-    /// that run the second half often.
+    /// Computes the gauge pressure in kPa at every node of the grid, from `initial_kpa` at the first, if it does not
+    /// depend on the contraction. This is the first half of [`run`](Self::run), for callers that run the second half
+    /// often.
     ///
     /// # Errors
     /// As [`run`](Self::run), and a chamber whose volume depends on the contraction.
@@ -92,11 +92,11 @@ impl Actuation {
         })
     }
 
-    /// Length in mm at every sample, from the gauge pressure in kPa at every node. This is the
-    /// second half of [`run`](Self::run) and has a separate memory.
+    /// Computes the length in mm at every sample, from the gauge pressure in kPa at every node. This is the second half
+    /// of [`run`](Self::run) and has a separate memory.
     ///
     /// # Errors
-    /// Slices of lengths that do not belong together.
+    /// Slices whose lengths do not match.
     ///
     /// ```
     /// use stretch_sim::{Actuation, DEFAULT_STEP_S, EffectSet, Openings, RigParams, Start};
@@ -159,7 +159,7 @@ impl Actuation {
         })
     }
 
-    /// The pressure at every node, at least one.
+    /// Computes the pressure at every node; there must be at least one.
     fn fill(
         &self,
         cells: &mut [f64],
@@ -184,8 +184,8 @@ impl Actuation {
         Ok(())
     }
 
-    /// Each step twice: the volume's change is first predicted, then computed from the muscle's
-    /// response to that prediction.
+    /// Computes each step twice: first with a predicted change of the volume, then with the volume that follows from
+    /// the muscle's response to that prediction.
     fn run_coupled(
         &self,
         cells: &mut [f64],

@@ -1,4 +1,4 @@
-//! The whole rig: every stage on the outputs of the previous one, or at an imposed length.
+//! The whole rig: every stage runs on the outputs of the previous stage, or the length is imposed from outside.
 
 use stretch_effects::{Grid, Start};
 
@@ -27,7 +27,7 @@ pub struct ChainMemory {
 }
 
 impl ChainMemory {
-    /// Forgets everything: the next trial settles.
+    /// Forgets everything: the next trial starts settled.
     pub fn clear(&mut self) {
         self.actuation.clear();
         self.sensing.clear();
@@ -83,7 +83,7 @@ impl Chain {
         })
     }
 
-    /// Memories for it.
+    /// Creates the memories for this rig.
     pub fn memory(&self) -> ChainMemory {
         ChainMemory {
             actuation: self.actuation.memory(),
@@ -93,7 +93,7 @@ impl Chain {
         }
     }
 
-    /// Steps of time.
+    /// The time steps.
     pub fn grid(&self) -> &Grid {
         self.actuation.grid()
     }
@@ -150,7 +150,7 @@ pub struct Held {
     reference: Reference,
 }
 
-/// What is imposed from outside, one value per sample.
+/// Inputs that are imposed from outside, one value per sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting<'a> {
     /// Length, mm.
@@ -178,7 +178,7 @@ impl Held {
         })
     }
 
-    /// Simulates one trial in the memory of the [`Chain`](super::Chain) of the same effects.
+    /// Simulates one trial with the memory of a [`Chain`](super::Chain) that has the same effects.
     ///
     /// # Errors
     /// As [`Chain::run`](super::Chain::run).
@@ -193,7 +193,7 @@ impl Held {
     ) -> Result<(), SimError> {
         let Recorded { pressure_kpa, length_mm, bridge_v } = recorded;
         check_length("set_length_mm", openings.check()?, setting.length_mm.len())?;
-        // The cells of the chamber are the first of the actuation's.
+        // The cells (states) of the chamber are the first in the memory of the actuation.
         let (own, set) = (&mut memory.actuation, setting.length_mm);
         let kpa = &mut *pressure_kpa;
         self.pneumatics.run_with_length(own, start, openings, set, initial_kpa, kpa)?;

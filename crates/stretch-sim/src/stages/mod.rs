@@ -1,4 +1,4 @@
-//! The stages: each prepared once from parameters and effects, then run on any number of trials without allocating.
+//! The stages. Each is prepared once from parameters and effects, then runs any number of trials without allocating.
 
 mod actuation;
 mod chain;
@@ -19,7 +19,7 @@ use stretch_effects::Start;
 
 use crate::SimError;
 
-/// `Ok` when `found` values are `expected`.
+/// Returns an error unless `found` equals `expected`; both are numbers of values.
 pub(crate) fn check_length(
     name: &'static str,
     expected: usize,
@@ -28,7 +28,7 @@ pub(crate) fn check_length(
     if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
 }
 
-/// Openings of the two valves, one value a sample, held until the next.
+/// Openings of the two valves, one value per sample, each held until the next sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Openings<'a> {
     /// Inlet, 0..1.
@@ -38,7 +38,7 @@ pub struct Openings<'a> {
 }
 
 impl Openings<'_> {
-    /// Number of samples.
+    /// Checks the openings and returns the number of samples.
     ///
     /// # Errors
     /// The valves have different numbers of samples, or an opening is not within 0..1.
@@ -53,18 +53,18 @@ impl Openings<'_> {
     }
 }
 
-/// Memory of a prepared stage: its operators' states, and buffers that grow once and are used again.
+/// Memory of a prepared stage: the states (cells) of its operators, and buffers that are allocated once and reused.
 ///
-/// Every stage hands out its own by `memory()`; a memory fits the stage (and effects) that made it, and any stage with
-/// the same effects at other values.
+/// The method `memory()` of a stage creates it. A memory fits the stage that created it, and any stage with the same
+/// effects at other values.
 #[derive(Debug, Clone, Default)]
 pub struct Memory {
     pub(crate) cells: Vec<f64>,
-    /// Whether a trial has run in it.
+    /// Whether a trial has run with this memory.
     pub(crate) used: bool,
     pub(crate) nodes: Vec<f64>,
     pub(crate) more_nodes: Vec<f64>,
-    /// Openings as the valves take them.
+    /// Openings after the effects on the valve commands.
     pub(crate) commands: [Vec<f64>; 2],
 }
 
@@ -73,7 +73,8 @@ impl Memory {
         Self { cells: vec![0.0; count], ..Self::default() }
     }
 
-    /// How a trial may start in it: nothing can be carried out of a fresh memory, so it settles.
+    /// Returns how a trial can start with this memory. A fresh memory has no state to carry over, so the trial starts
+    /// settled instead.
     pub(crate) fn start(&mut self, asked: Start) -> Start {
         let used = std::mem::replace(&mut self.used, true);
         match asked {
@@ -86,15 +87,15 @@ impl Memory {
         }
     }
 
-    /// Moves what is remembered a share of the way to what another memory of the same stage remembers: between two states that an
-    /// operator may be in lie only such states.
+    /// Moves the state by a share of the distance to the state of another memory of the same stage. The result is a
+    /// possible state, because the possible states of an operator form a convex set.
     pub fn move_towards(&mut self, other: &Self, share: f64) {
         for (own, other) in self.cells.iter_mut().zip(&other.cells) {
             *own += share * (other - *own);
         }
     }
 
-    /// Forgets everything: the next trial settles unless it begins with a given hysteresis state.
+    /// Forgets everything: the next trial starts settled unless it begins with a given hysteresis state.
     pub fn clear(&mut self) {
         self.cells.fill(0.0);
         self.used = false;

@@ -10,8 +10,8 @@ use crate::{
     static_law::StaticLaw,
 };
 
-/// The muscle, prepared: static contraction, effects on it, first-order lag, effects after it, L =
-/// L0 (1 - k).
+/// The muscle, prepared to run: static contraction, effects on it, first-order lag, effects after the lag, L = L0 (1 -
+/// k).
 #[derive(Debug)]
 pub struct Muscle {
     grid: Grid,
@@ -25,7 +25,7 @@ pub struct Muscle {
 }
 
 impl Muscle {
-    /// Prepares the stage. On a measured pressure [`Grid::new`] without delay is fitting, at
+    /// Prepares the stage. For a measured pressure, use [`Grid::new`] without delay and with steps of
     /// [`DEFAULT_STEP_S`](crate::DEFAULT_STEP_S).
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl Muscle {
         Self::at_cells(params, effects, grid, 0)
     }
 
-    /// As [`new`](Self::new), with its memory after that of another stage.
+    /// Like [`new`](Self::new), with its cells (states) placed after `offset` cells of another stage.
     pub(crate) fn at_cells(
         params: &RigParams,
         effects: &EffectSet,
@@ -64,12 +64,12 @@ impl Muscle {
         })
     }
 
-    /// A memory for it.
+    /// Creates a memory for this stage.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.end())
     }
 
-    /// Steps of time.
+    /// The time steps.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -78,7 +78,8 @@ impl Muscle {
         self.behind.end()
     }
 
-    /// Length in mm at every sample, from the gauge pressure in kPa at the same samples, linear between them.
+    /// Computes the length in mm at every sample, from the gauge pressure in kPa at the same samples, which is taken as
+    /// linear between them.
     ///
     /// # Errors
     /// Slices of different lengths.
@@ -99,7 +100,7 @@ impl Muscle {
         Ok(())
     }
 
-    /// Pressure (kPa) at the nodes, replaced by length (mm).
+    /// Replaces the pressure (kPa) at the nodes by the length (mm).
     pub(crate) fn run_nodes(&self, cells: &mut [f64], start: Start, nodes: &mut [f64]) {
         let Some(first) = nodes.first() else { return };
         self.begin(cells, start, *first);
@@ -123,7 +124,7 @@ impl Muscle {
         self.behind.begin(&span, start, moving, cells)
     }
 
-    /// Contraction at the next node.
+    /// Advances to the next node and returns the contraction there.
     #[inline]
     pub(crate) fn step(&self, cells: &mut [f64], node: usize, pressure_kpa: f64) -> f64 {
         let mut x = [self.law.contraction(pressure_kpa)];
@@ -156,7 +157,7 @@ impl Muscle {
     }
 }
 
-/// Samples, linear between them, at the nodes of a grid.
+/// Interpolates samples linearly at the nodes of a grid.
 pub(crate) fn interpolate(grid: &Grid, samples: &[f64], nodes: &mut Vec<f64>) {
     nodes.clear();
     nodes.reserve(grid.nodes(samples.len()));

@@ -15,13 +15,12 @@ const STIFF: f64 = 2.0;
 /// Largest number of effects that may draw on the supply at once.
 const MOST_DROOPS: usize = 2;
 
-/// Valves and chamber, prepared: ISO 6358 flow into and out of an isothermal chamber.
+/// Valves and chamber, prepared to run: ISO 6358 flow into and out of an isothermal chamber.
 ///
-/// The mass in the chamber is stepped by the classical Runge-Kutta rule. A step that would
-/// overshoot its equilibrium (where a valve's flow ends like a square root, so that the real state
-/// never overshoots) ends on it. With `chamber_volume` on, the pressure depends on the contraction:
-/// run [`Actuation`](crate::Actuation), or pass the measured length to
-/// [`run_with_length`](Self::run_with_length).
+/// The classical Runge-Kutta rule advances the mass in the chamber. A step that would overshoot its equilibrium ends on
+/// the equilibrium; the real state never overshoots, because a valve's flow ends like a square root. With
+/// `chamber_volume` on, the pressure depends on the contraction: run [`Actuation`](crate::Actuation), or pass the
+/// measured length to [`run_with_length`](Self::run_with_length).
 #[derive(Debug)]
 pub struct Pneumatics {
     grid: Grid,
@@ -45,7 +44,7 @@ pub struct Pneumatics {
     length_span_mm: f64,
 }
 
-/// What the chamber holds: p V / V0 (Pa), and the droops of the supply.
+/// State of the chamber and the supply: p V / V0 (Pa), and the droops (losses of supply pressure).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Chamber {
     pub(crate) held: f64,
@@ -119,17 +118,17 @@ impl Pneumatics {
         })
     }
 
-    /// A memory for it.
+    /// Creates a memory for this stage.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.end())
     }
 
-    /// First cell after those of this stage.
+    /// Index of the first cell (state) after those of this stage.
     pub(crate) fn end(&self) -> usize {
         self.commands[1].end()
     }
 
-    /// Steps of time.
+    /// The time steps.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -139,7 +138,7 @@ impl Pneumatics {
         self.coupled_by.is_some()
     }
 
-    /// Gauge pressure in kPa at every sample, from `initial_kpa` at the first.
+    /// Computes the gauge pressure in kPa at every sample, from `initial_kpa` at the first.
     ///
     /// # Errors
     /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not finite, or a
@@ -166,8 +165,7 @@ impl Pneumatics {
         }
     }
 
-    /// As [`run`](Self::run), with the chamber's volume following a measured length (mm, linear
-    /// between samples).
+    /// Like [`run`](Self::run), but the chamber's volume follows a measured length (mm, linear between samples).
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -227,7 +225,7 @@ impl Pneumatics {
     /// V/V0 at y = k/k_max.
     #[inline]
     pub(crate) fn volume(&self, y: f64) -> f64 {
-        // Keeps a collapsed chamber from a division by zero.
+        // Avoids a division by zero if the chamber has collapsed.
         self.volumes.iter().fold(1.0, |v, law| v * law.at(y)).max(0.05)
     }
 
@@ -237,7 +235,7 @@ impl Pneumatics {
         1e-3 * (held / volume - self.atmosphere_pa)
     }
 
-    /// Begins a trial in the first cells of a memory.
+    /// Begins a trial; its state is in the first cells of a memory.
     pub(crate) fn begin(
         &self,
         start: Start,
@@ -267,7 +265,7 @@ impl Pneumatics {
         cells[1..=MOST_DROOPS].copy_from_slice(&chamber.droops);
     }
 
-    /// Runs a trial with the openings as the valves take them.
+    /// Runs a trial with the openings after the effects on the valve commands.
     pub(crate) fn taking<T>(
         &self,
         memory: &mut Memory,
@@ -286,8 +284,8 @@ impl Pneumatics {
         done
     }
 
-    /// Openings as the valves receive them, in buffers of the memory; `None` if no effect acts on
-    /// the commands.
+    /// Returns the openings after the effects on the valve commands, in buffers of the memory; `None` if no effect acts
+    /// on the commands.
     fn taken(
         &self,
         memory: &mut Memory,
@@ -328,7 +326,7 @@ impl Pneumatics {
         }
     }
 
-    /// Flow in, and net flow, kg/s, at absolute pressures.
+    /// Returns the inflow and the net flow, kg/s, at absolute pressures.
     #[inline]
     fn flows(&self, valves: Valves, p: f64, supply: f64) -> (f64, f64) {
         let mut inflow = 0.0;
@@ -345,8 +343,7 @@ impl Pneumatics {
         (inflow, net)
     }
 
-    /// One step of length `h` with constant openings; the volume is linear between the two given
-    /// values.
+    /// Advances by one step of length `h` with constant openings. The volume is linear between the two given values.
     #[inline]
     pub(crate) fn advance(&self, valves: Valves, chamber: &mut Chamber, volume: [f64; 2], h: f64) {
         let still = valves.inlet == 0.0 && valves.outlet == 0.0;
@@ -361,7 +358,7 @@ impl Pneumatics {
         }
     }
 
-    /// Classical Runge-Kutta for what the chamber holds and the first `D` droops.
+    /// Advances the chamber's state and the first `D` droops by the classical Runge-Kutta rule.
     #[inline]
     fn step<const D: usize>(
         &self,
@@ -399,7 +396,7 @@ impl Pneumatics {
         for i in 0..D {
             y[i] += h / 6.0 * (f1[i] + 2.0 * (f2[i] + f3[i]) + f4[i]);
         }
-        // Pressures cannot pass the pressure that drives the flow.
+        // The chamber's pressure cannot pass the pressure that drives the flow.
         let (high, low) = (supply(&y) * volume[1], self.atmosphere_pa * volume[1]);
         let full = next > held && next > high;
         let empty = next < held && next < low;
@@ -408,8 +405,8 @@ impl Pneumatics {
         } else if empty {
             next = held.min(low);
         }
-        // A state cannot pass its equilibrium either: a step that was too long for a stiff state,
-        // or that had to be cut while something else still flows, ends on it.
+        // The state cannot pass its equilibrium either. A step that was too long for a stiff state, or that was cut
+        // while another flow continues, ends on the equilibrium.
         if k1 * k4 < 0.0 || full || empty {
             let (end, _) = rate(next, &y, volume[1]);
             let stiff = k1 * end < 0.0 && h * (end - k1).abs() > STIFF * (next - held).abs();
@@ -431,8 +428,8 @@ impl Pneumatics {
         chamber.held = next;
     }
 
-    /// A step in which the chamber follows a recovering supply ends on its equilibrium with the
-    /// supply, and the flow is the mass gained. Supply and chamber are matched by iteration.
+    /// Ends a step in which the chamber follows a recovering supply. The chamber ends in equilibrium with the supply,
+    /// and the mean flow follows from the mass gained. Supply and chamber are matched by iteration.
     #[cold]
     fn settle<const D: usize>(
         &self,
@@ -469,7 +466,7 @@ impl Pneumatics {
     }
 }
 
-/// Zero of `rate` between `a` and `b` by bisection, to the last significant bits.
+/// Finds the zero of `rate` between `a` and `b` by bisection, to a relative width of 1e-12.
 fn balance(mut a: f64, mut b: f64, rate_a: f64, rate: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..48 {
         let middle = 0.5 * (a + b);

@@ -5,7 +5,7 @@ use stretch_effects::{Action, Grid, Place, RigStage, Row, Span, Start, Surroundi
 use super::{Memory, check_length, pick};
 use crate::{SimError, effects::EffectSet, params::RigParams};
 
-/// The reference, prepared; without an effect it shows the true length.
+/// The reference, prepared to run. Without an effect it shows the true length.
 #[derive(Debug)]
 pub struct Reference {
     grid: Grid,
@@ -32,12 +32,13 @@ impl Reference {
         Self { grid: grid.clone(), row: Row::new(row, 0) }
     }
 
-    /// A memory for it.
+    /// Creates a memory for this stage.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.row.end())
     }
 
-    /// Measured length (before noise and rounding) at every sample, from the true length at every node of the grid.
+    /// Computes the measured length (before noise and rounding) at every sample, from the true length at every node of
+    /// the grid.
     ///
     /// # Errors
     /// Slices of different lengths.

@@ -27,7 +27,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Of a rig.
+    /// The bridge of a rig.
     pub fn new(params: &RigParams) -> Self {
         let stretch = 1.0 + params[Key::E0];
         let resistance = params[Key::R0];
@@ -40,7 +40,7 @@ impl Bridge {
         }
     }
 
-    /// The same with its trim lowered by a share.
+    /// Returns the same bridge with its trim lowered by a share.
     #[inline]
     pub fn shunted(&self, share: f64) -> Self {
         Self { trim: self.trim * (1.0 - share), ..*self }
@@ -66,7 +66,8 @@ impl Bridge {
     }
 }
 
-/// The sensing stage, prepared: the nominal bridge and the effects on strain, resistance, voltage and record.
+/// The sensing stage, prepared to run: the nominal bridge and the effects on strain, resistance, voltage and recorded
+/// samples.
 #[derive(Debug)]
 pub struct Sensing {
     grid: Grid,
@@ -77,7 +78,7 @@ pub struct Sensing {
 }
 
 impl Sensing {
-    /// Prepares the stage. Driven by a measured length, which is linear between samples, [`Grid::samples`] is enough.
+    /// Prepares the stage. For a measured length, which is linear between samples, [`Grid::samples`] is enough.
     ///
     /// # Errors
     /// None for the catalogue's effects.
@@ -96,19 +97,19 @@ impl Sensing {
         })
     }
 
-    /// A memory for it.
+    /// Creates a memory for this stage.
     pub fn memory(&self) -> Memory {
         Memory::with_cells(self.sites.record.end())
     }
 
-    /// Steps of time.
+    /// The time steps.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Bridge voltage in V at every sample, before noise, clipping and rounding.
+    /// Computes the bridge voltage in V at every sample, before noise, clipping and rounding.
     ///
-    /// `length_mm` and `pressure_kpa` hold one value a node of the grid (a sample, on [`Grid::samples`]); the
+    /// `length_mm` and `pressure_kpa` hold one value per node of the grid (per sample, on [`Grid::samples`]). The
     /// pressure may be empty unless `pressure_crosstalk` is on. `start_s` is the session time of the first sample.
     ///
     /// # Errors
@@ -125,9 +126,9 @@ impl Sensing {
         self.run_shunted(memory, start, start_s, (length_mm, &[]), pressure_kpa, bridge_v)
     }
 
-    /// As [`run`](Self::run), with a shunt that lowers the trim of the bridge by a share, given at
-    /// each node like the length; empty without a shunt. Everything behind the bridge sees this
-    /// step.
+    /// Like [`run`](Self::run), with a shunt that lowers the trim of the bridge by a share. The share is given at each
+    /// node like the length; it is empty without a shunt. The effects behind the bridge act on the voltage that the
+    /// shunt has changed.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -218,7 +219,7 @@ impl Sensing {
         Ok(())
     }
 
-    /// Effects on recorded samples.
+    /// Applies the effects on recorded samples.
     fn write_down(&self, memory: &mut Memory, start_s: f64, samples: &mut [f64]) {
         if self.sites.record.is_empty() {
             return;
@@ -229,7 +230,7 @@ impl Sensing {
     }
 }
 
-/// Samples from nodes, with a skew if there is one.
+/// Takes the samples from the nodes, shifted by a skew if there is one.
 pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mut [f64]) {
     match skew {
         Some(skew) => skew.sample(nodes, samples),
@@ -241,7 +242,7 @@ pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mu
     }
 }
 
-/// Rows of a sensing chain by place, in the catalogue's order.
+/// The operators of a sensing chain at each place, in the catalogue's order.
 #[derive(Debug)]
 pub(crate) struct Sites {
     pub(crate) strain: Row,

@@ -1,5 +1,7 @@
-//! Where the feature `page` is on, finds the page that was built beforehand, so that the program carries it: what `STRETCH_PAGE` names, else what
-//! web/build.sh made. A page that is named and missing is an error, because a release would lack it; where none is named, the program is built without.
+//! With the feature `page`, finds the page that was built beforehand and embeds it in the program.
+//! `STRETCH_PAGE` names the page; the default is the output of web/build.sh. A named page that is
+//! missing is an error, because a release would lack it. Without a named page, a missing page is
+//! not embedded.
 
 use std::{
     env, fs,

@@ -1,4 +1,4 @@
-//! Reading a trial of a million rows, against `csv` with serde on the same bytes.
+//! Reading a trial of a million rows, compared with `csv` and serde on the same bytes.
 
 use std::{hint::black_box, time::Duration};
 
@@ -10,7 +10,7 @@ use stretch_recording::{ReadOptions, Recording, RowReader};
 const ROWS: usize = 1_000_000;
 const SIX: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
 
-/// A file as a recorder writes it: 100 Hz, five decimals.
+/// Writes a file as a recorder does: 100 Hz, five decimals.
 fn file(names: &[&str]) -> Vec<u8> {
     let mut seed = 1_u64;
     let mut noise = || {
@@ -34,7 +34,7 @@ fn file(names: &[&str]) -> Vec<u8> {
     let mut text = Vec::new();
     let trial = Trial { name: "bench".to_owned(), time_s, channels };
     trial.write_to(&mut text).expect("memory takes everything");
-    // Rounding leaves tails such as 0.30000000000000004; a recorder prints none.
+    // Rounding removes tails such as 0.30000000000000004, which a recorder does not print.
     let fields = String::from_utf8(text).expect("text");
     fields.lines().map(|line| shorten(line) + "\n").collect::<String>().into_bytes()
 }
@@ -47,7 +47,7 @@ fn shorten(line: &str) -> String {
     line.split(',').map(short).collect::<Vec<_>>().join(",")
 }
 
-/// The peer's row: three columns.
+/// A row with three columns for `csv`.
 #[derive(Deserialize)]
 struct Three {
     time_s: f64,
@@ -55,7 +55,7 @@ struct Three {
     bridge_v: f64,
 }
 
-/// The peer's row: six columns.
+/// A row with six columns for `csv`.
 #[derive(Deserialize)]
 struct Six {
     time_s: f64,
@@ -73,7 +73,7 @@ fn with_serde<R: for<'de> Deserialize<'de>>(text: &[u8], mut take: impl FnMut(R)
     }
 }
 
-/// The peer's faster way: one record, parsed by the standard library.
+/// The faster way to use `csv`: one reused record, parsed by the standard library.
 fn with_records(text: &[u8], columns: &mut [Vec<f64>]) {
     let mut reader = csv::Reader::from_reader(text);
     let mut record = csv::ByteRecord::new();

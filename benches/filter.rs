@@ -1,9 +1,9 @@
 //! One step of a Savitzky-Golay rate (11 taps) and of a biquad, per sample,
 //! and one step of `sci-rs`, `biquad` and `idsp` in the same run.
 //!
-//! Before anything is timed, all are asked to agree. The ratios that are
-//! printed first come from rounds that take turns, so that a busy machine
-//! slows every candidate alike; criterion's own figures follow.
+//! Before the timing, the results of all candidates are checked for agreement. The ratios that are
+//! printed first come from alternating rounds, so that a busy machine slows all candidates equally.
+//! Criterion's own figures follow.
 
 use std::{
     hint::black_box,
@@ -23,28 +23,28 @@ use stretch_filter::{
 const SAMPLES: usize = 100_000;
 const HZ: f64 = 100.0;
 
-/// What is timed: fills the output from the input.
+/// A timed candidate: fills the output from the input.
 type Candidate<'a> = (&'static str, Box<dyn FnMut(&[f64], &mut [f64]) + 'a>);
 
 fn rate() -> SampleRate {
     SampleRate::new(HZ).expect("above zero")
 }
 
-/// A slow signal with a bend, the same on every machine.
+/// A slow signal with a bend, identical on every machine.
 fn signal() -> Vec<f64> {
     (0..SAMPLES)
         .map(|n| 0.4 + 0.3 * (n as f64 * 0.013).sin() * (n as f64 * 0.000_7).cos())
         .collect()
 }
 
-/// A plain causal filter: the newest window of a slice times the taps, summed.
+/// A plain causal filter: the sum of the newest window of a slice times the taps.
 fn plain_fir(taps_oldest_first: &[f64], x: &[f64], y: &mut [f64]) {
     for (window, y) in x.windows(taps_oldest_first.len()).zip(&mut y[10..]) {
         *y = window.iter().zip(taps_oldest_first).map(|(x, h)| x * h).sum();
     }
 }
 
-/// The live derivative as most firmware does it: a ring of samples and a modulo.
+/// The live derivative as usually written in firmware: a ring buffer indexed with a modulo.
 struct Ring {
     taps: [f64; 11],
     samples: [f64; 11],
@@ -195,7 +195,7 @@ fn sections<'a>() -> Vec<Candidate<'a>> {
     ]
 }
 
-/// The largest difference inside, where no start and no end matters.
+/// Returns the largest difference, excluding the transients at start and end.
 fn differ(a: &[f64], b: &[f64], shift: usize) -> f64 {
     let inside = 2000..SAMPLES - 2000;
     inside.map(|n| (a[n + shift] - b[n]).abs()).fold(0.0, f64::max)
@@ -210,7 +210,7 @@ fn outputs(candidates: &mut [Candidate], x: &[f64]) -> Vec<Vec<f64>> {
     candidates.iter_mut().map(run).collect()
 }
 
-/// Prints the fastest of many rounds in which the candidates take turns.
+/// Prints the fastest of many rounds, in which the candidates alternate.
 fn print_ratios(title: &str, candidates: &mut [Candidate], x: &[f64], baseline: usize) {
     let mut y = vec![0.0; x.len()];
     let mut best = vec![f64::INFINITY; candidates.len()];
@@ -249,7 +249,7 @@ fn filters(criterion: &mut Criterion) {
 
     let mut candidates = derivatives();
     let y = outputs(&mut candidates, &x);
-    // Live and centred is the log's output five samples later.
+    // The live output equals the centred one five samples later.
     assert!(differ(&y[1], &y[4], 5) < 1e-10 && differ(&y[4], &y[7], 0) < 1e-10);
     assert!(differ(&y[0], &y[5], 0) < 1e-10 && differ(&y[0], &y[6], 0) < 1e-10);
     assert!(differ(&y[0], &y[3], 0) == 0.0);

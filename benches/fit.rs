@@ -1,10 +1,9 @@
-//! Fits of poly13 from slices of rate, volts and value to seven coefficients,
-//! with nalgebra's QR as the peer in the same run.
+//! Fits of poly13 from slices of rate, volts and value to seven coefficients, compared with
+//! nalgebra's QR in the same run.
 //!
-//! The surface is ill-conditioned: raw volts between 1.23 and 1.25, condition
-//! about 1e8. The relative error of the coefficients (norm) is printed first,
-//! since a fast wrong answer is worth nothing. `reference/fit/numpy_lstsq_speed.py`
-//! measures NumPy on the same data.
+//! The surface is ill-conditioned: raw volts between 1.23 and 1.25, condition number about 1e8. The
+//! relative error of the coefficients (norm) is printed first, because speed is irrelevant if the
+//! result is wrong. `reference/fit/numpy_lstsq_speed.py` measures NumPy on the same data.
 
 use std::{hint::black_box, time::Duration};
 
@@ -15,7 +14,7 @@ use stretch_fit::{Factor, Sample, SurfaceAccumulator};
 
 const TERMS: usize = Degree::POLY13.terms();
 
-/// p00 p10 p01 p11 p02 p12 p03
+/// Order of the coefficients: p00 p10 p01 p11 p02 p12 p03.
 const TRUTH: [f64; 7] = [0.058, 0.001, 0.774, -0.121, 2.30, 0.094, -2.26];
 
 struct Log {
@@ -24,7 +23,7 @@ struct Log {
     values: Vec<f64>,
 }
 
-/// Two golden-ratio sequences fill the rectangle evenly, the same in any language.
+/// Two golden-ratio sequences fill the rectangle evenly, with the same values in any language.
 fn log(samples: usize, centre: f64, width: f64) -> Log {
     let fraction = |k: usize, step: f64| (k as f64 * step).fract();
     let rates: Vec<f64> =

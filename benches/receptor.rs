@@ -1,9 +1,9 @@
-//! The live step against a hand-written kernel that does the same arithmetic and
-//! nothing else: the limit.
+//! The live step of a receptor, compared with a hand-written kernel that does only the same
+//! arithmetic and serves as a lower limit.
 //!
-//! One step: normalise, causal 11-point Savitzky-Golay rate, branch, poly13,
-//! denormalise. The limit keeps a transposed filter, evaluates both surfaces and
-//! selects; it has no domain, no dead band, no missing samples, no rate of the length.
+//! One step: normalise, causal 11-point Savitzky-Golay rate, branch, poly13, denormalise. The
+//! kernel uses a transposed filter, evaluates both surfaces and selects one. It has no domain
+//! check, no dead band, no handling of missing samples, and no rate of the length.
 
 use std::hint::black_box;
 

@@ -1,4 +1,5 @@
-//! How fast the rig is simulated: every figure next to that of a plain loop that computes the nominal bridge of one sample.
+//! Speed of the rig simulation, compared with a plain loop that computes the nominal bridge voltage
+//! of each sample.
 
 use std::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! The whole pipeline, composed from the crates by hand: the one to copy.
+//! The complete pipeline, built directly from the crates. Copy this example as a starting point.
 //!
 //! A logged trial of a liquid-metal strain gauge on an artificial muscle becomes
 //! a calibration (two poly13 surfaces, as in the paper), the calibration becomes
@@ -21,8 +21,8 @@ use stretch_receptor::StretchReceptor;
 const REST_LENGTH_MM: f64 = 180.0;
 const SEED: u64 = 20;
 
-/// A trial in place of a log: a muscle that shortens by up to 29 mm, and a
-/// gauge that answers 40 ms late, bends, and has 2 mV of noise.
+/// Simulates a trial: a muscle that shortens by up to 29 mm, and a gauge with a delay of 40 ms, a
+/// nonlinearity, and 2 mV of noise.
 fn record(seed: u64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let phase = 6.0 * random.random::<f64>();
@@ -52,11 +52,11 @@ fn calibrate(
     let sample_rate = SampleRate::new(100.0)?;
     let dead_band = 0.05; // volts per second
 
-    // 1. the rate of the voltage, by the estimator that will run live
+    // 1. the rate of the voltage, with the estimator that is used live
     let mut rate = Runner::new(SgRate::<f64, 11, 1>::new(sample_rate)?);
     let rates: Vec<Option<f64>> = bridge_v.iter().map(|&v| rate.step(v)).collect();
 
-    // 2. each sample belongs to the branch that its rate says
+    // 2. assign each sample to the branch given by its rate
     let mut branches: [Vec<Sample<f64>>; 2] = [Vec::new(), Vec::new()];
     let mut branch = Branch::Inflation;
     let target = Target::Contraction { rest_length: REST_LENGTH_MM };
@@ -67,7 +67,7 @@ fn calibrate(
         branches[usize::from(branch == Branch::Deflation)].push(row);
     }
 
-    // 3. normalise by total range, and fit a surface a branch
+    // 3. normalise by the total range, and fit one surface per branch
     let signal_range = range(1.24, bridge_v)?;
     let contractions: Vec<f64> = length_mm.iter().map(|&l| target.from_reference(l)).collect();
     let target_range = range(0.0, &contractions)?;
@@ -98,7 +98,7 @@ fn calibrate(
     };
     let (inflation, deflation) = (fit(&branches[0])?, fit(&branches[1])?);
 
-    // 4. the record: what a board needs, and where it comes from
+    // 4. the calibration: the data for a board, and their provenance
     Ok(Calibration::new(CalibrationSpec {
         schema: Schema::CURRENT,
         signal: Label::new("bridge_v")?,
@@ -131,7 +131,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
 
-    // live: f32, one voltage every 10 ms; the design is shared, the memory is the channel's
+    // live: f32, one voltage every 10 ms; channels share the design, and each has its own memory
     let rate = SgRate::<f32, 11, 1>::new(SampleRate::new(100.0)?)?;
     let receptor = StretchReceptor::with_rate(&calibration, rate)?;
     let mut memory = receptor.memory();

@@ -1,8 +1,8 @@
-//! Man pages of the program, and what bash, zsh and fish complete:
+//! Writes man pages of the program and completions for bash, zsh and fish:
 //!
 //!     cargo run --release --example manual -- FOLDER
 //!
-//! A release has both next to the program (release/build.sh).
+//! A release contains both (release/build.sh).
 
 use std::{env, fs, io, path::Path};
 

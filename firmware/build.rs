@@ -1,5 +1,5 @@
-//! Puts `memory.x` where the linker finds it; with the feature `c`, compiles the headers of
-//! `stretch export` that lie in the folders of `STRETCH_C`.
+//! Copies `memory.x` to where the linker finds it. With the feature `c`, compiles the headers of
+//! `stretch export` in the folders of `STRETCH_C`.
 
 use std::{
     env,
@@ -24,7 +24,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// An object of all headers for the program `c`, and the list of their models for its `main`.
+/// Compiles all headers to one object for the program `c`, and writes the list of their models for
+/// its `main`.
 fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     let hard_float = env::var("TARGET")?.ends_with("eabihf");
     let core: &[&str] = if hard_float {
@@ -72,7 +73,8 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     }
     calls.push('}');
     fs::write(out.join("c_models.rs"), calls)?;
-    // soft float and the square root are the C compiler's own, as in a program of C alone, and hidden from Rust's
+    // The C compiler's own software floating point and square root are linked, as in a pure C
+    // program, and are hidden from the Rust code.
     let all = out.join("all.o");
     run(Command::new("arm-none-eabi-gcc")
         .args(core)

@@ -1,8 +1,9 @@
-//! What the program says, how wide its lines are, and whether they have colours, even if its reader may be gone: no work depends on it.
+//! Output of the program: texts on standard output and standard error, the width of lines, and
+//! colours.
 //!
-//! Standard error is a courtesy: what cannot be written there is let go. Standard output may be
-//! what was asked for: the first failure is kept, the work goes on, its files are written, and
-//! [`lost`] tells the end of the program.
+//! A closed or full stream never stops the work. Failed writes to standard error are ignored.
+//! Standard output may be the requested result, so its first failure is stored. The command then
+//! still writes its files, and [`lost`] reports the failure at the end of the program.
 
 use std::{
     env,
@@ -24,21 +25,22 @@ use stretch_data::files::is_standard_output;
 use terminal_size::{Width, terminal_size};
 use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};
 
-/// How much is said in addition to results and errors.
+/// How much is printed in addition to results and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Volume {
-    /// `-q`: nothing, and of a diagnosis the verdict alone.
+    /// `-q`: nothing; for a diagnosis, only the verdict.
     Quiet,
-    /// What was written, what to look at, and progress on a terminal.
+    /// Files written, warnings, and progress on a terminal.
     Usual,
-    /// `-v`: also what is read and chosen, how long it takes, in lines of their own, and every detail of a diagnosis.
+    /// `-v`: in addition, what is read and chosen and how long it takes, each in a line, and all
+    /// details of a diagnosis.
     Verbose,
 }
 
-/// When the program began, and how much it says.
+/// Start time of the program, and its volume.
 static BEGUN: OnceLock<(Instant, Volume)> = OnceLock::new();
 
-/// Says how much is said from now on, once.
+/// Sets the start time and the volume, once.
 pub(crate) fn begin(volume: Volume) {
     let _ = BEGUN.set((Instant::now(), volume));
 }
@@ -47,27 +49,27 @@ fn volume() -> Volume {
     BEGUN.get().map_or(Volume::Usual, |(_, volume)| *volume)
 }
 
-/// Whether a result is said in one sentence, without what explains it.
+/// Whether only the sentence of a result is printed, without explanations.
 pub(crate) fn is_quiet() -> bool {
     volume() == Volume::Quiet
 }
 
-/// Whether a result is said with every detail.
+/// Whether results are printed with all details.
 pub(crate) fn is_verbose() -> bool {
     volume() == Volume::Verbose
 }
 
-/// Whether progress is drawn: what `-v` says is written in separate lines.
+/// Whether a progress bar is drawn. With `-v`, separate lines report the progress instead.
 pub(crate) fn shows_progress() -> bool {
     volume() == Volume::Usual
 }
 
 static LOST: OnceLock<ErrorKind> = OnceLock::new();
 
-/// Whether a file goes to standard output, where nothing else may be written then.
+/// Whether a file is written to standard output, so that nothing else may be printed there.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// Gives standard output to the one of some files that is called `-`, or so.
+/// Reserves standard output for a file with the path `-`, if there is one among these files.
 pub(crate) fn give_stdout<'a>(
     files: impl IntoIterator<Item = Option<&'a Path>>,
 ) -> anyhow::Result<()> {
@@ -77,19 +79,19 @@ pub(crate) fn give_stdout<'a>(
     Ok(())
 }
 
-/// A result: a text and a line end to standard output, to standard error where a file goes there. Lines are as wide as the
-/// terminal at most.
+/// Prints a result to standard output, or to standard error if a file is written to standard
+/// output. Lines are wrapped to the width of the terminal.
 ///
 /// # Errors
-/// None: a result, so that a command can end with what it says.
+/// Never. The return value lets a command end with this call.
 pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     say_as_is(wrapped(&plain(&text.to_string())))
 }
 
-/// The result that all others explain: bold where that is shown.
+/// Prints the main result, in bold if the terminal supports it.
 ///
 /// # Errors
-/// None, as [`say`].
+/// Never, as [`say`].
 pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
     let text = wrapped(&plain(&text.to_string()));
     match TAKEN.load(SeqCst) {
@@ -98,10 +100,10 @@ pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// A result that other programs read, in separate lines: code, JSON, TOML.
+/// Prints a result that other programs read, without wrapping: code, JSON, TOML.
 ///
 /// # Errors
-/// None, as [`say`].
+/// Never, as [`say`].
 pub(crate) fn say_as_is(text: impl Display) -> anyhow::Result<()> {
     let text = plain(&text.to_string());
     if TAKEN.load(SeqCst) {
@@ -112,20 +114,20 @@ pub(crate) fn say_as_is(text: impl Display) -> anyhow::Result<()> {
 }
 
 fn write_out(text: &str) -> anyhow::Result<()> {
-    // what was lost is kept by `Output`
+    // `Output` stores the error.
     let _ = writeln!(Output, "{text}");
     Ok(())
 }
 
-/// What was done in addition to the result, such as a file that was written; not with `-q`.
+/// Reports an additional action, such as a file that was written. Silent with `-q`.
 ///
 /// # Errors
-/// None, as [`say`].
+/// Never, as [`say`].
 pub(crate) fn tell(text: impl Display) -> anyhow::Result<()> {
     if volume() == Volume::Quiet { Ok(()) } else { say(text) }
 }
 
-/// What is read, chosen, or begun, and when: with `-v`, on standard error.
+/// With `-v`, reports a step of the work and its time on standard error.
 pub(crate) fn detail(text: impl Display) {
     if let Some((begun, Volume::Verbose)) = BEGUN.get() {
         let line = format!("[{:7.2} s] {text}", begun.elapsed().as_secs_f64());
@@ -133,14 +135,14 @@ pub(crate) fn detail(text: impl Display) {
     }
 }
 
-/// What to look at: a text and a line end to standard error if it can be written; not with `-q`.
+/// Prints a warning to standard error, if it can be written. Silent with `-q`.
 pub(crate) fn warn(text: impl Display) {
     if volume() != Volume::Quiet {
         write_err(&wrapped(&plain(&text.to_string())));
     }
 }
 
-/// What went wrong: to standard error, always, behind the program's name.
+/// Prints an error to standard error, after the program's name.
 pub(crate) fn fail(text: impl Display) {
     let text = wrapped(&plain(&format!("stretch: {text}")));
     let (name, rest) = text.split_at("stretch:".len());
@@ -151,8 +153,8 @@ fn write_err(text: &str) {
     let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
-/// A text without what a terminal acts on, or what turns the text around it or hides: names come from
-/// files of any origin. What is written in its place is an escape of JSON, too.
+/// Escapes control and hidden characters, because names in files of any origin may contain them.
+/// The escapes are also valid in JSON.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
@@ -165,18 +167,18 @@ fn plain(text: &str) -> String {
     plain
 }
 
-/// Why standard output could not take all that it was given, if it could not.
+/// Returns the first error of writing to standard output, if there was one.
 pub(crate) fn lost() -> Option<ErrorKind> {
     LOST.get().copied()
 }
 
-/// Standard output that keeps the first failure for [`lost`].
+/// Standard output that stores its first error for [`lost`].
 #[derive(Debug)]
 pub(crate) struct Output;
 
 fn kept<T>(result: io::Result<T>) -> io::Result<T> {
     result.inspect_err(|error| {
-        // a call that was interrupted is made again
+        // An interrupted call is repeated.
         if error.kind() != ErrorKind::Interrupted {
             let _ = LOST.set(error.kind());
         }
@@ -205,8 +207,8 @@ pub(crate) fn columns() -> usize {
     set.or_else(found).unwrap_or(WIDEST).max(NARROWEST)
 }
 
-/// Breaks a text between words into lines of at most 100 columns; further lines keep the indent of the first. Rows of tables
-/// already fit, and a word is never cut.
+/// Wraps a text to the line width, between words, keeping the indentation of each line. Rows of
+/// tables already fit, and words are never cut.
 fn wrapped(text: &str) -> String {
     wrapped_at(text, columns().min(WIDEST))
 }
@@ -230,7 +232,8 @@ fn wrapped_at(text: &str, width: usize) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// A text in a style, where a stream shows one: a terminal, unless `NO_COLOR` is set (or `CLICOLOR_FORCE` says all the same).
+/// Applies a style to a text if the stream shows one: a terminal, unless `NO_COLOR` is set, or
+/// `CLICOLOR_FORCE`.
 fn painted(text: &str, style: Style, to: &impl RawStream) -> String {
     match AutoStream::choice(to) {
         ColorChoice::Never => text.to_owned(),

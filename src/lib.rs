@@ -1,7 +1,8 @@
-//! The program `stretch`: parses its arguments and runs a command. It is no library for other programs; what they need is in the
-//! crates that it is made of.
+//! The program `stretch`: parses its arguments and runs a command. This crate is not meant as a
+//! library; use the crates on which it is built.
 
-// these panic without a reader: `display` has what is said
+// These macros panic if the reader of the stream has closed it. Use the functions of `display`
+// instead.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod commands;
@@ -51,7 +52,7 @@ struct Cli {
     command: Command,
 }
 
-/// The part of the help that holds for all commands.
+/// The part of the help that applies to all commands.
 const STATUSES: &str = "\
 Where a file is read or written, - is standard input or output.
 
@@ -85,7 +86,7 @@ enum Command {
 /// Exit status after Ctrl-C.
 const INTERRUPTED: u8 = 130;
 
-/// The commands and options, for man pages and shells.
+/// Returns the commands and options, for man pages and shell completions.
 pub fn command() -> clap::Command {
     Cli::command()
 }
@@ -102,7 +103,7 @@ pub fn run() -> ExitCode {
         Ok(parsed) => parsed,
         Err(answer) => return explain(&answer),
     };
-    // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
+    // Without a handler Ctrl-C still ends the program, but temporary files are not removed.
     let _ = ctrlc::set_handler(|| commands::shared::on_ctrl_c(INTERRUPTED));
     display::begin(match (cli.quiet, cli.verbose) {
         (true, _) => Volume::Quiet,
@@ -128,7 +129,7 @@ pub fn run() -> ExitCode {
         Command::Page(args) => page::run(args),
     });
     display::detail("the end");
-    // the reader of our output is gone: nothing is wrong
+    // If the reader of standard output has closed it, as `head` does, this is no error.
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
     match (result, display::lost()) {
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
@@ -145,7 +146,7 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Help that was asked for, or what is wrong with the arguments.
+/// Prints the requested help, or the error in the arguments, and returns the exit status.
 fn explain(answer: &clap::Error) -> ExitCode {
     let is_surplus =
         matches!(answer.kind(), ArgumentError::UnknownArgument | ArgumentError::TooManyValues);
@@ -166,8 +167,8 @@ fn explain(answer: &clap::Error) -> ExitCode {
     }
 }
 
-/// The error and its causes as one sentence; a cause that the sentence
-/// already contains is left out.
+/// Joins an error and its causes to one sentence. A cause that the sentence already contains is
+/// left out.
 fn message(error: &anyhow::Error) -> String {
     let mut text = without_numbers(&error.to_string());
     for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
@@ -180,7 +181,7 @@ fn message(error: &anyhow::Error) -> String {
     stretch_data::files::without_temporary_names(&text)
 }
 
-/// A text without Rust's `(os error 28)`, which repeats the text before it.
+/// Removes Rust's `(os error 28)` from a text, because it repeats the text before it.
 fn without_numbers(text: &str) -> String {
     let mut parts = text.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_owned();

@@ -1,10 +1,10 @@
-//! Commands and options of earlier releases, and what to write instead.
+//! Commands and options of earlier releases and their replacements.
 
 use std::ffi::OsString;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// A command, and what to write instead.
+/// Removed commands, each with a sentence on the replacement.
 const COMMANDS: [(&str, &str); 9] = [
     (
         "blind",
@@ -32,7 +32,7 @@ const COMMANDS: [(&str, &str); 9] = [
     ("rig", "write stretch simulate --print-rig"),
 ];
 
-/// An option, and what to write instead.
+/// Removed options, each with a sentence on the replacement.
 const OPTIONS: [(&str, &str); 19] = [
     ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
@@ -55,8 +55,8 @@ const OPTIONS: [(&str, &str); 19] = [
     ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same"),
 ];
 
-/// An option that has the same meaning under another name, and that name: scripts that use the old spelling go on working. The value
-/// takes the place of the braces; without them there is none.
+/// Renamed options and their new names, so that old scripts still work. The value of the option
+/// replaces the braces. A new name without braces takes no value.
 const RENAMED: [(&str, &str); 7] = [
     ("--baselines", "--verbose"),
     ("--json-out", "--json={}"),
@@ -67,7 +67,7 @@ const RENAMED: [(&str, &str); 7] = [
     ("--time-unit", "--time=:{}"),
 ];
 
-/// The arguments with today's names of renamed options.
+/// Replaces renamed options by their present names.
 pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let mut arguments = arguments.peekable();
     let mut renamed = Vec::new();
@@ -96,7 +96,8 @@ pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Ve
     with_unit_behind_column(renamed)
 }
 
-/// The arguments with a unit of the time behind the column that another argument names.
+/// Moves a time unit, given as a separate option, to the end of the option that names the time
+/// column.
 fn with_unit_behind_column(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let find =
         |prefix: &str| arguments.iter().position(|a| a.to_string_lossy().starts_with(prefix));
@@ -118,7 +119,7 @@ fn with_unit_behind_column(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
-/// What to write in place of a command or an option that is not there any more.
+/// Returns a sentence on the replacement of a removed command or option, if the error is about one.
 pub(crate) fn instead(error: &clap::Error) -> Option<String> {
     let (kind, table) = match error.kind() {
         ErrorKind::InvalidSubcommand => (ContextKind::InvalidSubcommand, &COMMANDS[..]),

@@ -1,4 +1,4 @@
-//! Which options name what a command writes, and what of that is refused before the command begins.
+//! The options that name outputs, and checks of their paths before a command begins.
 
 use std::{
     any::TypeId,
@@ -15,19 +15,20 @@ use stretch_data::files::guard_inputs;
 const OUTPUTS: [&str; 9] =
     ["c", "experiment", "fix", "fixed", "json", "out", "report", "session", "snippets"];
 
-/// The option of an argument, where that is a path.
+/// Returns the long name of an option whose value is a path.
 fn option(argument: &Arg) -> Option<&str> {
     let is_path = argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
     argument.get_long().filter(|_| is_path)
 }
 
-/// An output that was asked for.
+/// An output given on the command line.
 struct Output {
     option: String,
     path: PathBuf,
-    /// How such a file is called in the help: `cal.json`.
+    /// Example of such a file name in the help: `cal.json`.
     example: String,
-    /// Whether a recording may be replaced: one that the command made before, but none that was recorded.
+    /// Whether an existing file that looks like a recording may be replaced, because the command
+    /// may have written it itself.
     replaces_recordings: bool,
 }
 
@@ -40,7 +41,7 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
             option: format!("--{name}"),
             path: path.clone(),
             example: example.clone(),
-            // estimates have words in their rows and are not taken for a recording
+            // Estimates have words in their rows and are not mistaken for a recording.
             replaces_recordings: !["apply", "convert"].contains(&command.get_name()),
         }));
     }
@@ -51,11 +52,11 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
     }
 }
 
-/// Guards what a command reads from what it writes, from now on.
+/// Guards the inputs of a command against being overwritten by its outputs.
 ///
 /// # Errors
-/// Two outputs that are one file, and a recording where something else is to be written: a shell makes of `--out r*.csv` the name of
-/// the first recording.
+/// Two outputs that are the same file; an output that would replace a recording. A shell turns
+/// `--out r*.csv` into the names of existing recordings, of which the first becomes the output.
 pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
     let mut outputs = Vec::new();
     named(command, matches, &mut outputs);
@@ -74,7 +75,7 @@ pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<(
     Ok(guard_inputs(outputs.into_iter().map(|output| (output.option, output.path)))?)
 }
 
-/// Whether a file begins with rows of numbers, or with what is no text, such as packed rows.
+/// Whether a file begins with rows of numbers, or contains zero bytes and is therefore binary.
 fn is_recording(path: &Path) -> bool {
     let mut head = Vec::new();
     let is_file = path.is_file();

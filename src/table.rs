@@ -6,16 +6,17 @@ pub(crate) use stretch_report::number;
 
 use crate::display::columns;
 
-/// A cell of so many characters is not broken, where that is not more than a third of the line: it is a number, an interval
-/// or a name.
+/// Longest cell, in characters, that is not broken, if it needs at most a third of the line. Such
+/// cells are numbers, intervals or names.
 const WHOLE: usize = 24;
-/// Characters around a cell.
+/// Characters between two cells.
 const AROUND: usize = 3;
 
-/// A table with a header line; the first column reads from the left, the others are numbers and aligned at the right.
+/// Formats a table with a header line. The first column is aligned to the left, the others to the
+/// right.
 ///
-/// It is as wide as the terminal at most: long texts break between words, and columns for which there is no room are put into a
-/// further table below, behind the first column again. Nothing is left out.
+/// The table is at most as wide as the terminal. Long texts break between words. Columns that do
+/// not fit are put into a further table below, which repeats the first column. Nothing is left out.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().collect();
     fitted(header, &rows, columns())
@@ -40,7 +41,7 @@ fn fitted(header: &[&str], rows: &[Vec<String>], width: usize) -> String {
     parts.collect::<Vec<_>>().join("\n")
 }
 
-/// The first column and some others.
+/// Formats a table of the first column and a group of others.
 fn some_columns(
     header: &[&str],
     rows: &[Vec<String>],
@@ -67,7 +68,7 @@ fn some_columns(
     table.to_string()
 }
 
-/// Least width of a column: its longest word, and its longest cell as far as that is not broken.
+/// Returns the minimum width of a column: its longest word, or its longest unbroken cell.
 fn least(head: &str, rows: &[Vec<String>], column: usize, whole: usize) -> usize {
     let longest_word = |text: &str| text.split(' ').map(length).max().unwrap_or(0);
     let of_cell = |text: &String| longest_word(text).max(length(text).min(whole));
@@ -79,24 +80,24 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// A table of a report with its caption.
+/// Formats a table of a report with its caption.
 pub(crate) fn table_text(report: &stretch_report::Table) -> String {
     format!("{}:\n{}", unbroken(&report.caption), drawn(report))
 }
 
-/// A table of a report without it.
+/// Formats a table of a report without its caption.
 pub(crate) fn drawn(report: &stretch_report::Table) -> String {
     let head: Vec<&str> = report.head.iter().map(String::as_str).collect();
     let rows = report.rows.iter().map(|row| row.iter().map(|cell| unbroken(cell)).collect());
     table(&head, rows)
 }
 
-/// A text of a page: its spaces are those of a terminal.
+/// Replaces the non-breaking spaces of a report by plain ones.
 pub(crate) fn unbroken(text: &str) -> String {
     text.replace('\u{a0}', " ")
 }
 
-/// A number that may be missing.
+/// Formats a number that may be missing.
 pub(crate) fn maybe(x: Option<f64>) -> String {
     x.map_or_else(|| "-".to_owned(), number)
 }

@@ -1,6 +1,6 @@
-//! Small files that are wrong, a folder a reader, each with the sentence that it must earn (`sentences.txt`:
-//! exit code and the last line of standard error). Recordings in other formats than CSV have their own, in
-//! the crate that reads them.
+//! Small invalid files, in one folder per reader, each with the expected message (`sentences.txt`
+//! holds exit code and last line of standard error). Tests for recordings in other formats than CSV
+//! are in the crate that reads them.
 
 use std::{fs, path::Path};
 
@@ -9,7 +9,7 @@ use stretch_calibrate::calibration_to_json;
 use stretch_receptor::example_calibration;
 use testkit::corpus::is_as_it_should;
 
-/// A servo's problem whose worker answers with what a file holds.
+/// A problem file of a servo whose worker answers with the contents of a file.
 const PROBLEM: &str = r#"name = "servo"
 wrap = "all"
 [simulator]
@@ -28,7 +28,8 @@ tolerance = "10 %"
 file = "a.csv"
 "#;
 
-/// What the program says of a file of the corpus that was put where a user would have it.
+/// Runs the program on a file of the corpus, placed where a user would have it, and returns its
+/// message.
 fn told(reader: &str, folder: &Path, name: &str) -> String {
     let scratch = Scratch::new();
     let bytes = fs::read(folder.join(name)).unwrap();
@@ -97,7 +98,7 @@ fn told(reader: &str, folder: &Path, name: &str) -> String {
     format!("{name}: {code}: {last}").trim_end().to_owned()
 }
 
-/// A test a folder.
+/// Generates a test for each folder.
 macro_rules! readers {
     ($($reader:ident)*) => {$(
         #[test]

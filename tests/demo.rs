@@ -1,4 +1,4 @@
-//! `stretch demo`, as a user runs it.
+//! `stretch demo`, run as a user would.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use crate::support::{Scratch, fails, runs, stretch};
 use serde_json::Value;
 use testkit::page::without_program;
 
-/// Both parts in one page that needs no network.
+/// Asserts that the report contains calibration and diagnosis, and needs no network.
 fn holds_both_parts(out: &Path) {
     let page = without_program(&fs::read_to_string(out.join("report.html")).unwrap());
     for heading in
@@ -16,7 +16,7 @@ fn holds_both_parts(out: &Path) {
     }
     assert!(page.contains(": simulator against rig</h1>") && !page.contains("NaN"));
     assert_eq!(page.matches("<!DOCTYPE html>").count(), 1);
-    // a picture first, in either part
+    // Each part begins with a picture.
     let parts: Vec<&str> = page.split("<p class=\"verdict\">").skip(1).collect();
     assert_eq!(parts.len(), 2);
     for part in parts {
@@ -26,7 +26,7 @@ fn holds_both_parts(out: &Path) {
     assert!(!elsewhere.contains("http://") && !elsewhere.contains("https://"));
 }
 
-/// RMSE of raw, linear, non-linear and the chosen model.
+/// Returns the RMSE of raw signal, linear, non-linear and the chosen model.
 fn rmse(methods: &Value) -> [f64; 4] {
     [0, 1, 2, 3].map(|i| methods[i]["rmse"].as_f64().unwrap())
 }
@@ -40,7 +40,7 @@ fn the_demo_does_the_whole_job_without_anybody_s_data() {
     command.env("STRETCH_DATA", scratch.path("nothing")).args(["demo", "--json"]);
     let said: Value = serde_json::from_str(&runs(command.arg("--out").arg(&out))).unwrap();
     assert_eq!(said["seed"], 3);
-    // memory is what the rig has and the paper's surfaces lack
+    // The simulated rig has memory, which the paper's surfaces do not model.
     for kind in [0, 1] {
         let [_, linear, surfaces, chosen] = rmse(&said["kinds"][kind][1]);
         assert!(surfaces < linear && chosen < surfaces, "{}", said["kinds"][kind]);
@@ -56,7 +56,7 @@ fn the_demo_does_the_whole_job_without_anybody_s_data() {
     for name in ["linear.json", "poly13.json", "chosen.json", "estimates.csv", "estimate.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 100, "{name}");
     }
-    // With what was named in the rig file a second diagnosis finds nothing.
+    // A second diagnosis with the corrected rig file finds nothing.
     let fixed = scratch.path("fixed.toml");
     let diagnose = || {
         let mut command = stretch();
@@ -66,7 +66,7 @@ fn the_demo_does_the_whole_job_without_anybody_s_data() {
     runs(diagnose().arg("--fix").arg(&fixed));
     let again: Value = serde_json::from_str(&runs(diagnose().arg("--rig").arg(&fixed))).unwrap();
     assert_eq!(again["verdict"], "no_gap", "{}", again["sentence"]);
-    // the data set that it wrote is one like any other, and the record too
+    // The demo's data set and calibration file can be used like any others.
     let mut command = stretch();
     command.args(["evaluate", "--json", "--calibration"]).arg(out.join("chosen.json"));
     let same: Value = serde_json::from_str(&runs(command.arg(out.join("bench")))).unwrap();
@@ -85,7 +85,8 @@ fn with_data_measured_sessions_take_the_same_way() {
     let said: Value = serde_json::from_str(&text).unwrap();
     let [raw, linear, surfaces, chosen] = rmse(&said["evaluation"]["pooled"]);
     assert!(surfaces < linear && surfaces < raw && chosen < surfaces, "{text}");
-    // The built-in rig is no model of this machine: whatever closes a part of the gap, more is left than a form explains.
+    // The built-in rig is no model of this machine. Even if an effect closes a part of the gap,
+    // more is left than a form explains.
     let verdict = said["diagnosis"]["verdict"].as_str().unwrap();
     assert!(["partial", "unknown"].contains(&verdict), "{verdict}");
     assert!(said["diagnosis"]["unexplained"]["share"].as_f64().unwrap() > 0.05, "{text}");

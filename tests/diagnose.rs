@@ -1,4 +1,4 @@
-//! `stretch diagnose` as a user runs it.
+//! `stretch diagnose`, run as a user would.
 
 use std::{
     fs,
@@ -11,8 +11,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 use testkit::{page::without_program, tolerance::TRAINED_APART};
 
-/// What a run that succeeds prints.
-/// A simulated data set: one arbitrary trial to fit, one to test, with effects.
+/// Simulates a data set with effects: one arbitrary trial to fit, and one to test.
 fn bench(scratch: &Scratch, name: &str, effects: &[&str]) -> PathBuf {
     let out = scratch.path(name);
     let parts = ["one", "two"].map(|part| {
@@ -44,7 +43,7 @@ fn describe(folder: &Path, trials: &[(&str, &str)]) {
     fs::write(folder.join("dataset.toml"), text).unwrap();
 }
 
-/// Rewrites a column of a trial, sample by sample.
+/// Changes every sample of a column of a trial.
 fn alter(file: &Path, column: &str, change: impl Fn(usize, f64) -> f64) {
     let text = fs::read_to_string(file).unwrap();
     let at = text.lines().next().unwrap().split(',').position(|c| c == column).unwrap();
@@ -113,19 +112,21 @@ fn a_simulated_effect_is_named_and_reported() {
     let regimes = d["where"]["slices"].as_array().unwrap();
     assert!(regimes.iter().any(|s| s["by"] == "regime" && s["slice"] == "turnaround"));
     assert!(d["parameters"].as_array().unwrap().iter().any(|p| p["name"] == "e0"));
-    // A calibration trained with the effect is nearly as good as one trained on the measurement.
+    // A calibration trained on the simulation with the effect is nearly as good as one trained on
+    // the measurement.
     let poly13 = |from: &str| d["transfer"]["poly13"][from].as_f64().unwrap();
     assert!(poly13("sim") > 1.2 * poly13("real") && d["transfer"]["unit"] == "percent_full_scale");
     let (with, real) = (poly13("sim_with_effect"), poly13("real"));
     assert_abs_diff_eq!(with, real, epsilon = TRAINED_APART * real);
-    // The parameters are as shipped: then the simplest method does, too.
+    // Because the other parameters have their nominal values, even the simplest method finds the
+    // effect.
     assert_eq!(d["baselines"]["largest_drop"], "gauge_hysteresis");
     assert!(
         text.contains("by where the calibration was trained")
             && text.contains("Methods that leave one step out"),
         "{text}"
     );
-    // Whatever the number of threads, the same bits.
+    // The result has the same bits for any number of threads.
     let (again, page_again) = (scratch.path("again.json"), scratch.path("again.html"));
     runs(run("1", &again).arg("--report").arg(&page_again));
     assert!(d == read(&again));
@@ -138,7 +139,7 @@ fn a_simulated_effect_is_named_and_reported() {
             && !page.contains("NaN")
             && !page.contains("class=\"missing\"")
     );
-    // With its entry removed from the catalogue no other effect is named as confidently.
+    // Without the effect in the catalogue, no other effect is named with the same confidence.
     let without = scratch.path("without.json");
     runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg(json_to(&without)));
     let w = read(&without);
@@ -152,7 +153,7 @@ fn a_rig_without_a_fault_gets_no_name() {
     let folder = bench(&scratch, "bench", &[]);
     let text = runs(&mut diagnose(&folder));
     assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
-    // One trial alone: its last part is held back and tested on.
+    // A single trial: its last part is reserved for testing.
     describe(&folder, &[("fit.csv", "fit")]);
     let text = runs(&mut diagnose(&folder));
     assert!(text.contains("no test trial") && !text.contains("lacks"), "{text}");
@@ -179,7 +180,7 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
         rename(f, [("length_mm", "x"), ("bridge_v", "length_mm"), ("x", "bridge_v")]);
     });
     fails(&mut diagnose(&swapped), &["swapped"]);
-    // One trial's wire came off while the others are sound.
+    // The sensor wire of one trial was disconnected; the others are valid.
     let loose = spoiled("loose", &|f| alter(&f.join("test.csv"), "bridge_v", |_, _| 1.24));
     fails(&mut diagnose(&loose), &["test.csv", "bridge_v", "dead"]);
     let valves =
@@ -204,7 +205,7 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
         both(f, "outlet", |_, _| 0.0);
     });
     fails(&mut diagnose(&shut), &["valve", "inlet"]);
-    // What was asked for and cannot be is said before anything is computed.
+    // Impossible requests are reported before the computation starts.
     fails(
         diagnose(&good).args(["--without", "gauge_histeresis"]),
         &["did you mean `gauge_hysteresis`"],
@@ -219,7 +220,7 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
 #[test]
 fn odd_data_get_an_honest_verdict() {
     let scratch = Scratch::new();
-    // Two seconds are missing: said, and no cause invented.
+    // Two seconds are missing. This is reported, and no effect is named for it.
     let folder = bench(&scratch, "gap", &[]);
     let file = folder.join("fit.csv");
     let text = fs::read_to_string(&file).unwrap();
@@ -230,7 +231,7 @@ fn odd_data_get_an_honest_verdict() {
         text.contains("missing after") && !text.lines().next().unwrap().contains("lacks"),
         "{text}"
     );
-    // Another user's rig: the gap is everything, and no effect takes the blame.
+    // A different rig: the gap is total, and no effect is named.
     let rig = prints(stretch().args(["simulate", "--print-rig"]));
     let other = rig
         .replace("value = 180.0", "value = 300.0")
@@ -239,7 +240,7 @@ fn odd_data_get_an_honest_verdict() {
     let other = scratch.write("other.toml", other);
     let text = runs(diagnose(&folder).arg("--rig").arg(&other));
     assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
-    // Named in general, or by the value that is most wrong: 300 mm for 180.
+    // Either a general message, or the most wrong value: 300 mm instead of 180 mm.
     assert!(text.contains("Is it the right rig") || text.contains("L0 in the rig file"), "{text}");
 }
 
@@ -261,7 +262,8 @@ fn a_simulator_that_has_the_effect_agrees() {
         let folder = bench(&scratch, name, &[effect]);
         let rig = scratch.write(&format!("{name}.toml"), format!("{stock}\n[[effect]]\n{table}"));
         agrees(diagnose(&folder).arg("--rig").arg(&rig), name);
-        // The rig file that `simulate` wrote next to its trials is the rig that they come from.
+        // The rig file that `simulate` wrote next to its trials describes the rig from which they
+        // come.
         let written = scratch.path(&format!("{name}-one")).join("rig.toml");
         agrees(diagnose(&folder).arg("--rig").arg(&written), name);
     }
@@ -281,7 +283,7 @@ fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);
     let stock = prints(stretch().args(["simulate", "--print-rig"]));
-    // Each a rig that the data do not come from, none of which the tolerances reach.
+    // Rigs that did not produce the data, and that cannot be reached within the tolerances.
     let others = [
         ("amplifier", "G = { value = 10.0", "G = { value = 8.0"),
         ("bridge", "beta = { value = 1.0", "beta = { value = 0.9"),
@@ -293,7 +295,7 @@ fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
         let other = scratch.write(&format!("{name}.toml"), stock.replace(from, to));
         let text = runs(diagnose(&folder).arg("--rig").arg(&other));
         let first = text.lines().next().unwrap();
-        // The message names the rig in general, or the value that is wrong.
+        // The message names the rig in general, or the wrong value.
         let told = first.contains("right rig") || first.contains("rig file");
         assert!(told && !first.contains("lacks"), "{name}: {text}");
     }
@@ -311,7 +313,8 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     both(&folder, "bridge_v", |_, v| v.min(1.9));
     let text = runs(&mut diagnose(&folder));
     assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
-    // What a clipped record looks like is a saturated amplifier or a slack sleeve, and nothing else.
+    // A clipped recording may be explained by a saturated amplifier or a slack sleeve, and by
+    // nothing else.
     let first = text.lines().next().unwrap();
     let named =
         ["the amplifier's saturation", "the sleeve's slack"].iter().any(|e| first.contains(e));
@@ -339,7 +342,7 @@ fn ctrl_c_leaves_nothing_half_written() {
     let pid = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
     let code = child.wait().unwrap().code();
-    // A machine on which it was done by then has written both.
+    // A machine that finished before the signal has written both files.
     let files = fs::read_dir(&out).unwrap().count();
     assert!((code, files) == (Some(130), 0) || (code, files) == (Some(0), 2), "{code:?} {files}");
 }
@@ -347,7 +350,7 @@ fn ctrl_c_leaves_nothing_half_written() {
 #[test]
 fn a_gauge_alone_is_diagnosed_beside_its_reference() {
     let scratch = Scratch::new();
-    // The signal shows the length of 30 ms earlier.
+    // The signal shows the length 30 ms earlier.
     let trial = scratch.loops("loops.csv", 60.0, 1.1);
     let page = scratch.path("gauge.html");
     let columns = ["--reference", "length_mm", "--signal", "bridge_v"];

@@ -1,4 +1,4 @@
-//! `stretch diagnose` on a gauge alone, as a user runs it.
+//! `stretch diagnose` for a gauge alone, run as a user would.
 
 use std::{
     f64::consts::TAU,
@@ -11,12 +11,12 @@ use approx::assert_abs_diff_eq;
 use serde_json::Value;
 use testkit::{page::without_program, random::unit, tolerance::SKEW_FOUND_S};
 
-/// Position of a joint, degrees, at a time.
+/// Returns the position of a joint at a time, degrees.
 fn joint(t: f64) -> f64 {
     40.0 + 25.0 * (TAU * 0.31 * t).sin() + 12.0 * (TAU * 0.83 * t).sin()
 }
 
-/// Writes a trial of a minute: reference, and a signal that shows it 0.12 s late.
+/// Writes a trial of one minute: a reference, and a signal that lags it by 0.12 s.
 fn record(file: &Path, header: &str, scale: f64, begin_s: f64) {
     let mut text = header.to_owned() + "\n";
     for i in 0..6000 {
@@ -57,7 +57,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
         let first = text.lines().next().unwrap();
         assert!(first.contains("the time offset between bridge and length"), "{text}");
     };
-    // One trial and two columns; the report and the JSON say the same.
+    // One trial and two columns. Report and JSON agree with the text.
     let file = scratch.path("joint.csv");
     record(&file, "time_s,angle_deg,s2", 1.0, 0.0);
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
@@ -71,14 +71,15 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     assert_eq!(d["shares"][0]["effect"], "channel_skew");
     let page = without_program(&fs::read_to_string(page).unwrap());
     assert!(page.contains("channel_skew") && page.contains("deg") && !page.contains("NaN"));
-    // A data set whose rig file says so, its columns named; the usual columns need no naming.
+    // A data set whose rig file describes a gauge, with named columns. The default columns need not
+    // be named.
     let set = folder(&scratch, "kind", "time_s,angle_deg,s2", Some(GAUGE));
     let columns = ["--reference", "angle_deg", "--signal", "s2"];
     named(&runs(stretch().arg("diagnose").arg(&set).args(columns)));
     fails(stretch().arg("diagnose").arg(&set), &["--reference", "angle_deg, s2"]);
     let set = folder(&scratch, "usual", "time_s,length_mm,bridge_v", None);
     named(&runs(stretch().arg("diagnose").arg(&set)));
-    // A rig file of a whole rig does not describe a gauge.
+    // A rig file of a complete rig does not describe a gauge.
     let rig = scratch.path("rig.toml");
     fs::write(&rig, prints(stretch().args(["simulate", "--print-rig"]))).unwrap();
     let mut command = stretch();
@@ -131,7 +132,8 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     );
     let swapped = good.replacen("angle_deg,s2", "bridge_v,length_mm", 1);
     fails(&mut run(&swapped, "bridge_v", "length_mm"), &["swapped", "reference is the length"]);
-    // A gap in time and a converter at its end are no reason to refuse, and not passed over.
+    // A gap in time and a converter at its limit are reported, but are no reason to refuse the
+    // recording.
     let kept = good.lines().enumerate().filter(|(i, _)| !(4000..4300).contains(i));
     let gap: String = kept.map(|(_, l)| l.to_owned() + "\n").collect();
     let text = runs(&mut run(&gap, "angle_deg", "s2"));
@@ -142,7 +144,7 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let clipped = spoiled(2, &|i| Some(format!("{:.5}", all[i]?.min(1.5))));
     let text = runs(&mut run(&clipped, "angle_deg", "s2"));
     assert!(text.contains("s2 stands at its greatest value, 1.5"), "{text}");
-    // Reference and signal exchanged: reported, and no effect is named with certainty.
+    // Exchanged reference and signal are reported, and no effect is named with certainty.
     let text = runs(&mut run(&good, "s2", "angle_deg"));
     assert!(text.contains("swapped?"), "{text}");
     let metres = scratch.path("metres.csv");
@@ -165,7 +167,8 @@ fn with_data_a_measured_sleeve_gets_shares_and_no_confident_name() {
     let text = runs(&mut command);
     let first = text.lines().next().unwrap();
     assert!(!first.contains("lacks"), "{first}");
-    // Slow memory, as a fit of other forms finds it too (book/src/results/gauge_alone.md), and a term for the rest.
+    // Slow memory, which a fit of other model forms confirms (book/src/results/gauge_alone.md), and
+    // a term for the rest.
     assert!(
         first.contains("the gauge's relaxation") && first.contains("What is missing"),
         "{first}"

@@ -1,10 +1,11 @@
-//! The loop as a newcomer types it: a name, a simulator that agrees, a calibration that uses it, and C for a board.
+//! The complete loop as a new user types it: a named effect, a simulator that agrees, a calibration
+//! that uses the effect, and C code for a board.
 
 use std::{fs, process::Command};
 
 use crate::support::{Scratch, fails, json_to, runs, stretch};
 
-/// A data set of the paper's protocol with an effect of the gauge.
+/// Simulates a data set of the paper's protocol with an effect of the gauge.
 fn bench(scratch: &Scratch, effect: &str) -> std::path::PathBuf {
     let folder = scratch.path("bench");
     runs(
@@ -54,7 +55,7 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     let (own, poly13) = (rmse(&judged, "diagnosed"), rmse(&judged, "poly13"));
     assert!(own < 0.5 * poly13, "{own} {poly13}");
 
-    // Live it says how sure it is.
+    // The live output contains the standard deviation.
     let trial = fs::read_to_string(bench.join("arbitrary_2.csv")).unwrap();
     let live = stretch()
         .arg("apply")
@@ -70,7 +71,7 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     let last: Vec<&str> = lines.last().unwrap().split(',').collect();
     assert!(last[5].parse::<f64>().unwrap() > 0.0, "{last:?}");
 
-    // On a diagnosis of the whole rig, and as C.
+    // Calibration from a diagnosis of the complete rig, and its export to C.
     runs(stretch().arg("diagnose").arg(&bench).arg("--no-next").arg(json_to(&d)));
     let said = runs(
         stretch()
@@ -114,7 +115,7 @@ fn a_diagnosis_that_cannot_help_is_refused_with_what_to_do() {
     };
     ask("no.json", "{\"rows\": 3}", &["no.json", "stretch diagnose --json="]);
     ask("newer.json", "{\"schema\": 7}", &["newer.json", "schema 7", "newer"]);
-    // A diagnosis without any effect, and one of another stage alone.
+    // A diagnosis without any effect, and a diagnosis that names only an effect of another stage.
     let folder = scratch.path("quiet");
     runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&folder));
     let d = scratch.path("quiet.json");

@@ -1,4 +1,4 @@
-//! Every effect of the catalogue, simulated and diagnosed as a newcomer would type it.
+//! Every effect of the catalogue, simulated and diagnosed as a new user would.
 
 use std::{fs, path::Path};
 
@@ -11,9 +11,10 @@ use serde_json::Value;
 use stretch_sim::{CATALOGUE, Effect};
 use testkit::random::Random;
 
-/// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
+/// Returns the effect as an option, with a strength in the middle of the lower half of its range, a
+/// single threshold, and typical shapes.
 fn spelled(effect: &Effect) -> String {
-    // At 50 Hz and a phase of 0 every sample at 100 Hz meets a zero of the wave.
+    // At 50 Hz and phase 0, every sample at 100 Hz would coincide with a zero of the wave.
     let fixed = match effect.name {
         "mains_hum" => return "mains_hum:a=0.02,f=60,phase=1".into(),
         "amplifier_saturation" => return "amplifier_saturation:v_hi=2.1".into(),
@@ -23,11 +24,12 @@ fn spelled(effect: &Effect) -> String {
     format!("{fixed}:{}", values.collect::<Vec<_>>().join(","))
 }
 
-/// Difference of scores, nats, up to which two fit alike; the choice between two ends of a saturation costs ln 2 of it.
+/// Difference of scores, in nats, up to which two candidates fit equally well. The choice between
+/// two ends of a saturation costs ln 2 of it.
 const TIE: f64 = 1.0;
 
-/// Whether a diagnosis names an effect first, or one that fits exactly like it: a sleeve that goes slack and an amplifier that
-/// saturates may come in either order.
+/// Whether a diagnosis ranks an effect first, or ties it with another that fits equally well: a
+/// sleeve that goes slack and an amplifier that saturates may be ranked in either order.
 fn is_first(diagnosis: &Value, effect: &Effect) -> bool {
     let all = diagnosis["candidates"].as_array().unwrap();
     let own = all.iter().filter(|c| c["effects"][0] == effect.name);
@@ -36,13 +38,15 @@ fn is_first(diagnosis: &Value, effect: &Effect) -> bool {
     diagnosis["named"][0] == effect.name || is_tied
 }
 
-/// Share of the gap that was closed up to which what is left counts as the first diagnosis' own mismatch: play acts on the motion, and a
-/// diagnosis knows the motion as far as its noise allows, which shows where the motion turns.
+/// Share of the closed gap up to which the remaining gap counts as a mismatch of the first
+/// diagnosis. Play acts on the motion, which a diagnosis knows only up to noise, and the error is
+/// visible where the motion reverses.
 const MISMATCH: f64 = 0.005;
-/// Root mean square distance, in noises, of a replay with noise off from a measurement: 1 is the noise alone.
+/// Root mean square distance of a noise-free replay from the measurement, relative to the noise.
+/// The noise alone gives 1.
 const REPLAYED: f64 = 1.15;
 
-/// Takes the pressure out of every trial of a data set, and with it the digests of what the trials were.
+/// Removes the pressure column and the digests from every trial of a data set.
 fn without_pressure(folder: &Path) {
     let index = folder.join("dataset.toml");
     let text = fs::read_to_string(&index).unwrap();
@@ -79,7 +83,8 @@ fn is_named_and_agreed_with_once_it_is_written_into_the_rig_file() {
             }
             let first = diagnosed(&scratch, &folder, None, Some(&fixed));
             let again = diagnosed(&scratch, &folder, Some(&fixed), None);
-            // All trials in one session: what a trial remembers of the one before is in it.
+            // All trials in one session, because a trial may depend on the one before through
+            // memory effects.
             let apart = replayed(&scratch, &fixed, &folder, &folder);
             let [before, left] = [&first, &again].map(|d| d["gap"]["retuned"].as_f64().unwrap());
             println!(
@@ -103,10 +108,10 @@ fn is_named_and_agreed_with_once_it_is_written_into_the_rig_file() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Sets of two that are drawn.
+/// Number of pairs of effects that are tested.
 const SETS_OF_TWO: usize = 20;
 
-/// Two different effects of the catalogue, each at its typical strength.
+/// Draws two different effects of the catalogue, each at its typical strength.
 fn set_of_two(random: &mut Random) -> [&'static Effect; 2] {
     let mut drawn = || CATALOGUE[(random.unit() * CATALOGUE.len() as f64) as usize];
     loop {

@@ -1,4 +1,4 @@
-//! `stretch export`: from trials to C that a compiler takes, and what is refused.
+//! `stretch export`: from trials to C code that compiles, and the refused cases.
 
 use std::{
     fs,
@@ -10,7 +10,7 @@ use stretch_sleeve::{array_bytes, example_array};
 
 use crate::support::{Scratch, calibrate, fails, runs, stdout, stretch};
 
-/// A calibration of that model, and the command that exports it to `c`.
+/// Calibrates with these arguments, and returns the path of the calibration file.
 fn calibrated(scratch: &Scratch, arguments: &[&str]) -> PathBuf {
     let (trial, out) = (scratch.loops("a.csv", 20.0, 1.1), scratch.path("cal.json"));
     runs(calibrate(&trial, &out).args(arguments));
@@ -23,7 +23,7 @@ fn export(calibration: &Path, out: &Path) -> assert_cmd::Command {
     command
 }
 
-/// Compiles and runs a program; what it prints.
+/// Compiles and runs a program, and returns its output.
 fn compiled(compiler: &[&str], folder: &Path, main: &str, include: &Path) -> String {
     let (source, program) = (folder.join("main.c"), folder.join("program"));
     fs::write(&source, main).unwrap();
@@ -36,7 +36,7 @@ fn compiled(compiler: &[&str], folder: &Path, main: &str, include: &Path) -> Str
     stdout(&output)
 }
 
-/// A header passes its self-test where the compiler that Rust links with translates it.
+/// Asserts that a header passes its self-test when compiled with the system's C compiler.
 fn passes_its_self_test(scratch: &Scratch, header: &Path) {
     let main = "#include \"stretch.h\"\nint main(void) { return stretch_self_test(); }\n";
     compiled(&["cc", "-std=c99"], &scratch.path("."), main, header);
@@ -59,8 +59,8 @@ fn a_header_of_every_model_passes_its_self_test() {
     }
 }
 
-/// What an Arduino core has, as far as the examples need it: a converter that gives a rising code or, of a gauge that is cut
-/// off, its last one, a clock, and a port that is standard output.
+/// The parts of an Arduino core that the examples need: a converter that returns a rising code or,
+/// for a disconnected gauge, its last code; a clock; and a serial port that is standard output.
 const ARDUINO: &str = r#"
 #include <cstdint>
 #include <iostream>
@@ -102,7 +102,8 @@ fn with_gxx_an_arduino_library_reads_a_sample_every_period() {
         let compiler = ["g++", "-x", "c++", "-std=gnu++11"];
         let said = compiled(&compiler, &scratch.path("."), &main, &library.join("src"));
         let lines: Vec<&str> = said.lines().collect();
-        // a loop every 5 ms answers every other time; one of 70 ms loses six samples and warms up again
+        // A loop every 5 ms takes every other sample. A loop of 70 ms loses six samples, and the
+        // rate filter warms up again.
         assert_eq!(lines.iter().filter(|line| **line == "warming").count(), 20, "{said}");
         assert_eq!(lines.len(), 151, "{said}");
         assert!(lines[60].contains("mm inflation"), "{said}");
@@ -140,7 +141,7 @@ fn with_gxx_the_arduino_example_of_two_gauges_names_the_one_that_is_cut_off() {
 fn with_gxx_a_board_of_another_converter_is_refused_with_the_option_that_names_it() {
     let scratch = Scratch::new();
     let calibration = calibrated(&scratch, &["--model", "poly13"]);
-    // of a library for AVR
+    // A part of the C library for AVR.
     fs::create_dir(scratch.path("avr")).unwrap();
     scratch
         .write("avr/pgmspace.h", "#include <string.h>\n#define PROGMEM\n#define memcpy_P memcpy\n");
@@ -194,7 +195,7 @@ fn what_has_no_form_in_c_says_so_and_writes_nothing() {
 #[test]
 fn integers_that_the_model_or_the_converter_does_not_allow() {
     let scratch = Scratch::new();
-    // a rate in the middle of its window has a form in floats alone
+    // A rate at the middle of its window can only be exported in floating point.
     let calibration = calibrated(&scratch, &["--model", "poly13", "--rate", "savgol:11,2,5"]);
     let before = scratch.names();
     let out = scratch.path("c");

@@ -1,4 +1,5 @@
-//! `stretch diagnose --fix` and `--snippets`: from a name to a simulator that agrees, as a newcomer types it.
+//! `stretch diagnose --fix` and `--snippets`: from a named effect to a simulator that agrees, run
+//! as a new user would.
 
 use std::{fs, path::Path};
 
@@ -9,7 +10,7 @@ use crate::support::{
 };
 use serde_json::Value;
 
-/// Two sessions of one arbitrary trial: one to fit, one to test.
+/// Simulates two sessions with one arbitrary trial each: one to fit, one to test.
 fn bench(scratch: &Scratch, effects: &[&str]) -> std::path::PathBuf {
     let out = scratch.path("bench");
     fs::create_dir(&out).unwrap();
@@ -62,11 +63,11 @@ fn a_named_effect_is_written_agrees_and_replays_the_measurement() {
     assert!(is_agreed(&again), "{}", again["sentence"]);
     let rig = fs::read_to_string(&fixed).unwrap();
     assert!(rig.contains("tolerance = "), "re-tuned parameters keep a tolerance");
-    // The first trial, which nothing comes before.
+    // The first trial, which has no predecessor.
     for (column, floors) in replayed(&scratch, &fixed, &folder.join("fit.csv"), &folder) {
         assert!(floors < 1.1, "{column}: {floors} floors");
     }
-    // A file that is there is replaced, and that is said; one that is read is not; nor is a folder.
+    // An existing file is replaced, which is reported. An input file or a folder is not replaced.
     let with = |rig: &Path| {
         let mut command = stretch();
         command.arg("diagnose").arg(&folder).args(["--no-next", "--rig"]).arg(rig);
@@ -96,7 +97,7 @@ fn where_nothing_is_named_it_is_said_what_is_written() {
     assert!(!fs::read_to_string(&fixed).unwrap().contains("[[effect]]"));
     assert!(is_agreed(&diagnosed(&scratch, &folder, Some(&fixed), None)));
     fs::remove_file(&fixed).unwrap();
-    // A length in inches is no matter of the rig.
+    // A length in inches is an error of the recording, not of the rig.
     for file in ["fit.csv", "test.csv"] {
         let path = folder.join(file);
         let text = fs::read_to_string(&path).unwrap();

@@ -1,4 +1,4 @@
-//! `stretch export --fixed`: the record that a board reads, run on converter codes.
+//! `stretch export --fixed`: the calibration file for a board, run on converter codes.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ fn adc() -> Adc {
     parse_adc(ADC).unwrap()
 }
 
-/// Calibrates on a trial, and reads both records back.
+/// Calibrates on a trial, exports, and reads both calibration files.
 fn records(scratch: &Scratch, trial: &Path, model: &str, read_as: &str) -> (Calibration, Vec<u8>) {
     let (float, fixed) = (scratch.path("cal.json"), scratch.path("cal.fixed.postcard"));
     runs(calibrate(trial, &float).args(["--model", model]));
@@ -32,14 +32,14 @@ fn export(calibration: &Path, fixed: &Path) -> assert_cmd::Command {
     command
 }
 
-/// The signal of a trial, as the converter gives it.
+/// Converts the signal of a trial to converter codes.
 fn codes(trial: &PathBuf) -> Vec<AdcCode> {
     let text = std::fs::read_to_string(trial).unwrap();
     let volts = text.lines().skip(1).map(|line| line.rsplit(',').next().unwrap());
     volts.map(|volts| adc().code(volts.parse().unwrap())).collect()
 }
 
-/// How far each answer in integers lies from the one in `f64`, in millimetres.
+/// Returns the differences between the estimates in integers and in `f64`, in millimetres.
 fn apart<D, F>(fixed: D, float: F, codes: &[AdcCode]) -> Vec<f64>
 where
     D: Design + Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
@@ -73,7 +73,7 @@ fn an_observer_runs_from_its_record_as_it_does_in_floats() {
         assert_eq!(errors.len(), 4000, "an observer needs no warm-up");
         let per_target = calibration.spec().target.reference_per_target().abs();
         let span_mm = calibration.spec().target_range.span() * per_target;
-        // a thousandth for the last rounding
+        // One thousandth of a millimetre for the final rounding.
         let bound = testkit::tolerance::FIXED_OBSERVER * span_mm + 1e-3;
         let largest = largest(&errors);
         assert!(largest <= bound, "{model}: {largest} mm, bound {bound} mm");
@@ -93,7 +93,7 @@ fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
         );
         let float = StretchReceptor::with_rate(&calibration, rate.unwrap()).unwrap();
         let errors = apart(FixedReceptor::new(fixed), float, &codes(&test));
-        // a line needs no rate and answers at once
+        // A line needs no rate, so it has an estimate from the first sample.
         let warm_up = if model == "linear" { 0 } else { 10 };
         assert_eq!(errors.len(), 4000 - warm_up, "{model}");
         let largest = largest(&errors);

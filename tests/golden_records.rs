@@ -1,6 +1,7 @@
-//! Golden calibrations: what every model fits to one simulated session, number by number.
+//! Golden calibrations: the coefficients that every model fits to one simulated session.
 //!
-//! `STRETCH_BLESS=1 cargo test golden_records` writes the file anew; its commit says why a number changed.
+//! `STRETCH_BLESS=1 cargo test golden_records` writes the file anew. The commit message must
+//! explain why a number changed.
 
 use std::{collections::BTreeMap, env, fs, path::Path};
 
@@ -10,7 +11,7 @@ use crate::support::{Scratch, runs, stretch};
 
 const MODELS: [&str; 5] = ["linear", "poly13", "observer", "history", "diagnosed"];
 
-/// The parts of a record that a fit decides.
+/// The parts of a calibration file that are results of the fit.
 const PARTS: [&str; 4] = ["signal_range", "target_range", "dead_band", "model"];
 
 #[test]

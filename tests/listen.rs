@@ -1,4 +1,4 @@
-//! `stretch listen` on a pseudo-terminal, with everything that a cable does.
+//! `stretch listen` on a pseudo-terminal, with all disturbances of a cable.
 #![cfg(unix)]
 
 use std::{
@@ -33,14 +33,14 @@ fn due() -> Adc {
     Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
 }
 
-/// A board's frames for `samples` samples from reset, all of its answers real.
+/// Returns the frames of a board for `samples` samples after a reset, with real estimates.
 fn board(samples: u32) -> Vec<Frame> {
     let fixed = FixedCalibration::<11, 2>::new(&example_calibration(), &due()).unwrap();
     let mut receptor = Runner::new(FixedReceptor::new(fixed));
     frames(samples, |code| receptor.step(code))
 }
 
-/// The frames of a board that answers so.
+/// Returns the frames of a board with these answers.
 fn frames(
     samples: u32,
     mut answer: impl FnMut(AdcCode) -> Result<CodeReading<i32>, Withheld>,
@@ -48,7 +48,7 @@ fn frames(
     (0..samples)
         .map(|counter| {
             let swing = (f64::from(counter) * 0.02).sin();
-            // one sample in a hundred does not come
+            // One sample in a hundred is missing.
             let code = if counter % 100 == 57 { -1 } else { due().code(1.6 + 0.35 * swing).0 };
             let answer = answer(AdcCode(code)).into();
             Frame { counter, time_ms: 10 * counter, code, answer }
@@ -56,7 +56,7 @@ fn frames(
         .collect()
 }
 
-/// A board with a floating-point unit, which runs a calibration in `f32`.
+/// Returns the frames of a board with a floating-point unit, which runs a calibration in `f32`.
 fn float_board(calibration: &Calibration) -> Vec<Frame> {
     let mut receptor = Runner::new(Receptor::<f32>::new(calibration).unwrap());
     frames(300, |code| {
@@ -71,7 +71,7 @@ fn line(frame: &Frame) -> Vec<u8> {
     frame.encode(&mut [0; Frame::LONGEST]).to_vec()
 }
 
-/// The other end of the port, which has a name that stays.
+/// Opens a pseudo-terminal as the other end of the port, and links its name to a fixed path.
 fn plug(name: &Path) -> File {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&master).unwrap();
@@ -128,7 +128,7 @@ impl Listener {
         fs::read_to_string(self.folder.path().join("trial.csv")).unwrap()
     }
 
-    /// Waits until the record has `rows` rows.
+    /// Waits until the recording has `rows` rows.
     fn await_rows(&self, rows: usize) {
         let start = Instant::now();
         while self.recorded().lines().count() < rows + 1 {
@@ -137,7 +137,7 @@ impl Listener {
         }
     }
 
-    /// Ctrl-C; how it ended and what it had to say.
+    /// Sends Ctrl-C. Returns the exit status, the messages and the recording.
     fn stop(mut self) -> (ExitStatus, String, String) {
         kill_process(Pid::from_child(&self.child), Signal::INT).unwrap();
         let status = self.child.wait().unwrap();
@@ -152,7 +152,7 @@ impl Listener {
     }
 }
 
-/// The rows that a record of these frames has, without the time.
+/// Returns the expected rows of a recording of these frames, without the time.
 fn rows<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<String> {
     use stretch_link::Answer;
     let row = |frame: &Frame| {
@@ -188,11 +188,13 @@ fn a_clean_line_is_recorded_sample_by_sample() {
     assert!(recorded.contains("\n2.99,"), "the board's clock");
     assert!(notes.contains("300 frames, 0 lost, 0 damaged, 0 repeated, 0 restarts"), "{notes}");
     let told = notes.split("calibration by ").nth(1).unwrap().split(' ').next().unwrap();
-    // the last rounding of the board's fixed point, and what bridging three samples costs it
+    // The final rounding of the board's fixed point, and the effect of bridging missing samples on
+    // it.
     assert!((0.0004..=0.0015).contains(&told.parse::<f64>().unwrap()), "{notes}");
 }
 
-/// Listens to the frames with that record; the largest difference that it tells.
+/// Listens to the frames with this calibration file. Returns the largest difference that is
+/// reported.
 fn difference(record: &[u8], frames: &[Frame], what: &str) -> f64 {
     let (listener, mut master) = Listener::start_with(record);
     frames.iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
@@ -217,7 +219,7 @@ fn every_model_that_is_calibrated_is_listened_to() {
         runs(calibrate(&trial, &out).args(["--model", &kind]));
         let calibration = read_calibration(&out).unwrap();
         let told = difference(&fs::read(&out).unwrap(), &float_board(&calibration), &kind);
-        // the last rounding to a micrometre, and f32 on the board
+        // The final rounding to a micrometre, and the rounding of `f32` on the board.
         let bound = 6e-4 + testkit::tolerance::REMEMBERING_F32_MM;
         assert!(told <= bound, "{kind}: {told} mm, bound {bound} mm");
 
@@ -252,7 +254,7 @@ fn a_start_that_fails_leaves_nothing_behind() {
     }
 }
 
-/// Listens to bytes on standard input and records them; what it said, and what is recorded.
+/// Listens to bytes on standard input and records them. Returns the messages and the recording.
 fn heard(bytes: &[u8]) -> (String, String) {
     let scratch = Scratch::new();
     scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
@@ -278,7 +280,7 @@ fn codes_beyond_the_converter_are_counted_and_nothing_is_called_compared() {
     assert!(notes.contains("2 samples that the board did not get"), "{notes}");
     assert!(notes.contains("no estimate was compared") && !notes.contains("differs"), "{notes}");
     assert!(recorded.is_empty());
-    // one among good ones
+    // One such frame among valid ones.
     let mut frames = board(200);
     frames[20].code = 4096;
     let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
@@ -342,7 +344,7 @@ fn faults_lose_their_own_frames_and_no_others() {
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{notes}");
     assert_eq!(without_time(&recorded), rows(&kept));
-    // 340 of 400; every lost one lies before the last that came
+    // 340 of 400 frames arrive. Every lost one lies before the last one that arrived.
     assert!(notes.contains("340 frames, 60 lost, 100 damaged, 20 repeated, 0 restarts"), "{notes}");
 }
 
@@ -352,28 +354,28 @@ fn a_pulled_cable_and_a_board_that_restarts_lose_nothing_recorded() {
     let (mut listener, mut master) = Listener::start();
     frames[..100].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
     listener.await_rows(99);
-    // half a line, and the cable is pulled
+    // Half a line is sent, and the cable is disconnected.
     master.write_all(&line(&frames[100])[..15]).unwrap();
     let before = listener.recorded();
-    // the name goes first: the system gives the number to the next pseudo-terminal
+    // The link is removed first, because the system reuses the number for the next pseudo-terminal.
     fs::remove_file(Listener::port(listener.folder.path())).unwrap();
     drop(master);
     listener.await_note("waiting");
     assert_eq!(listener.recorded(), before, "what was recorded stays");
     let mut master = plug(&Listener::port(listener.folder.path()));
     listener.await_note("connected");
-    // the end of that line, and the rest
+    // The second half of that line, and the rest.
     master.write_all(&line(&frames[100])[15..]).unwrap();
     frames[101..].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
     listener.await_rows(99 + 49);
-    // the board starts again
+    // The board restarts.
     frames[..30].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
     listener.await_rows(99 + 49 + 30);
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{notes}");
     let kept = frames[..100].iter().chain(&frames[101..]).chain(&frames[..30]);
     assert_eq!(without_time(&recorded), rows(kept));
-    // the first half of that line may go with the cable
+    // The first half of that line may be lost with the cable.
     let damaged = if notes.contains("2 damaged") { 2 } else { 1 };
     let expected = format!("179 frames, 1 lost, {damaged} damaged, 0 repeated, 1 restarts");
     assert!(notes.contains(&expected), "{notes}");
@@ -406,7 +408,7 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
             .spawn()
             .unwrap();
         let mut input = child.stdin.take().unwrap();
-        // a program that refuses to start does not read
+        // A program that refuses to start does not read its input.
         let _ = frames.iter().try_for_each(|frame| input.write_all(&line(frame)));
         drop(input);
         child.wait_with_output().unwrap()
@@ -423,7 +425,8 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     assert_eq!(fs::read_to_string(folder.path().join("trial.csv")).unwrap(), recorded);
 }
 
-/// Everything that a terminal of 24 rows shows while `listen` runs on it, and how it ended.
+/// Returns the exit status of `listen` on a terminal of 24 rows, the text shown there, and the
+/// recorded files.
 fn seen_on_a_terminal(out: &[&str]) -> (ExitStatus, String, Vec<PathBuf>) {
     let folder = tempfile::tempdir().unwrap();
     let calibration = calibration_to_json(&example_calibration()).unwrap();
@@ -449,7 +452,7 @@ fn seen_on_a_terminal(out: &[&str]) -> (ExitStatus, String, Vec<PathBuf>) {
         .unwrap();
     let seen = thread::spawn(move || {
         let (mut seen, mut buffer) = (Vec::new(), [0; 4096]);
-        // the terminal's end is an error on this side
+        // The end of the terminal is an error on this side.
         while let Ok(n) = eyes.read(&mut buffer) {
             seen.extend_from_slice(&buffer[..n]);
             if n == 0 {
@@ -474,7 +477,7 @@ fn seen_on_a_terminal(out: &[&str]) -> (ExitStatus, String, Vec<PathBuf>) {
 fn a_terminal_shows_one_line_that_is_renewed() {
     let (status, seen, recorded) = seen_on_a_terminal(&["--out", "trial.csv"]);
     assert!(status.success(), "{seen}");
-    // drawn again and again in place: far fewer lines than samples
+    // The status line is redrawn in place, so there are far fewer lines than samples.
     assert!(seen.matches("mm; ").count() > 3 && seen.lines().count() < 12, "{seen}");
     assert!(seen.contains("frames, 0 lost") && !seen.contains("time_s,"), "{seen}");
     assert!(seen.contains("198 rows recorded"), "{seen}");
@@ -514,7 +517,7 @@ fn a_board_whose_clock_stands_is_told() {
     let (stood, time_s) = said(199);
     assert!(stood.contains("the board's clock stood still at 100 frames"), "{stood}");
     assert!(stood.contains("without a new time and no rows"), "{stood}");
-    // no time is invented: those that are recorded are the board's
+    // No time is invented: recorded times are those of the board.
     let of_board = |frames: Vec<Frame>| -> Vec<f64> {
         let sampled = frames.into_iter().filter(|frame| frame.code >= 0);
         sampled.map(|frame| f64::from(frame.time_ms) / 1e3).collect()

@@ -1,4 +1,5 @@
-//! The tests of the program from outside, one program: linking takes longer than most of them.
+//! Integration tests of the program in one test program, because linking takes longer than most of
+//! the tests.
 
 mod attack;
 mod corpus;

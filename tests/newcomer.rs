@@ -1,10 +1,11 @@
-//! What a user sees who has never used the program: own names, own units, own folders.
+//! Messages for new users: their own names, units and folders.
 
 use std::fmt::Write;
 
 use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
 
-/// A trial with its own columns and scale: a reference of 151 to 179 and a gauge of 1.27 to 2.2 times `times`.
+/// Writes a trial with custom columns and scale: a reference of 151 to 179, and a gauge of 1.27 to
+/// 2.2 multiplied by `times`.
 fn trial(scratch: &Scratch, name: &str, header: &str, times: f64) -> std::path::PathBuf {
     let mut text = format!("{header}\n");
     for n in 0..3000 {
@@ -33,7 +34,7 @@ fn own_columns_keep_their_units() {
     let mut evaluate = stretch();
     let told = runs(evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&log));
     assert!(told.contains("RMSE, mm"), "{told}");
-    // a unit is written as people write it
+    // Units are printed in their usual form.
     let log = trial(&scratch, "force.csv", "time_s,force_n,gauge_v", 1.0);
     let record = scratch.path("force.json");
     runs(calibrate(&log, &record).args(["--reference", "force_n", "--signal", "gauge_v"]));
@@ -140,7 +141,7 @@ fn a_diagnosis_says_what_its_page_says() {
     let told =
         runs(command.arg("diagnose").arg(&bench).arg("--no-next").arg("--report").arg(&page));
     let html = std::fs::read_to_string(&page).unwrap().replace('\u{a0}', " ");
-    // what is left comes first
+    // The remaining difference is shown first.
     let at = |part: &str| html.find(part).unwrap_or_else(|| panic!("no {part}"));
     assert!(at("measured \u{2212} simulated") < at("<table"));
     assert!(!told.contains("Stability"), "the numbers of rivals are for -v: {told}");
@@ -151,7 +152,8 @@ fn a_diagnosis_says_what_its_page_says() {
     for cell in cells {
         assert!(html.contains(cell), "{cell} is not on the page");
     }
-    // no rivals, no experiment: users who asked for the file get a message, with -q or without
+    // Without rivals there is no experiment. A user who requested the file gets a message, with or
+    // without -q.
     let file = scratch.path("next.csv");
     let mut command = stretch();
     command.arg("-q").arg("diagnose").arg(&bench).arg("--experiment").arg(&file);
@@ -192,7 +194,7 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
         let rows: String = text.lines().skip(1).map(row).collect();
         scratch.write(name, format!("time_s,length_mm,bridge_v\n{rows}"))
     };
-    // in centimetres, and on a mount that has moved by 10 mm
+    // In centimetres, and on a mount that has moved by 10 mm.
     for (name, change, off) in [
         ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148."),
         ("moved.csv", |mm| mm + 10.0, "10.0000 mm below the reference on average"),

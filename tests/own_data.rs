@@ -1,4 +1,4 @@
-//! The project carries no recordings of others.
+//! The project contains no recordings of other authors.
 
 use std::{
     collections::HashSet,
@@ -8,14 +8,14 @@ use std::{
     process::Command,
 };
 
-/// Values in a row that no two recordings share by chance.
+/// Number of consecutive values that two recordings do not share by chance.
 const RUN: usize = 8;
-/// Least different values among them: a run of zeros belongs to no file.
+/// Smallest number of different values among them, because a run of zeros identifies no recording.
 const DIFFERENT: usize = 5;
-/// Least fields of a row, without the time, that are looked for as a whole.
+/// Smallest number of fields, without the time, for a row to be searched for.
 const FIELDS: usize = 3;
 
-/// Rows and columns of recordings, as hashes.
+/// Hashes of the rows and columns of recordings.
 #[derive(Default)]
 struct Recordings {
     rows: HashSet<u64>,
@@ -28,7 +28,7 @@ fn hash(value: impl Hash) -> u64 {
     hasher.finish()
 }
 
-/// Runs of values that tell a recording.
+/// Returns the hashes of runs of values that identify a recording.
 fn runs<'a>(values: &'a [&str]) -> impl Iterator<Item = u64> + 'a {
     let telling = |run: &&[&str]| {
         let long = run.iter().filter(|value| value.len() >= 4);
@@ -37,7 +37,7 @@ fn runs<'a>(values: &'a [&str]) -> impl Iterator<Item = u64> + 'a {
     values.windows(RUN).filter(telling).map(hash)
 }
 
-/// A row without its time, if there is enough in it to tell whose it is.
+/// Returns the hash of a row without its time, if the row contains enough to identify a recording.
 fn row(line: &str) -> Option<u64> {
     let fields: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).skip(1).collect();
     let long = fields.iter().filter(|f| f.len() >= 4 && f.parse::<f64>().is_ok());
@@ -48,14 +48,14 @@ impl Recordings {
     fn add(&mut self, text: &str) {
         self.rows.extend(text.lines().skip(1).filter_map(row));
         let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|l| l.split(',').collect()).collect();
-        // all recordings share the time
+        // The time column is skipped, because all recordings share it.
         for column in 1..rows.first().map_or(0, Vec::len) {
             let values: Vec<&str> = rows.iter().filter_map(|r| r.get(column).copied()).collect();
             self.runs.extend(runs(&values));
         }
     }
 
-    /// How much of a text is theirs: rows, and runs of values however they are set apart.
+    /// Counts rows and runs of values of the recordings in a text, with any separators.
     fn found_in(&self, text: &str) -> usize {
         let rows = text.lines().filter_map(row).filter(|r| self.rows.contains(r)).count();
         let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E');
@@ -71,7 +71,7 @@ impl Recordings {
     }
 }
 
-/// Every CSV file below a folder.
+/// Returns every CSV file below a folder.
 fn csv_files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
     entries
@@ -114,7 +114,8 @@ fn with_data_no_committed_file_holds_a_recording_of_others() {
     }
     let listed = String::from_utf8(listed.stdout).unwrap();
     for name in listed.split('\0').filter(|name| !name.is_empty()) {
-        // a file that was just removed is listed until that is committed; a binary one is no text
+        // A file that was just removed is listed until the removal is committed. A binary file is
+        // not text.
         let Ok(text) = fs::read_to_string(root.join(name)) else { continue };
         assert_eq!(recordings.found_in(&text), 0, "{name} holds rows or columns of a recording");
     }

@@ -1,4 +1,4 @@
-//! `stretch page`: written whole from where it was built, or a sentence.
+//! `stretch page` writes the page completely, or prints an error.
 
 use std::{fs, path::Path};
 
@@ -40,8 +40,9 @@ fn what_is_no_page_is_refused_and_nothing_is_left() {
 fn a_program_that_carries_the_page_needs_nothing_beside_it() {
     let scratch = Scratch::new();
     let (alone, out) = (scratch.path("stretch"), scratch.path("out.html"));
-    // away from the source tree, where it would find the page
-    // a link where one can be made: a copy is busy while another test starts a program that inherits its open file
+    // The program must be outside the source tree, where it would find the page. It is a hard link
+    // if possible, because a copy may be busy while another test starts a process that inherits its
+    // open file.
     let built = env!("CARGO_BIN_EXE_stretch");
     fs::hard_link(built, &alone).or_else(|_| fs::copy(built, &alone).map(drop)).unwrap();
     runs(assert_cmd::Command::new(&alone).env_clear().arg("page").arg("--out").arg(&out));

@@ -1,10 +1,10 @@
-//! `stretch init` and `stretch diagnose problem.toml`: any simulator with any recording.
+//! `stretch init` and `stretch diagnose problem.toml`: custom simulators with any recording.
 
 use std::{fmt::Write, fs, path::Path};
 
 use crate::support::{json_to, stretch};
 
-/// A servo whose brake holds 2 degrees, commanded every 0.6 s.
+/// Writes a recording of a servo with a brake of 2 degrees and a new command every 0.6 s.
 fn recording(path: &Path) {
     recording_from(path, 7);
 }
@@ -45,14 +45,15 @@ range = [0, 20]
 off = 0
 "#;
 
-/// What a diagnosis of a problem's file says, or of the one in a folder.
+/// Diagnoses a problem file, or the one in a folder. Returns whether it succeeded, and its output
+/// in one line.
 fn said(path: &Path, more: &[&str]) -> (bool, String) {
     let inside = path.join("problem.toml");
     let file = if inside.exists() { &inside } else { path };
     let out = stretch().arg("diagnose").arg(file).args(more).output().unwrap();
     let text = [out.stdout, out.stderr].concat();
     let text = String::from_utf8(text).unwrap();
-    // how wide a terminal is says where lines break
+    // The line breaks depend on the width of the terminal.
     (out.status.success(), text.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
@@ -85,11 +86,11 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     assert!(value["model_runs"]["count"].as_u64().unwrap() < 400);
     assert_eq!(value["identifiability"][0]["knowledge"], "determined");
     assert!(fs::read_to_string(page).unwrap().contains("brake"));
-    // The name that the first file has is that of its folder.
+    // The generated problem has the name of its folder.
     let name = folder.path().file_name().unwrap().to_str().unwrap();
     assert_eq!((&value["seed"], &value["data_set"]), (&1.into(), &name.into()));
 
-    // What was found is written into the problem, and nothing is missing then.
+    // With the corrected problem file, nothing is missing any more.
     let fixed = folder.path().join("fixed.toml");
     let (is_good, text) = said(folder.path(), &["--fix", fixed.to_str().unwrap()]);
     assert!(is_good && text.contains("the problem re-tuned, with brake"), "{text}");
@@ -132,12 +133,12 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let bare = stretch().arg("predict").arg(&file).arg(&b).output().unwrap();
     let text = String::from_utf8_lossy(&bare.stderr).into_owned();
     assert!(!bare.status.success() && text.contains("it holds no effect that was found"), "{text}");
-    // The command's old name.
+    // The earlier name of the command.
     let old = stretch().arg("foretell").arg(&fixed).arg(&b).output().unwrap();
     let text = String::from_utf8_lossy(&old.stderr).into_owned();
     assert!(old.status.code() == Some(2) && text.contains("stretch predict"), "{text}");
 
-    // Both runs by themselves.
+    // Both runs are fitted separately.
     let two = own.clone() + PARAMETERS + "[[trial]]\nfile = \"b.csv\"\n";
     let both = folder.path().join("both.toml");
     fs::write(&both, two).unwrap();
@@ -150,7 +151,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let (is_good, text) = said(&both, &["--by", "load_kg"]);
     assert!(!is_good && text.contains("there is no column load_kg"), "{text}");
 
-    // An object of a Python module, and one that is wrong.
+    // A Python object as the simulator, which raises an error.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";
     fs::write(folder.path().join("own.py"), module).unwrap();
     let command = "command = [\"python3\", \"servo.py\"]";
@@ -186,7 +187,8 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         fs::write(folder.path().join("problem.toml"), good.replacen(from, to, 1)).unwrap();
         let (is_good, text) = said(folder.path(), &[]);
         assert!(!is_good && text.contains(told), "{to}: {text}");
-        // Where the program that runs FMUs is next to this one it says that there is no such file.
+        // If the program that runs FMUs is next to this one, the message is that the file does not
+        // exist.
         let is_fmu = text.contains("STRETCH_FMU") || text.contains("x.fmu: No such file");
         assert!(is_fmu || !to.contains("fmu ="), "{to}: {text}");
     }
@@ -216,7 +218,8 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     );
 }
 
-/// A folder as it comes from another user: recordings, and a problem whose simulator leaves a trace.
+/// A folder as received from another user: recordings, and a problem whose simulator leaves a file
+/// when it runs.
 fn downloaded(folder: &Path) -> std::path::PathBuf {
     recording(&folder.join("a.csv"));
     let text = "simulator = [\"sh\", \"-c\", \"touch ran; exec cat\"]\n[[stage]]\noutput = \"angle_deg\"\ninputs = [\"command_V\"]\n[[trial]]\nfile = \"a.csv\"\n";
@@ -228,7 +231,7 @@ fn downloaded(folder: &Path) -> std::path::PathBuf {
 #[cfg(unix)]
 fn a_folder_runs_no_program_unasked() {
     let scratch = tempfile::tempdir().unwrap();
-    // a name that ends like a file's is a folder's nevertheless
+    // A folder may have a name that ends like that of a file.
     for name in ["bench", "bench.toml"] {
         let folder = scratch.path().join(name);
         fs::create_dir(&folder).unwrap();
@@ -260,7 +263,7 @@ fn what_runs_is_said_in_a_line_before() {
     for command in [&["diagnose"][..], &["effects", "--data"]] {
         let out = stretch().args(command).arg(&file).output().unwrap();
         let text = String::from_utf8_lossy(&out.stderr).into_owned();
-        // a worker that answers with what it is asked says no hello
+        // A worker that echoes its input does not send a valid hello.
         assert!(!out.status.success(), "{text}");
         fs::remove_file(&ran).unwrap_or_else(|_| panic!("it did not run: {text}"));
         let lines: Vec<_> =
@@ -278,7 +281,8 @@ fn what_a_data_set_or_a_rig_file_says_runs_nothing() {
         "name = 'a'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'\n";
     let command = "simulator = ['sh', '-c', 'touch ran']\n";
     let gauge = ["--reference", "angle_deg", "--signal", "command_V"];
-    // next to a data set a problem's file is not read; a simulator in the data set or in a rig file is a key that nothing reads
+    // A problem file next to a data set is not read. A simulator entry in the data set or in a rig
+    // file is ignored.
     for text in [set.to_owned(), format!("{command}{set}")] {
         fs::write(folder.path().join("dataset.toml"), text).unwrap();
         stretch().arg("diagnose").arg(folder.path()).args(gauge).output().unwrap();

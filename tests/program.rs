@@ -1,4 +1,4 @@
-//! The program as a user runs it.
+//! The program, run as a user would.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -32,7 +32,7 @@ fn calibrate_apply_evaluate() {
     let rmse = |method: usize| evaluation["pooled"][method]["rmse"].as_f64().unwrap();
     assert_eq!(evaluation["unit"], "mm");
     assert_eq!(evaluation["pooled"][2]["method"], "poly13");
-    // the gauge lags by 30 ms: only the rate can make up for it
+    // The gauge lags by 30 ms, which only a model with a rate can compensate.
     assert!(rmse(2) < 0.5 * rmse(1), "poly13 {} mm, linear {} mm", rmse(2), rmse(1));
 
     let out = scratch.path("estimates.csv");
@@ -151,7 +151,8 @@ fn live_each_line_is_answered_as_it_comes() {
     writeln!(input, "bridge_v,time_s").unwrap();
     assert!(answers.next().unwrap().unwrap().starts_with("time_s,estimate_mm"));
     for n in 0..20 {
-        // the answer is read before the next line is written: a buffer would hang here
+        // Each estimate is read before the next line is written, so buffered output would hang
+        // here.
         writeln!(input, "1.5,{:.2}", 0.01 * f64::from(n)).unwrap();
         let answer = answers.next().unwrap().unwrap();
         assert_eq!(answer.ends_with("warming"), n < 10, "{answer}");
@@ -200,7 +201,7 @@ fn ctrl_c_ends_a_recording_and_keeps_what_came() {
 fn ctrl_c_in_the_middle_leaves_no_partial_file() {
     let scratch = Scratch::new();
     let calibration = scratch.calibration("cal.json");
-    // a pipe that stays open keeps the program in the middle of its work
+    // A pipe that stays open keeps the program running.
     let fifo = scratch.path("pipe.csv");
     assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
     let before = scratch.names();

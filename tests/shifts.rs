@@ -1,5 +1,5 @@
-//! Gauges that sit elsewhere than at calibration: hours of simulated movement without a shift, and gauges that were put
-//! on again 8 mm off.
+//! Shifted gauges: hours of simulated movement without a shift, and gauges that were put on again
+//! with an offset of 8 mm.
 
 use stretch_calibrate::{Options, calibrate};
 use stretch_core::Degree;
@@ -12,12 +12,13 @@ use stretch_sleeve::{
 };
 
 const GAUGES: usize = 3;
-/// Trials of a minute that a calibration is made of.
+/// Number of one-minute trials for a calibration.
 const FITTED: usize = 3;
-/// The same of a single gauge, which has some twelve movements a minute to go by.
+/// Number for a single gauge, which has only about twelve movements a minute for learning its
+/// turning levels.
 const FITTED_ONE: usize = 5;
 
-/// A muscle with three gauges, whose gain, trim and memory are drawn.
+/// A muscle with three gauges, with random gain, trim and memory.
 struct Worn {
     sessions: Vec<Session>,
     seed: u64,
@@ -40,7 +41,7 @@ impl Worn {
         Self { sessions: (0..GAUGES).map(gauge).collect(), seed, done: 0 }
     }
 
-    /// The next minute of drawn movement.
+    /// Simulates the next minute of random movement.
     fn next(&mut self) -> Trial {
         self.done += 1;
         let plan = TrialPlan::arbitrary(self.done, self.seed);
@@ -57,7 +58,7 @@ impl Worn {
         trial
     }
 
-    /// A calibration of the first gauge alone.
+    /// Calibrates the first gauge alone.
     fn one_calibrated(&mut self) -> GaugeCalibration {
         let trials: Vec<Trial> = (0..FITTED_ONE).map(|_| self.next()).collect();
         let options = Options { signal: name(0), ..Options::default() };
@@ -88,11 +89,11 @@ fn gauge(k: usize, trial: &Trial) -> Channel {
     Channel { name: name(k), values: trial.channel("bridge_v").expect("recorded").to_vec() }
 }
 
-/// The volts that a gauge changes by for a millimetre: its regression on the length.
+/// Returns the change of a gauge's voltage per millimetre, from a regression on the length.
 fn volts_per_mm(trial: &Trial, k: usize) -> f64 {
     let length = trial.channel("length_mm").expect("recorded");
     let volts = trial.channel(&name(k)).expect("recorded");
-    // the volts are the value here, over the length
+    // The fields are exchanged, because the voltage is regressed on the length.
     let row = |(&length, &volts)| Sample { rate: 0.0, volts: length, value: volts };
     let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE).expect("room for a line");
     line.extend(length.iter().zip(volts).map(row)).expect("numbers");
@@ -101,7 +102,8 @@ fn volts_per_mm(trial: &Trial, k: usize) -> f64 {
 
 const RIGS: u64 = 8;
 const MINUTES: usize = 30;
-/// Of a Poisson count with a mean of one, the stated rate over the hours simulated here, more come once in 270.
+/// With the stated rate, one alarm is expected in the simulated hours. A Poisson count with that
+/// mean exceeds this in one of 270 cases.
 const MOST_ALARMS: usize = 4;
 
 #[test]
@@ -146,7 +148,8 @@ fn a_gauge_that_was_put_on_8_mm_off_is_told_within_two_blocks() {
                 *applied.shifts.iter().find(|(_, s)| s.shifted != 0).expect("told");
             assert!(at_s <= 2.0 * limits.block_s, "rig {seed}, gauge {k}: {at_s} s");
             assert!(shifts.has_shifted(k), "rig {seed}, gauge {k}: {shifts:?}");
-            // what lies outside of the calibration's domain is moved to its end: it says at least how far
+            // Values outside the calibration's domain are clamped to its end, so the reported
+            // offset is a lower bound.
             let off = shifts.off[k];
             assert!(limits.limits[k] < off && off < 9.0, "rig {seed}, gauge {k}: {off} mm");
             cases += 1;
@@ -156,7 +159,8 @@ fn a_gauge_that_was_put_on_8_mm_off_is_told_within_two_blocks() {
     assert!(10 * named >= 9 * cases, "{named} of {cases} are named");
 }
 
-/// One gauge alone has the levels at which its movements turn: of drawn movements many at rest and some anywhere.
+/// A single gauge is monitored by the levels at which its movements turn. Random movements turn
+/// often at rest, and sometimes at other levels.
 #[test]
 fn one_gauge_alarms_seldom_and_tells_8_mm() {
     let (mut hours, mut alarms, mut found, mut errors) = (0.0, 0, 0_u64, Vec::new());

@@ -1,10 +1,9 @@
-//! `stretch simulate`, `effects` and `rig` as a user runs them.
+//! `stretch simulate` and `effects`, run as a user would.
 
 use std::fs;
 
 use crate::support::{Scratch, fails, prints, runs, stretch};
 
-/// What a run that succeeds prints.
 #[test]
 fn a_run_is_repeated_from_its_own_rig_file() {
     let scratch = Scratch::new();
@@ -35,7 +34,7 @@ fn a_run_is_repeated_from_its_own_rig_file() {
         }
     }
     assert_eq!(files, 18);
-    // The stock rig is what the data are to be compared with, not the rig with the effect.
+    // The data are compared with the stock rig, not with the rig that has the effect.
     assert!(!fs::read_to_string(first.join("dataset.toml")).unwrap().contains("rig ="));
 }
 
@@ -107,7 +106,7 @@ fn a_replayed_session_is_the_session_again() {
     }
 }
 
-/// Greatest distance of two columns of two trials.
+/// Returns the largest difference between a column of two trials.
 fn apart(a: &std::path::Path, b: &std::path::Path, column: &str) -> f64 {
     let values = |path: &std::path::Path| -> Vec<f64> {
         let text = fs::read_to_string(path).unwrap();
@@ -141,14 +140,14 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
     assert!(apart(&usual_at, &dim_at, "bridge_v") > 0.1, "the bridge is dimmed");
     assert_eq!(apart(&usual_at, &dim_at, "length_mm"), 0.0);
     assert!(fs::read_to_string(&dim_at).unwrap().contains("excitation_share"));
-    // Clamped, the chamber fills and the muscle does not move.
+    // With the length clamped, the chamber fills and the muscle does not move.
     let (mut clamped, clamped_at) =
         replayed("inlet,outlet,set_length_mm", &|i| fills(i).to_owned() + ",165");
     runs(&mut clamped);
     assert_eq!(apart(&usual_at, &clamped_at, "pressure_kpa"), 0.0);
     let text = fs::read_to_string(&clamped_at).unwrap();
     assert!(text.lines().skip(1).all(|line| line.split(',').nth(4) == Some("165")));
-    // A shunt acts at once, and a slow amplifier behind it is slow.
+    // A shunt acts immediately, and a slow amplifier after it responds slowly.
     let shunted = |i: usize| if (200..400).contains(&i) { "0.02" } else { "0" };
     let (mut shunt, shunt_at) = replayed("inlet,outlet,set_length_mm,shunt_share", &|i| {
         format!("{},165,{}", fills(i), shunted(i))
@@ -171,7 +170,7 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
         format!("{},{}", fills(i), if i < 400 { "1" } else { "0.7" })
     });
     fails(&mut command, &["next.csv", "excitation_share", "0.7 stands beside 1"]);
-    // An experiment on a gauge alone sets what this rig has no place for.
+    // An experiment for a gauge alone sets a quantity that this rig does not have.
     let (mut command, _) = replayed("set_angle_deg", &|_| "10".to_owned());
     fails(&mut command, &["next.csv", "set_angle_deg"]);
 }

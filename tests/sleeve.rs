@@ -1,5 +1,6 @@
-//! Sensors that are put on again, by another, or broken: `stretch sleeve learn`, `calibrate --signal s1,s2` and `--prior`, `sleeve renew`,
-//! and `apply` with several gauges.
+//! Sensors that are put on again, that are worn by another person, or that are broken:
+//! `stretch sleeve learn`, `calibrate --signal s1,s2` and `--prior`, `sleeve renew`, and `apply`
+//! with several gauges.
 
 use std::{fmt::Write, path::PathBuf};
 
@@ -7,7 +8,7 @@ use assert_cmd::Command;
 
 use crate::support::{Scratch, fails, one_line, prints, runs, stretch};
 
-/// What a session differs by from the usual one.
+/// Parameters of a session.
 #[derive(Clone, Copy)]
 struct Worn {
     wearer: usize,
@@ -19,7 +20,7 @@ struct Worn {
 const SHORT: Worn = Worn { wearer: 7, number: 0, seconds: 20.0, hz: 50.0 };
 
 impl Scratch {
-    /// A session of a wearer in CSV: two gauges with gain, zero and a memory, and an angle.
+    /// Writes a session of a wearer as CSV: two gauges with gain, zero and memory, and an angle.
     fn worn(&self, name: &str, worn: Worn, change: impl Fn(&mut [f64; 3])) -> PathBuf {
         let Worn { wearer, number, seconds, hz } = worn;
         let (w, n) = (wearer as f64, number as f64);
@@ -45,7 +46,7 @@ impl Scratch {
         self.write(name, text)
     }
 
-    /// A session's sums in a file.
+    /// Writes a session, and its sums as a session file.
     fn summed(
         &self,
         name: &str,
@@ -75,7 +76,7 @@ impl Scratch {
         session
     }
 
-    /// Two sessions of each of four wearers.
+    /// Writes two sessions of each of four wearers.
     fn sessions(&self) -> Vec<PathBuf> {
         let one = |k: usize| {
             let worn = Worn { wearer: k / 2, number: k % 2, seconds: 75.0, hz: 50.0 };
@@ -98,14 +99,16 @@ impl Scratch {
         command
     }
 
-    /// Root mean square error of a record's estimates on a session, and what `apply` said on standard error.
+    /// Returns the root mean square error of a calibration's estimates on a session, and the
+    /// messages of `apply` on standard error.
     fn error(&self, record: &str, trial: &str) -> (f64, String) {
         let (errors, said) = self.errors(record, trial, 3);
         assert!(errors.len() > 100, "{said}");
         (root_mean_square(&errors), said)
     }
 
-    /// Errors of a record's estimates of the reference in a column, counted from 0, and what `apply` said on standard error.
+    /// Returns the errors of a calibration's estimates relative to the reference in a column
+    /// (counted from 0), and the messages of `apply` on standard error.
     fn errors(&self, record: &str, trial: &str, column: usize) -> (Vec<f64>, String) {
         let mut command = self.sleeve(&["apply", "--calibration", record, trial]);
         let output = command.output().unwrap();
@@ -124,7 +127,8 @@ fn root_mean_square(errors: &[f64]) -> f64 {
     (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
-/// A wrist bends and turns, and each of three gauges follows both: a record for each angle, out of one recording.
+/// A wrist bends and turns, and three gauges depend on both angles. One recording gives a
+/// calibration file for each angle.
 #[test]
 fn several_references_get_a_record_each() {
     let scratch = Scratch::new();
@@ -153,11 +157,11 @@ fn several_references_get_a_record_each() {
     for (angle, column) in [("bend_deg", 4), ("turn_deg", 5)] {
         assert!(said.contains(&format!("{angle} on s1, s2, s3: RMSE")), "{said}");
         let record = format!("wrist.{angle}.json");
-        // A hundredth of some 80 degrees, and what lies beyond the first recording's ranges.
+        // 2 % of some 80 degrees, including errors beyond the ranges of the first recording.
         let (errors, _) = scratch.errors(&record, "later.csv", column);
         let (rmse_deg, count) = (root_mean_square(&errors), errors.len());
         assert!(count > 2000 && rmse_deg < 1.6, "{angle}: {rmse_deg} of {count}");
-        // No angle knows of the other.
+        // The calibration of an angle does not depend on the other angle.
         let alone = ["--reference", angle, "--signal", "s1,s2,s3", "--out", "alone.json"];
         runs(scratch.sleeve(&["calibrate", "wrist.csv"]).args(alone));
         let text = |name: &str| std::fs::read_to_string(scratch.path(name)).unwrap();
@@ -190,14 +194,14 @@ fn a_prior_needs_seconds_of_reference_or_none() {
     let (alone, ten) =
         (scratch.error("alone.json", "new.csv").0, scratch.error("ten.json", "new.csv").0);
     assert!(ten < 0.3 * alone, "{ten} beside {alone}");
-    // today has no reference at all
+    // The new recording has no reference.
     scratch.worn("today.csv", new, |row| row[2] = f64::NAN);
     let renew = ["sleeve", "renew", "--prior", "prior.json", "--out"];
     let said = runs(scratch.sleeve(&renew).args(["renewed.json", "today.csv"]));
     assert!(said.contains("it is assumed") && said.contains("high end"), "{said}");
     let renewed = scratch.error("renewed.json", "new.csv").0;
     assert!(renewed < 0.6 * alone && renewed > ten, "{renewed} beside {alone}");
-    // the calibration of an earlier session of the same wearer, that is the prior's
+    // The calibration of an earlier session of the same wearer, made from the same prior.
     runs(scratch.sleeve(&from).args(["w1.json", "--of", "w1", "w1_0.csv"]));
     scratch.worn("w1_3.csv", Worn { wearer: 1, number: 2, seconds: 60.0, hz: 50.0 }, |_| ());
     let again = ["--calibration", "w1.json", "--of", "w1", "w1_3.csv", "--json"];
@@ -250,7 +254,7 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
     let (stuck, said) = scratch.error("cal.json", "stuck.csv");
     assert!(said.contains("s2 is left out from 40.") && said.contains("s on: still"), "{said}");
     assert!(stuck < 20.0 * whole, "{stuck} beside {whole}");
-    // a command that takes one gauge says so
+    // A command for one gauge refuses several gauges.
     let evaluate = &mut scratch.sleeve(&["evaluate", "--calibration", "cal.json", "knee.csv"]);
     fails(evaluate, &["cal.json", "several gauges", "stretch apply"]);
 }
@@ -291,7 +295,7 @@ fn priors_refuse_what_they_have_not_seen() {
     fails(&mut with(&["radian.csv"]), &["angle_deg", "--reference"]);
     let other = &mut with(&["--reference", "angle_rad", "radian.csv"]);
     fails(other, &["angle_rad", "stretch convert"]);
-    // an unrelated model is no option next to it
+    // The prior determines the model, so --model is refused.
     assert_eq!(with(&["--model", "linear", "plain.csv"]).output().unwrap().status.code(), Some(2));
     let renew = |name: &str, says: &[&str]| {
         let arguments = ["sleeve", "renew", "--prior", "prior.json", "--out", "no.json", name];
@@ -299,7 +303,7 @@ fn priors_refuse_what_they_have_not_seen() {
     };
     scratch.worn("brief.csv", Worn { seconds: 1.0, ..SHORT }, |_| ());
     renew("brief.csv", &["brief.csv", "no whole movement", "reference"]);
-    // wearer 1 differed by a gain of 0.02 from session to session, and this session by 0.18
+    // The gain of wearer 1 differed by 0.02 between sessions, and in this session by 0.18.
     let far = Worn { wearer: 1, number: 9, seconds: 60.0, hz: 50.0 };
     scratch.worn("far.csv", far, |row| row[2] = f64::NAN);
     let arguments = "sleeve renew --prior prior.json --of w1 --out no.json far.csv";
@@ -327,7 +331,8 @@ fn sessions_of_different_kinds_make_no_prior() {
     fails(scratch.sleeve(&["sleeve", "learn", "--out", "no.json"]).args(&good), &["at least 3"]);
     let damaged = std::fs::read_to_string(&good[0]).unwrap().replacen("0.", "1.", 1);
     refused(scratch.write("damaged.json", damaged), &["damaged.json", "edited or damaged"]);
-    // rows after the end of a reference are left out and counted; a third of all rows is too many
+    // Rows after the end of the reference are left out and counted. A third of all rows is too
+    // many.
     let k = std::cell::Cell::new(0);
     scratch.worn("early.csv", worn(2), |row| {
         k.set(k.get() + 1);

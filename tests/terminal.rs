@@ -1,5 +1,5 @@
-//! What every command has in common on a terminal: how much it says, how wide, in which colours, as JSON, through `-`, and with
-//! which status it ends.
+//! Properties of all commands on a terminal: amount of output, line width, colours, JSON, the path
+//! `-`, and exit status.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use crate::support::{Scratch, calibrate, fails, json_to, one_line, prints, runs,
 use clap_complete::Shell;
 use serde_json::Value;
 
-/// A rig with hysteresis, which a diagnosis names, and one without any effect.
+/// Simulates a rig with hysteresis, which a diagnosis names, and a rig without any effect.
 fn benches() -> Scratch {
     let scratch = Scratch::new();
     for (name, effect) in [("bench", Some("gauge_hysteresis:h=0.2,s=0.012")), ("plain", None)] {
@@ -32,7 +32,7 @@ fn verdicts_that_are_named_have_a_status_of_their_own() {
         let mut command = stretch();
         command.arg("diagnose").arg(scratch.path(folder)).args(["--no-next", "--fail-on", on]);
         let output = command.output().unwrap();
-        // the answer is there whatever the status
+        // The result is printed whatever the exit status.
         assert!(stdout(&output).lines().count() > 5, "{folder} {on}");
         output.status.code()
     };
@@ -77,7 +77,7 @@ fn json_is_a_flag_and_a_file_has_an_option() {
     assert_eq!(whole(&printed), written);
     assert_eq!(whole(&dashed), written);
     assert_eq!(written["verdict"], "effect");
-    // other commands
+    // Other commands.
     let trial = scratch.loops("a.csv", 20.0, 1.1);
     let cal = scratch.path("cal.json");
     let told = json(&runs(calibrate(&trial, &cal).arg("--json")));
@@ -93,7 +93,7 @@ fn json_is_a_flag_and_a_file_has_an_option() {
     let file = scratch.path("e.json");
     runs(with("evaluate --calibration cal.json a.csv").arg(json_to(&file)));
     assert_eq!(json(&fs::read_to_string(file).unwrap())["unit"], "mm");
-    // what was written before
+    // An earlier form of the option.
     for (line, says) in [
         ("diagnose bench --json d.json", "write --json=d.json for a file"),
         ("diagnose --json d.json bench", "write --json=d.json for a file"),
@@ -168,7 +168,7 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     assert_eq!(both.status.code(), Some(2));
 }
 
-/// What a command prints at the width that `COLUMNS` gives.
+/// Runs a command with a line width given by `COLUMNS`, and returns its output.
 fn at_width(scratch: &Scratch, line: &str, columns: Option<usize>) -> String {
     let mut command = stretch();
     command.current_dir(scratch.path("")).args(line.split(' ')).env_remove("COLUMNS");
@@ -213,9 +213,9 @@ fn no_line_is_wider_than_the_terminal_or_a_hundred_columns() {
                 "{line}: a word that cannot break stands alone: {row}"
             );
         }
-        // narrower, not less
+        // Narrower output contains the same words.
         let words = |text: &str| -> std::collections::BTreeSet<String> {
-            // -v begins its lines with the time, which is another in every run
+            // With -v, lines begin with the elapsed time, which differs between runs.
             let stamp = |line: &str| line.starts_with('[').then(|| line.find(']')).flatten();
             let said = text.lines().map(|line| &line[stamp(line).map_or(0, |end| end + 1)..]);
             let own = said
@@ -246,7 +246,8 @@ fn colours_follow_the_terminal_and_no_color() {
     assert!(!said(&[("NO_COLOR", "1")]).contains('\u{1b}'));
 }
 
-/// Options that a command lists in its help, without help, version, and what all commands have.
+/// Counts the options that a command lists in its help, without help, version, and the global
+/// options.
 fn options(command: &clap::Command) -> usize {
     let is_own = |argument: &&clap::Arg| {
         !argument.is_positional()
@@ -257,7 +258,7 @@ fn options(command: &clap::Command) -> usize {
     command.get_arguments().filter(is_own).count() + below.map(options).sum::<usize>()
 }
 
-/// A newcomer reads a command's help at a glance, and the program does not grow an option for everything.
+/// A command's help must be short, and the numbers of commands and options must remain small.
 #[test]
 fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let program = stretch_cli::command();

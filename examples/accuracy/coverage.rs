@@ -1,4 +1,4 @@
-//! How often the 95 % bounds of an observer's parameters hold the truth.
+//! How often the 95 % bounds of an observer's parameters contain the true values.
 
 use std::f64::consts::TAU;
 
@@ -15,9 +15,9 @@ const LEAD_S: f64 = 0.02;
 const AMPLITUDE: f64 = 0.4;
 const TAU_S: f64 = 0.25;
 
-/// A gauge of exactly the observer's form on a motion of random sines, with white
-/// noise of 1 % and, where `wandering` is above zero, an error that the model does
-/// not have: a first-order Gauss-Markov process of 1 s.
+/// Simulates a gauge of exactly the observer's form, with a motion of random sines, white noise of
+/// 1 % and, if `wandering` is above zero, an error that is not in the model: a first-order
+/// Gauss-Markov process of 1 s.
 fn trial(random: &mut ChaCha8Rng, wandering: f64) -> Trial {
     let waves: Vec<(f64, f64)> = (0..5)
         .map(|k| (0.4 + 1.3 * f64::from(k) + random.random::<f64>(), TAU * random.random::<f64>()))

@@ -1,12 +1,12 @@
-//! Trials: simulated sessions, and what may go wrong with a log.
+//! Trials of simulated sessions, and faults of logs.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stretch_data::{Split, Trial};
 use stretch_sim::{Rig, RunSettings, Session, TrialPlan};
 
-/// A simulated session: twelve ramps, an arbitrary and a pulse trial to fit, two
-/// arbitrary and a pulse trial to test on.
+/// A simulated session. For fitting: twelve ramps, an arbitrary trial and a pulse trial. For
+/// testing: two arbitrary trials and a pulse trial.
 pub(crate) struct Simulated {
     pub(crate) fit: Vec<Trial>,
     pub(crate) test: Vec<Trial>,
@@ -24,7 +24,7 @@ impl Simulated {
         Ok(Self { fit, test })
     }
 
-    /// The paper's twelve.
+    /// Returns the paper's twelve ramps.
     pub(crate) fn ramps(&self) -> &[Trial] {
         &self.fit[..12]
     }
@@ -38,16 +38,16 @@ impl Simulated {
     }
 }
 
-/// Something wrong with a log at use that was not there at calibration.
+/// A fault of a log in use that was not present at calibration.
 #[derive(Clone, Copy)]
 pub(crate) enum Fault {
-    /// White noise, in shares of the signal's range.
+    /// White noise, relative to the signal's range.
     Noise(f64),
-    /// Time stamps off by up to so many seconds either way.
+    /// Errors of the time stamps of up to this many seconds in both directions.
     Jitter(f64),
-    /// So large a share of the samples lost.
+    /// Share of samples that are lost.
     Dropped(f64),
-    /// The signal shifting by so large a share of its range over the trial.
+    /// Drift of the signal over the trial, relative to its range.
     Drift(f64),
 }
 
@@ -62,13 +62,13 @@ impl Fault {
         match self {
             Self::Noise(share) => {
                 for x in channel(&mut out, signal) {
-                    // twelve uniforms: a normal deviate to three digits
+                    // The sum of twelve uniform numbers is a normal deviate to three digits.
                     let normal: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
                     *x += share * span * normal;
                 }
             }
             Self::Jitter(seconds) => {
-                // the sample is taken late or early; its stamp says when it should have been
+                // The sample is taken late or early, while its stamp shows the nominal time.
                 let times = &trial.time_s;
                 let moved: Vec<f64> = times
                     .iter()

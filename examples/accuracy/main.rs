@@ -1,17 +1,16 @@
-//! Every figure of `book/src/results/accuracy.md`, by one command:
+//! Computes every figure of `book/src/results/accuracy.md` with one command:
 //!
 //! ```sh
 //! cargo run --release --example accuracy              # prints tables
 //! cargo run --release --example accuracy -- --write   # and renews reference/accuracy/*.csv
 //! ```
 //!
-//! Seeds are arbitrary until `--development` asks for the ones that
-//! the models were designed on; then nothing is written.
+//! The seeds are fixed and arbitrary. `--development` uses the seeds on which the models were
+//! designed, and writes nothing.
 //!
-//! Measured sessions are not part of the project: `--data DIR` or `STRETCH_DATA` names the folder that holds
-//! `knit_sleeve` (default `../shared/data` next to the workspace); without it their tables are left out.
-//!
-//! Names of parts (why, candidates, effects, robust, measured, coverage) or of effects select some.
+//! `--data DIR` or `STRETCH_DATA` names the folder with `knit_sleeve` (default `../shared/data` next
+//! to the workspace). Without it the tables of measured sessions are left out. Names of parts
+//! (why, candidates, effects, robust, measured, coverage) or of effects select these.
 //!
 //! All errors are root mean squares on trials that were never fitted. Intervals
 //! come from a block bootstrap over half-second blocks.
@@ -68,7 +67,7 @@ impl ResultTable {
     }
 }
 
-/// What makes the tables of one part.
+/// A function that computes the tables of one part.
 type Part<'a> = &'a dyn Fn() -> anyhow::Result<Vec<ResultTable>>;
 
 fn main() -> anyhow::Result<()> {

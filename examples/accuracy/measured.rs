@@ -1,5 +1,6 @@
-//! Candidates on measured sessions: calibrated on one, tested on another of the same sleeve
-//! (github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit 47369abac95f, MIT).
+//! Candidates on measured sessions: calibrated on one session, tested on another session of the
+//! same sleeve (github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit 47369abac95f,
+//! MIT).
 
 use std::path::Path;
 
@@ -19,14 +20,14 @@ const SESSIONS: [[&str; 2]; 3] = [
     ["lift_up_1", "lift_up_2"],
 ];
 
-/// One session to fit, another to test on, and the signal chosen on the first.
+/// A session to fit, a session to test on, and the signal chosen on the first.
 pub(crate) struct Pair {
     pub(crate) fit: Trial,
     pub(crate) test: Trial,
     pub(crate) options: Options,
 }
 
-/// All pairs of sessions of a sleeve; empty if they are not there.
+/// Returns all pairs of sessions of a sleeve. Empty if the data do not exist.
 pub(crate) fn pairs(data: &Path) -> anyhow::Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     let Some(sleeve) = testkit::measured::folder_in(data, "knit_sleeve") else { return Ok(pairs) };

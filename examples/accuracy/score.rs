@@ -8,7 +8,7 @@ use stretch_data::Trial;
 
 /// Samples in a block: half a second.
 const BLOCK: usize = 50;
-/// Samples of warm-up that are not judged.
+/// Samples of warm-up that are not evaluated.
 const SETTLE: usize = 20;
 const DRAWS: usize = 2000;
 
@@ -28,7 +28,7 @@ impl Blocks {
         Ok(blocks)
     }
 
-    /// The signal scaled so that its extremes meet the reference's.
+    /// Errors of the signal, scaled so that its extremes equal those of the reference.
     pub(crate) fn raw(calibration: &Calibration, trials: &[Trial]) -> anyhow::Result<Self> {
         let mut blocks = Self::default();
         for trial in evaluate(&[("x", calibration)], trials)?.trials {
@@ -43,7 +43,8 @@ impl Blocks {
             let errors = truth.iter().zip(estimate).map(|(t, e)| (t - e).powi(2));
             let (sum, n) =
                 errors.filter(|e| e.is_finite()).fold((0.0, 0.0), |(sum, n), e| (sum + e, n + 1.0));
-            // a block without any answer keeps its place: pairs must stay pairs
+            // A block without any estimate becomes NaN, so that blocks of two methods still
+            // correspond.
             self.0.push(if n > 0.0 { sum / n } else { f64::NAN });
         }
     }
@@ -57,7 +58,7 @@ impl Blocks {
         (good.iter().sum::<f64>() / good.len() as f64).sqrt()
     }
 
-    /// Ratio of root mean squares to another's, and its 95 % interval.
+    /// Returns the ratio of this root mean square to another one, and its 95 % interval.
     pub(crate) fn over(&self, other: &Self) -> (f64, f64, f64) {
         let pairs: Vec<(f64, f64)> = (self.0.iter().zip(&other.0))
             .map(|(a, b)| (*a, *b))

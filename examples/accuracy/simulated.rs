@@ -11,9 +11,10 @@ use crate::{
     score::{Blocks, interval, number},
 };
 
-/// Seeds that structure, margins and grids were chosen on: their figures flatter.
+/// Seeds on which structure, margins and grids were chosen. Their results are therefore too
+/// optimistic.
 pub(crate) const DEVELOPMENT: [u64; 5] = [7, 8, 9, 10, 12];
-/// Seeds of the published figures, fixed before anything ran on them.
+/// Seeds of the published figures, fixed before any run on them.
 pub(crate) const PUBLISHED: [u64; 5] = [1_000_101, 1_000_102, 1_000_103, 1_000_104, 1_000_105];
 pub(crate) const MODELS: [&str; 6] =
     ["linear", "poly13", "history", "observer", "history+rest", "observer+rest"];
@@ -64,7 +65,7 @@ impl Row {
     }
 }
 
-/// All candidates, calibrated on all fit trials and on the paper's twelve ramps.
+/// Evaluates all candidates, calibrated on all fit trials and on the paper's twelve ramps.
 pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "model",
@@ -114,7 +115,7 @@ fn sessions(seeds: &[u64]) -> anyhow::Result<Vec<Simulated>> {
     seeds.iter().map(|&seed| Simulated::new(&rig, seed, true)).collect()
 }
 
-/// Each effect of the sensing stage alone, at the middle of its range.
+/// The effects of the sensing stage that are tested, one at a time, at the middle of their ranges.
 const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
     ("sleeve_slack", &[("e_s", 0.1)]),
     ("sleeve_slip", &[("w", 0.015)]),
@@ -137,7 +138,7 @@ pub(crate) fn is_effect(name: &str) -> bool {
     EFFECTS.iter().any(|(own, _)| *own == name)
 }
 
-/// Those of `only`, or all of them.
+/// Evaluates the effects in `only`, or all effects if it is empty.
 pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "effect",
@@ -185,7 +186,7 @@ pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Result
     Ok(vec![table])
 }
 
-/// Faults at use that were not there at calibration.
+/// Evaluates faults in use that were not present at calibration.
 pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "fault at use",

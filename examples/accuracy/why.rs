@@ -1,4 +1,4 @@
-//! Why the published method fails on arbitrary actuation: each cause switched off.
+//! Why the published method fails on arbitrary actuation: each cause is removed separately.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(crate) fn tables(data: &Path, seeds: &[u64]) -> anyhow::Result<Vec<ResultTab
     Ok(tables)
 }
 
-/// What is left of each estimate when something of it is taken away afterwards.
+/// A part of each estimate's error that is removed afterwards.
 #[derive(Clone, Copy)]
 enum After {
     /// The best constant delay of each trial.

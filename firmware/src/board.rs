@@ -1,4 +1,4 @@
-//! The edge of the program: what a port to another board replaces.
+//! Board-specific code, to be replaced when porting to another board.
 
 use core::marker::PhantomData;
 
@@ -7,20 +7,20 @@ use stretch_receptor::code::AdcCode;
 
 use crate::trial;
 
-/// Something that converts one sample when asked.
+/// A converter that takes one sample per call.
 ///
-/// embedded-hal 1.0 has no trait for converters, and that of 0.2
-/// ([`OneShot`]) is still what most chips' crates implement; [`Pin`] makes one of
-/// these from any of those. A chip whose crate has neither implements this.
+/// embedded-hal 1.0 has no trait for converters. Most chips' crates still implement that of
+/// embedded-hal 0.2 ([`OneShot`]), and [`Pin`] adapts it to this trait. A chip whose crate does not
+/// implement it can implement this trait directly.
 pub trait Converter {
-    /// Why there is no sample.
+    /// Error if there is no sample.
     type Error;
 
     /// Starts a conversion and waits for it: a few microseconds.
     fn convert(&mut self) -> Result<AdcCode, Self::Error>;
 }
 
-/// A converter of embedded-hal 0.2 and the pin that the bridge's amplifier is on.
+/// A converter of embedded-hal 0.2, and the pin to which the bridge's amplifier is connected.
 pub struct Pin<Port, Adc, P> {
     adc: Adc,
     pin: P,
@@ -28,7 +28,7 @@ pub struct Pin<Port, Adc, P> {
 }
 
 impl<Port, Adc, P> Pin<Port, Adc, P> {
-    /// A converter and one of its pins.
+    /// Combines a converter with one of its pins.
     pub fn new(adc: Adc, pin: P) -> Self {
         Self { adc, pin, port: PhantomData }
     }
@@ -46,14 +46,14 @@ where
     }
 }
 
-/// In place of a converter: the recorded trial.
+/// A replacement for a converter: replays the recorded trial.
 pub struct Replay<I>(I);
 
-/// The trial has ended.
+/// The error after the end of the trial.
 pub struct Ended;
 
 impl Replay<()> {
-    /// From the first sample.
+    /// Starts at the first sample.
     pub fn new() -> Replay<impl Iterator<Item = AdcCode>> {
         Replay(trial::codes())
     }
@@ -76,7 +76,7 @@ impl Uart {
     /// Enables the transmitter.
     ///
     /// # Safety
-    /// The program runs on an MPS2 board, and nothing else uses the port.
+    /// The program must run on an MPS2 board, and nothing else may use the port.
     pub unsafe fn take() -> Self {
         let uart = Self(());
         uart.write_register(0x10, 217); // 25 MHz / 115,200
@@ -85,7 +85,8 @@ impl Uart {
     }
 
     fn write_register(&self, offset: usize, value: u32) {
-        // SAFETY: a register of the port that `take` was promised.
+        // SAFETY: the register belongs to the port, whose exclusive use the caller of `take`
+        // guarantees.
         unsafe { ((Self::BASE + offset) as *mut u32).write_volatile(value) }
     }
 

@@ -1,8 +1,8 @@
-//! A checksum over everything that a receptor answers.
+//! A checksum over all answers of a receptor.
 
 use stretch_receptor::{Withheld, code::CodeReading};
 
-/// FNV-1a, 32 bits.
+/// An FNV-1a hash, 32 bits.
 #[derive(Debug, Clone, Copy)]
 pub struct Checksum(pub u32);
 
@@ -14,7 +14,7 @@ impl Default for Checksum {
 
 /// The bits of an estimate.
 pub trait Bits {
-    /// As they would lie in memory.
+    /// Returns the bits in their memory representation.
     fn bits(self) -> u32;
 }
 
@@ -35,7 +35,7 @@ impl Checksum {
         self.0 = (self.0 ^ u32::from(byte)).wrapping_mul(0x0100_0193);
     }
 
-    /// Takes one answer: what it is, branch and domain, and every bit of the estimate.
+    /// Adds one answer: its kind, branch and domain, and every bit of the estimate.
     pub fn answer<E: Bits>(&mut self, answer: Result<CodeReading<E>, Withheld>) {
         match answer {
             Ok(reading) => {

@@ -1,7 +1,7 @@
-//! Counting instructions in the emulator.
+//! Counts instructions in the emulator.
 //!
-//! Under `-icount shift=7` an instruction takes 128 ns of virtual time and
-//! SysTick counts 25 MHz of it: 3.2 ticks an instruction, exactly.
+//! Under `-icount shift=7` an instruction takes 128 ns of virtual time. SysTick counts this time at
+//! 25 MHz, which is exactly 3.2 ticks per instruction.
 
 use core::sync::atomic::{Ordering::SeqCst, compiler_fence};
 
@@ -17,8 +17,8 @@ pub fn start(syst: &mut SYST) {
     syst.enable_counter();
 }
 
-/// What `body` answers, and how many instructions it took, the reading of the
-/// counter included.
+/// Returns the result of `body` and the number of its instructions, including the reading of the
+/// counter.
 #[inline(always)]
 pub fn bracket<R>(body: impl FnOnce() -> R) -> (R, u32) {
     compiler_fence(SeqCst);
@@ -28,7 +28,7 @@ pub fn bracket<R>(body: impl FnOnce() -> R) -> (R, u32) {
     compiler_fence(SeqCst);
     let after = SYST::get_current();
     compiler_fence(SeqCst);
-    // it counts down
+    // The counter counts down.
     let ticks = before.wrapping_sub(after) & RELOAD;
     (result, (ticks * 10 + 16) / 32)
 }

@@ -1,4 +1,4 @@
-//! Four gauges that follow the trial, each with its own gain.
+//! Four simulated gauges that follow the trial, each with a different gain.
 
 use stretch_core::Branch;
 use stretch_receptor::{Domain, Withheld, code::CodeReading};
@@ -7,17 +7,17 @@ use stretch_sleeve::{ArrayReading, ArrayWithheld};
 /// Number of gauges.
 pub const GAUGES: usize = 4;
 
-/// Gain of a gauge over the trial's volts.
+/// Returns the gain of a gauge relative to the trial's volts.
 pub fn gain(gauge: usize) -> f32 {
     1.0 + 0.25 * gauge as f32
 }
 
-/// A sample of each gauge; NaN of each where the trial has none.
+/// Returns a sample of each gauge. All are NaN if the trial's sample is missing.
 pub fn samples(volts: f32) -> [f32; GAUGES] {
     core::array::from_fn(|gauge| gain(gauge) * volts)
 }
 
-/// What goes into the checksum: a lost channel takes the place of the branch.
+/// Converts a reading for the checksum. A lost channel is encoded as the branch.
 pub fn answer(
     reading: Result<ArrayReading<f32>, ArrayWithheld>,
 ) -> Result<CodeReading<f32>, Withheld> {

@@ -1,4 +1,4 @@
-//! What the programs in `src/bin` share. See the README next to this package.
+//! Code shared by the programs in `src/bin`. See the README of this package.
 #![no_std]
 
 pub mod board;

@@ -1,4 +1,4 @@
-//! Replays the trial through a receptor and prints what it cost.
+//! Replays the trial through a receptor and prints the cost of a step.
 
 use semihosting::{eprintln, println};
 use stretch_core::Millimetres;
@@ -12,12 +12,12 @@ use crate::{
     count, stack, trial,
 };
 
-/// What a step answers here.
+/// The answer of a step.
 pub type Answer<E> = Result<CodeReading<E>, Withheld>;
 
-/// An estimate that can be shown.
+/// An estimate that can be converted to a length.
 pub trait Length: Bits + Copy {
-    /// In millimetres.
+    /// Returns the length in millimetres.
     fn length(self) -> Millimetres<f32>;
 }
 
@@ -33,8 +33,8 @@ impl Length for f32 {
     }
 }
 
-/// Length, branch and domain of a reading, and not its rate: what is not read
-/// is not computed.
+/// Keeps length, branch and domain of a reading, but not its rate, so that the compiler removes the
+/// computation of the rate.
 #[inline(always)]
 pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
     answer.map(|Reading { estimate, branch, domain, .. }| CodeReading { estimate, branch, domain })
@@ -42,9 +42,9 @@ pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
 
 /// Replays every sample through `step`, a function that is not inlined, and prints one line.
 ///
-/// `input` makes the sample, and `answer` an answer of what came back, outside of the count. The count has everything
-/// between two readings of the counter but those: passing the arguments, the
-/// call, the step, the return.
+/// `input` makes the sample, and `answer` converts the result to an answer; neither is counted. The
+/// count covers the code between two readings of the counter, without the readings themselves:
+/// passing the arguments, the call, the step, and the return.
 #[inline(never)]
 pub fn replay<D, M: ?Sized, I, R, E: Length>(
     model: &str,
@@ -54,7 +54,7 @@ pub fn replay<D, M: ?Sized, I, R, E: Length>(
     step: impl Fn(&D, &mut M, I) -> R,
     answer: impl Fn(R) -> Answer<E>,
 ) {
-    // a program of several models starts the counter once
+    // A program with several models starts the counter only once.
     if let Some(mut core) = cortex_m::Peripherals::take() {
         count::start(&mut core.SYST);
     }
@@ -88,13 +88,13 @@ pub fn replay<D, M: ?Sized, I, R, E: Length>(
     }
 }
 
-/// A record from flash, its seal checked.
+/// Loads a calibration from flash and checks its checksum.
 pub fn load<'a, T: serde::Deserialize<'a>>(record: &'a [u8]) -> T {
     stretch_core::record::load(record).expect("a sound record")
 }
 
-/// The `main` of a program that replays the trial through a design, once for each
-/// model and the record of it: from converter codes, or from volts to `f32`.
+/// Generates the `main` of a program that replays the trial through a design, once for each model
+/// and its calibration. The samples are converter codes, or volts in `f32`.
 ///
 /// `codes, Design, Estimate, |record| design` or `volts, Design, |calibration| design`,
 /// then `"model" from "record"`.

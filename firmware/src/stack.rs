@@ -1,11 +1,11 @@
-//! How deep the stack went.
+//! Measures the depth of the stack.
 
 const DEPTH: usize = 4096;
 const PAINT: u32 = 0xa5c3_5a3c;
 
-/// Paints [`DEPTH`] bytes below the caller's frame.
+/// Fills [`DEPTH`] bytes below the caller's frame with a pattern.
 ///
-/// Inlined, so that none of its data lies there.
+/// This function is inlined, so that none of its data lies in that area.
 #[inline(always)]
 pub fn paint() -> usize {
     let sp: usize;
@@ -20,7 +20,7 @@ pub fn paint() -> usize {
     sp
 }
 
-/// Bytes below `sp` that were written since [`paint`].
+/// Returns the number of bytes below `sp` from the deepest one that was written since [`paint`].
 pub fn depth(sp: usize) -> usize {
     let mut at = sp - DEPTH;
     // SAFETY: as above, read only.

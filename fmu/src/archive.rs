@@ -1,4 +1,4 @@
-//! An FMU as a file: unpacked, read and checked before any of its code runs.
+//! The FMU file: unpacked, read and checked before any of its code runs.
 
 use std::{
     fs,
@@ -20,7 +20,7 @@ use crate::{
     model::{Model, Version},
 };
 
-/// An FMU, unpacked into a folder that is removed with it.
+/// An FMU, unpacked into a temporary folder.
 #[derive(Debug)]
 pub struct Fmu {
     file: PathBuf,
@@ -32,7 +32,7 @@ impl Fmu {
     /// Unpacks an FMU and reads its description; none of its code runs.
     ///
     /// # Errors
-    /// Files that are no FMU for co-simulation, or none for this machine.
+    /// Files that are no FMU for co-simulation, or that contain no library for this machine.
     ///
     /// ```
     /// let error = stretch_fmu::Fmu::open("no_such.fmu").unwrap_err();
@@ -55,12 +55,12 @@ impl Fmu {
         }
     }
 
-    /// What it says of itself.
+    /// Returns the model description.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The file that it was opened from.
+    /// Returns the path from which the FMU was opened.
     pub fn file(&self) -> &Path {
         &self.file
     }

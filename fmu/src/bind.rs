@@ -1,4 +1,4 @@
-//! Matches names of a problem with variables of an FMU.
+//! Matching of names in a problem with variables of an FMU.
 
 use std::collections::BTreeMap;
 
@@ -11,29 +11,29 @@ use crate::{
     model::{Kind, Model, Role, Variable},
 };
 
-/// Names that are listed at most in a message.
+/// Largest number of names listed in a message.
 const LISTED: usize = 12;
 
-/// What a problem says of names beyond the session.
+/// Additional information of a problem about its names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Names {
-    /// Variable of the FMU for a parameter, an effect's value or a column, if its name differs.
+    /// Variable of the FMU for a parameter, an effect's value or a column, if the names differ.
     pub variables: BTreeMap<String, String>,
-    /// Units of parameters and effects' values in the problem; those of columns are in the session.
+    /// Units of parameters and effect values in the problem. Units of columns are in the session.
     pub units: BTreeMap<String, String>,
 }
 
-/// What of an FMU is set and read in a session.
+/// The variables of an FMU that a session sets and reads.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bound {
     /// Parameters, then effects, in the session's order.
     pub(crate) values: Slots,
-    /// Columns that drive it, each once.
+    /// Input columns, without duplicates.
     pub(crate) inputs: Vec<String>,
     pub(crate) inputs_at: Slots,
-    /// Outputs of the stages, in their order.
+    /// Outputs, in the order of the stages.
     pub(crate) outputs: Slots,
-    /// What there is to say.
+    /// Notes for the user.
     pub(crate) notes: Vec<String>,
 }
 
@@ -128,7 +128,7 @@ fn check_mapped(session: &RecordedSession, names: &Names) -> Result<(), FmuError
     }
 }
 
-/// A name that is looked for.
+/// A name to be found among the variables.
 struct Asked<'a> {
     what: &'static str,
     name: &'a str,
@@ -140,8 +140,8 @@ impl Asked<'_> {
     fn of<'m>(&self, model: &'m Model, names: &Names) -> Result<&'m Variable, FmuError> {
         let mapped = names.variables.get(self.name).map(String::as_str);
         let named = |name: &str| model.variables.iter().find(|v| v.name == name);
-        // A column has its unit in its name, as angle_deg; a variable of an FMU has it in a
-        // separate attribute.
+        // The unit is a part of a column's name, such as angle_deg. A variable of an FMU has its
+        // unit in a separate attribute.
         let bare = || self.name.strip_suffix(self.unit)?.strip_suffix('_').and_then(named);
         let found = match mapped {
             Some(name) => named(name),
@@ -181,7 +181,7 @@ impl Asked<'_> {
         }
     }
 
-    /// Refuses a variable that something else sets already.
+    /// Refuses a variable that is already set under another name.
     fn once<'m>(&self, variable: &'m Variable, set: &mut Vec<&'m str>) -> Result<(), FmuError> {
         if set.contains(&variable.name.as_str()) {
             return Err(FmuError::Variable {
@@ -200,7 +200,7 @@ impl Asked<'_> {
         let fits =
             |v: &&Variable| self.roles.contains(&v.role) && !matches!(v.kind, Kind::Other(_));
         let all: Vec<&str> = model.variables.iter().filter(fits).map(|v| v.name.as_str()).collect();
-        // Names have several parts in most FMUs: users remember the last one, or a part of it.
+        // Most FMUs have names of several parts. Users remember the last part, or a piece of it.
         let lower = variable.to_lowercase();
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let is_near = |name: &str| {
@@ -232,7 +232,7 @@ impl Asked<'_> {
     }
 }
 
-/// Whether two units are written alike; an unknown one fits any.
+/// Whether two units have the same notation. A unit that is not given matches any.
 fn is_same(a: &str, b: &str) -> bool {
     let plain = |unit: &str| -> String {
         let unit = unit.trim().replace(['·', '*', ' '], ".");

@@ -1,21 +1,21 @@
-//! A place on the stack that stays as it is.
+//! Calls at the bottom of a deep stack, so that their stack frames are not overwritten.
 //!
-//! `fmi2Instantiate` takes its callbacks as a pointer to a struct. Some FMUs keep the pointer and
-//! follow it as long as they live. The library that calls it here keeps the struct on its stack,
-//! and the next calls would overwrite it. Therefore an instance is made at the bottom of a deep
-//! stack, and everything else is called from its top. The distance is larger than the whole stack
-//! of a usual program.
+//! `fmi2Instantiate` takes its callbacks as a pointer to a struct. Some FMUs keep this pointer and
+//! dereference it during their whole life. The library used here keeps the struct on its stack,
+//! where later calls would overwrite it. Therefore an instance is created at the bottom of a deep
+//! stack, and everything else is called from its top. The distance equals the whole stack of a
+//! usual program.
 
 use std::{hint::black_box, mem::MaybeUninit};
 
-/// Distance between deep calls and calls from the top, bytes: the usual stack of a whole program.
+/// Distance between deep calls and calls from the top, bytes: the usual stack size of a program.
 const DEPTH: usize = 8 << 20;
-/// Stack of a thread that calls deep, bytes.
+/// Stack size of a thread that makes deep calls, bytes.
 pub(crate) const STACK: usize = 3 * DEPTH;
-/// Bytes of one frame.
+/// Size of one frame, bytes.
 const FRAME: usize = 64 << 10;
 
-/// Calls a function [`DEPTH`] bytes further down.
+/// Calls a function [`DEPTH`] bytes further down the stack.
 pub(crate) fn deep<T>(call: impl FnOnce() -> T) -> Option<T> {
     let mut call = Some(call);
     let mut out = None;
@@ -31,8 +31,7 @@ fn sink(frames: usize, call: &mut dyn FnMut()) {
         0 => call(),
         _ => sink(frames - 1, call),
     }
-    // Something has to be done after the call, because otherwise it would be a tail call and take
-    // no stack.
+    // This use of `frame` prevents a tail call, which would need no additional stack.
     black_box(&frame);
 }
 

@@ -1,4 +1,4 @@
-//! What an FMU offers, as the beginning of a problem's file.
+//! The interface of an FMU as the beginning of a problem file.
 
 use std::fmt::Write;
 
@@ -7,10 +7,10 @@ use crate::{
     model::{Kind, Role, Variable},
 };
 
-/// A first `problem.toml`: a stage for every output, driven by all inputs, and every parameter,
-/// exact until a tolerance is given.
+/// Returns a first `problem.toml`: a stage for every output, driven by all inputs, and all
+/// parameters, which are exact until a tolerance is given.
 ///
-/// Columns have the names of the variables; the recordings have to be added.
+/// Columns have the names of the variables. The recordings have to be added by the user.
 pub fn describe(fmu: &Fmu) -> String {
     let model = fmu.model();
     let with = |role: Role| {
@@ -22,7 +22,7 @@ pub fn describe(fmu: &Fmu) -> String {
     let inputs: Vec<&str> = with(Role::Input).map(|v| v.name.as_str()).collect();
     let mut out = format!("# {}, FMI {}\n", model.name.replace('\n', " "), model.version.number());
     let mut add = |text: std::fmt::Arguments<'_>| {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = out.write_fmt(text);
     };
     add(format_args!("[simulator]\nfmu = {file:?}\n"));

@@ -1,8 +1,8 @@
-//! Why an FMU cannot be a simulator of a problem.
+//! Reasons why an FMU cannot be the simulator of a problem.
 
 use std::path::PathBuf;
 
-/// Why an FMU cannot be a simulator of a problem; says what to do.
+/// Why an FMU cannot be the simulator of a problem. The message states the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FmuError {
@@ -14,7 +14,7 @@ pub enum FmuError {
         /// What went wrong.
         why: String,
     },
-    /// The file is no ZIP archive.
+    /// The file is not a ZIP archive.
     #[error("{}: it is no ZIP archive, so it is no FMU ({why}); give the .fmu file itself", file.display())]
     Archive {
         /// The file.
@@ -22,7 +22,7 @@ pub enum FmuError {
         /// What is wrong with it.
         why: String,
     },
-    /// The description is missing or does not do.
+    /// The model description is missing or invalid.
     #[error("{}: its modelDescription.xml does not do: {why}", file.display())]
     Description {
         /// The file.
@@ -30,30 +30,30 @@ pub enum FmuError {
         /// What is wrong with it.
         why: String,
     },
-    /// Another version of the standard.
+    /// The FMU is for an unsupported version of the standard.
     #[error("{}: it is of FMI {version}; FMI 2.0 and FMI 3.0 are run, export it as one of them", file.display())]
     Version {
         /// The file.
         file: PathBuf,
-        /// What it says.
+        /// The version in the description.
         version: String,
     },
-    /// Model exchange: it brings no solver.
+    /// The FMU is only for model exchange, so it contains no solver.
     #[error("{}: it is for model exchange alone and brings no solver; export it for co-simulation", file.display())]
     Exchange {
         /// The file.
         file: PathBuf,
     },
-    /// No library for this machine.
+    /// The FMU contains no library for this machine.
     #[error(
         "{}: it holds no {wanted} and cannot run on this machine; it holds {found}; export it for this platform", file.display()
     )]
     Platform {
         /// The file.
         file: PathBuf,
-        /// The library that is looked for.
+        /// The required library.
         wanted: String,
-        /// Platforms that it has libraries for.
+        /// The platforms for which it contains libraries.
         found: String,
     },
     /// The library cannot be loaded.
@@ -61,7 +61,7 @@ pub enum FmuError {
     Library {
         /// The file.
         file: PathBuf,
-        /// What the loader says.
+        /// The loader's message.
         why: String,
     },
     /// The library lacks a function of the standard.
@@ -76,12 +76,12 @@ pub enum FmuError {
         /// Version of FMI.
         version: u8,
     },
-    /// It gives no instance of itself.
+    /// The FMU cannot be instantiated.
     #[error("{}: it gives no instance of itself{said}", file.display())]
     Instance {
         /// The file.
         file: PathBuf,
-        /// What it says of that.
+        /// The FMU's message.
         said: String,
     },
     /// A name that matches no variable.
@@ -91,14 +91,14 @@ pub enum FmuError {
         what: &'static str,
         /// Name in the problem.
         name: String,
-        /// Name that was looked for in the FMU.
+        /// Name that was searched for in the FMU.
         variable: String,
-        /// What may be meant, in parentheses.
+        /// Similar names, in parentheses.
         near: String,
-        /// Variables that would do.
+        /// Variables that can be used.
         known: String,
     },
-    /// A variable that cannot be used as the problem wants to.
+    /// A variable with an unsuitable role or type.
     #[error("{what} {name}: variable {variable} of the FMU is {found}; {hint}")]
     Variable {
         /// Parameter, effect, input or output.
@@ -107,12 +107,12 @@ pub enum FmuError {
         name: String,
         /// The variable.
         variable: String,
-        /// What it is.
+        /// The actual role or type.
         found: String,
         /// What to do.
         hint: &'static str,
     },
-    /// Two units for the same number.
+    /// Different units in the problem and in the FMU.
     #[error(
         "{what} {name} is in {problem}, variable {variable} of the FMU in {found}; convert the recording or the value, or give it the unit that it has"
     )]
@@ -128,12 +128,12 @@ pub enum FmuError {
         /// Unit in the FMU.
         found: String,
     },
-    /// A name in a mapping that the problem does not have.
+    /// A name in the mapping of variables that is not in the problem.
     #[error("variables: the problem has no parameter, effect or column {name}{near}")]
     Mapped {
         /// The name.
         name: String,
-        /// What may be meant, in parentheses.
+        /// The most similar name, in parentheses.
         near: String,
     },
 }

@@ -1,4 +1,4 @@
-//! One instance of an FMU, from its making to its end, the same for both versions of the standard.
+//! An instance of an FMU, from instantiation to termination, for both versions of the standard.
 
 use std::{
     mem,
@@ -18,16 +18,16 @@ use crate::{
     model::{Kind, Variable, Version},
 };
 
-/// Why a run ended before its end.
+/// Why a run was stopped early.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Stopped {
-    /// It cannot go on with these values; others may do.
+    /// The run cannot continue with these values; other values may work.
     Refused(String),
-    /// Nothing of the FMU may be called any more.
+    /// The instance may not be called any more.
     Fatal(String),
 }
 
-/// What a call answers, in the words of neither version.
+/// The status of a call, common to both versions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Status {
     Fine,
@@ -60,7 +60,7 @@ impl From<fmi3Status> for Status {
     }
 }
 
-/// The last message of an FMU that was more than a remark.
+/// The last warning or error message of an FMU.
 #[derive(Debug, Default)]
 struct Said(Mutex<Option<String>>);
 
@@ -72,7 +72,7 @@ impl Said {
         }
     }
 
-    /// As the end of a sentence; empty where nothing was said.
+    /// Returns the message as the end of a sentence, or an empty string if there is none.
     fn text(&self) -> String {
         let said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         said.as_ref().map_or(String::new(), |said| format!("; it says: {said}"))
@@ -93,7 +93,7 @@ impl fmi3::log::Logger for Said {
     }
 }
 
-/// Variables that are set or read together, by the type of their numbers.
+/// Variables that are set or read together, grouped by the type of their numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Slots {
     count: usize,
@@ -101,7 +101,7 @@ pub(crate) struct Slots {
     singles: Group,
 }
 
-/// Value references, and which of the values each takes.
+/// Value references, and the index of the value for each of them.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Group {
     references: Vec<u32>,
@@ -143,7 +143,7 @@ enum Native {
     Three(Arc<FMU3>),
 }
 
-/// An instance. Dropping it frees it, unless it must not be called any more.
+/// An instance. It is freed on drop, unless it may not be called any more.
 pub(crate) struct Instance {
     native: Option<Native>,
     said: Arc<Said>,
@@ -193,7 +193,7 @@ impl Instance {
         }
     }
 
-    /// What a status means for the run.
+    /// Converts the status of a call to a result.
     fn checked(&mut self, call: &str, status: Status) -> Result<(), Stopped> {
         let said = self.said.text();
         match status {
@@ -204,7 +204,7 @@ impl Instance {
                 "{call} answers pending: it works in the background, which is not done here{said}"
             ))),
             Status::Fatal => {
-                // Not even to be freed: whatever it holds is lost.
+                // After a fatal status the instance may not even be freed, so its memory is leaked.
                 if let Some(native) = self.native.take() {
                     mem::forget(native);
                 }
@@ -263,7 +263,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Between start values and first inputs.
+    /// Enters the initialization mode. Called after setting start values and before setting the
+    /// first inputs.
     pub(crate) fn begin(&mut self) -> Result<(), Stopped> {
         let status = match &self.native {
             Some(Native::Two(fmu)) => match fmu.setupExperiment(None, 0.0, None) {
@@ -276,7 +277,7 @@ impl Instance {
         self.checked("beginning its initialization", status)
     }
 
-    /// Behind the first inputs.
+    /// Exits the initialization mode. Called after setting the first inputs.
     pub(crate) fn begun(&mut self) -> Result<(), Stopped> {
         let status = match &self.native {
             Some(Native::Two(fmu)) => fmu.exitInitializationMode().into(),
@@ -286,11 +287,11 @@ impl Instance {
         self.checked("its initialization", status)
     }
 
-    /// One step of the session.
+    /// Advances by one step of the session.
     pub(crate) fn step(&mut self, time_s: f64, step_s: f64) -> Result<(), Stopped> {
         let (mut event, mut is_over, mut is_early, mut reached_s) = (false, false, false, time_s);
         let status = match &self.native {
-            // Nothing goes back before this point.
+            // The flag 1 promises that the simulation never returns to a time before this point.
             Some(Native::Two(fmu)) => fmu.doStep(time_s, step_s, 1).into(),
             Some(Native::Three(fmu)) => fmu
                 .doStep(
@@ -315,7 +316,7 @@ impl Instance {
         Ok(())
     }
 
-    /// The regular end of a run.
+    /// Terminates a run regularly.
     pub(crate) fn end(&mut self) -> Result<(), Stopped> {
         let status = match &self.native {
             Some(Native::Two(fmu)) => fmu.terminate().into(),

@@ -1,4 +1,4 @@
-//! An FMU as a worker of `stretch`.
+//! The worker `stretch-fmu`: runs an FMU for `stretch`.
 
 use std::{
     fs::File,
@@ -22,7 +22,7 @@ stretch-fmu --describe FILE.fmu
     prints the beginning of a problem.toml
 ";
 
-/// What the command line asks for.
+/// The requested action.
 enum Asked {
     Help,
     Describe(PathBuf),
@@ -55,7 +55,8 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
     Ok(if describes { Asked::Describe(file) } else { Asked::Serve(file, names) })
 }
 
-/// Standard output carries only frames: what the FMU prints there goes to standard error.
+/// Returns a stream for frames only. Anything that the FMU prints to standard output goes to
+/// standard error.
 #[cfg(unix)]
 fn frames() -> io::Result<File> {
     let own = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stdout(), 3)?;
@@ -79,7 +80,7 @@ fn run() -> Result<(), String> {
             };
             match serve(io::stdin().lock(), to, begin) {
                 Ok(()) => Ok(()),
-                // The other side has this error already and reports it.
+                // The other side has already received this error and reports it.
                 Err(ServeError::Simulator(_)) => std::process::exit(1),
                 Err(error) => Err(error.to_string()),
             }

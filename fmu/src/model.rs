@@ -1,4 +1,4 @@
-//! Description of an FMU, the same for both versions of the standard.
+//! The model description of an FMU, common to both versions of the standard.
 
 use fmi_rs::model_description::{fmi2, fmi3};
 
@@ -12,7 +12,7 @@ pub enum Version {
 }
 
 impl Version {
-    /// 2 or 3.
+    /// Returns the number of the version, 2 or 3.
     pub fn number(self) -> u8 {
         match self {
             Self::Fmi2 => 2,
@@ -21,7 +21,7 @@ impl Version {
     }
 }
 
-/// What a variable is for.
+/// The role of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Role {
@@ -31,7 +31,7 @@ pub enum Role {
     Input,
     /// Read at every step.
     Output,
-    /// Can be read.
+    /// Internal variable that can be read.
     Local,
     /// Anything else: calculated parameters, sizes of arrays, time.
     Other,
@@ -49,7 +49,7 @@ impl Role {
     }
 }
 
-/// How its numbers are held.
+/// Number format of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
@@ -57,7 +57,7 @@ pub enum Kind {
     Double,
     /// 32 bits, floating point.
     Single,
-    /// No number on a continuous scale, or more than one; what it is.
+    /// Any other type: an array, or not a floating-point number. The text names the type.
     Other(&'static str),
 }
 
@@ -66,18 +66,18 @@ pub enum Kind {
 pub struct Variable {
     /// Its name.
     pub name: String,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
-    /// How its numbers are held.
+    /// Its number format.
     pub kind: Kind,
-    /// Unit, where there is one.
+    /// Unit, if it is given.
     pub unit: Option<String>,
-    /// Value that it starts with, where there is one.
+    /// Start value, if it is given.
     pub start: Option<f64>,
     pub(crate) reference: u32,
 }
 
-/// What an FMU says of itself.
+/// The model description of an FMU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     /// Version of the standard.
@@ -92,7 +92,7 @@ pub struct Model {
     /// GUID, or instantiation token.
     pub(crate) token: String,
     pub(crate) takes_allocator: bool,
-    /// It needs another program that is installed.
+    /// Whether it needs an installed program to run.
     pub(crate) needs_tool: bool,
 }
 
@@ -101,7 +101,7 @@ fn number(text: Option<&String>) -> Option<f64> {
 }
 
 impl Model {
-    /// `None` if it is not for co-simulation.
+    /// Returns `None` if the FMU is not for co-simulation.
     pub(crate) fn of_fmi2(description: &fmi2::ModelDescription) -> Option<Self> {
         use fmi2::{Causality, VariableType};
         let about = description.coSimulation.as_ref()?;
@@ -122,8 +122,8 @@ impl Model {
             start: number(v.variableType.start().as_ref()),
             reference: v.valueReference,
         };
-        // FMI 2 does not describe internal steps. An FMU that takes communication steps of one
-        // length only practically has fixed steps.
+        // FMI 2 does not describe internal steps. An FMU that only accepts communication steps of
+        // one length usually has fixed internal steps.
         let step = description.defaultExperiment.as_ref().and_then(|e| number(e.stepSize.as_ref()));
         Some(Self {
             version: Version::Fmi2,
@@ -137,7 +137,7 @@ impl Model {
         })
     }
 
-    /// `None` if it is not for co-simulation.
+    /// Returns `None` if the FMU is not for co-simulation.
     pub(crate) fn of_fmi3(description: &fmi3::ModelDescription) -> Option<Self> {
         use fmi3::{Causality, VariableType};
         let about = description.coSimulation.as_ref()?;

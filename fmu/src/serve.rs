@@ -1,4 +1,5 @@
-//! The worker's side of the protocol: frames come in, frames go out. The protocol is in `book/src/reference/worker.md`.
+//! The worker's side of the protocol: receives request frames and sends response frames. The
+//! protocol is described in `book/src/reference/worker.md`.
 
 use std::io::{ErrorKind, Read, Write};
 
@@ -12,20 +13,20 @@ use stretch_problem::{
 /// Version of the protocol.
 const VERSION: u64 = 1;
 
-/// Why a worker ends before it is asked to end.
+/// Why a worker ends before the other side requests it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {
-    /// Standard input or output.
+    /// Error of standard input or output.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// What came is no frame.
+    /// The received bytes are no frame.
     #[error("{0}")]
     Frame(#[from] FrameError),
-    /// What came is a frame, and yet not what was due.
+    /// A valid frame that was not expected.
     #[error("{0}")]
     Protocol(String),
-    /// The simulator will not do or is gone.
+    /// The simulator cannot be used, or has ended.
     #[error("{0}")]
     Simulator(String),
 }
@@ -34,8 +35,8 @@ fn wrong(what: &str) -> ServeError {
     ServeError::Protocol(format!("the {what} cannot be read; do both programs belong together?"))
 }
 
-/// Answers frames until the other side says bye or closes; `begin` makes the simulator of a
-/// session.
+/// Answers frames until the other side sends `bye` or closes the stream. `begin` makes the
+/// simulator for a session.
 ///
 /// Errors are sent to the other side before the worker ends.
 ///
@@ -98,7 +99,7 @@ where
     Ok(())
 }
 
-/// The next frame; `None` if the other side has closed.
+/// Reads the next frame. Returns `None` if the other side has closed the stream.
 fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
     let mut prefix = [0; PREFIX];
     match from.read_exact(&mut prefix) {
@@ -106,7 +107,8 @@ fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
         read => read?,
     }
     let Prefix { header, body } = Prefix::parse(&prefix)?;
-    // The lengths are only claims: memory is allocated for what is actually read.
+    // The lengths in the prefix may be wrong, so memory is allocated only for bytes that are
+    // actually read.
     let mut part = |bytes: usize| {
         let mut out = Vec::new();
         let read = from.take(bytes as u64).read_to_end(&mut out)?;
@@ -162,7 +164,7 @@ fn read_session(frame: &WorkerFrame) -> Option<RecordedSession> {
     })
 }
 
-/// An ask, and its altered inputs where it has some.
+/// A request to simulate, with its altered inputs if there are any.
 struct Owned<'a> {
     stage: usize,
     parameters: &'a [f64],

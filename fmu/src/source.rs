@@ -1,4 +1,4 @@
-//! An FMU as a source of samples.
+//! An FMU as a simulator of a session.
 
 use std::{
     borrow::Cow,
@@ -16,15 +16,15 @@ use crate::{
     instance::{Instance, Stopped},
 };
 
-/// An FMU that answers the asks of a session.
+/// An FMU that simulates a session.
 ///
-/// A new instance runs each trial of each model. Parameters and effects are set before its
-/// initialization, and the first sample of the inputs during it. The other samples are set one by
-/// one and held until the next one. Outputs are read at every sample, before the step to the next
-/// one. Time begins at 0 in every trial.
+/// A new instance is created for each trial of each model. Parameters and effects are set before
+/// its initialization, and the first sample of the inputs during it. The following samples are set
+/// one by one, and each is held until the next one. Outputs are read at every sample, before the
+/// step to the next one. Time starts at 0 in every trial.
 ///
-/// Runs of one source are sequential, because the library of an FMU may hold numbers that all its
-/// instances share. To run models at the same time, use separate processes, as the worker
+/// Runs of one source are sequential, because the library of an FMU may have global state that all
+/// its instances share. To run models in parallel, use separate processes, as the worker
 /// `stretch-fmu` does. A crash or a hang then affects only its process; here it affects the whole
 /// program.
 #[derive(Debug)]
@@ -32,12 +32,12 @@ pub struct FmuSource {
     fmu: Fmu,
     session: RecordedSession,
     bound: Bound,
-    /// One run at a time.
+    /// Ensures that only one run is active.
     turn: Mutex<()>,
 }
 
 impl FmuSource {
-    /// Binds the names of a session to variables, and makes one instance to see that it can be made.
+    /// Binds the names of a session to variables, and checks that an instance can be created.
     ///
     /// # Errors
     /// Names without a variable, variables that cannot be used in this way, different units, and
@@ -68,7 +68,7 @@ impl FmuSource {
         Ok(out)
     }
 
-    /// Columns that drive it: altered ones as requested, all others as measured.
+    /// Returns the input columns: altered ones as requested, all others as measured.
     fn inputs<'a>(&'a self, ask: &Ask<'a>) -> Result<Vec<Cow<'a, [f64]>>, SourceError> {
         let inputs = |stage: usize| &self.session.stages[stage].inputs;
         let samples = self.session.samples(ask.trials);
@@ -120,8 +120,8 @@ impl FmuSource {
     }
 }
 
-/// Runs something on a thread with enough stack for [`deep`](crate::deep::deep); `None` if no
-/// thread can be started.
+/// Runs a function on a thread with enough stack for [`deep`](crate::deep::deep). Returns `None` if
+/// no thread can be started.
 fn apart<T: Send>(run: impl FnOnce() -> T + Send) -> Option<T> {
     thread::scope(|scope| {
         let begun = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);

@@ -1,4 +1,4 @@
-//! A diagnosis by an FMU is the diagnosis by the same equations in Rust.
+//! A diagnosis with an FMU equals the diagnosis with the same equations in Rust.
 
 mod support;
 
@@ -26,7 +26,7 @@ fn fmi_2_and_fmi_3_diagnose_as_the_same_equations_in_rust() {
         let problem = Checked::new(spec()).unwrap();
         let spec = stretch_problem::worker::WorkersSpec { jobs: 2, ..worker(&built.file, &[]) };
         let workers = Workers::start(spec, problem.session()).unwrap();
-        // The same operations in the same order: not one bit is another.
+        // The operations and their order are the same, so all bits are equal.
         assert_eq!(diagnosed(Arc::new(workers)), in_rust, "FMI {fmi}");
     }
 }

@@ -1,4 +1,4 @@
-//! A problem's file whose simulator is an FMU.
+//! A problem file whose simulator is an FMU.
 
 mod support;
 
@@ -53,7 +53,7 @@ fn a_problem_is_read_and_its_fmu_found_and_run() {
     }
     let file = folder.join("problem.toml");
     fs::write(&file, TEXT).unwrap();
-    // The program is searched in the folder of the caller.
+    // The worker is searched for in the folder of the calling program.
     let beside = env::current_exe().unwrap().with_file_name("stretch-fmu");
     let _ = fs::remove_file(&beside);
     fs::hard_link(env!("CARGO_BIN_EXE_stretch-fmu"), &beside).unwrap();

@@ -11,7 +11,7 @@ use stretch_problem::{
 };
 use support::{Wrong, servo, spec, worker};
 
-/// What the worker says of an FMU at its start.
+/// Starts the workers for an FMU, or returns the error message.
 fn started(spec: ProblemSpec, workers: WorkersSpec) -> Result<Workers, String> {
     let problem = Checked::new(spec).unwrap();
     Workers::start(workers, problem.session()).map_err(|e| e.to_string())
@@ -86,7 +86,7 @@ fn names_and_units_that_do_not_fit_are_refused() {
 
 type Answer = Result<Vec<f64>, SourceError>;
 
-/// What comes of a model of which one value makes trouble.
+/// Runs a model in which the value of the parameter `trouble` provokes a fault.
 fn troubled(fmi: u8, trouble: f64) -> Option<(Answer, Vec<String>)> {
     let built = servo(fmi, Wrong::Nothing)?;
     let mut spec = spec();

@@ -1,4 +1,4 @@
-//! Calibrations are made, applied and evaluated here.
+//! Python bindings for making, applying and evaluating calibrations.
 
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ impl CalibrationRecord {
     }
 }
 
-/// Options of a calibration, under the names of the package.
+/// Options of a calibration, under the names used in the Python package.
 #[derive(Debug, FromPyObject)]
 pub(crate) struct Choices {
     #[pyo3(item)]
@@ -64,7 +64,8 @@ pub(crate) struct Choices {
 }
 
 impl Choices {
-    /// The options as Rust takes them; no model where the model is to be chosen.
+    /// Converts the options to those of the Rust crates. The model is `None` if it is to be chosen
+    /// automatically.
     fn options(&self) -> PyResult<(Options, Option<ModelKind>)> {
         let base = if self.paper { Options::paper() } else { Options::default() };
         let model = match self.model.as_str() {
@@ -100,7 +101,7 @@ impl Choices {
     }
 }
 
-/// The fits, models and notes of a calibration that was just made.
+/// Fits, compared models and notes of a new calibration.
 #[derive(Serialize)]
 struct Made<'a> {
     model: String,
@@ -161,7 +162,7 @@ pub(crate) fn evaluate(
     Ok((serde_json::to_string(&evaluation).map_err(said)?, pairs(doubts)))
 }
 
-/// Codes and sentences of doubts.
+/// Converts doubts to pairs of code and sentence.
 fn pairs(doubts: Vec<Doubt>) -> Vec<(&'static str, String)> {
     doubts.into_iter().map(|doubt| (doubt.code, doubt.text)).collect()
 }

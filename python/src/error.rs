@@ -1,4 +1,4 @@
-//! Errors as Python sees them: the sentence that the program would say.
+//! Errors as Python exceptions, with the same sentence that the program prints.
 
 use std::fmt::Display;
 
@@ -11,7 +11,7 @@ create_exception!(
     "What is wrong with the data or the question, and what to do about it, in a sentence."
 );
 
-/// The sentence as an exception.
+/// Returns an exception with the error's sentence.
 pub(crate) fn said(error: impl Display) -> PyErr {
     StretchError::new_err(error.to_string())
 }

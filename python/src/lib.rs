@@ -1,7 +1,7 @@
-//! The native part of the Python package `stretch`.
+//! The native part of the Python package `stretch_gap`.
 //!
-//! Calibrations and diagnoses are done here, in Rust. The Python code in `package/stretch_gap` takes recordings in whatever form they come,
-//! and shows results.
+//! Calibrations and diagnoses are computed here, in Rust. The Python code in `package/stretch_gap`
+//! accepts recordings in various forms and shows results.
 
 mod calibration;
 mod error;

@@ -1,4 +1,4 @@
-//! A simulator with recordings: its problem is checked and diagnosed.
+//! Python bindings for problems: a simulator with recordings is checked and diagnosed.
 
 use std::{
     num::NonZeroUsize,
@@ -29,7 +29,7 @@ use crate::{
     source::{Asked, Message, serve},
 };
 
-/// Options of a diagnosis, as the package hands them over.
+/// Options of a diagnosis, passed as JSON by the Python package.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct How {
     name: String,
@@ -42,11 +42,12 @@ pub(crate) struct How {
     answers_all: bool,
     /// Whether the simulator can be driven by altered inputs.
     takes_inputs: bool,
-    /// Whether the experiment that would tell rivals apart is looked for.
+    /// Whether to search for the experiment that would distinguish competing explanations.
     experiment: bool,
 }
 
-/// A recording, the session time of its first sample, s, and whether the recording may only be tested on.
+/// A recording, the session time of its first sample in seconds, and whether it may only be used
+/// for testing.
 type Entry<'py> = (Recording<'py>, f64, bool);
 
 fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
@@ -74,19 +75,19 @@ pub(crate) struct FixedEntries {
     file: Option<ProblemSpec>,
 }
 
-/// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the named effects, the next experiment, and
-/// the fixed problem.
+/// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the
+/// named effects, the next experiment, and the corrected problem.
 struct Answer {
     json: String,
     page: String,
     curves: Vec<(String, [Vec<f64>; 4])>,
-    /// Python functions of the named effects that have code, by effect.
+    /// Pairs of an effect's name and its Python code, for the named effects that have code.
     code: Vec<(String, String)>,
     experiment: Option<Trial>,
     fixed: Option<ProblemSpec>,
 }
 
-/// An [`Answer`] as Python takes it.
+/// An [`Answer`] as returned to Python.
 type PyAnswer<'py> = (
     String,
     String,
@@ -245,7 +246,7 @@ impl Entries {
         Ok(Self { checked: Checked::new(spec).map_err(said)?, trials, file })
     }
 
-    /// Does a job on a separate thread, while this one answers for the simulator.
+    /// Runs a job on a separate thread, while the calling thread runs the simulator for it.
     fn worked<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -284,12 +285,12 @@ struct Work<T> {
     how: How,
     /// Messages to the main thread.
     main_thread: mpsc::Sender<Message<Result<T, String>>>,
-    /// Whether the main thread has left, because the caller was interrupted.
+    /// Whether the main thread has returned, because the caller was interrupted.
     left: Arc<AtomicBool>,
 }
 
 impl<T: Send + 'static> Work<T> {
-    /// The simulator of the caller, or the workers of the problem's file.
+    /// Returns the caller's simulator, or the workers named in the problem file.
     fn source(&self, session: &RecordedSession) -> Result<Arc<dyn Source>, String> {
         if let Some(spec) = &self.workers {
             let started = Workers::start(spec.clone(), session);

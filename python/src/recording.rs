@@ -1,4 +1,4 @@
-//! Recordings as Python hands them over, and as files hold them.
+//! Recordings passed from Python, or read from files.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,8 @@ use stretch_recording::{Array, Clock, ReadOptions, Recording as FileRecording};
 
 use crate::{error::said, watched::watched};
 
-/// A name, time stamps in seconds, and named channels of the same length; checked by the package.
+/// A name, time stamps in seconds, and named channels of the same length. The Python package has
+/// checked them.
 #[derive(Debug, FromPyObject)]
 pub(crate) struct Recording<'py> {
     #[pyo3(item)]
@@ -21,7 +22,7 @@ pub(crate) struct Recording<'py> {
 }
 
 impl Recording<'_> {
-    /// A copy of the recording in Rust's memory, which Python code cannot change meanwhile.
+    /// Copies the recording, so that Python code cannot change it during the work.
     pub(crate) fn trial(&self) -> Trial {
         let channel = |(name, values): &(String, PyReadonlyArray1<'_, f64>)| Channel {
             name: name.clone(),
@@ -35,12 +36,12 @@ impl Recording<'_> {
     }
 }
 
-/// Copies of all recordings.
+/// Copies all recordings.
 pub(crate) fn trials(recordings: &[Recording<'_>]) -> Vec<Trial> {
     recordings.iter().map(Recording::trial).collect()
 }
 
-/// What is asked of a file, under the names of the package.
+/// Reading options, under the names used in the Python package.
 #[derive(Debug, FromPyObject)]
 pub(crate) struct Asked {
     #[pyo3(item)]
@@ -68,7 +69,7 @@ impl Asked {
     }
 }
 
-/// Columns by name, the time among them.
+/// Columns by name, including the time.
 type Columns<'py> = Vec<(String, Bound<'py, PyArray1<f64>>)>;
 /// The columns of each clock, by its name.
 type Clocks<'py> = Vec<(String, Columns<'py>)>;

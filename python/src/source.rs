@@ -1,7 +1,10 @@
-//! A simulator that lives in Python: Rust's threads ask it, and the main thread, which called, answers.
+//! A simulator written in Python: Rust threads send questions, and the calling main thread answers
+//! them.
 //!
-//! Python's signal handlers run on the main thread, and simulators keep objects that belong to a thread. So the work goes to a thread of its
-//! own, while the main thread takes questions (several at once where several wait), asks the user's simulator, and handles Ctrl-C.
+//! Python's signal handlers run on the main thread, and a simulator may hold objects that are bound
+//! to a thread. Therefore the work runs on a separate thread. The main thread receives the
+//! questions (several at once if several are waiting), calls the user's simulator, and handles
+//! Ctrl-C.
 
 use std::{
     sync::mpsc::{self, Receiver, RecvTimeoutError, Sender},
@@ -21,10 +24,10 @@ create_exception!(
     "Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."
 );
 
-/// How often Python is asked whether it was interrupted.
+/// Interval at which Python signals are checked.
 const TICK: Duration = Duration::from_millis(50);
 
-/// One run that is asked for, and the channel for its answer.
+/// One requested run, and the channel for its result.
 #[derive(Debug)]
 pub(crate) struct Question {
     stage: usize,
@@ -40,15 +43,15 @@ pub(crate) struct Question {
 /// A message to the main thread.
 #[derive(Debug)]
 pub(crate) enum Message<T> {
-    /// A run is asked for.
+    /// A run is requested.
     Question(Question),
-    /// The progress of the work, in words.
+    /// A progress message.
     Progress(String),
     /// The work is done.
     Done(T),
 }
 
-/// The simulator as Rust's threads see it.
+/// The simulator, as used by the Rust threads.
 #[derive(Debug)]
 pub(crate) struct Asked<T> {
     /// Messages to the main thread.
@@ -77,7 +80,7 @@ impl<T: Send> Source for Asked<T> {
             };
             self.main_thread.send(Message::Question(question)).map(|()| answer).map_err(|_| gone())
         };
-        // All questions are sent before the first answer is waited for.
+        // All questions are sent before waiting for the first result.
         let answers: Vec<_> = asks.iter().map(send).collect();
         answers.into_iter().map(|answer| answer?.recv().map_err(|_| gone())?).collect()
     }
@@ -101,11 +104,13 @@ impl<T: Send> Source for Asked<T> {
 
 /// Answers questions with the user's simulator until the work is done.
 ///
-/// `simulator` is called with stage, number of trials, parameters `[n, p]`, effects `[n, e]`, the altered inputs, an
-/// array `[n, samples]` each, or None, and those of other stages, each with stage and input; it returns `[n, samples]`.
+/// `simulator` is called with the stage; the number of trials; parameters `[n, p]`; effects
+/// `[n, e]`; the altered inputs, each an array `[n, samples]`, or None; and altered inputs of other
+/// stages, each with stage and input. It returns `[n, samples]`.
 ///
 /// # Errors
-/// Exceptions of the simulator, and KeyboardInterrupt; the work then ends by itself, because its questions stay without an answer.
+/// Exceptions of the simulator, and KeyboardInterrupt. The work then ends by itself, because its
+/// questions get no answer.
 pub(crate) fn serve<T: Send>(
     py: Python<'_>,
     mut messages: Receiver<Message<T>>,
@@ -156,7 +161,7 @@ pub(crate) fn serve<T: Send>(
 }
 
 impl Question {
-    /// Stage and input of every altered column of other stages.
+    /// Returns stage and input of every altered column of other stages.
     fn places(&self) -> impl Iterator<Item = (usize, usize)> {
         self.others.iter().map(|(stage, input, _)| (*stage, *input))
     }
@@ -169,7 +174,8 @@ impl Question {
     }
 }
 
-/// Asks the simulator once for all questions of a group, and one by one where the simulator refuses the group.
+/// Calls the simulator once for a group of questions. If it refuses the group, calls it for each
+/// question separately.
 fn answer(py: Python<'_>, simulator: &Bound<'_, PyAny>, group: Vec<Question>) -> PyResult<()> {
     match call(py, simulator, &group) {
         Ok(rows) => {
@@ -205,7 +211,7 @@ fn call(
     let wrong = |e: numpy::ndarray::ShapeError| PyRuntimeError::new_err(e.to_string());
     let parameters = table(|q| &q.parameters).map_err(wrong)?;
     let effects = table(|q| &q.effects).map_err(wrong)?;
-    // For each input there is one column for each model.
+    // Each input is a list with one column per model of the group.
     let inputs = first.inputs.as_ref().map(|columns| {
         let of = |column: usize| {
             let own = |q: &Question| q.inputs.as_ref().map(|all| all[column].clone());

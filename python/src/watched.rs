@@ -1,4 +1,4 @@
-//! Work that Ctrl-C interrupts.
+//! Work that can be interrupted with Ctrl-C.
 
 use std::{
     sync::mpsc::{self, RecvTimeoutError},
@@ -8,13 +8,15 @@ use std::{
 
 use pyo3::{exceptions::PyRuntimeError, prelude::*};
 
-/// How often Python is asked whether it was interrupted.
+/// Interval at which Python signals are checked.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Does `work` on a separate thread, without the interpreter's lock, and asks Python meanwhile for interrupts: signal handlers run on
-/// Python's main thread alone, so the work must run on another thread.
+/// Runs `work` on a separate thread, without the interpreter lock, and checks Python signals
+/// meanwhile. The calling thread must stay free, because signal handlers run only on Python's main
+/// thread.
 ///
-/// An interrupted caller returns at once; the work runs to its end, and its result is dropped.
+/// If the caller is interrupted, this returns immediately. The work continues to its end, and its
+/// result is dropped.
 pub(crate) fn watched<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,

@@ -1,4 +1,4 @@
-//! `stretch apply`: a calibration on a trial, or live on standard input.
+//! `stretch apply`: applies a calibration to a trial, or live to standard input.
 
 use std::{
     io::{self, BufRead, BufReader, BufWriter, Read, Write},
@@ -106,7 +106,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes rows into a file, whole or not at all, or to standard output where no other is named.
+/// Writes rows to a file, completely or not at all, or to standard output if no file is named.
 pub(super) fn write_out(
     path: Option<&Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -119,18 +119,18 @@ pub(super) fn write_out(
     Ok(out.flush()?)
 }
 
-/// The calibration at another sample rate, where its estimates need none.
+/// Returns the calibration at another sample rate, if its model permits that.
 fn at_rate(gauge: &GaugeCalibration, rate_hz: f64) -> anyhow::Result<GaugeCalibration> {
     let calibration = stretch_calibrate::at_rate(gauge.calibration(), rate_hz)?;
     Ok(GaugeCalibration::new(calibration, gauge.turns().copied())?)
 }
 
-/// Reports on a trial on standard error.
+/// Prints a summary of a trial to standard error.
 fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let (calibration, applied) = (gauge.calibration(), &found.applied);
     let faults = applied.faults;
     let (seen, doubts) = applied.seen(calibration, trial);
-    // a gap is counted up to what its count can hold
+    // The count of missing samples saturates at `u32::MAX`.
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
     let Seen { samples, withheld, clamped, .. } = seen;
     warn(format!(
@@ -144,7 +144,7 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     zero_watch.end();
 }
 
-/// Answers each line as it comes.
+/// Reads rows and writes each estimate immediately.
 fn live(
     gauge: &GaugeCalibration,
     follow: bool,
@@ -155,7 +155,7 @@ fn live(
     let calibration = gauge.calibration();
     let mut input = BufReader::new(input);
     if !Recording::is_text(input.fill_buf()?) {
-        // Packed rows and arrays come whole.
+        // Binary rows and arrays can only be read as a whole.
         let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
         let found = apply_gauge(gauge, &trial, follow)?;
         write_all(calibration, &trial, &found.applied, out)?;
@@ -166,7 +166,7 @@ fn live(
     if follow {
         receptor = receptor.following(gauge)?;
     }
-    // A program that reads the answers may wait for their header before sending a row.
+    // A program that reads the estimates may wait for their header before it sends a row.
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
     let mut rows = RowReader::new(input, "standard input", options)?;
@@ -221,8 +221,8 @@ fn write_all(
     Ok(())
 }
 
-/// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference; `sd_mm` behind it where the model knows how sure
-/// it is.
+/// Returns the header `time_s,estimate_mm,rate_mm_per_s,branch,domain`, with the unit of the
+/// reference. The column `sd_mm` is added if the model computes a standard deviation.
 pub(super) fn header(calibration: &Calibration) -> String {
     let unit = unit(calibration.spec().reference.as_str())
         .map_or(String::new(), |unit| format!("_{unit}"));
@@ -241,7 +241,7 @@ fn push_line(
     calibration: &Calibration,
 ) {
     push_number(line, time_s);
-    // writing to memory cannot fail
+    // Writing to memory cannot fail.
     let _ = match reading {
         Ok(Reading { estimate, rate, branch, domain, sd }) => {
             let branch = calibration.spec().target.branch_name(*branch);
@@ -261,7 +261,7 @@ fn push_line(
     line.push(b'\n');
 }
 
-/// The estimates of a trial as a file would hold them.
+/// Returns the estimates of a trial as the bytes of a CSV file.
 pub(super) fn estimates_csv(
     calibration: &Calibration,
     trial: &Trial,
@@ -272,12 +272,12 @@ pub(super) fn estimates_csv(
     Ok(text)
 }
 
-/// Tells when a zero has shifted, once until it is back.
+/// Reports a shift of the gauge's zero once, and again only after the zero has returned.
 struct ZeroWatch {
     turns: Option<Turns>,
     period_s: f64,
     unit: String,
-    /// The name of the trial, with a colon; empty of a stream.
+    /// Name of the trial with a colon, or empty for a stream.
     trial: String,
     shifted: bool,
     needs_signal_only: bool,
@@ -298,7 +298,7 @@ impl ZeroWatch {
         }
     }
 
-    /// What a movement said that ended at a time.
+    /// Takes the state of the zero after a movement has ended, at a time.
     fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
             let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
@@ -317,10 +317,11 @@ impl ZeroWatch {
         self.last = Some(*zero);
     }
 
-    /// How far the zero was followed, and that a record tells no shifts.
+    /// Reports at the end how far the zero was followed, or that the calibration cannot detect
+    /// shifts.
     fn end(&self) {
         let Some(turns) = self.turns else {
-            // a load cell need not move
+            // A load cell need not move.
             if self.needs_signal_only {
                 return;
             }

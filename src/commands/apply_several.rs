@@ -1,4 +1,4 @@
-//! `stretch apply` with a calibration of several gauges.
+//! `stretch apply` for a calibration of several gauges.
 
 use std::{
     io::{self, Write},
@@ -12,7 +12,8 @@ use stretch_sleeve::{AppliedArray, ArrayCalibration, MAX_CHANNELS, apply_array};
 use super::{apply::write_out, reading::read_recording};
 use crate::{display::warn, table::number};
 
-/// Writes time, estimate, standard deviation, the channels that are left out, and whether a state was clamped.
+/// Applies the calibration and writes time, estimate, standard deviation, the names of excluded
+/// channels, and whether a state was clamped.
 pub(super) fn apply_several(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Path,
@@ -35,7 +36,7 @@ pub(super) fn apply_several(
     Ok(())
 }
 
-/// Reports each time that a gauge begins to differ from the others.
+/// Prints a line each time a gauge begins to deviate from the other gauges.
 fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applied: &AppliedArray) {
     let Some(usual) = &calibration.spec().shifts else { return };
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();

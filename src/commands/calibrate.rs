@@ -1,4 +1,4 @@
-//! `stretch calibrate`: from logged trials to a calibration record.
+//! `stretch calibrate`: fits a calibration to logged trials and writes a calibration file.
 
 use std::{
     convert::Infallible,
@@ -69,7 +69,8 @@ pub(crate) struct Args {
     /// linear, curve, polyIJ, observer, history, diagnosed, or auto [default: poly13]
     ///
     /// curve is a polynomial of the signal alone, its degree by cross-validation; curve and linear also take a table of weights and
-    /// readings without a time. polyIJ is of degree I in the rate and J in the signal. observer, history and diagnosed remember; +rest behind observer or
+    /// readings without a time. polyIJ is of degree I in the rate and J in the signal.
+    /// observer, history and diagnosed remember; +rest behind observer or
     /// history follows a drifting baseline. auto takes the best on trials left out.
     #[arg(
         long,
@@ -135,16 +136,17 @@ pub(crate) struct Args {
     pub(super) json: Json,
 }
 
-/// Options of what `calibrate_sleeve` does, which takes none of those that only a calibration of one gauge without a prior has.
+/// Options that are handled by `calibrate_sleeve`. They exclude options that apply only to one
+/// gauge without a prior.
 const SLEEVE: [&str; 2] = ["prior", "session"];
 
-/// Columns of signals.
+/// Columns of signals, as selected with `--signal`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Signal {
     One(String),
-    /// The best of these; of all where there is none.
+    /// The best of these columns; of all columns if the list is empty.
     Best(Vec<String>),
-    /// Gauges that are calibrated together; all where there is none.
+    /// Gauges that are calibrated together; all columns if the list is empty.
     Together(Vec<String>),
 }
 
@@ -163,7 +165,7 @@ impl FromStr for Signal {
     }
 }
 
-/// An estimator of the rate, or the published method as a whole.
+/// An estimator of the rate, or the complete published method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rate {
     Paper,
@@ -192,7 +194,7 @@ const MODELS: [&str; 10] = [
     "diagnosed+rest",
 ];
 
-/// A model, or the choice of one.
+/// A model, or the automatic choice of one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Model {
     Auto,
@@ -219,12 +221,12 @@ enum Loss {
 }
 
 impl Args {
-    /// The signal, or the signals that there are to choose from or to calibrate together.
+    /// Returns the signal selection, by default `bridge_v`.
     pub(super) fn signal(&self) -> Signal {
         self.signal.clone().unwrap_or_else(|| Signal::One("bridge_v".to_owned()))
     }
 
-    /// Whether signals were named.
+    /// Whether `--signal` was given.
     pub(super) fn names_signals(&self) -> bool {
         self.signal.is_some()
     }
@@ -233,7 +235,7 @@ impl Args {
         self.model.unwrap_or(Model::One(Options::default().model))
     }
 
-    /// Whether several gauges, a prior or its sums are asked for.
+    /// Whether several gauges, a prior or a session file are requested.
     fn is_sleeve(&self) -> anyhow::Result<bool> {
         let is_together = matches!(self.signal(), Signal::Together(_));
         let is_of_one = self.model.is_some()
@@ -264,7 +266,7 @@ impl Args {
                 _ => String::new(),
             },
             reference: self.reference.clone(),
-            // a signal is ranked, and a model chosen, beginning from the published one
+            // Ranking signals and choosing a model start from the published model.
             model: match self.model() {
                 Model::Auto => base.model,
                 Model::One(kind) => kind,
@@ -280,7 +282,8 @@ impl Args {
         }
     }
 
-    /// The trials, and whether they are tables without a time, to which a line or a curve can be fitted.
+    /// Reads the trials. The flag tells whether they are tables without a time, to which only a
+    /// line or a curve can be fitted.
     fn read(&self, columns: &mut ReadOptions) -> anyhow::Result<(Vec<Trial>, bool)> {
         let own = "name the columns of yours with --reference and --signal";
         let error = match read_trials(&self.trials, Split::Fit, columns) {
@@ -295,12 +298,13 @@ impl Args {
             models.contains(&self.model()),
             "{error}; weights and readings without a time are calibrated with --model curve or --model linear"
         );
-        // the time of a table is the number of the row
+        // The time of a table is its row number.
         *columns = columns.clone().untimed_hz(1.0);
         Ok((read_trials(&self.trials, Split::Fit, columns)?, true))
     }
 
-    /// What a diagnosis names, that was written before or is made of the trials as a gauge alone, where the model asks for it.
+    /// Returns the effects that a diagnosis names, if the model needs them. The diagnosis is read
+    /// from `--from`, or made here from the trials of the gauge alone.
     fn causes(&self, trials: &[Trial], options: &Options) -> anyhow::Result<Causes> {
         match (self.model(), &self.from) {
             (Model::One(kind), _)
@@ -321,17 +325,17 @@ impl Args {
     }
 }
 
-/// The newest diagnosis that is read.
+/// Newest schema version of a diagnosis that can be read.
 const SCHEMA: u32 = 1;
 
-/// What is read of a diagnosis before the rest.
+/// The fields of a diagnosis that are read first.
 #[derive(Deserialize)]
 struct Schema {
     schema: u32,
     data_set: Option<String>,
 }
 
-/// What a diagnosis names that was written, for some trials.
+/// Reads the effects that a stored diagnosis names, for use with these trials.
 fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let name = || path.display().to_string();
     let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
@@ -356,7 +360,8 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let of =
         schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
     let mut notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
-    // Another rig of the same make may lack the same; whose names they are is said.
+    // The diagnosis of another rig of the same type may apply, so this is permitted, but a note
+    // names both data sets.
     if let ([own], Some(set)) = (trials, &schema.data_set)
         && name_of(own) != *set
     {
@@ -389,7 +394,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let mut columns = named.iter().fold(columns, |columns, name| columns.require(name));
     let (trials, is_table) = args.read(&mut columns)?;
     options.is_table = is_table;
-    // signals that are only candidates may be anything, and the rows of a table may be far apart
+    // Outliers are removed only from the named columns, because candidate signals may be anything.
+    // Rows of a table may be far apart, so nothing is removed from tables.
     let named = [args.reference.as_str(), options.signal.as_str()];
     let named = if is_table { &[][..] } else { &named[..] };
     let (trials, gross_errors) = without_gross_errors(trials, named);
@@ -437,7 +443,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let record = gauge.map_err(named)?.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
     if let Some(path) = &args.report {
-        // the line is the yardstick that every surface is compared with
+        // The line is the baseline with which every surface is compared.
         let linear = Options { model: ModelKind::Linear, ..options.clone() };
         let linear = calibrate(&trials, &linear).map_err(named)?;
         let fitted = [&linear, &calibrated];
@@ -463,7 +469,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     })
 }
 
-/// The columns of the first trial but some.
+/// Returns the columns of the first trial, except those in `but`.
 pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> Vec<String> {
     let channels = trials.first().into_iter().flat_map(|trial| &trial.channels);
     channels.map(|channel| channel.name.clone()).filter(|name| !but.contains(name)).collect()

@@ -1,4 +1,5 @@
-//! Calibrations of several gauges, and those that begin from a prior: `stretch calibrate --signal s1,s2` and `--prior`.
+//! Calibrations of several gauges, and calibrations that update a prior:
+//! `stretch calibrate --signal s1,s2` and `--prior`.
 
 use std::path::{Path, PathBuf};
 
@@ -21,21 +22,21 @@ use crate::{
     table::{maybe, number, table},
 };
 
-/// A calibration to one reference, and what `--json` prints of it.
+/// A calibration to one reference, with the data that `--json` prints.
 #[derive(Serialize)]
 struct Made {
     #[serde(skip)]
     calibration: SleeveCalibration,
     reference: String,
     signals: Vec<String>,
-    /// Root mean square error on data left out.
+    /// Root mean square error on data that were left out of the fit.
     rmse: Option<f64>,
     carried: Vec<Carried>,
     update: Option<UpdateSummary>,
     notes: Vec<String>,
 }
 
-/// What `--json` prints: of several references a list.
+/// The output of `--json`: a list if there are several references.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Answer<'a> {
@@ -46,7 +47,7 @@ enum Answer<'a> {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let prior = args.prior.as_deref().map(Prior::read).transpose()?;
     let references: Vec<String> = match &prior {
-        // the name that is there unless another is given
+        // The prior's reference is used unless another one is given.
         Some(prior) if args.reference == "length_mm" => vec![prior.reference.clone()],
         _ => args.reference.split(',').map(str::to_owned).collect(),
     };
@@ -68,7 +69,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             anyhow::bail!("--signal auto: --prior and --session take the signals by their names")
         }
     };
-    // those of the prior are asked of its trials by the update
+    // The update itself requires the prior's signals, so only named signals are required here.
     let asked = references.iter().chain(named.iter().filter(|_| args.names_signals()));
     let columns = asked.fold(args.recorded.options(), |columns, name| columns.require(name));
     let trials = read_trials(&args.trials, Split::Fit, &columns);
@@ -108,7 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })
 }
 
-/// A prior, updated by trials.
+/// Updates a prior by trials.
 fn update(
     prior: &Prior,
     trials: &[Trial],
@@ -133,7 +134,7 @@ fn update(
     })
 }
 
-/// Several gauges, fitted to trials.
+/// Fits several gauges to trials.
 fn fit(
     trials: &[Trial],
     signals: &[String],
@@ -158,7 +159,8 @@ fn fit(
     })
 }
 
-/// Where the record of each of several references goes: wrist.json becomes wrist.bend_deg.json.
+/// Returns the path for the calibration file of one of several references: wrist.json becomes
+/// wrist.bend_deg.json.
 fn record_of(out: &Path, reference: &str) -> PathBuf {
     match out.extension() {
         Some(ending) => out.with_extension(format!("{reference}.{}", ending.to_string_lossy())),

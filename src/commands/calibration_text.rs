@@ -10,13 +10,14 @@ use super::shared::{say, say_first, tell};
 use crate::display::is_verbose;
 use crate::table::{maybe, number, table, table_text};
 
-/// The heading of how far the mean squared error of a model is above that of the best one.
+/// Heading of the column with the excess of a model's mean squared error over that of the best
+/// model.
 const SQUARED_EXCESS: &str = "over the best, squared";
 
 /// Columns of the kinds of trial.
 const KINDS: RangeInclusive<usize> = 2..=4;
 
-/// What `auto` rests on; columns without a value are left out.
+/// Prints the models that `auto` compared. Columns without values are left out.
 pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
     say_first(format!("Chosen: {}.", choice.why))?;
     let unit = unit_of(reference);
@@ -78,7 +79,8 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     Ok(())
 }
 
-/// From volts in `f32`, and in fixed point where the model has that form.
+/// Formats the instruction count from volts in `f32`, and in fixed point if the model has such a
+/// form.
 fn instructions(row: &ModelRow) -> String {
     match (row.m3_instructions, row.m3_instructions_fixed) {
         (Some(float), Some(fixed)) => format!("{float:.0} ({fixed:.0})"),
@@ -87,7 +89,7 @@ fn instructions(row: &ModelRow) -> String {
     }
 }
 
-/// The tables of a calibration; with `-v` all that the paper prints.
+/// Prints the tables of a calibration. With `-v`, prints everything that the paper lists.
 pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     print_fits(calibrated, ranking)?;
     if is_verbose() {
@@ -96,7 +98,7 @@ pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::R
     print_notes(calibrated)
 }
 
-/// How well each part was fitted.
+/// Prints the quality of each fit.
 fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     if !ranking.is_empty() {
         say(table_text(&signal_table(ranking)))?;
@@ -122,7 +124,7 @@ fn print_notes(calibrated: &Calibrated) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The numbers of the fit, and the orders that it was chosen from.
+/// Prints the coefficients of each fit, and the orders among which it was chosen.
 fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
     say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
     let rows = calibrated.fits.iter().flat_map(|fit| {
@@ -136,7 +138,7 @@ fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
         })
     });
     say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
-    // an order alone has nothing to be compared with
+    // If there is only one order, there is nothing to compare.
     let mut fits = calibrated.fits.iter().filter(|fit| fit.orders.len() > 1);
     fits.try_for_each(|fit| say(table_text(&order_table(fit))))
 }

@@ -1,4 +1,4 @@
-//! `stretch convert`: a foreign log in the format of the other commands.
+//! `stretch convert`: converts a foreign log to the format of the other commands.
 
 use std::path::PathBuf;
 
@@ -60,7 +60,7 @@ fn parse_column(text: &str) -> Result<Column, String> {
     let wrong = || format!("\"{text}\" is not NEW=OLD, NEW=OLD*FACTOR or NEW=OLD*FACTOR+OFFSET");
     let (new, source) = text.split_once('=').ok_or_else(wrong)?;
     let (old, scale) = source.split_once('*').unwrap_or((source, "1"));
-    // the sign of the offset is the last one that does not belong to a number
+    // The sign of the offset is the last sign that does not belong to an exponent.
     let sign = scale
         .char_indices()
         .skip(1)
@@ -87,7 +87,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options = options.require(&column.old);
     }
     let mut log = read_recording(&args.log, &options)?;
-    // a second copy of a long log may not fit in addition to the first
+    // A second copy of a long log may not fit in memory.
     let channels = if args.columns.is_empty() {
         std::mem::take(&mut log.channels)
     } else {

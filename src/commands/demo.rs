@@ -1,4 +1,5 @@
-//! `stretch demo`: the whole job, on the simulated rig or on measured sessions.
+//! `stretch demo`: calibration and diagnosis on the simulated rig or on measured sessions, in one
+//! report.
 
 mod published;
 mod sessions;
@@ -112,7 +113,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Does the job, writes what comes of it into a folder, and says the result.
+/// Calibrates and diagnoses, writes all files into a folder, and returns the result as a sentence.
 fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job, String)> {
     let (title, sessions) = match &args.data {
         Some(path) => {
@@ -130,7 +131,8 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job, String)>
     Ok((sessions, job, result))
 }
 
-/// The paper's session on the rig of the demonstration, written as a data set and read back as one.
+/// Simulates the paper's session on the demonstration rig, writes it as a data set, and reads it
+/// back.
 fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     let rig = demo_preset()?;
     let settings = RunSettings { seed: SEED, ..RunSettings::default() };
@@ -148,7 +150,7 @@ fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     Ok(sessions)
 }
 
-/// Writes all files; the result in words.
+/// Writes all files, and returns the result as a sentence.
 fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::Result<String> {
     let file = |name: &str| out.join(name);
     let calibrations = &job.calibrations;
@@ -191,9 +193,9 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     Ok(format!("{} {}", calibration_verdict(&judged), in_words(&job.examined.diagnosis).sentence))
 }
 
-/// Everything that was found.
+/// All results of the demo.
 struct Job {
-    /// Signals by error, the best first.
+    /// Candidate signals by error, the best first.
     ranking: Vec<Candidate>,
     problem: Problem,
     examined: Examined,
@@ -206,10 +208,10 @@ struct Calibrations {
     surfaces: Calibrated,
     chosen: Calibrated,
     choice: ModelChoice,
-    /// What the chosen one is called.
+    /// Display name of the chosen model.
     name: String,
     evaluation: Evaluation,
-    /// Errors by kind of trial, where there are several.
+    /// Errors by kind of trial, if there are several kinds.
     kinds: Vec<(String, Vec<MethodErrors>)>,
 }
 
@@ -227,7 +229,7 @@ impl Job {
         };
         let best = ranking.first().map(|best| &best.signal).or(sessions.signals.first());
         let options = Options { signal: best.cloned().unwrap_or_default(), ..options };
-        // neither waits for the other
+        // Calibration and diagnosis are independent and run in parallel.
         let (calibrations, examined) = std::thread::scope(|scope| {
             let asked = scope.spawn(|| -> anyhow::Result<(Problem, Examined)> {
                 let problem = sessions.problem(&options.signal)?;
@@ -283,7 +285,7 @@ impl Calibrations {
         Ok(Self { linear, surfaces, chosen, choice, name, evaluation, kinds })
     }
 
-    /// By the names that the evaluation knows them by.
+    /// Returns the calibrations under the names that the evaluation uses.
     fn shown(&self) -> [(&str, &Calibrated); 3] {
         [("linear", &self.linear), ("non-linear", &self.surfaces), (&self.name, &self.chosen)]
     }
@@ -293,7 +295,7 @@ fn trials(count: usize) -> String {
     if count == 1 { "one trial".to_owned() } else { format!("{count} trials") }
 }
 
-/// The result, and with `-v` all that it rests on.
+/// Prints the result, and with `-v` the details.
 fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
     let Calibrations { surfaces, choice, evaluation, kinds, .. } = &job.calibrations;
     say_first(result)?;

@@ -1,4 +1,5 @@
-//! `stretch diagnose`: where simulator and measurement part, which effect causes it, how far the gap closes.
+//! `stretch diagnose`: locates the gap between simulator and measurement, names the missing effect,
+//! and reports how much of the gap it explains.
 
 use std::{
     io,
@@ -22,12 +23,13 @@ use super::{
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
-/// What is said where there are rivals, and still no experiment.
+/// End of the message if there are competing explanations but no recommended experiment.
 const NOT_FORETOLD: &str =
     " that the simulator could predict: it takes no altered inputs, or its runs are spent";
-/// Status of a diagnosis whose verdict is one that `--fail-on` names.
+/// Exit status if the verdict is listed in `--fail-on`.
 const FAILED_ON: u8 = 3;
-/// Status of a diagnosis that is based on fewer runs than it asked for, because the budget of runs was spent.
+/// Exit status of a diagnosis with fewer simulator runs than requested, because the budget was
+/// exhausted.
 const SPENT: u8 = 4;
 
 /// Say where a simulator and a measurement differ, which effect causes it, and how far the gap closes
@@ -150,25 +152,25 @@ enum FailOn {
 }
 
 impl FailOn {
-    /// Whether a diagnosis is one of those.
+    /// Whether a diagnosis matches this option.
     fn covers(self, diagnosis: &Diagnosis) -> bool {
         use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
         let verdict = diagnosis.verdict;
         match self {
-            // a partial answer names an effect, and leaves what nothing explains
+            // A partial answer names an effect, and a part of the gap remains unexplained.
             Self::Effect => matches!(verdict, Effect | Partial),
             Self::Unknown => matches!(verdict, Unknown | Partial),
             Self::Record => verdict == Record,
             Self::Faint => diagnosis.is_faint(),
             Self::Parameters => verdict == Parameters,
-            // what hides a gap is no agreement
+            // A fault that hides a gap is no agreement.
             Self::Gap => !diagnosis.is_agreement(),
             Self::Any => verdict != NoGap || diagnosis.is_faint() || !diagnosis.is_agreement(),
         }
     }
 }
 
-/// Diagnoses, and says with which status the program ends.
+/// Runs the diagnosis and returns the exit status.
 pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let fail_on = args.fail_on.clone();
     let diagnosis = diagnosed(args)?;
@@ -206,13 +208,13 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         announce: Some(announce),
     };
     let problem = open(&args.data_set, &reading)?;
-    // what a simulation makes of numbers is the rig file's matter as much as the data's
+    // An error may come from the rig file as well as from the data, so messages name both.
     let beside = || match &args.rig {
         Some(rig) => format!("{} with {}", shown(), rig.display()),
         None => shown(),
     };
     detail(format!("read {}", beside()));
-    // of a simulator whose runs cost the next experiment is looked for where it is asked for
+    // If simulator runs are limited, the next experiment is searched for only on request.
     let looks_on = match problem.simulator().model_runs() {
         Some(_) => args.experiment.is_some(),
         None => !args.no_next,
@@ -230,23 +232,23 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     Ok(examined.diagnosis)
 }
 
-/// Reads a problem; an error names the path once.
+/// Reads a problem. Errors name its path exactly once.
 pub(super) fn open(path: &Path, reading: &Reading<'_>) -> anyhow::Result<Problem> {
     Problem::read(path, reading).map_err(|error| {
         let shown = path.display().to_string();
-        // an error of a problem's own file already names that file
+        // Errors of a problem file already name that file.
         let is_named = error.to_string().starts_with(&shown);
         let error = anyhow::Error::from(error);
         if is_named { error } else { error.context(shown) }
     })
 }
 
-/// Says which program is going to run.
+/// Announces the program that is going to run.
 pub(super) fn announce(program: &str) {
     warn(program);
 }
 
-/// Reports what goes on: next to a bar, or with `-v` in lines.
+/// Returns a function that shows progress: on a bar, and with `-v` in lines.
 pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
     move |what| {
         detail(what);
@@ -254,7 +256,8 @@ pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
     }
 }
 
-/// Writes the files first, all or none: a message that they are there is then true.
+/// Writes all files or none, and then prints. In this order the messages about written files are
+/// true.
 fn conclude(
     args: &Args,
     (examined, by_trial): (&Examined, Option<&ByTrial>),
@@ -267,7 +270,7 @@ fn conclude(
             outputs.file(path, |out| trial.write_to(out).map_err(io::Error::other))?;
             said.push(format!("wrote {}", path.display()));
         }
-        // a script that goes on with the file must not wonder
+        // This is an error message, because a script may expect the file.
         (Some(path), None) => missing.push(format!(
             "{} is not written: no experiment is recommended, there are no rivals to tell apart{}",
             path.display(),
@@ -299,9 +302,9 @@ fn conclude(
     Ok(())
 }
 
-/// The sentence, and everything behind it unless the program is to be quiet.
+/// Prints the sentence, and all details unless the program is quiet.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
-    // with every detail the names are those of files and options
+    // With `-v`, effects have the names that are used in files and options.
     let diagnosis = match is_verbose() {
         true => &examined.diagnosis,
         false => &in_words(&examined.diagnosis),

@@ -1,4 +1,5 @@
-//! What a diagnosis prints on a terminal, and writes: a file with what was found, and the code of what is named.
+//! Output of a diagnosis: text for a terminal, a file with the corrected model, and code of the
+//! named effects.
 
 use std::path::Path;
 
@@ -20,13 +21,14 @@ use crate::{
     table::{drawn, number, table, table_text, unbroken},
 };
 
-/// Most slices that are listed.
+/// Largest number of slices that are listed.
 const SLICES: usize = 8;
-/// Most candidates that are listed.
+/// Largest number of candidates that are listed.
 const CANDIDATES: usize = 6;
 
-/// Everything behind the sentence: where, which, how far, and what to do next; with every parameter that these data do not
-/// determine, and the numbers of every candidate, where `is_verbose` says so.
+/// Returns all details of a diagnosis: where the gap is, which effects explain it, how much they
+/// explain, and what to do next. With `is_verbose`, also every parameter that the data do not
+/// determine, and the numbers of every candidate.
 pub(crate) fn text(
     diagnosis: &Diagnosis,
     implementations: &[Implementation],
@@ -71,7 +73,7 @@ pub(crate) fn text(
     out.join("\n").trim_end().to_owned()
 }
 
-/// What an effect is, and the name by which options and files call it.
+/// Returns an effect in words, with the name used in options and files.
 fn named(one: &Implementation, diagnosis: &Diagnosis) -> String {
     match effect_in_words(&one.name, diagnosis) {
         words if words == one.name => words,
@@ -79,12 +81,12 @@ fn named(one: &Implementation, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// A share as in the report.
+/// Formats a share as in the report.
 fn percent(share: f64) -> String {
     unbroken(&stretch_report::percent(share))
 }
 
-/// A table of the report: the same words and numbers.
+/// Appends a table of the report.
 fn put_table(out: &mut Vec<String>, report: &Table) {
     out.push(format!("\n{}", table_text(report)));
 }
@@ -107,7 +109,7 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    // of those that agree one in twenty differs by chance
+    // If simulator and recording agree, one slice in twenty still stands out by chance.
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     if agrees && !diagnosis.is_faint() {
         return;
@@ -146,7 +148,8 @@ fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     if is_verbose {
         put_table(out, &candidate_numbers_table(&shown, &diagnosis.stabilities));
     }
-    // effects of one set belong together, so that a rival is only an effect that may replace one of them
+    // The named effects form one set. Only effects outside it are rivals, each of which may replace
+    // one of them.
     let Diagnosis { named, ambiguous, .. } = diagnosis;
     let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();
     match (named.as_slice(), rivals.as_slice()) {
@@ -163,7 +166,7 @@ fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     }
 }
 
-/// What is named, as something to type.
+/// Lists equation and state of each named effect, for implementing it.
 fn implement(out: &mut Vec<String>, all: &[Implementation], diagnosis: &Diagnosis) {
     if all.is_empty() {
         return;
@@ -209,7 +212,8 @@ fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     out.push(table(&header, rows));
 }
 
-/// How many nominal parameters the data determine, and with every detail what is wrong with the others.
+/// Reports how many nominal parameters the data determine and, with `is_verbose`, why the others
+/// are not determined.
 fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     let all = &diagnosis.identifiability;
     if all.is_empty() {
@@ -231,7 +235,7 @@ fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: boo
     }
 }
 
-/// How far a parameter was bent to hide the effect, in tolerances.
+/// Returns how far a parameter was changed to hide the effect, in tolerances.
 fn bent(p: &stretch_gap::ParameterShift) -> f64 {
     let tolerance = (p.fitted - p.nominal) / p.sigmas;
     let far = ((p.bent - p.fitted) / tolerance).abs();
@@ -258,7 +262,7 @@ fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
         ));
 }
 
-/// Which runs disagree, and in what; every value unless the program is to be quiet.
+/// Prints which runs disagree and in which parameters, unless the program is quiet.
 pub(super) fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
     if is_quiet() {
         return Ok(());
@@ -268,7 +272,7 @@ pub(super) fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
     say(format!("\n{}", table_text(&run_table(by_trial))))
 }
 
-/// Writes the rig file or the problem's file where there is something to write; says what it did.
+/// Writes the corrected rig or problem file, if there is one, and returns a message about it.
 pub(super) fn write_fix(
     outputs: &mut Outputs,
     path: &Path,
@@ -294,7 +298,7 @@ pub(super) fn write_fix(
     Ok(format!("wrote {shown}: {what} re-tuned, with {with}{replaced}"))
 }
 
-/// Writes the code of what is named where there is something; says what it did.
+/// Writes the code of the named effects, if there is any, and returns a message about it.
 pub(super) fn write_snippets(
     outputs: &mut Outputs,
     folder: &Path,

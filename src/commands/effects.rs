@@ -1,4 +1,5 @@
-//! `stretch effects`: the catalogue of what a rig may do in addition to its nominal physics.
+//! `stretch effects`: lists the catalogue of effects that can be added to the nominal physics of a
+//! rig.
 
 use std::path::{Path, PathBuf};
 
@@ -62,7 +63,7 @@ fn language(name: &str) -> Result<Language, &'static str> {
     Language::ALL.into_iter().find(of_name).ok_or("write c, python or matlab")
 }
 
-/// An effect of the rig, or a kind for any channel.
+/// An effect of the rig, or a kind of effect for any channel.
 enum Entry {
     Effect(&'static Effect),
     Kind(&'static Kind),
@@ -78,7 +79,7 @@ impl Entry {
         })
     }
 
-    /// Name, words, equation, and where it acts.
+    /// Returns name, description, equation, and stage.
     fn columns(&self) -> [&'static str; 4] {
         match self {
             Self::Effect(e) => [e.name, e.words, e.equation, e.stage.name()],
@@ -93,7 +94,7 @@ impl Entry {
         }
     }
 
-    /// How it is typed with these values.
+    /// Returns the implementation sketch for these parameter values.
     fn sketch(&self, values: &[f64]) -> anyhow::Result<Sketch> {
         let grid = Grid::samples(1.0 / RATE_HZ)?;
         let sketch = match self {
@@ -111,7 +112,7 @@ impl Entry {
     }
 }
 
-/// A channel from 0 to 1.
+/// The range of a channel from 0 to 1.
 const CHANNEL: Extent = Extent::between(0.0, 1.0);
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
@@ -135,7 +136,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     args.json.answer(&answer, || list(&chosen))
 }
 
-/// The catalogue as text.
+/// Prints the catalogue as text.
 fn list(chosen: &[Entry]) -> anyhow::Result<()> {
     let mut before = None;
     for entry in chosen {
@@ -163,7 +164,7 @@ fn list(chosen: &[Entry]) -> anyhow::Result<()> {
     }
 }
 
-/// The code of an effect as a usual rig has it.
+/// Returns the code of an effect with its usual parameter values.
 fn typical_code(entry: &Entry, language: Language) -> anyhow::Result<String> {
     let values: Vec<f64> = entry.parameters().iter().map(EffectParameter::usual).collect();
     let [name, words, equation, _] = entry.columns();
@@ -171,10 +172,10 @@ fn typical_code(entry: &Entry, language: Language) -> anyhow::Result<String> {
     Ok(entry.sketch(&values)?.code(language, name, &comments))
 }
 
-/// `h: 0 .. 0.6`, with the unit where there is one.
+/// Formats the range of a parameter, with its unit if it has one: `h: 0 .. 0.6`.
 fn range(p: &EffectParameter) -> String {
     let number = |x: f64| {
-        // Four digits are enough for a third.
+        // Four significant digits are enough, for example for one third.
         let x = format!("{x:.3e}").parse().unwrap_or(x);
         if x != 0.0 && x.abs() < 1e-3 || x.abs() >= 1e6 { format!("{x:e}") } else { format!("{x}") }
     };
@@ -204,7 +205,8 @@ fn json(entry: &Entry) -> serde_json::Value {
     })
 }
 
-/// Diagnoses the data and shows the detection limits of the effects with some names, of all without a name.
+/// Diagnoses the data and prints the detection limits of the named effects, or of all effects if
+/// none is named.
 fn list_limits(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()> {
     ensure!(data.exists(), "{}: there is no such file or folder", data.display());
     let bar = spinner();

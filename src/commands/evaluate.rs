@@ -1,4 +1,4 @@
-//! `stretch evaluate`: how good a calibration is on trials with a reference.
+//! `stretch evaluate`: measures the errors of a calibration on trials with a reference.
 
 use std::path::PathBuf;
 
@@ -56,14 +56,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         .map_err(|error| with_columns_to_name(error, renamed))?;
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
     let evaluation = evaluate(&named, &trials)?;
-    // on standard error, so that a table and JSON are what they were
+    // Printed on standard error, so that the output on standard output is unchanged.
     for doubt in evaluation_doubts(&named, &trials, &evaluation) {
         warn(format!("stretch: {doubt}"));
     }
     args.json.answer(&evaluation, || print(&evaluation))
 }
 
-/// The paper's table of some trials.
+/// Prints the paper's table of errors for some trials.
 pub(super) fn print_errors(
     title: &str,
     methods: &[MethodErrors],
@@ -73,7 +73,7 @@ pub(super) fn print_errors(
     say(table_text(&method_table(title, methods, &names, unit)))
 }
 
-/// The paper's table, a trial each and pooled.
+/// Prints the paper's table for each trial, and for all trials together.
 pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
     let unit = &evaluation.unit;
     let name = |i: usize| evaluation.pooled[i].method.clone();

@@ -1,4 +1,5 @@
-//! `stretch export`: a calibration for a board, and the seal of a record.
+//! `stretch export`: exports a calibration for a board, and checks or renews the checksum of a
+//! calibration file.
 
 use std::path::{Path, PathBuf};
 
@@ -116,7 +117,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
 }
 
-/// Says what a record is and whether its seal holds, once that was renewed if `is_sealing`.
+/// Describes a calibration file and the state of its checksum, after renewing the checksum if
+/// `is_sealing`.
 fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
     if is_sealing {
         seal_record(path)?;
@@ -130,7 +132,7 @@ fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
     say(format!("{}: {kind}, {seal:08x}, {state}", path.display()))
 }
 
-/// Puts the header, or the library around it, among the files of the command.
+/// Stages the header, or the library around it, among the outputs of the command.
 fn stage(
     outputs: &mut Outputs,
     out: &Path,

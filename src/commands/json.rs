@@ -1,4 +1,4 @@
-//! Results as JSON: the same option in every command that has a result.
+//! Results as JSON, through the same option in all commands.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ pub(crate) struct Json {
 }
 
 impl Json {
-    /// Whether it is written to standard output, in place of text.
+    /// Whether JSON is printed to standard output in place of text.
     pub(crate) fn is_printed(&self) -> bool {
         self.json.as_deref().is_some_and(is_standard_output)
     }
@@ -34,10 +34,10 @@ impl Json {
         self.json.as_deref().filter(|path| !is_standard_output(path))
     }
 
-    /// Gives standard output to the JSON, or to the one of some files that is called `-`.
+    /// Reserves standard output for the JSON, or for a file with the path `-`.
     ///
     /// # Errors
-    /// Two for one.
+    /// Two outputs that would both go to standard output.
     pub(crate) fn share_stdout<'a>(
         &self,
         files: impl IntoIterator<Item = Option<&'a Path>>,
@@ -51,10 +51,11 @@ impl Json {
         give_stdout(files)
     }
 
-    /// Keeps all files of a command, the JSON among them, and says the result, as JSON or as text, once they are there.
+    /// Commits all files of a command, including a JSON file, and then prints the result, as JSON
+    /// or as text.
     ///
     /// # Errors
-    /// A file that cannot be written, a value that JSON cannot hold.
+    /// Files that cannot be written; values that JSON cannot represent.
     pub(crate) fn conclude(
         &self,
         mut outputs: Outputs,
@@ -72,10 +73,10 @@ impl Json {
         self.file().map_or(Ok(()), |path| tell(format!("wrote {}", path.display())))
     }
 
-    /// [`Json::conclude`] of a command that writes no other file.
+    /// Prints the result of a command that writes no other file, as [`Json::conclude`].
     ///
     /// # Errors
-    /// As that.
+    /// As [`Json::conclude`].
     pub(crate) fn answer(
         &self,
         value: &impl Serialize,
@@ -85,7 +86,7 @@ impl Json {
     }
 }
 
-/// What to write in place of `--json FILE`, where that is what was meant.
+/// Returns advice if `--json FILE` was written where `--json=FILE` was meant.
 pub(crate) fn meant_a_file(arguments: &[String]) -> Option<String> {
     let at = arguments.iter().position(|argument| argument == "--json")?;
     let file = arguments.get(at + 1)?;

@@ -1,4 +1,4 @@
-//! `stretch listen`: a board's live link, shown and recorded.
+//! `stretch listen`: shows and records the data of a board's live link.
 
 mod port;
 mod trial_file;
@@ -73,7 +73,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let (shown_port, baud) = path_and_speed(&args.port);
     let heard = port::listen(Path::new(shown_port), baud).with_context(|| shown_port.to_owned())?;
     let header = trial_file::header(&twin);
-    // last of what can fail: a start that fails leaves nothing behind
+    // Created after everything else that can fail, so that a failed start leaves no file.
     let out = args.out.as_deref();
     let file = out.filter(|out| !is_standard_output(out));
     let recording = file.map(|path| TrialFile::create(path, &header)).transpose();
@@ -112,12 +112,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             Err(RecvTimeoutError::Timeout) => false,
         };
         view.refresh(&session.status);
-        // without a recording and without a reader there is nothing left to do
+        // Without a recording and without a reader there is nothing left to do.
         if is_last || result.is_err() || (recording.is_none() && view.is_gone()) {
             break;
         }
     }
-    // the recording is on the disk before a slow reader is waited for
+    // The recording is synced to disk before waiting for a slow reader.
     session.status.rows = recording.as_ref().map(TrialFile::rows);
     let finished = recording.map_or(Ok(()), TrialFile::finish);
     let unseen = view.close();
@@ -131,14 +131,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     result.and(finished).with_context(|| cannot_record(file))
 }
 
-/// The path of a port and its speed, which may follow a colon; a path may have colons itself.
+/// Splits a port into its path and its speed, which may follow a colon. The path itself may contain
+/// colons.
 fn path_and_speed(port: &str) -> (&str, u32) {
     let parts = port.rsplit_once(':').filter(|_| !Path::new(port).exists());
     let speed = parts.and_then(|(path, speed)| Some((path, speed.parse().ok()?)));
     speed.unwrap_or((port, 115_200))
 }
 
-/// What came is recorded before it is shown.
+/// Records the samples before they are shown.
 fn keep(
     samples: &[Sample],
     recording: &mut Option<TrialFile>,
@@ -155,16 +156,16 @@ fn cannot_record(path: Option<&Path>) -> String {
     format!("{}: cannot record there", path.unwrap_or(Path::new("")).display())
 }
 
-/// A tick of the board's clock, s.
+/// Period of the board's clock, s.
 const TICK_S: f64 = 1e-3;
 
-/// From bytes to samples.
+/// Converts received bytes to samples.
 struct Samples {
     decoder: Decoder,
     time_line: TimeLine,
     begun: Instant,
     adc: Adc,
-    /// The calibration here, on the board's codes.
+    /// The calibration on this computer, which receives the same codes as the board.
     twin: Twin,
     status: Status,
 }
@@ -176,7 +177,7 @@ impl Samples {
             adc_bits: adc.spec().bits,
             ..Status::of(&twin.unit)
         };
-        // for a record that does not say
+        // The default is for a calibration file that does not contain a sample period.
         let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));
         Self { decoder: Decoder::new(), time_line, begun: Instant::now(), adc, twin, status }
     }
@@ -194,8 +195,8 @@ impl Samples {
     fn sample(&mut self, event: Event) -> Option<Sample> {
         let frame = event.frame()?;
         if !matches!(event, Event::Frame(_)) {
-            // the board has seen samples that did not arrive here, or forgot those
-            // that did: both agree again when the window has filled
+            // The board has seen samples that did not arrive here, or has restarted. Both agree
+            // again once the window of the rate filter is filled.
             self.twin.reset();
         }
         let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64());
@@ -210,12 +211,12 @@ impl Samples {
         }
         self.compare(&sample);
         self.status.newest = sample.estimate.or(self.status.newest);
-        // a sample whose time is unknown is no row of a trial
+        // A sample with an unknown time cannot be a row of a trial.
         self.status.standing += u64::from(time_s.is_none());
         time_s.map(|_| sample)
     }
 
-    /// Where both have an estimate on the same branch, by how much they differ.
+    /// Compares the estimates of board and computer, if both have one on the same branch.
     fn compare(&mut self, sample: &Sample) {
         let ours = self.twin.step(AdcCode(sample.frame.code), sample.signal);
         let (Some((ours, own)), Answer::Reading { branch, .. }) = (ours, sample.frame.answer)
@@ -229,7 +230,8 @@ impl Samples {
         }
     }
 
-    /// No byte follows what was begun: the last frame may lack its newline.
+    /// Ends the frame in progress, because no further byte follows. The last frame may lack its
+    /// newline.
     fn disconnected(&mut self) -> Option<Sample> {
         let last = self.decoder.disconnected();
         let last = last.and_then(|event| self.sample(event));
@@ -239,13 +241,13 @@ impl Samples {
     }
 }
 
-/// What a record says of the stream, and the receptor that it describes.
+/// Data of a calibration file about the stream, and its receptor.
 pub(super) struct Twin {
     /// Column of the signal.
     pub signal: String,
-    /// Unit of the estimate; empty where the record does not say.
+    /// Unit of the estimate; empty if the file does not contain it.
     pub unit: String,
-    /// Seconds a sample, where the record says so.
+    /// Sample period, s, if the file contains it.
     pub period_s: Option<f64>,
     receptor: Own,
 }
@@ -253,12 +255,12 @@ pub(super) struct Twin {
 enum Own {
     Volts(Box<Runner<Receptor<f64>>>),
     Codes(BoardReceptor),
-    /// A rate that looks a sample ahead: nothing can be answered live.
+    /// The rate estimator needs the next sample, so there are no live estimates.
     Silent,
 }
 
 impl Twin {
-    /// Any record of `stretch calibrate` or of `stretch export --fixed`.
+    /// Reads a file of `stretch calibrate` or of `stretch export --fixed`.
     pub(super) fn read(path: &Path, adc_bits: u8) -> anyhow::Result<Self> {
         let Some(receptor) = BoardReceptor::read(path) else {
             return Self::of(&read_calibration(path)?);
@@ -291,12 +293,12 @@ impl Twin {
         })
     }
 
-    /// Whether it answers at all.
+    /// Whether there are live estimates.
     pub(super) fn answers(&self) -> bool {
         !matches!(self.receptor, Own::Silent)
     }
 
-    /// Forgets the stream.
+    /// Resets the receptor.
     pub(super) fn reset(&mut self) {
         match &mut self.receptor {
             Own::Volts(receptor) => receptor.reset(),
@@ -305,7 +307,7 @@ impl Twin {
         }
     }
 
-    /// The estimate of a sample, in the reference's unit, and its branch.
+    /// Returns the estimate for a sample, in the unit of the reference, and its branch.
     pub(super) fn step(&mut self, code: AdcCode, signal: Option<f64>) -> Option<(f64, Branch)> {
         match &mut self.receptor {
             Own::Volts(receptor) => {

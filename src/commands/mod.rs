@@ -1,4 +1,4 @@
-//! One file a subcommand, and what they share.
+//! The subcommands, one file each, and their shared functions.
 
 pub(crate) mod apply;
 mod apply_several;

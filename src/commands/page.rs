@@ -1,4 +1,4 @@
-//! `stretch page`: the page that needs no installation.
+//! `stretch page`: writes the browser version of stretch, which needs no installation.
 
 use std::{
     borrow::Cow,
@@ -13,10 +13,10 @@ use stretch_data::files::{read_whole, write_whole};
 use super::shared::say;
 use crate::display::warn;
 
-/// The page's one file in the folder where it is built.
+/// File name of the page in the build folder.
 const FILE: &str = "index.html";
 
-/// The page that was built before this program (`build.rs`).
+/// The page that was built before this program (see `build.rs`).
 #[cfg(has_page)]
 const CARRIED: Option<&[u8]> = Some(include_bytes!(env!("STRETCH_PAGE_FILE")));
 #[cfg(not(has_page))]
@@ -50,7 +50,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// The page: the one that is asked for, the one that this program carries, or one that is built.
+/// Returns the page named by `STRETCH_PAGE`, otherwise the embedded one, otherwise builds it.
 fn page() -> anyhow::Result<Cow<'static, [u8]>> {
     let from = match (env::var_os("STRETCH_PAGE"), CARRIED) {
         (Some(asked), _) => {
@@ -68,7 +68,7 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
     Ok(page.into())
 }
 
-/// Builds the page in the source tree that this program is in.
+/// Builds the page in the source tree that contains this program.
 fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
     let Some((target, script)) = program.as_deref().and_then(sources) else {
@@ -84,7 +84,8 @@ fn build() -> anyhow::Result<PathBuf> {
     Ok(target.join("page").join(FILE))
 }
 
-/// Cargo's target folder and the script that builds the page, if the program is in the source tree, where Cargo puts it.
+/// Returns Cargo's target folder and the script that builds the page, if the program is located in
+/// the target folder of the source tree.
 fn sources(program: &Path) -> Option<(PathBuf, PathBuf)> {
     let target = program.ancestors().find(|folder| folder.ends_with("target"))?;
     let script = target.parent()?.join("web/build.sh");

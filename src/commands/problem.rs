@@ -1,4 +1,5 @@
-//! `stretch init` and `stretch predict`: a first problem from recordings, and what a fixed one predicts of others.
+//! `stretch init` and `stretch predict`: write a first problem file from recordings, and predict
+//! new recordings with a corrected problem.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -84,7 +85,7 @@ pub(crate) struct PredictArgs {
     fail_above: Option<f64>,
 }
 
-/// Predicts, and returns the status with which the program ends.
+/// Predicts new recordings and returns the exit status.
 pub(crate) fn predict(args: PredictArgs) -> anyhow::Result<ExitCode> {
     let is_number = args.fail_above.is_none_or(|most| most.is_finite() && most > 0.0);
     ensure!(is_number, "--fail-above: give a number above 0, in multiples of the noise");
@@ -106,7 +107,7 @@ pub(crate) fn predict(args: PredictArgs) -> anyhow::Result<ExitCode> {
     Ok(if is_above { ExitCode::from(FAILED_ABOVE) } else { ExitCode::SUCCESS })
 }
 
-/// The sentence, and everything behind it unless the program is to be quiet.
+/// Prints the sentence, and all details unless the program is quiet.
 fn print(prediction: &Prediction) -> anyhow::Result<()> {
     say_first(prediction.sentence())?;
     if is_quiet() {

@@ -1,4 +1,4 @@
-//! How recordings are read: what the commands that take them share.
+//! Reading of recordings: options and functions shared by the commands.
 
 use std::{
     path::{Path, PathBuf},
@@ -39,13 +39,13 @@ pub(crate) struct Rows {
     pub(crate) strict: bool,
 }
 
-/// Where the time of a recording is.
+/// The source of a recording's time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum TimeColumn {
     Named(String, Option<TimeUnit>),
-    /// With the order of its dates.
+    /// A column with dates, and the order of day and month.
     Dated(String, DateOrder),
-    /// Not read: samples a second.
+    /// No column is read; samples have this rate, Hz.
     Rate(f64),
 }
 
@@ -77,7 +77,7 @@ impl FromStr for TimeColumn {
 }
 
 impl TimeColumn {
-    /// What is asked of a recording with such a time.
+    /// Returns the reading options for this source of time.
     pub(crate) fn options(&self) -> ReadOptions {
         let options = ReadOptions::new();
         match self {
@@ -89,24 +89,24 @@ impl TimeColumn {
     }
 }
 
-/// Samples a second.
+/// Parses a sample rate, Hz.
 pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate_hz = text.parse::<f64>().ok().filter(|hz| (1e-3..=1e7).contains(hz));
     rate_hz.ok_or_else(|| format!("\"{text}\" is not a rate between 1e-3 and 1e7 Hz"))
 }
 
-/// The name of a column as recordings are read: `Pos (mm)` is pos_mm.
+/// Returns the name of a column as the reader normalizes it: `Pos (mm)` becomes pos_mm.
 pub(crate) fn column(name: &str) -> Result<String, std::convert::Infallible> {
     Ok(tidy_column(name))
 }
 
-/// Names of columns with commas, each as recordings are read.
+/// Returns comma-separated names of columns, each as the reader normalizes it.
 pub(crate) fn columns(names: &str) -> Result<String, std::convert::Infallible> {
     Ok(names.split(',').map(tidy_column).collect::<Vec<_>>().join(","))
 }
 
 impl Recorded {
-    /// The samples a second of recordings without a time, where the command line says it.
+    /// Returns the sample rate given on the command line, if there is one, Hz.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         match self.time {
             TimeColumn::Rate(rate_hz) => Some(rate_hz),
@@ -114,7 +114,7 @@ impl Recorded {
         }
     }
 
-    /// What is asked of each recording.
+    /// Returns the reading options.
     pub(crate) fn options(&self) -> ReadOptions {
         let options = self.time.options().strict(self.rows.strict);
         match &self.named {
@@ -124,12 +124,12 @@ impl Recorded {
     }
 }
 
-/// Reads a recording, `-` being standard input, and reports on standard error what had to be changed.
+/// Reads a recording (`-` is standard input) and prints notes on changes to standard error.
 pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial, RecordingError> {
     Ok(with_notes_printed(Recording::read(path, options)?))
 }
 
-/// The trial of a recording, after its notes were printed.
+/// Prints the notes of a recording and returns its trial.
 pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial {
     for note in notes {
         warn(format!("note: {}: {note}", trial.name));
@@ -140,7 +140,7 @@ pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial
     trial
 }
 
-/// An error of reading, with what to do where a column that is needed has another name.
+/// Adds advice to an error about a missing column.
 pub(crate) fn with_columns_to_name(error: anyhow::Error, what_to_do: &str) -> anyhow::Error {
     let missing = match error.downcast_ref() {
         Some(RecordingError::Data(missing @ DataError::MissingColumn { .. })) => {
@@ -151,15 +151,16 @@ pub(crate) fn with_columns_to_name(error: anyhow::Error, what_to_do: &str) -> an
     anyhow::anyhow!("{missing}; {what_to_do}")
 }
 
-/// Reads trials from files; a folder with a `dataset.toml` means its
-/// trials of that split.
+/// Reads trials from files. For a folder with a `dataset.toml`, reads its trials of the given
+/// split.
 pub(crate) fn read_trials(
     paths: &[PathBuf],
     split: Split,
     options: &ReadOptions,
 ) -> anyhow::Result<Vec<Trial>> {
     let mut trials = Vec::new();
-    // pipes and standard input are read in their order, because each can be read once
+    // Pipes and standard input are read in order and one by one, because each can be read only
+    // once.
     let known: Vec<(&PathBuf, bool)> = paths.iter().map(|path| (path, path.is_file())).collect();
     for group in known.chunk_by(|(_, a), (_, b)| *a && *b) {
         let folder = group[0].0;
@@ -176,7 +177,7 @@ pub(crate) fn read_trials(
             );
         }
         let own = read_all(&entries, |entry| Recording::of_entry(entry, folder, options))?;
-        // once: what is wrong is one line of dataset.toml
+        // Reported once, because the error is in one line of dataset.toml.
         let wrong = own.iter().find_map(|trial| set.rate_mismatch(trial));
         wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
         trials.extend(own);
@@ -184,10 +185,11 @@ pub(crate) fn read_trials(
     Ok(trials)
 }
 
-/// Recordings that are read before their notes are printed. The first that cannot be read ends the reading after its batch.
+/// Number of recordings that are read before their notes are printed. After an error, reading stops
+/// at the end of the batch.
 const BATCH: usize = 256;
 
-/// Reads recordings on all cores; notes and the first error are those of reading them in order.
+/// Reads recordings on all cores. Notes and the first error are those of reading in order.
 fn read_all<T: Sync>(
     items: &[T],
     read: impl Fn(&T) -> Result<Recording, RecordingError> + Send + Sync,

@@ -1,6 +1,7 @@
-//! What the subcommands share: progress, writing, Ctrl-C.
+//! Functions shared by the subcommands: progress, writing, Ctrl-C.
 //!
-//! At Ctrl-C a live recording ends like a stream that ends; anything else stops at once and leaves nothing half-written.
+//! At Ctrl-C a live recording ends normally, as at the end of its stream. Everything else stops
+//! immediately, and no partial output remains.
 
 use std::{
     ffi::OsStr,
@@ -50,14 +51,14 @@ impl<P: TypedValueParser> TypedValueParser for Completed<P> {
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
     let bar = ProgressBar::new(steps).with_message(what);
-    // the template is a constant: were it wrong, the plain bar is shown
+    // The template is a constant. If it were wrong, the plain bar would be shown.
     if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {elapsed}") {
         bar.set_style(style);
     }
     ticking(bar)
 }
 
-/// Seen on a terminal only: what goes on, and for how long already.
+/// Returns a spinner with the current step and the elapsed time. It is visible on a terminal only.
 pub(crate) fn spinner() -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_message("reading");
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
@@ -66,7 +67,7 @@ pub(crate) fn spinner() -> ProgressBar {
     ticking(bar)
 }
 
-/// A bar that moves, or a hidden one.
+/// Makes a bar move, or hides it.
 fn ticking(bar: ProgressBar) -> ProgressBar {
     if shows_progress() {
         bar.enable_steady_tick(Duration::from_millis(150));
@@ -76,7 +77,7 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
     bar
 }
 
-/// Says how a folder that is in the way can be replaced.
+/// Adds to the error about an existing folder how it can be replaced.
 pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref::<FileError>() {
         Some(FileError::Exists { .. }) => anyhow::anyhow!(
@@ -86,7 +87,7 @@ pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// An error with the files that it came of, where it does not name them itself.
+/// Adds the names of files to an error that does not contain them.
 pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> anyhow::Error {
     let (error, shown) = (error.into(), |path: &Path| path.display().to_string());
     let message = format!("{error:#}");
@@ -104,28 +105,28 @@ pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> an
     }
 }
 
-/// A text file among what one command writes.
+/// Adds a text file to the outputs of a command.
 pub(crate) fn stage_text(outputs: &mut Outputs, path: &Path, text: &str) -> anyhow::Result<()> {
     Ok(outputs.file(path, |out| out.write_all(text.as_bytes()))?)
 }
 
-/// Writes a text file, whole or not at all.
+/// Writes a text file, completely or not at all.
 pub(crate) fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
     Ok(stretch_data::files::write_whole(path, |out| out.write_all(text.as_bytes()))?)
 }
 
-/// A file's name without folder and ending, for a table.
+/// Returns a file's name without folder and extension.
 pub(crate) fn short_name(path: &Path) -> String {
     path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Pieces of standard input that may wait.
+/// Largest number of queued blocks of standard input.
 const WAITING: usize = 64;
 
 static RECORDING: AtomicBool = AtomicBool::new(false);
 static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// What the handler of Ctrl-C does; the second Ctrl-C stops a recording, too.
+/// Handles Ctrl-C. The first one ends a recording normally, the second one exits.
 pub(crate) fn on_ctrl_c(exit_code: u8) {
     if RECORDING.load(SeqCst) && !ENDED.swap(true, SeqCst) {
         return;
@@ -133,17 +134,17 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     stretch_data::files::clean_up_and_exit(exit_code)
 }
 
-/// From now on the first Ctrl-C only sets the flag of [`is_ended`].
+/// From now on, the first Ctrl-C only sets the flag of [`is_ended`].
 pub(crate) fn begin_recording() {
     RECORDING.store(true, SeqCst);
 }
 
-/// Whether Ctrl-C ended the recording.
+/// Whether Ctrl-C has ended the recording.
 pub(crate) fn is_ended() -> bool {
     ENDED.load(SeqCst)
 }
 
-/// Standard input that ends at Ctrl-C, so that what has come is still written.
+/// Standard input that ends at Ctrl-C, so that the data received before are still written.
 pub(crate) struct RecordedInput {
     pieces: Receiver<io::Result<Vec<u8>>>,
     piece: Vec<u8>,
@@ -151,11 +152,11 @@ pub(crate) struct RecordedInput {
 }
 
 impl RecordedInput {
-    /// Reads standard input from now on.
+    /// Starts to read standard input.
     pub(crate) fn new() -> Self {
         begin_recording();
         let (sender, pieces) = sync_channel(WAITING);
-        // Reading blocks; the thread ends with the stream or with the program.
+        // Reading blocks. The thread ends with the stream or with the program.
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             loop {

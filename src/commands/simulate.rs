@@ -1,4 +1,4 @@
-//! `stretch simulate`: a data set from the simulated rig.
+//! `stretch simulate`: writes a data set from the simulated rig.
 
 use std::path::{Path, PathBuf};
 
@@ -64,7 +64,7 @@ pub(crate) struct Args {
     print_rig: bool,
 }
 
-/// An effect as it is written on the command line.
+/// An effect as given on the command line.
 #[derive(Debug, Clone, PartialEq)]
 struct EffectArg {
     name: String,
@@ -86,7 +86,7 @@ fn parse_effect(text: &str) -> Result<EffectArg, String> {
         })
         .collect::<Result<Vec<_>, String>>()?;
     let arg = EffectArg { name: name.trim().to_owned(), values };
-    // Unknown names and values out of range are found before anything is simulated.
+    // Unknown names and values out of range are reported before the simulation.
     arg.add_to(&mut Rig::default()).map_err(|e| e.to_string())?;
     Ok(arg)
 }
@@ -143,7 +143,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// One trial as a stream: a folder cannot be one.
+/// Writes a single trial to standard output.
 fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> anyhow::Result<()> {
     let [plan] = plans else {
         bail!(
@@ -163,7 +163,7 @@ fn plans(protocol: &str, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>>
         "paper" => return Ok(TrialPlan::paper(seed)),
         "arbitrary" => return Ok(vec![TrialPlan::arbitrary(1, seed)]),
         "pulses" => return Ok(vec![TrialPlan::pulses(1, seed)]),
-        // a trial, or a folder with a data set
+        // A trial, or a folder with a data set.
         path => Path::new(path),
     };
     let named = |path: &Path| path.display().to_string();
@@ -188,7 +188,7 @@ fn plans(protocol: &str, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>>
     set.trials.iter().map(one).collect()
 }
 
-/// Writes the data set, whole or not at all.
+/// Simulates the plans and writes the data set, completely or not at all.
 pub(super) fn write(
     out: &Path,
     force: bool,
@@ -240,7 +240,7 @@ mod tests {
         let effect = parse_effect("gauge_hysteresis:h=0.2,s=0.012").unwrap();
         assert_eq!(effect.name, "gauge_hysteresis");
         assert_eq!(effect.values, [("h".to_owned(), 0.2), ("s".to_owned(), 0.012)]);
-        // Forms, as a diagnosis answers them.
+        // Optional parameters (forms) are accepted, too, because a diagnosis reports them.
         let effect = parse_effect("gauge_hysteresis:h=0.2,s=0.012,spread=0.4").unwrap();
         assert_eq!(effect.values[2], ("spread".to_owned(), 0.4));
         for (wrong, says) in [

@@ -1,4 +1,5 @@
-//! `stretch sleeve`: sensors that are put on again.
+//! `stretch sleeve`: learns from earlier sessions and renews calibrations of sensors that were put
+//! on again.
 
 use std::path::PathBuf;
 

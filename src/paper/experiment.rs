@@ -1,4 +1,5 @@
-//! The paper's experiment: simulate, then calibrate, apply and judge the paper's way and ours.
+//! The paper's experiment, simulated: calibration, application and evaluation with the published
+//! method and with ours.
 
 use serde_json::{Value, json};
 use stretch_calibrate::{
@@ -15,19 +16,19 @@ use super::responses::{FrequencyPoint, GapPoint, frequency_response, pulse_gaps}
 pub(crate) struct Experiment {
     /// Seed of commands and noise.
     pub(crate) seed: u64,
-    /// Central differences, strain rate at calibration and voltage rate at use,
+    /// Published method: central differences, strain rate for calibration and voltage rate for use,
     /// each trial normalised by its own range, no dead band.
     pub(crate) published: Pipeline,
-    /// Live rates at calibration and use, ranges frozen, dead band.
+    /// Our method: the same causal rate for calibration and use, fixed ranges, dead band.
     pub(crate) ours: Pipeline,
-    /// Error against the gap between two pulses.
+    /// Error as a function of the gap between two pulses.
     pub(crate) gaps: Vec<GapPoint>,
-    /// What the sensor makes of sines.
+    /// Frequency response of the sensor.
     pub(crate) frequency: Vec<FrequencyPoint>,
 }
 
 impl Experiment {
-    /// Runs it all: twelve ramps to fit, an arbitrary and a pulse trial to judge.
+    /// Runs the experiment: twelve ramps for fitting, an arbitrary and a pulse trial for testing.
     pub(crate) fn run(rig: &Rig, seed: u64) -> anyhow::Result<Self> {
         let settings = RunSettings { seed, ..RunSettings::default() };
         let mut session = Session::new(rig, &settings)?;
@@ -47,7 +48,7 @@ impl Experiment {
         Ok(Self { seed, published, ours, gaps, frequency })
     }
 
-    /// All tables, for a file.
+    /// Returns all results as JSON.
     pub(super) fn to_json(&self) -> Value {
         json!({
             "seed": self.seed,
@@ -59,18 +60,18 @@ impl Experiment {
     }
 }
 
-/// Both calibrations, fitted and applied one way.
+/// Calibrations fitted and applied with one method.
 #[derive(Debug, Clone)]
 pub(crate) struct Pipeline {
     /// The linear calibration.
     pub(crate) linear: Calibrated,
     /// Two poly13 surfaces.
     pub(crate) non_linear: Calibrated,
-    /// A model that remembers, fitted to the same ramps; ours alone.
+    /// A model with memory, fitted to the same ramps; only for our method.
     pub(crate) observer: Option<Calibrated>,
-    /// Raw, linear, non-linear and the observer on arbitrary actuation.
+    /// Errors of raw signal, linear, non-linear and observer on arbitrary actuation.
     pub(crate) arbitrary: Evaluation,
-    /// Raw, linear, non-linear and the observer on pulses.
+    /// Errors of raw signal, linear, non-linear and observer on pulses.
     pub(crate) pulses: Evaluation,
 }
 
@@ -84,7 +85,7 @@ impl Pipeline {
     ) -> anyhow::Result<Self> {
         let linear = calibrate(ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
         let non_linear = calibrate(ramps, options)?;
-        // the paper's way has no such model
+        // The published method has no model with memory.
         let model = ModelKind::Remembering { kind: Memory::Observer, rest: true };
         let observer = if own_ranges {
             None
@@ -96,7 +97,7 @@ impl Pipeline {
         Ok(Self { linear, non_linear, observer, arbitrary, pulses })
     }
 
-    /// All methods on other trials, ranges frozen or each trial's own.
+    /// Evaluates all methods on other trials, with fixed ranges or with each trial's own range.
     pub(super) fn judge(&self, trials: &[Trial], own_ranges: bool) -> anyhow::Result<Evaluation> {
         judge(&self.linear, &self.non_linear, self.observer.as_ref(), trials, own_ranges)
     }
@@ -108,7 +109,8 @@ impl Pipeline {
     }
 }
 
-/// Raw and every method on trials, with ranges frozen or each trial's own.
+/// Evaluates the raw signal and all methods on trials, with fixed ranges or with each trial's own
+/// range.
 fn judge(
     linear: &Calibrated,
     non_linear: &Calibrated,

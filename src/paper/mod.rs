@@ -1,7 +1,9 @@
-//! `stretch demo --paper`: the paper's experiment end to end on the simulated rig, next to the figures that the paper prints.
+//! `stretch demo --paper`: the paper's experiment on the simulated rig, compared with the published
+//! figures.
 //!
-//! The paper's recordings are not public; the preset of effects is one of several that come about as close, and never *the* explanation.
-//! Errors of trials depend on commands that the paper does not print: only their order of magnitude can be compared.
+//! The paper's recordings are not public. The preset of effects is one of several that match the
+//! figures about equally well, so it is no proof of an explanation. The errors of trials depend on
+//! commands that the paper does not print, so only their order of magnitude can be compared.
 
 mod experiment;
 mod page;
@@ -43,7 +45,7 @@ pub(crate) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Re
     tell(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
 }
 
-/// The paper's tables next to ours.
+/// Prints the paper's tables with our values.
 fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
     say(format!("The paper's experiment on the simulated rig, preset `paper`, seed {seed}"))?;
     say(format!("\n{}", table_text(&fit_table(experiment))))?;
@@ -86,7 +88,7 @@ fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
     verdicts(experiment).iter().try_for_each(|sentence| say(format!("- {sentence}")))
 }
 
-/// A probability, down to the smallest.
+/// Formats a p-value; values below 1e-4 are shown as "< 0.0001".
 fn p_value(p: Option<f64>) -> String {
     match p {
         None => "-".to_owned(),

@@ -1,4 +1,4 @@
-//! The paper's experiment as a page.
+//! The HTML page of the paper's experiment.
 
 use plotters::prelude::*;
 use stretch_report::kit::{Area, Axes, Drawn, Figure, FigureSize, Ink, Page, plot, stroke};
@@ -9,7 +9,8 @@ use super::{
     tables::{error_tables, fit_table, verdicts},
 };
 
-/// Tables next to the published ones, and the two figures that the paper asks for.
+/// Builds the page: tables with published and own values, and figures of the studies that the paper
+/// proposes.
 pub(super) fn paper_page(experiment: &Experiment) -> String {
     let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
     let verdict = format!(
@@ -92,7 +93,7 @@ fn gap_figure(experiment: &Experiment) -> Figure {
     .legend(names.into_iter().enumerate().map(|(i, name)| (Ink::of(i), name.to_owned())))
 }
 
-/// Frequencies are on a logarithmic axis.
+/// Returns axes with a logarithmic frequency axis.
 fn frequency_axes(y: std::ops::Range<f64>, y_label: &str) -> Axes {
     Axes { is_log: true, ..Axes::new(-1.75..1.15, y, ["frequency, Hz", y_label]) }
 }

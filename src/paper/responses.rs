@@ -1,4 +1,5 @@
-//! What the paper asks for next: the error against the gap between two pulses, and the frequency response of the sensor.
+//! Studies that the paper proposes: the error as a function of the gap between two pulses, and the
+//! frequency response of the sensor.
 
 use std::f64::consts::TAU;
 
@@ -8,27 +9,27 @@ use stretch_sim::{Grid, Key, Rig, Sensing, Session, SimError, Start, TrialPlan};
 
 use super::experiment::Pipeline;
 
-/// Gaps that are tried, in seconds: the paper's range and a little beyond.
+/// Tested gaps, in seconds: the paper's range and a little more.
 const GAPS_S: [f64; 9] = [0.10, 0.15, 0.22, 0.32, 0.46, 0.66, 0.95, 1.4, 2.0];
 
 /// Length of a trial, in seconds.
 const TRIAL_S: f64 = 30.0;
 
-/// Errors on a trial whose pulse pairs all have one gap.
+/// Errors on a trial in which all pulse pairs have the same gap.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct GapPoint {
     /// From the end of the first pulse to the start of the second, in seconds.
     pub(crate) gap_s: f64,
-    /// RMSE of raw, linear and non-linear as published, in millimetres.
+    /// RMSE of raw, linear and non-linear with the published method, in millimetres.
     pub(crate) published_rmse_mm: [f64; 3],
-    /// RMSE of raw, linear, non-linear and the observer as decided here, in millimetres.
+    /// RMSE of raw, linear, non-linear and observer with our method, in millimetres.
     pub(crate) ours_rmse_mm: [f64; 4],
 }
 
-/// Goes on with a session: a trial of pulse pairs for each gap.
+/// Continues a session with one trial of pulse pairs for each gap.
 ///
-/// Pulses are 0.25 s of full inlet; the outlet is open in the gap and for 1 s
-/// after a pair, then both valves are shut for 0.5 s.
+/// A pulse is 0.25 s of fully open inlet. The outlet is open in the gap and for 1 s after a pair.
+/// Then both valves are closed for 0.5 s.
 pub(crate) fn pulse_gaps(
     session: &mut Session,
     published: &Pipeline,
@@ -80,16 +81,16 @@ fn pairs(gap_s: f64) -> TrialPlan {
     }
 }
 
-/// Frequencies, in hertz.
+/// Tested frequencies, in hertz.
 const FREQUENCIES_HZ: [f64; 12] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.6, 2.5, 4.0, 7.0, 12.0];
 
 /// Amplitude of the length, in millimetres.
 const AMPLITUDE_MM: f64 = 3.0;
 
-/// Periods that are left out until the response has settled, and that are kept.
+/// Number of periods to settle, and number of periods that are evaluated.
 const PERIODS: (f64, f64) = (4.0, 6.0);
 
-/// Samples a second of the simulation here.
+/// Sample rate of this simulation, Hz.
 const RATE_HZ: f64 = 500.0;
 
 /// Gain and phase of the bridge voltage at one frequency.
@@ -104,8 +105,8 @@ pub(crate) struct FrequencyPoint {
     pub(crate) lead_deg: f64,
 }
 
-/// Drives the sensing stage by sines of 3 mm about the middle of the stroke, at
-/// constant pressure, without noise, and fits the fundamental by least squares.
+/// Drives the sensing stage with sines of 3 mm about the middle of the stroke, at constant pressure
+/// and without noise. Estimates the fundamental by projection on sine and cosine.
 pub(crate) fn frequency_response(rig: &Rig) -> anyhow::Result<Vec<FrequencyPoint>> {
     let grid = Grid::samples(1.0 / RATE_HZ).map_err(SimError::from)?;
     let stage = Sensing::new(&rig.params, &rig.effects, &grid)?;
@@ -116,7 +117,7 @@ pub(crate) fn frequency_response(rig: &Rig) -> anyhow::Result<Vec<FrequencyPoint
             let settle_s = (PERIODS.0 / frequency_hz).max(20.0);
             let samples = ((settle_s + PERIODS.1 / frequency_hz) * RATE_HZ) as usize;
             let phase = |n: usize| TAU * frequency_hz * n as f64 / RATE_HZ;
-            // a positive sine is a contraction: the length falls
+            // A positive sine is a contraction, so the length decreases.
             let length_mm: Vec<f64> =
                 (0..samples).map(|n| middle_mm - AMPLITUDE_MM * phase(n).sin()).collect();
             let pressure_kpa = vec![300.0; samples];

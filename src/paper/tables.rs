@@ -1,4 +1,4 @@
-//! The paper's experiment next to the figures that it prints: tables and sentences, for a terminal and a page.
+//! Comparison with the paper's published figures: tables and sentences, for a terminal and a page.
 
 use stretch_calibrate::{Evaluation, FitReport};
 use stretch_report::{Table, number};
@@ -10,21 +10,22 @@ use super::experiment::Experiment;
 pub(super) struct PublishedFit {
     /// Coefficient of determination.
     pub(super) r_squared: f64,
-    /// RMSE in percent of normalised strain; none for the linear fit.
+    /// RMSE in percent of normalised strain; `None` for the linear fit.
     rmse_percent: Option<f64>,
 }
 
-/// A method's errors as published: average error in percent, RMSE in millimetres (the paper prints them as percent).
+/// Published errors of a method: average error in percent, and RMSE in millimetres (which the paper
+/// labels as percent).
 struct PublishedErrors {
     average_error_percent: f64,
     rmse_mm: f64,
 }
 
-/// The figures that the paper prints (its sections 3.1 to 3.4).
+/// Published figures (sections 3.1 to 3.4 of the paper).
 pub(super) struct PublishedFigures {
     /// The linear fit.
     pub(super) linear: PublishedFit,
-    /// Its slope and intercept.
+    /// Slope and intercept of the linear fit.
     pub(super) line: (f64, f64),
     /// poly13 on inflations: next lower order, chosen, next higher.
     inflation: [PublishedFit; 3],
@@ -44,7 +45,7 @@ const fn errors(average_error_percent: f64, rmse_mm: f64) -> PublishedErrors {
     PublishedErrors { average_error_percent, rmse_mm }
 }
 
-/// What the paper prints.
+/// The published values.
 pub(super) const PUBLISHED: PublishedFigures = PublishedFigures {
     linear: PublishedFit { r_squared: 0.9680, rmse_percent: None },
     line: (0.9744, 0.1757),
@@ -54,7 +55,8 @@ pub(super) const PUBLISHED: PublishedFigures = PublishedFigures {
     pulses: [errors(5.180, 0.9266), errors(5.875, 1.845), errors(4.863, 1.550)],
 };
 
-/// Trials of one kind: its name, the errors of the published way, those that the paper prints, and ours.
+/// Trials of one kind: name, errors of the published method here, errors printed in the paper,
+/// errors of our method.
 type Applied<'a> = (&'static str, &'a Evaluation, &'static [PublishedErrors; 3], &'a Evaluation);
 
 fn applied(experiment: &Experiment) -> [Applied<'_>; 2] {
@@ -65,7 +67,7 @@ fn applied(experiment: &Experiment) -> [Applied<'_>; 2] {
     ]
 }
 
-/// A fit, what the paper prints, and the same fit with our decisions.
+/// Compares each fit with the paper's value and with the fit of our method.
 pub(super) fn fit_table(experiment: &Experiment) -> Table {
     let (there, here) = (&experiment.published, &experiment.ours);
     let row = |name: String, a: (f64, f64), paper: PublishedFit, b: (f64, f64)| {
@@ -115,7 +117,8 @@ pub(super) fn fit_table(experiment: &Experiment) -> Table {
     )
 }
 
-/// For each kind of trials, a method's errors, what the paper prints, and the same with our decisions.
+/// Compares the errors of each method, for each kind of trials, with the paper's values and with
+/// our method.
 pub(super) fn error_tables(experiment: &Experiment) -> [Table; 2] {
     let head = [
         "Method",
@@ -146,7 +149,7 @@ pub(super) fn error_tables(experiment: &Experiment) -> [Table; 2] {
     })
 }
 
-/// Plain sentences, each decided by the figures.
+/// Returns sentences on which published findings are reproduced, decided by the figures.
 pub(super) fn verdicts(experiment: &Experiment) -> Vec<String> {
     let there = &experiment.published;
     let mut said = Vec::new();

@@ -1,13 +1,13 @@
-//! Folders of small files, each with the line that must come of it.
+//! Folders of small files, each with a line that the program must print for it.
 
 use std::{fs, path::Path};
 
-/// Compares the answer of `told` for every file of a folder with its line in `sentences.txt` there. `SNAPSHOTS=overwrite` writes that
-/// file anew: then look at what git says has changed.
+/// Compares `told(name)` for every file of a folder with the file's line in `sentences.txt` there.
+/// `SNAPSHOTS=overwrite` writes that file anew; then review the changes in git.
 ///
 /// # Panics
 ///
-/// Where a line differs or has no file, showing both; where the folder has no file.
+/// If a line differs or has no file, showing both; if the folder has no file.
 pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     let entries = fs::read_dir(folder).expect("a folder of the corpus");
     let mut names: Vec<String> = entries
@@ -20,7 +20,8 @@ pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     is_in_file(&folder.join("sentences.txt"), &all);
 }
 
-/// Compares a text with a file, line by line. `SNAPSHOTS=overwrite` writes the file anew: then look at what git says has changed.
+/// Compares a text with a file, line by line. `SNAPSHOTS=overwrite` writes the file anew; then
+/// review the changes in git.
 ///
 /// # Panics
 ///

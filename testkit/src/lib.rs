@@ -1,6 +1,7 @@
-//! Tolerances, reference vectors, folders of odd files, and the way to measured data, that the workspace's own tests share.
+//! Tolerances, reference vectors, folders of invalid files, and access to measured data, shared by
+//! the tests of the workspace.
 //!
-//! Every tolerance has a name and a reason; tests never spell a bare number.
+//! Every tolerance has a name and a reason. Tests do not contain bare numbers.
 
 pub mod corpus;
 pub mod measured;

@@ -1,20 +1,23 @@
-//! Recordings of others: the project carries none, but its tests and examples use them where they are.
+//! Measured data sets of other authors. The project does not contain them, but its tests and
+//! examples use them if they are available.
 
 use std::{
     env,
     path::{Path, PathBuf},
 };
 
-/// The folder that holds measured data sets: `STRETCH_DATA`, else `../shared/data` next to the workspace.
+/// Returns the folder with measured data sets: `STRETCH_DATA`, otherwise `../shared/data` next to
+/// the workspace.
 pub fn root() -> PathBuf {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     env::var_os("STRETCH_DATA").map_or_else(beside, PathBuf::from)
 }
 
-/// The folder of one data set. A test that asks for it is `#[ignore]`d: `./ci.sh` runs it where the data are.
+/// Returns the folder of one data set. A test that calls this is `#[ignore]`d; `./ci.sh` runs it if
+/// the data are available.
 ///
 /// # Panics
-/// Where it is not there, with what to do.
+/// If the folder does not exist, with advice.
 ///
 /// ```should_panic
 /// testkit::measured::folder("nobody_recorded_this");
@@ -24,7 +27,8 @@ pub fn folder(name: &str) -> PathBuf {
     folder.unwrap_or_else(|| panic!("no {name}: STRETCH_DATA names the folder that holds it"))
 }
 
-/// The folder of one data set below another folder than [`root`]; none, and a line that says so, where it is not there.
+/// Returns the folder of one data set below `root`. If it does not exist, prints a line and returns
+/// `None`.
 pub fn folder_in(root: &Path, name: &str) -> Option<PathBuf> {
     let folder = root.join(name);
     let found = folder.is_dir();

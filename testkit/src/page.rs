@@ -1,10 +1,11 @@
-//! Pages of reports, as tests read them.
+//! Report pages in tests.
 
-/// A page without the text of its script, which is a section of characters to XML: what is left was written of the data.
+/// Removes the text of a page's script, which is a CDATA section in XML. The rest depends on the
+/// data.
 ///
 /// # Panics
 ///
-/// Where the section does not end.
+/// If the section does not end.
 pub fn without_program(page: &str) -> String {
     let Some((before, rest)) = page.split_once("/*<![CDATA[*/") else { return page.to_owned() };
     let (_, after) = rest.split_once("/*]]>*/").expect("the section ends");

@@ -1,4 +1,4 @@
-//! Seeded random numbers for tests: the same on every machine.
+//! Seeded random numbers for tests, identical on every machine.
 
 use rand_xoshiro::{
     SplitMix64,
@@ -17,34 +17,35 @@ use rand_xoshiro::{
 pub struct Random(SplitMix64);
 
 impl Random {
-    /// The generator of a seed.
+    /// Creates the generator for a seed.
     pub fn new(seed: u64) -> Self {
         Self(SplitMix64::seed_from_u64(seed))
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// Uniform from 0 to 1.
+    /// Returns a uniform number from 0 to 1.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Mean 0, standard deviation 1, nearly normal: the sum of twelve uniform numbers.
+    /// Returns a nearly normal number of mean 0 and standard deviation 1: the sum of twelve uniform
+    /// numbers.
     pub fn noise(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 }
 
-/// Uniform from 0 to 1, the `i`-th.
+/// Returns the `i`-th uniform number from 0 to 1.
 pub fn unit(i: usize) -> f64 {
     Random::new(i as u64).unit()
 }
 
-/// Mean 0, standard deviation 1, nearly normal, the `i`-th.
+/// Returns the `i`-th nearly normal number of mean 0 and standard deviation 1.
 pub fn noise(i: usize) -> f64 {
-    // seeds that are near each other would share their sums
+    // Sums of twelve numbers with neighbouring seeds would share most of their terms.
     Random::new(Random::new(i as u64).bits()).noise()
 }

@@ -6,14 +6,14 @@ pub const F64_ROUNDING: f64 = 1e-14;
 /// Relative: a value printed by another tool with at least twelve digits.
 pub const PRINTED: f64 = 1e-12;
 
-/// Horner and term by term: roundings of terms of size `3 * 2^5`, of which there are 21.
+/// Horner's scheme compared with a sum of terms: roundings of 21 terms of size `3 * 2^5`.
 pub const HORNER: f64 = 21.0 * 96.0 * 4.0 * f64::EPSILON;
 
-/// Of a normalised number, in units of the larger of 1 and (offset + span) / span: eight
-/// roundings there and back.
+/// For a normalised number, in units of the larger of 1 and (offset + span) / span: eight roundings
+/// for the conversion in both directions.
 pub const RANGE_ROUND_TRIP: f64 = 8.0 * f64::EPSILON;
 
-/// In codes: one rounding to the nearest, of a sum that is exact before it.
+/// In codes: a single rounding to nearest of an exact sum.
 pub const LAST_ROUNDING: f64 = 0.5;
 
 /// In units of the input, up to 1: a hysteresis of slopes from 0.1 to 9 and its inverse. Some
@@ -37,7 +37,8 @@ pub const SOLVED_TAPS: f64 = 1e-9;
 /// values up to 1e3 s^2 of a parabola or 1e2 of a ramp, times the sample rate of 100 Hz.
 pub const RATE_FROM_DIFFERENCES: f64 = 1e-7;
 
-/// Relative: what a live estimator may still lack when it says that it has warmed up.
+/// Relative: the part of a transient that may remain when a live estimator reports that it has
+/// warmed up.
 pub const WARMED_UP: f64 = 0.01;
 
 /// Relative: superposition through a recursive filter, rounded at every step, whose
@@ -55,21 +56,20 @@ pub const LOCAL_RATE: f64 = 1e-8;
 /// whose magnitudes add up to less than a hundred.
 pub const LOCAL_VALUE: f64 = 1e-11;
 
-/// Relative to the largest output: 120 steps of a cascade of up to four
-/// recursive sections of which two implementations round every step apart.
-/// At a cutoff of fs/200 the sections forget over 100 samples and magnify
-/// rounding of their poles by (fs/cutoff)^2, some 1e4.
+/// Relative to the largest output: 120 steps of a cascade of up to four recursive sections, in two
+/// implementations that round every step differently. At a cutoff of fs/200 the sections forget
+/// over 100 samples and magnify rounding of their poles by (fs/cutoff)^2, about 1e4.
 pub const RECURSIVE_OUTPUT: f64 = 1e-9;
 
-/// Relative: a quadrature by another tool that was asked for 1e-12.
+/// Relative: a quadrature by another tool with a requested accuracy of 1e-12.
 pub const QUADRATURE: f64 = 1e-9;
 
 /// Relative: a delay that the other tool took from the phase at a small but not
 /// zero frequency (1e-3 Hz, cutoff 0.5 Hz and above): second order in the ratio.
 pub const DELAY_FROM_PHASE: f64 = 1e-4;
 
-/// Relative: a standard deviation measured on 40 000 outputs, of which, as they
-/// are correlated, a few hundred are independent: three standard errors.
+/// Relative: a standard deviation measured on 40 000 correlated outputs, which are worth a few
+/// hundred independent ones: three standard errors.
 pub const MEASURED_DEVIATION: f64 = 0.08;
 
 /// Relative to the largest output: `f32` against `f64` through a filter of gain
@@ -82,20 +82,20 @@ pub const METRICS_SUMS: f64 = 1e-11;
 /// Relative: a parabola through correlations that differ in their fifth digit.
 pub const METRICS_LAG: f64 = 1e-8;
 
-/// Samples: what a parabola misplaces between samples on two slow sines over 400 samples,
-/// whose ends weigh differently at each lag.
+/// Samples: the error of parabolic interpolation between samples, for two slow sines over 400
+/// samples whose end effects depend on the lag.
 pub const METRICS_LAG_PARABOLA: f64 = 0.1;
 
 /// Relative: P near 1e-240, where d(ln P)/d(ln t) is about -700.
 pub const METRICS_TINY_P: f64 = 1e-9;
 
-/// Relative to max(1, |ln P|): a few roundings of the terms that ln P is the sum of.
+/// Relative to max(1, |ln P|): a few roundings of the terms of ln P.
 pub const METRICS_LN_P: f64 = 2e-14;
 
 /// Relative: P down to 1e-300; the exponent, near 700, is rounded to 1e-13.
 pub const METRICS_P: f64 = 1e-12;
 
-/// Relative: SciPy's inverse; P rounded to 1e-14 moves a small t by no more.
+/// Relative: SciPy's inverse. A rounding of P to 1e-14 changes a small t by at most this.
 pub const METRICS_CRITICAL: f64 = 1e-11;
 
 /// Relative to max(1, value): moments merged in another order.
@@ -108,21 +108,23 @@ pub const METRICS_SHIFT: f64 = 1e-9;
 /// Relative: the errors themselves are rounded to `f32`, each by 2^-24; the length adds nothing.
 pub const METRICS_F32: f64 = 5e-7;
 
-/// Relative: an integral time from 40 000 samples of correlation 0.8, whose hundred squared
-/// autocorrelations have a chance part of 4.6/40 000 each: three standard errors.
+/// Relative: an integral time from 40 000 samples of correlation 0.8. The sum of its hundred
+/// squared autocorrelations has a random error of 4.6/40 000 each: three standard errors.
 pub const EFFECTIVE_SIZE: f64 = 0.1;
 
-/// Of a noise and of the share of it that is slow, from a hundred windows of 128 samples: 125 powers of a window tell its
-/// variance to a part in 11, a hundred windows to one in 110; a slow part that outlasts a seventh of a window is known from its
-/// tail alone, five times worse.
+/// Of a noise level and of its slow share, from a hundred windows of 128 samples. The 125 powers of
+/// a window determine its variance to one part in 11, a hundred windows to one in 110. A slow part
+/// with a correlation time longer than a seventh of a window is only known from its tail, five
+/// times less accurately.
 pub const NOISE_LEVEL: f64 = 0.1;
 
-/// Relative: what two equal columns of a singular system share, solved with a jitter of 1e-13 of
-/// its diagonal, whose condition of 1e13 magnifies roundings of 1e-16.
+/// Relative: how two equal columns of a singular system share their common coefficient. The system
+/// is solved with a jitter of 1e-13 of its diagonal, whose condition of 1e13 magnifies roundings of
+/// 1e-16.
 pub const TWINS: f64 = 1e-2;
 
-/// Of a gain of -0.9 over the range, found by a diagnosis that was given -0.82: noise of 2e-3 at 12 000
-/// samples of spread 0.35 leaves 5e-5; the rest is for the reference, which is smoothed, and the prior.
+/// For a gain of -0.9 over the range, found by a diagnosis that started at -0.82: noise of 2e-3 at
+/// 12 000 samples of spread 0.35 leaves 5e-5. The rest is for the smoothed reference and the prior.
 pub const GAIN_FOUND: f64 = 2e-3;
 
 /// Seconds: a skew found by a diagnosis; a fifth of a sample of 10 ms.
@@ -131,41 +133,43 @@ pub const SKEW_FOUND_S: f64 = 2e-3;
 /// Seconds: a time constant of 30 ms found by a diagnosis, a fifth of a sample of 10 ms.
 pub const POLE_FOUND_S: f64 = 2e-3;
 
-/// Relative to nominal: the inlet's flow found by a diagnosis, a sixth of the 0.2 that it is off.
+/// Relative to nominal: the inlet's flow found by a diagnosis, one sixth of its actual error of
+/// 0.2.
 pub const FLOW_FOUND: f64 = 0.03;
 
-/// Relative to nominal: the muscle's time constant of 30 ms found by a diagnosis, a third of the
-/// 0.3 that it is off: 3 ms, a third of a sample.
+/// Relative to nominal: the muscle's time constant of 30 ms found by a diagnosis, a third of its
+/// actual error of 0.3: 3 ms, a third of a sample.
 pub const LAG_FOUND: f64 = 0.1;
 
-/// Seconds: where a record resumes after a gap, on a grid of 10 ms whose stamps come up to 4 ms late,
-/// and with a sample lost: five samples.
+/// Seconds: the time at which a recording resumes after a gap, on a grid of 10 ms with stamps up to
+/// 4 ms late and one lost sample: five samples.
 pub const RESUMED_S: f64 = 0.05;
 
-/// Excess of a sound model on 1800 test samples: three standard errors, 3 sqrt(2/1800).
+/// Excess error of a correct model on 1800 test samples: three standard errors, 3 sqrt(2/1800).
 pub const GAP_NULL: f64 = 0.1;
 
-/// Relative: errors of two calibrations trained on two noises of the same 18 s.
+/// Relative: errors of two calibrations trained with two noise realisations on the same 18 s.
 pub const TRAINED_AGAIN: f64 = 0.1;
 
-/// Relative: a mean square of 20 000 samples, or a spread from the median of as many second differences, each in three neighbours:
-/// four standard errors.
+/// Relative: a mean square of 20 000 samples, or a spread from the median of as many second
+/// differences, each of three neighbours: four standard errors.
 pub const MEDIAN_SPREAD: f64 = 0.04;
 
-/// Excess of a slice of 2500 samples whose mean square is 9: five standard errors 9 sqrt(2/2500).
+/// Excess error of a slice of 2500 samples whose mean square is 9: five standard errors, 9
+/// sqrt(2/2500).
 pub const SLICE_EXCESS: f64 = 1.3;
 
 /// Relative norm: coefficients of a fit on data of condition up to about a thousand.
 pub const FIT_WELL: f64 = 1e-12;
 
-/// Relative norm: coefficients of a fit on raw volts of condition up to 1.3e8. Rounding
-/// of 1e-16 may grow by the condition, to 1e-8; as the roundings of 240 rows are
-/// independent it stays well below, and normal equations (condition squared) far above.
+/// Relative norm: coefficients of a fit on raw volts of condition up to 1.3e8. Rounding of 1e-16
+/// may be magnified by the condition, to 1e-8. The roundings of 240 rows are independent, so the
+/// error stays well below that; with normal equations (condition squared) it would be far above.
 pub const FIT_ILL: f64 = 1e-9;
 
-/// Share of `|A| |c|` and of the condition times the residual: what reflections over 300 rows
-/// of up to 21 terms round off. Were all 6000 roundings of 1e-16 of one sign it would be
-/// 1e-12; they walk at random, as their square root.
+/// Share of `|A| |c|` and of the condition times the residual: rounding of reflections over 300
+/// rows with up to 21 terms. If all 6000 roundings of 1e-16 had the same sign, it would be 1e-12;
+/// as a random walk they grow with the square root of their number.
 pub const FIT_BACKWARD: f64 = 1e-14;
 
 /// Relative: SSE, R^2 and RMSE, whose residuals lose at most six digits to the values.
@@ -175,180 +179,195 @@ pub const FIT_STATISTICS: f64 = 1e-9;
 /// logarithms of gamma functions cancel.
 pub const FIT_QUANTILE: f64 = 1e-9;
 
-/// Relative: a condition number by a dozen power iterations, from below.
+/// Relative: a condition number estimated from below by a dozen power iterations.
 pub const FIT_CONDITION: f64 = 0.1;
 
 /// Relative norm: the bisquare stops once no coefficient moves by 1.5e-8 of its size.
 pub const FIT_BISQUARE: f64 = 1e-7;
 
-/// Relative: the sum of absolute residuals above the linear program's optimum: a smoothing
-/// of a millionth of the scale at each of seven interpolated samples, and slow convergence.
+/// Relative: excess of the sum of absolute residuals over the linear program's optimum. Reasons are
+/// a smoothing of a millionth of the scale at each of seven interpolated samples, and slow
+/// convergence.
 pub const FIT_LEAST_ABSOLUTE: f64 = 1e-6;
 
-/// Relative norm: statsmodels' bisquare, whose scale is the plain MAD without leverage.
+/// Relative norm: compared with the bisquare of statsmodels, whose scale is the plain MAD without
+/// leverage.
 pub const FIT_OTHER_SCALE: f64 = 1e-2;
 
-/// Relative norm: as [`FIT_ILL`] over 1e5 samples, whose roundings average out: what
-/// orthogonal methods reach, and normal equations miss by nine orders.
+/// Relative norm: as [`FIT_ILL`] over 1e5 samples, whose roundings average out. Orthogonal methods
+/// reach this, and normal equations miss it by nine orders of magnitude.
 pub const FIT_ILL_LONG: f64 = 1e-10;
 
-/// Relative norm: `f32` coefficients and surface: a rounding of 6e-8 times up to a thousand,
-/// on volts that are normalised or whose centre was taken off.
+/// Relative norm: `f32` coefficients and surface. A rounding of 6e-8 times up to a thousand, with
+/// volts that are normalised or centred.
 pub const FIT_F32: f64 = 1e-4;
 
-/// Share of k_max: the static law of the muscle tabulated by cubics at 128 knots a reference
-/// pressure; interpolation leaves h^4/384 of a fourth derivative of about 100.
+/// Share of k_max: the static law of the muscle tabulated by cubics at 128 knots for each reference
+/// pressure. Interpolation leaves h^4/384 of a fourth derivative of about 100.
 pub const STATIC_LAW: f64 = 1e-8;
 
-/// Share of a channel's full scale: two implementations of the rig at other steps of
-/// integration (the reference's own step leaves 1.5e-6, ours at most [`RIG_STEP`]).
+/// Share of a channel's full scale: two implementations of the rig with different integration steps
+/// (the reference's own step leaves 1.5e-6, ours at most [`RIG_STEP`]).
 pub const RIG_CONFORMANCE: f64 = 2e-3;
 
-/// Share of a channel's full scale by which halving the step of integration may move it.
+/// Share of a channel's full scale: the change if the integration step is halved.
 pub const RIG_STEP: f64 = 1e-4;
 
-/// In units of the noise: how far least absolute residuals may end up from the truth at the
-/// edge of the rectangle, where a few samples decide, when a fifth of all are spoilt.
+/// In units of the noise: deviation of a fit of least absolute residuals from the truth at the edge
+/// of the rectangle, where few samples determine it, if a fifth of all samples are corrupted.
 pub const FIT_GROSS_ERRORS: f64 = 20.0;
 
-/// Millimetres between receptors that remember in `f32` and in `f64`: states near
-/// 1 with 24 bits, up to 35 terms of coefficients up to 2, a stroke of 30 mm.
+/// Millimetres between receptors with memory in `f32` and in `f64`: states near 1 with 24 bits, up
+/// to 35 terms of coefficients up to 2, a stroke of 30 mm.
 pub const REMEMBERING_F32_MM: f64 = 2e-2;
 
-/// Millimetres of a 30 mm stroke by which an observer may err on its own gauge
-/// without noise: its motion model has no acceleration, so it trails a sine of
-/// 0.6 Hz by about `acceleration * settling time^2`.
+/// Millimetres of a 30 mm stroke: error of an observer on its own gauge without noise. Its motion
+/// model has no acceleration, so it trails a sine of 0.6 Hz by about
+/// `acceleration * settling time^2`.
 pub const OBSERVER_INVERTS_MM: f64 = 0.5;
 
-/// Share of the stroke by which an observer in integers may differ from one in
-/// `f64`: states in 2^-26 of it and gains of 20 bits, behind a curve up to ten
-/// times flatter than its mean and a filter that sums over hundreds of samples.
+/// Share of the stroke by which an observer in integers may differ from one in `f64`: states with a
+/// resolution of 2^-26 of the stroke and gains of 20 bits, a curve up to ten times flatter than its
+/// mean slope, and a filter that sums over hundreds of samples.
 pub const FIXED_OBSERVER: f64 = 1e-4;
 
-/// Relative: time constant and amplitude of an observer on its own gauge. Golden sections
-/// stop at a few per cent of the time constant, and the amplitude takes up the difference.
+/// Relative: time constant and amplitude of an observer on its own gauge. The golden-section search
+/// stops at a few per cent of the time constant, and the amplitude compensates the difference.
 pub const OBSERVER_SEARCHED: f64 = 0.1;
 
-/// Relative: the error of a model of the history as it runs against that of its fit, which
+/// Relative: the error of a history model when running, compared with that of its fit. The fit
 /// divides by the degrees of freedom (126 of 9000) and leaves out the first samples.
 pub const HISTORY_LIVE: f64 = 0.05;
 
-/// Relative: errors of two calibrations, one trained on simulated trials that last as long as the
-/// measured ones but are others: half as much again as [`TRAINED_AGAIN`].
+/// Relative: errors of two calibrations, one of them trained on simulated trials that have the
+/// length of the measured ones but other commands: one and a half times [`TRAINED_AGAIN`].
 pub const TRAINED_APART: f64 = 0.15;
 
-/// In units of a signal up to 25: a smoother may round off a corner of slope 1 by a tenth of a sample's step.
+/// In units of a signal up to 25: a smoother may round a corner of slope 1 by a tenth of a sample's
+/// step.
 pub const CORNER_KEPT: f64 = 0.1;
 
-/// Share of k_max: the contraction at the reference pressure as the literature prints it, to four decimals.
+/// Share of k_max: the contraction at the reference pressure as printed in the literature, to four
+/// decimals.
 pub const K_MAX_DIGITS: f64 = 5e-5;
 
-/// Of a value near 1: printed tables with five decimals.
+/// For a value near 1: printed tables with five decimals.
 pub const TABLE_DIGITS: f64 = 1e-5;
 
-/// Volts: a value between samples, led over linearly where the time is a whole sample but for
-/// rounding of 1e-15 s times the session's length, at slopes up to 1e2 V/s.
+/// Volts: a value interpolated linearly between samples at a time that is a whole sample up to
+/// rounding of 1e-15 times the session's length, at slopes up to 1e2 V/s.
 pub const SHIFTED_V: f64 = 1e-9;
 
-/// Share of full scale: a stage on samples that are led over linearly sees less of the kinks.
+/// Share of full scale: linear interpolation of a stage's input smooths its kinks.
 pub const STAGE_ALONE: f64 = 2e-3;
 
-/// Volts: what an amplifier of a time constant of 1e12 s follows in 6 s of up to 2 V: 1e-11, and rounding.
+/// Volts: the response in 6 s of an amplifier with a time constant of 1e12 s to up to 2 V: 1e-11,
+/// and rounding.
 pub const NEVER_FOLLOWS_V: f64 = 1e-6;
 
-/// Millimetres: by how much a length still moves at the end of a move that settled for seconds.
+/// Millimetres: remaining motion of a length at the end of a move that settled for seconds.
 pub const BEHIND_MM: f64 = 1e-6;
 
-/// In codes: values that are whole codes but for seven printed digits.
+/// In codes: values that are whole codes up to rounding to seven printed digits.
 pub const WHOLE_CODE: f64 = 1e-3;
 
-/// Micrometres: half a step of 3.3 V/65536 at up to three taps of 0.12 a sample, at 100 Hz and
+/// Micrometres: half a step of 3.3 V/65536 at up to three taps of 0.12 per sample, at 100 Hz and
 /// about 1.1 mm for 1 V/s, in addition to the stated error: 0.9 + 0.6.
 pub const CODE_STEP_UM: f64 = 1.5;
 
-/// Millimetres of a 30 mm stroke: a baseline that drifted by 0.1 V and rested for 15 s, found again.
+/// Millimetres of a 30 mm stroke: error after a baseline drift of 0.1 V and a rest of 15 s, in
+/// which the baseline is found again.
 pub const REST_FOUND_MM: f64 = 0.5;
 
-/// Standard deviation, relative, and correlation of 200 000 coloured samples of heavy tails, some
-/// 20 000 of them independent: 0.5 %, twice that for the tails, five times.
+/// Relative standard deviation, and correlation, of 200 000 coloured samples with heavy tails,
+/// equivalent to about 20 000 independent ones: 0.5 %, doubled for the tails, and five times that.
 pub const BLIND_NOISE: f64 = 0.05;
 
-/// Relative: the standard deviation of a slow drift of 5 s over 40 000 s, 4000 of them independent: 1.1 %,
-/// up to twice that where several lags follow each other, four to five times.
+/// Relative: the standard deviation of a slow drift of 5 s over 40 000 s, equivalent to 4000
+/// independent samples: 1.1 %, up to twice that for a cascade of several lags, and four to five
+/// times that.
 pub const BLIND_SUPPLY: f64 = 0.1;
 
-/// Relative: the share of 4000 missing rows, four in a row: 1000 independent ones, 3 %, five times.
+/// Relative: the share of 4000 missing rows in groups of four: 1000 independent groups, 3 %, five
+/// times that.
 pub const BLIND_ROWS: f64 = 0.15;
 
-/// Of curves of size near 1, through a table or a spline: some hundred roundings at most.
+/// For curves of size near 1, through a table or a spline: at most some hundred roundings.
 pub const BLIND_CURVE: f64 = 1e-12;
 
-/// Relative: a slope by differences in a table of 240 intervals of values up to 2: 240 times a rounding or two, and ten times that.
+/// Relative: a slope from differences in a table of 240 intervals of values up to 2: 240 times one
+/// or two roundings, and ten times that.
 pub const BLIND_SLOPE: f64 = 1e-11;
 
-/// Of a law from 0 to 1: where it starts, a table's first knot less what it is scaled from.
+/// For a law from 0 to 1: its start, which is the difference between a table's first knot and its
+/// reference value.
 pub const BLIND_LAW_START: f64 = 1e-9;
 
-/// Relative: where it ends, a table of 240 intervals, scaled to end at 1.
+/// Relative: its end, where a table of 240 intervals is scaled to 1.
 pub const BLIND_LAW_END: f64 = 1e-9;
 
 /// Share of the reference pressure: a linear table of 4096 knots, h^2 x''/8.
 pub const BLIND_LAW_TABLE: f64 = 1e-6;
 
-/// Of unknowns near 1: the descent stops once none moves by 1e-7; ten times that.
+/// For unknowns near 1: ten times the change of 1e-7 at which the descent stops.
 pub const BOUNDED_SQUARES: f64 = 1e-6;
 
-/// Seconds: a delay of 0.05 s by a sum over steps of 0.1 ms, two of them.
+/// Seconds: a delay of 0.05 s computed as a sum over steps of 0.1 ms: two steps.
 pub const BLIND_DELAY_S: f64 = 2e-4;
 
-/// Seconds: the same where rising has a separate time constant.
+/// Seconds: as `BLIND_DELAY_S`, with a separate time constant for rising.
 pub const BLIND_UNEVEN_S: f64 = 0.02;
 
-/// Relative: what a filter of 1 ns holds back of a step after 1 ms, 1e-6 at each of up to ten poles.
+/// Relative: the remaining step response of up to ten poles of 1 ns after 1 ms, 1e-6 each.
 pub const BLIND_NO_FILTER: f64 = 1e-5;
 
-/// Relative: how much of a move of 1/20 000 of its reach a loop of any family yields.
+/// Relative: inelastic part of a move of 1/20 000 of the reach of a hysteresis loop of any
+/// family.
 pub const BLIND_ELASTIC: f64 = 0.1;
 
-/// Relative: how much of a move of 1/2000 of its reach a loop of the written forms yields.
+/// Relative: inelastic part of a move of 1/2000 of the reach of a hysteresis loop of the written
+/// forms.
 pub const BLIND_LOOP_ELASTIC: f64 = 0.05;
 
-/// Relative: what lags of 0.1 s still lack after 20 s: exp(-200) and rounding.
+/// Relative: the remaining transient of lags of 0.1 s after 20 s: exp(-200), and rounding.
 pub const BLIND_SETTLED: f64 = 1e-9;
 
-/// What a relaxation still lacks after 20 s whose slowest part is eight to ten times 0.1 s: exp(-20).
+/// The remaining transient after 20 s of a relaxation whose slowest part is eight to ten times 0.1
+/// s: exp(-20).
 pub const BLIND_RELAXED: f64 = 1e-6;
 
-/// Pascals of 620 kPa that a chamber still lacks when it is full.
+/// Pascals of 620 kPa: the remaining pressure difference of a full chamber.
 pub const BLIND_FULL_PA: f64 = 100.0;
 
-/// Pascals of 28.8 kPa that choked filling brings in 10 ms: the first steps of integration.
+/// Pascals of 28.8 kPa that choked filling adds in 10 ms: the first integration steps.
 pub const BLIND_FILL_PA: f64 = 50.0;
 
-/// Millimetres: the printed contraction, 5e-5 of 29 mm, and what [`BLIND_FULL_PA`] still moves.
+/// Millimetres: rounding of the printed contraction, 5e-5 of 29 mm, and the effect of
+/// [`BLIND_FULL_PA`].
 pub const BLIND_LENGTH_MM: f64 = 0.01;
 
-/// Volts at rest of a bridge that was trimmed: rounding, magnified by the amplifier.
+/// Volts of a trimmed bridge at rest: rounding, magnified by the amplifier.
 pub const BLIND_TRIMMED_V: f64 = 1e-9;
 
-/// Relative: the offset of a slip whose hysteresis state a vent left; the vent ends where its curve is still a little bent.
+/// Relative: the offset that a slip with hysteresis keeps after venting. Venting ends where the
+/// curve is still slightly bent.
 pub const BLIND_HYSTERESIS_STATE: f64 = 0.2;
 
-/// Relative: what a steady load has still to draw down after 40 s.
+/// Relative: the part of a draw-down by a steady load that remains after 40 s.
 pub const BLIND_DRAWN: f64 = 0.01;
 
-/// Of an opening up to 1, far beyond a dead band: the end of its law, [`BLIND_LAW_END`].
+/// For an opening up to 1, far beyond a dead band: the end of its law, [`BLIND_LAW_END`].
 pub const BLIND_BAND: f64 = 1e-9;
 
-/// Of an opening: what a dead band of 1e-9 may take, up to ten times itself.
+/// For an opening: the effect of a dead band of 1e-9, up to ten times its width.
 pub const BLIND_BAND_OFF: f64 = 1e-8;
 
-/// A term that was planted, compared with the one proposed for it: shapes are refined in steps of 5 %, and a width that is that much
-/// off takes as much of the coefficient with it.
+/// A planted term compared with the proposed one. Shapes are refined in steps of 5 %, and an error
+/// of the width changes the coefficient by the same share.
 pub const PLANTED_TERM: f64 = 0.08;
-/// A coefficient fitted in other units: factors that are no powers of two round every sample, and a search of its parameters by
-/// differences ends where their steps do.
+/// A coefficient fitted in other units. Factors that are no powers of two round every sample, and a
+/// search with numerical derivatives stops at its step size.
 pub const RESCALED: f64 = 1e-4;
 
-/// Sums of ten thousand squares in another order, and a difference that is added again.
+/// Sums of ten thousand squares in another order, and a difference that is added back.
 pub const TURNED: f64 = 1e-9;

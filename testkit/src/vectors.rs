@@ -1,12 +1,12 @@
-//! Reads reference vectors: CSV files made by other tools, kept under `reference/`.
+//! Reads reference vectors: CSV files written by other tools, stored under `reference/`.
 
 use std::{collections::HashMap, fs, path::PathBuf};
 
-/// The columns of `reference/<name>` by header, as numbers.
+/// Returns the columns of `reference/<name>` by header, as numbers.
 ///
 /// # Panics
-/// When the file is missing or a field is not a number: a reference that
-/// cannot be read must fail the test that asked for it.
+/// If the file is missing or a field is not a number, because a reference that cannot be read must
+/// fail the test.
 pub fn columns(name: &str) -> HashMap<String, Vec<f64>> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../reference").join(name);
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

@@ -1,4 +1,5 @@
-//! Wrong input gives a message with the place, exit code 1 and no output. Invalid files are in `corpus/`.
+//! Wrong input gives a message that states the place, exit code 1, and no output. Invalid files are
+//! in `corpus/`.
 
 use std::fs::File;
 
@@ -66,7 +67,7 @@ fn crlf_bom_and_semicolons_are_understood() {
         calibrate(trial, &scratch.path(out)).assert().success();
     }
     let read = |name| std::fs::read_to_string(scratch.path(name)).unwrap();
-    // the trial's name is sealed with the rest
+    // The checksum covers the trial's name, too.
     let unsealed = |name| read(name).split("\"digest\"").next().unwrap().to_owned();
     assert_eq!(unsealed("a.json"), unsealed("b.json").replace("foreign.csv", "plain.csv"));
     assert_eq!(unsealed("a.json"), unsealed("c.json").replace("german.csv", "plain.csv"));
@@ -113,7 +114,7 @@ fn a_full_disk_leaves_nothing_half_written() {
     let calibration = scratch.calibration("cal.json");
     let trial = scratch.loops("long.csv", 60.0, 1.2);
     let before = scratch.names();
-    // a file size limit acts as a full disk; the signal is ignored, so that the write fails
+    // A file size limit acts like a full disk. Its signal is ignored, so that the write fails.
     let script =
         "trap '' XFSZ; ulimit -f 8; exec \"$0\" apply --calibration \"$1\" \"$2\" --out \"$3\"";
     let output = std::process::Command::new("bash")
@@ -134,7 +135,7 @@ fn the_papers_differentiator_cannot_run_live() {
     let trial = scratch.loops("trial.csv", 30.0, 1.2);
     let out = scratch.path("cal.json");
     calibrate(&trial, &out).args(["--rate", "central"]).assert().success();
-    // on a log it may look ahead
+    // On a log, the rate estimator may use later samples.
     stretch().arg("apply").arg("--calibration").arg(&out).arg(&trial).assert().success();
     let mut live = stretch();
     live.arg("apply").arg("--calibration").arg(&out).arg("-").write_stdin("time_s,bridge_v\n0,1\n");

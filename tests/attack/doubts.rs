@@ -1,13 +1,15 @@
-//! Logs that are accepted but give doubtful results: the warning, for every command that takes them.
+//! Logs that are accepted although the results are doubtful: every command that takes them must
+//! print a warning.
 
 use std::{fmt::Write, fs};
 
 use crate::support::{Scratch, fails, one_line, stretch, warned};
 
-/// Time in seconds, length and signal of a row; `None` leaves it out.
+/// Changes a row of time in seconds, length and signal; `None` removes the row.
 type Change<'a> = &'a dyn Fn(usize, [f64; 3]) -> Option<[f64; 3]>;
 
-/// The log that [`Scratch::calibration`] is fitted to, each row changed by its number.
+/// Returns the log to which [`Scratch::calibration`] is fitted, with each row changed depending on
+/// its number.
 fn rows(scratch: &Scratch, change: Change<'_>) -> String {
     let text = fs::read_to_string(scratch.loops("whole.csv", 40.0, 1.1)).unwrap();
     let mut out = String::from("time_s,length_mm,bridge_v\n");
@@ -21,12 +23,13 @@ fn rows(scratch: &Scratch, change: Change<'_>) -> String {
     out
 }
 
-/// The command before the log, or before its text on standard input.
+/// The command line before the log's name. For a stream, the log goes to standard input.
 const EVALUATE: &str = "evaluate --calibration cal.json";
 const APPLY: &str = "apply --calibration cal.json";
 const STREAM: &str = "apply --calibration cal.json -";
 
-/// A log's name and text, which commands are given it, what they say once each, and what they do not say.
+/// Name and text of a log, the commands that take it, phrases that must occur once in the messages,
+/// and phrases that must not occur.
 type Member<'a> = (&'a str, String, &'a [&'a str], &'a [&'a str], &'a [&'a str]);
 
 const ANOTHER: &str = "samples a second, the calibration";
@@ -39,7 +42,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let scratch = Scratch::new();
     scratch.calibration("cal.json");
     fs::create_dir(scratch.path("elsewhere")).unwrap();
-    // all rows or some, their times multiplied, and every other one late
+    // All rows or every `every`th row, with times multiplied, and with every other row late.
     let timed = |times: f64, every: usize, late_s: f64| {
         rows(&scratch, &|n, [t, length, signal]| {
             let late_s = if (n / every).is_multiple_of(2) { 0.0 } else { late_s };
@@ -49,7 +52,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let own = fs::read_to_string(scratch.loops("own.csv", 20.0, 1.0)).unwrap();
     let same = timed(1.0, 1, 0.0);
     let other = rows(&scratch, &|_, [t, length, signal]| Some([t, length + 0.1 * t.sin(), signal]));
-    // the same samples later, with a column more
+    // The same samples at later times, with an additional column.
     let later = rows(&scratch, &|_, [t, length, signal]| Some([9.0 + t, length, signal]));
     let later = later.replace('\n', ",1\n").replacen("bridge_v,1", "bridge_v,more", 1);
     let still = rows(&scratch, &|_, [t, _, signal]| Some([t, 74.0, signal]));
@@ -151,7 +154,7 @@ fn stamps_that_cannot_be_or_come_unevenly_are_told_or_refused() {
     scratch.write("ps.csv", at(500, &|n, _| 1e-12 * n as f64));
     scratch.write("jitter.csv", jitter);
     scratch.write("late.csv", &late);
-    // more samples than a gap's count can hold
+    // More missing samples than the count of a gap can hold.
     scratch.write("longer.csv", late.replace("\n100000", "\n999900000"));
     for (line, is_done, parts) in [
         ("calibrate ps.csv --out c.json", false, &["1.000e12 samples a second"][..]),

@@ -1,13 +1,13 @@
-//! More rows change only the run time.
+//! A larger number of rows changes only the run time.
 
 use std::fmt::Write;
 
 use crate::support::{Scratch, fails, prints, stretch};
 
-/// More rows than an earlier release read at once.
+/// More rows than an earlier release could read at once.
 const MANY: u32 = 1_600_000;
 
-/// A gauge between two lengths.
+/// A gauge that moves between two lengths.
 fn rows(count: u32, (least_mm, most_mm): (f64, f64), phase: f64) -> String {
     let mut text = String::from("time_s,length_mm,bridge_v\n");
     for n in 0..count {
@@ -20,7 +20,8 @@ fn rows(count: u32, (least_mm, most_mm): (f64, f64), phase: f64) -> String {
     text
 }
 
-/// The short trials hold five sixths of the range: without them the estimates are off by millimetres.
+/// The short trials cover five sixths of the range. Without them the estimates would be wrong by
+/// millimetres.
 #[test]
 #[ignore = "reads 1,600,000 rows twice; ./ci.sh runs it"]
 fn short_trials_are_fitted_with_a_long_one_and_digests_are_checked() {

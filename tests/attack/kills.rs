@@ -1,4 +1,4 @@
-//! Commands killed while they write leave the old file or the new one.
+//! Commands that are killed while they write leave either the old file or the new one.
 #![cfg(unix)]
 
 use std::{
@@ -17,12 +17,12 @@ use crate::support::{
     written::{command, prepared, tree, writes},
 };
 
-/// A command that writes; the folder that it replaces or makes in one step, or the files of which each is whole.
+/// A command that writes a folder in one step, or several files that are each complete.
 struct Writing {
     line: &'static str,
-    /// How often it is killed for each time that the others are.
+    /// Relative frequency with which this command is killed.
     weight: usize,
-    /// Whether all of it appears at once.
+    /// Whether all output appears in one step.
     at_once: bool,
 }
 
@@ -63,7 +63,8 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Whether a file is the new one. A diagnosis says how long it took: there it is the length and the end that count.
+/// Whether a file is the new one. A diagnosis contains its run time, so only its length and its end
+/// are compared.
 fn is_new(name: &str, bytes: &[u8], new: &BTreeMap<String, Vec<u8>>) -> bool {
     let Some(expected) = new.get(name) else { return false };
     let end = |bytes: &[u8]| bytes[bytes.len().saturating_sub(8)..].to_vec();
@@ -72,7 +73,8 @@ fn is_new(name: &str, bytes: &[u8], new: &BTreeMap<String, Vec<u8>>) -> bool {
         || (is_timed && bytes.len().abs_diff(expected.len()) < 32 && end(bytes) == end(expected))
 }
 
-/// Kills the commands at random, half of them once they write, until `hits` kills came before the command ended.
+/// Kills the commands at random times, half of them after they have begun to write, until `hits`
+/// kills came before the command ended.
 fn killed_at_random(hits: usize, seed: u64) {
     let before = prepared();
     let expected: Vec<_> = WRITING
@@ -128,7 +130,7 @@ fn killed_at_random(hits: usize, seed: u64) {
         for name in old.keys().filter(|name| new.contains_key(*name)) {
             assert!(found.contains_key(name), "{case}: {name} is gone");
         }
-        // the next try is not in the way of this one
+        // The leftovers of a kill do not obstruct the next attempt.
         if kill % 4 == 0 {
             let again = command(&scratch, writing.line).status().unwrap();
             let found = tree(&scratch.path(""));
@@ -143,7 +145,7 @@ fn killed_at_random(hits: usize, seed: u64) {
     println!("{kill} kills, {hit} before the end, {new_ones} of them with all written");
 }
 
-/// As many kills before the end of a command as `STRETCH_KILLS` says: 300 take ten minutes.
+/// `STRETCH_KILLS` sets the number of kills before a command ends. 300 take ten minutes.
 #[test]
 #[ignore = "a minute of kills; ./ci.sh runs it"]
 fn a_kill_leaves_the_old_or_the_new() {

@@ -1,4 +1,5 @@
-//! A small file that needs too much memory or time is refused with a message, without an abort.
+//! A small file that would need too much memory or time is refused with a message, without an
+//! abort.
 #![cfg(target_os = "linux")]
 
 use std::{
@@ -12,10 +13,11 @@ use crate::support::{
     program,
 };
 
-/// Address space of a run, kB: the program itself takes a tenth of it, and a file of a few megabytes may take 256 MB.
+/// Address space of a run, kB. The program itself needs a tenth of it, and reading a file of a few
+/// megabytes may need 256 MB.
 const MOST_KB: u32 = 1_500_000;
 
-/// Runs the program in a folder within the limit; a shell's line follows its name.
+/// Runs the program in a folder within the limit. `line` holds its arguments in shell syntax.
 fn limited(scratch: &Scratch, line: &str) -> Output {
     within(scratch, MOST_KB, line)
 }
@@ -24,7 +26,7 @@ fn within(scratch: &Scratch, most_kb: u32, line: &str) -> Output {
     let script = format!("ulimit -v {most_kb}; exec \"$0\" {line}");
     let mut shell = Command::new("sh");
     shell.current_dir(scratch.path("")).args(["-c", &script]).arg(program());
-    // threads have stacks of address space, as many as there are processors
+    // The stacks of threads need address space, and by default there is one thread per processor.
     shell.env("RAYON_NUM_THREADS", "2").stdin(Stdio::null());
     shell.output().expect("a shell runs")
 }
@@ -39,14 +41,15 @@ fn refused(scratch: &Scratch, line: &str, parts: &[&str]) {
     }
 }
 
-/// Header of an array of bytes, NPY version 1.
+/// Returns the header of a byte array in NPY format, version 1.
 fn npy(count: usize) -> Vec<u8> {
     let told = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({count},), }}");
     let told = format!("{told:<117}\n");
     [b"\x93NUMPY\x01\x00", &(told.len() as u16).to_le_bytes()[..], told.as_bytes()].concat()
 }
 
-/// Numbers of two bytes take eight in memory, and once: a matrix is taken apart without a second copy.
+/// Numbers of two bytes need eight bytes in memory. A matrix is split into columns without a second
+/// copy.
 #[test]
 fn an_archive_of_short_numbers_takes_four_times_its_size_and_256_mb() {
     const ROWS: usize = 5_000_000;
@@ -88,7 +91,7 @@ fn an_archive_that_unpacks_to_gigabytes_is_refused() {
         "convert bomb.npz --out out.csv",
         &["bomb.npz", "time_s", "more than 19", "MB of memory"],
     );
-    // numbers take eight times the bytes that they take in the file
+    // These numbers need eight times as much memory as in the file.
     let small = [npy(60_000_000), vec![1; 60_000_000]].concat();
     scratch.write("small.npy", small);
     refused(
@@ -102,7 +105,7 @@ fn an_archive_that_unpacks_to_gigabytes_is_refused() {
 #[test]
 fn a_packed_text_that_goes_on_for_ever_is_refused() {
     let scratch = Scratch::in_memory();
-    // blank lines take no memory, and time
+    // Blank lines need no memory, but time.
     scratch
         .write("lines.csv.gz", gzip(&deflated(b"time_s,length_mm,bridge_v\n0,1,1\n", b'\n', 1500)));
     for line in ["convert lines.csv.gz --out out.csv", "calibrate lines.csv.gz --out cal.json"] {
@@ -142,7 +145,7 @@ fn a_grid_far_finer_than_the_recording_is_refused() {
 fn a_port_faster_than_the_program_waits() {
     let scratch = Scratch::in_memory();
     scratch.calibration("cal.json");
-    // more than there is memory for, of nothing
+    // A file of zeros that is larger than the available memory.
     let zeros = scratch.path("zeros");
     File::create(&zeros).unwrap().set_len(600_000_000).unwrap();
     let script = "ulimit -v 300000; exec \"$0\" listen --calibration cal.json --port zeros";

@@ -1,7 +1,8 @@
-//! Attacks on the program from outside: wrong input, outputs over inputs, kills, full disks, endless files.
+//! Attacks on the program from outside: wrong input, outputs over inputs, kills, full disks,
+//! endless files.
 //!
-//! Most files hold one kind of attack as a table of cases, so that a new case is one line. The table in
-//! `book/src/results/trust.md` gives how often an attack is made.
+//! Most files contain one kind of attack as a table of cases, so that a new case is one line. The
+//! table in `book/src/results/trust.md` states how often each attack is made.
 
 mod bad_input;
 mod doubts;

@@ -1,11 +1,11 @@
-//! Logs and records that do not fit the command are refused, and nothing is written.
+//! Logs and calibration files that do not fit the command are refused, and nothing is written.
 
 use std::{fmt::Write, fs};
 
 use crate::support::{Scratch, calibrate, fails, runs, stretch};
 use testkit::random::unit;
 
-/// The rows of a trial, each changed by its number.
+/// Writes a trial whose rows are changed depending on their numbers.
 fn changed(
     scratch: &Scratch,
     name: &str,
@@ -39,7 +39,7 @@ fn wild_values_are_counted_told_and_left_out() {
         evaluate.args(["evaluate", "--json", "--calibration"]).arg(&out).arg(&whole);
         let judged: serde_json::Value = serde_json::from_str(&runs(&mut evaluate)).unwrap();
         let rmse = judged["pooled"][1]["rmse"].as_f64().unwrap();
-        // as good as from the log without them, to a tenth
+        // The error is at most 10 % larger than with the log without gross errors.
         let mut evaluate = stretch();
         runs(&mut calibrate(&whole, &scratch.path("sound.json")));
         evaluate.args(["evaluate", "--json", "--calibration"]).arg(scratch.path("sound.json"));
@@ -56,11 +56,12 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
     let dead = changed(&scratch, "dead.csv", |n, cells| {
         cells[2] = format!("{:.5}", 1.65 + 0.002 * unit(n));
     });
-    // a recorder that made up more than can be distinguished from a motion: half of the lengths, in between
+    // A recorder that replaced half of the lengths by random values between the extremes, too many
+    // for removal.
     let made_up = changed(&scratch, "made_up.csv", |n, cells| {
         cells[1] = format!("{:.4}", 150.0 + 30.0 * unit(n));
     });
-    // a dead sensor has no branches either: a surface is refused for that
+    // A dead sensor has no branches either, so a surface is refused for another reason.
     for (log, models) in [(dead, &["linear"][..]), (made_up, &["linear", "poly13"])] {
         for model in models {
             let mut command = calibrate(&log, &out);

@@ -1,4 +1,5 @@
-//! The workers of a simulator, and all that they start, end with the program, however it ends.
+//! The workers of a simulator, and all processes that they start, end with the program, however it
+//! ends.
 #![cfg(unix)]
 
 use std::{
@@ -18,22 +19,23 @@ use rustix::{
 
 use crate::support::{Scratch, program};
 
-/// A worker that never answers. Every process that it starts holds the pipe `alive` open: a child, a grandchild that has no parent any
-/// more, and the shell itself, which goes on once its standard input has ended.
+/// A worker that never answers. Every process that it starts holds the pipe `alive` open: a child,
+/// a grandchild without a parent, and the shell itself, which continues after its standard input
+/// has ended.
 const WORKER: &str = "exec 3>alive; sleep 600 & (sleep 600 &); trap '' HUP INT TERM; echo up >&3; cat >/dev/null; sleep 600; true";
 
-/// How the program is ended.
+/// The way in which the program ends.
 #[derive(Debug, Clone, Copy)]
 enum Death {
     By(Signal),
-    /// The worker's own deadline passes, and the program ends by itself.
+    /// The deadline for the worker passes, and the program ends by itself.
     Deadline,
 }
 
 const DEATHS: [Death; 4] =
     [Death::By(Signal::TERM), Death::By(Signal::INT), Death::By(Signal::KILL), Death::Deadline];
 
-/// What has been written into the pipe, and whether a process still holds it open for writing.
+/// Reads the data in the pipe. Returns whether a process still holds it open for writing.
 fn heard(pipe: &mut File, text: &mut String) -> bool {
     let mut bytes = [0; 64];
     match pipe.read(&mut bytes) {
@@ -46,7 +48,7 @@ fn heard(pipe: &mut File, text: &mut String) -> bool {
     }
 }
 
-/// Waits until something holds, a minute at most: how long it takes is the machine's matter.
+/// Waits until a condition holds, at most one minute, because the time depends on the machine.
 fn waits(mut holds: impl FnMut() -> bool) -> bool {
     let until = Instant::now() + Duration::from_secs(60);
     while !holds() {
@@ -69,7 +71,8 @@ fn begun(folder: &Path, death: Death) -> Child {
     stretch.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
-/// Lets the program die so often, in turn in each way; how many left a process behind.
+/// Ends the program this number of times, in each way in turn. Returns how often a process was
+/// left.
 fn orphans_of(deaths: usize) -> usize {
     let scratch = Scratch::in_memory();
     let rows: String = (0..400)
@@ -91,13 +94,13 @@ fn orphans_of(deaths: usize) -> usize {
             text == "up\n"
         });
         assert!(is_up, "{death:?}: the worker was not started: {text:?}");
-        // some are caught at once, some while the program waits
+        // Some signals arrive immediately, others while the program waits.
         thread::sleep(Duration::from_micros(700 * (n as u64 % 7)));
         if let Death::By(signal) = death {
             kill_process(Pid::from_child(&stretch), signal).unwrap();
         }
         assert!(!stretch.wait().unwrap().success(), "{death:?}");
-        // who was killed may take a moment to be gone
+        // A killed process may take a moment to disappear.
         let until = Instant::now() + Duration::from_secs(5);
         while heard(&mut pipe, &mut text) && Instant::now() < until {
             thread::sleep(Duration::from_millis(2));
@@ -112,7 +115,7 @@ fn a_program_that_dies_leaves_no_worker_behind() {
     assert_eq!(orphans_of(8), 0);
 }
 
-/// As many deaths as `STRETCH_DEATHS` says.
+/// `STRETCH_DEATHS` sets the number of runs.
 #[test]
 #[ignore = "200 deaths take a minute; ./ci.sh runs it"]
 fn two_hundred_deaths_leave_no_worker_behind() {

@@ -1,4 +1,5 @@
-//! No output is written over an input of the same command, or over another output, whatever the paths look like.
+//! An output never overwrites an input of the same command or another output, whatever the paths
+//! look like.
 #![cfg(unix)]
 
 use std::{fs, os::unix::fs::symlink, process::Stdio};
@@ -8,9 +9,10 @@ use crate::support::{
     written::{command, prepared, tree},
 };
 
-/// Commands that write `OUT` over one of the files that they read.
+/// Commands that would write `OUT` over one of the files that they read.
 const OVER_INPUTS: [(&str, &str); 35] = [
-    // a shell makes of --out r*.csv the names of all recordings, the first of which is no input
+    // A shell turns --out r*.csv into the names of all recordings, the first of which is not an
+    // input.
     ("calibrate --out OUT b.csv", "a.csv"),
     ("calibrate a.csv --out cal.json --report OUT", "b.csv"),
     ("convert --out OUT b.csv", "a.csv"),
@@ -119,7 +121,7 @@ fn a_refusal_names_the_option_and_the_input() {
     ] {
         fails(stretch().current_dir(scratch.path("")).args(line.split(' ')), &parts);
     }
-    // a pipe from a file is that file
+    // If standard input is redirected from a file, that file is an input.
     scratch.write("begun.csv", "time_s,bridge_v\n");
     let before = tree(&scratch.path(""));
     let mut piped = command(&scratch, "apply --calibration cal.json - --out begun.csv");
@@ -162,19 +164,19 @@ fn two_outputs_of_one_name_are_refused_before_anything_is_there() {
 fn what_is_no_loss_is_done() {
     let scratch = inputs();
     for line in [
-        // neither holds data itself
+        // These targets hold no data.
         "convert a.csv --out /dev/null",
         "calibrate a.csv --out /dev/null --report /dev/null --json=/dev/null",
         "evaluate --calibration cal.json a.csv --json=/dev/stdout",
-        // an output of yesterday
+        // An output of an earlier run.
         "calibrate a.csv --out cal.json --report cal.html",
         "apply --calibration cal.json a.csv --out estimate.csv",
         "apply --calibration cal.json b.csv --out estimate.csv",
         "convert a.csv --out out.csv",
-        // in its own place, by design
+        // Commands that update a file in place.
         "export --calibration cal.json --seal",
         "init logs --force",
-        // a rig file of one's own is kept in a folder that is replaced
+        // A user's own rig file in a folder that is replaced is kept.
         "simulate --protocol pulses --rig bench/mine.toml --out bench --force",
     ] {
         fs::copy(scratch.path("rig.toml"), scratch.path("bench/mine.toml")).unwrap();

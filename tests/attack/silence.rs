@@ -20,7 +20,7 @@ fn a_trial_that_is_fitted_is_not_tested_on_under_another_name() {
     let stage = "[[stage]]\noutput = \"bridge_v\"\ninputs = [\"length_mm\"]\n";
     let problem = scratch.write("p.toml", format!("simulator = [\"true\"]\n{stage}{trials}"));
     fails(stretch().arg("diagnose").arg(problem), &told);
-    // fitted twice, it weighs double
+    // A trial that is fitted twice has double weight.
     let out = calibrate(&scratch.path("a.csv"), &scratch.path("c.json"))
         .arg(scratch.path("b.csv"))
         .output();
@@ -70,7 +70,7 @@ fn entries_of_a_problem_that_cannot_be_are_refused() {
         ("[\"command_V\"]", "[\"command_V\", \"angle_deg\"]", own),
         ("output.backlash", "output.backslash", "effect brake: there is no twin output.backslash"),
         ("\"a.csv\"", "\"a.csv\"\nsplit = \"test\"", "no trial may be fitted"),
-        // what a clock cannot reach is no panic
+        // Times beyond the range of a clock do not cause a panic.
         ("start_s = 5", "start_s = 1e19\ndeadline_s = 1e19", "it closed its standard output"),
         ("start_s = 5", "start_s = 5", "it closed its standard output"),
     ];

@@ -1,4 +1,4 @@
-//! An hour of frames through a pipe, without pauses: every frame is recorded or reported as lost.
+//! An hour of frames through a pipe without pauses: every frame is recorded or reported as lost.
 
 use std::{
     fs,
@@ -13,12 +13,12 @@ use stretch_core::Branch;
 use stretch_link::{Answer, Frame};
 use stretch_receptor::{Domain, example_calibration};
 
-/// What the way does, drawn for every frame; the same in every run.
+/// Random disturbances of the connection, drawn for every frame; the same in every run.
 struct Way {
     seed: u64,
-    /// Frames that are still to be lost, of a cable that is out.
+    /// Number of frames that will still be lost because the cable is disconnected.
     out: u32,
-    /// The last frames, of which a block may come again.
+    /// The last frames, of which a block may be repeated.
     last: Vec<Vec<u8>>,
 }
 
@@ -31,7 +31,7 @@ impl Way {
         self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 16
     }
 
-    /// Sends a line; one that `must` come comes whole.
+    /// Sends a line with random disturbances. A line with `must` is sent unchanged.
     fn send(&mut self, line: &[u8], must: bool, out: &mut impl Write) -> std::io::Result<()> {
         let draw = self.draw();
         let chance = (draw >> 20) % 100_000;
@@ -40,11 +40,12 @@ impl Way {
             return Ok(());
         }
         match chance {
-            // lost, alone or with those behind it
+            // The frame is lost, alone or with the following ones.
             0..200 if !must => return Ok(()),
             200..205 if !must => {
                 self.out = (draw % 2000) as u32;
-                // the cable goes in the middle of a line and comes back in the middle of another
+                // The cable is disconnected in the middle of a line, and connected again in the
+                // middle of another.
                 return out.write_all(&line[..line.len() / 2]);
             }
             205..300 if !must => {
@@ -75,7 +76,7 @@ impl Way {
     }
 }
 
-/// Sends so many frames of a board that starts again now and then.
+/// Sends this number of frames of a board that restarts now and then.
 fn send(frames: u32, out: impl Write) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 16, out);
     let mut way = Way { seed: 88_172_645_463_325_252, out: 0, last: Vec::new() };
@@ -89,7 +90,8 @@ fn send(frames: u32, out: impl Write) -> std::io::Result<()> {
         let code = (n * 7 % 4096) as i32;
         let frame = Frame { counter, time_ms: 10 * counter, code, answer };
         let line = frame.encode(&mut [0; Frame::LONGEST]).to_vec();
-        // what comes last before a board starts again, or first behind it, cannot be missed
+        // The last frame before a restart and the first frame after it are always sent, because
+        // their loss could not be detected.
         let starts_again = n % 500_000 == 499_999;
         must |= starts_again || n + 1 == frames;
         way.send(&line, must, &mut out)?;
@@ -103,7 +105,7 @@ fn send(frames: u32, out: impl Write) -> std::io::Result<()> {
     out.flush()
 }
 
-/// The number before a word.
+/// Returns the number before a word.
 fn number(text: &str, word: &str) -> u64 {
     let before = text.split(word).next().unwrap_or_default();
     let digits = before.rsplit(|c: char| !c.is_ascii_digit()).find(|part| !part.is_empty());
@@ -138,7 +140,8 @@ fn every_frame_is_accounted_for(frames: u32) {
     assert_eq!(lines, rows + 1, "a header and the rows");
 }
 
-/// An hour at 100 Hz, or as many frames as `STRETCH_FRAMES` says: a day's 8640000 take a minute or two.
+/// An hour at 100 Hz, or as many frames as `STRETCH_FRAMES` states. The 8640000 frames of a day
+/// take one or two minutes.
 #[test]
 #[ignore = "an hour of frames; ./ci.sh runs it"]
 fn an_hour_on_the_line_loses_nothing_unsaid() {

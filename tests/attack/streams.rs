@@ -1,5 +1,5 @@
-//! Standard output and standard error that are full, closed, slow or gone: files are the same,
-//! exit codes are right.
+//! Standard output and standard error that are full, closed, slow or closed by their reader. The
+//! written files are the same, and exit codes are correct.
 #![cfg(unix)]
 
 use std::{
@@ -21,16 +21,16 @@ use stretch_receptor::{
     example_calibration,
 };
 
-/// What is behind a stream.
+/// The other end of a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum End {
     /// A process that reads.
     Read,
     /// A disk without space.
     Full,
-    /// A pipe whose reader has gone.
+    /// A pipe whose reader has closed it.
     Gone,
-    /// Nothing: `2>&-`.
+    /// A closed stream: `2>&-`.
     Closed,
 }
 
@@ -39,19 +39,19 @@ impl End {
         match self {
             Self::Read | Self::Closed => Stdio::null(),
             Self::Full => File::options().write(true).open("/dev/full").unwrap().into(),
-            // the reading end is dropped here
+            // The reading end is dropped here.
             Self::Gone => std::io::pipe().unwrap().1.into(),
         }
     }
 }
 
-/// What every command works on.
+/// Creates the inputs of all commands.
 fn inputs() -> Scratch {
     let scratch = Scratch::new();
     scratch.loops("a_1.csv", 20.0, 1.1);
     scratch.loops("a_2.csv", 15.0, 0.9);
     scratch.calibration("cal.json");
-    // a row that is malformed is reported on standard error
+    // A malformed row is reported on standard error.
     let rows = fs::read_to_string(scratch.path("a_1.csv")).unwrap();
     let (head, rest) = rows.split_at(rows.find("\n1.00,").unwrap());
     scratch.write("live.csv", format!("{head}\nthis is no row{rest}"));
@@ -60,7 +60,7 @@ fn inputs() -> Scratch {
     scratch
 }
 
-/// The lines of a board that answers as the example calibration does.
+/// Returns the lines of a board that runs the example calibration.
 fn frames(samples: u32) -> Vec<u8> {
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
     let fixed = FixedCalibration::<11, 2>::new(&example_calibration(), &adc).unwrap();
@@ -75,7 +75,7 @@ fn frames(samples: u32) -> Vec<u8> {
     lines
 }
 
-/// Every command, with what it reads from standard input.
+/// Every command, with the file for its standard input.
 const COMMANDS: [(&str, Option<&str>); 18] = [
     ("calibrate a_1.csv --out new.json --report new.html", None),
     ("apply --calibration cal.json a_1.csv --out out.csv", None),
@@ -89,7 +89,7 @@ const COMMANDS: [(&str, Option<&str>); 18] = [
     ("simulate --print-rig", None),
     ("listen --port frames --calibration board.json --out trial.csv", None),
     ("export --calibration board.json --c c --fixed new.postcard", None),
-    // files that go to standard output
+    // Commands that write a file to standard output.
     ("convert a_1.csv --out -", None),
     ("calibrate a_1.csv --out /dev/stdout", None),
     ("apply --calibration cal.json a_1.csv --out -", None),
@@ -112,7 +112,7 @@ fn run(scratch: &Scratch, (line, input): (&str, Option<&str>), out: End, err: En
     command.status().unwrap()
 }
 
-/// Length and hash of every file below a folder, by its path there.
+/// Returns length and hash of every file below a folder by relative path.
 fn contents(folder: &Path) -> BTreeMap<String, (usize, u64)> {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -130,7 +130,7 @@ fn contents(folder: &Path) -> BTreeMap<String, (usize, u64)> {
     files
 }
 
-/// Runs a command with all that can be behind its streams, and compares the files.
+/// Runs a command with every combination of stream ends under test, and compares the files.
 #[track_caller]
 fn files_do_not_depend_on_streams(command: (&str, Option<&str>)) {
     let expected = inputs();
@@ -138,7 +138,7 @@ fn files_do_not_depend_on_streams(command: (&str, Option<&str>)) {
     let expected = contents(&expected.path(""));
     let ends = [End::Read, End::Full, End::Gone, End::Closed];
     for (out, err) in ends.into_iter().flat_map(|out| ends.map(|err| (out, err))) {
-        // one stream at a time, and both full
+        // One stream at a time, and both full.
         if out != End::Read && err != End::Read && (out, err) != (End::Full, End::Full) {
             continue;
         }
@@ -154,7 +154,7 @@ fn files_do_not_depend_on_streams(command: (&str, Option<&str>)) {
 
 #[test]
 fn every_command_writes_the_same_files_whatever_stands_behind_its_streams() {
-    // one thread for each command: each waits for the disk most of the time
+    // One thread per command, because each waits for the disk most of the time.
     thread::scope(|scope| {
         for command in COMMANDS {
             scope.spawn(move || files_do_not_depend_on_streams(command));
@@ -195,7 +195,7 @@ fn what_comes_through_a_pipe_is_read_once() {
         let mut bash = Command::new("bash");
         bash.args(["-c", &format!("\"$0\" {line} > /dev/null")]).arg(program());
         let bash = bash.current_dir(scratch.path("")).stdin(Stdio::null());
-        // without bash no user writes <(...)
+        // Without bash, users cannot write <(...).
         let Ok(output) = bash.output() else { return };
         assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     }
@@ -204,7 +204,7 @@ fn what_comes_through_a_pipe_is_read_once() {
 #[test]
 fn a_pipe_whose_reader_goes_is_no_failure() {
     let scratch = inputs();
-    // more than a pipe holds
+    // More than the buffer of a pipe.
     scratch.loops("long.csv", 120.0, 1.1);
     for line in [
         "convert long.csv --out - | head -1",
@@ -242,7 +242,7 @@ fn help_that_cannot_be_shown_is_a_failure_and_help_that_nobody_reads_is_none() {
 #[test]
 fn a_recording_does_not_wait_for_a_reader_that_does_not_read() {
     let scratch = inputs();
-    // more than a pipe holds
+    // More than the buffer of a pipe.
     let rows = 5000;
     scratch.write("frames", frames(rows));
     let mut child = Command::new(program())
@@ -261,7 +261,7 @@ fn a_recording_does_not_wait_for_a_reader_that_does_not_read() {
         thread::sleep(Duration::from_millis(20));
     }
     assert_eq!(recorded().lines().count(), rows as usize + 1, "nothing was read of what is shown");
-    // who reads late is shown all
+    // A late reader gets all rows.
     let mut shown = String::new();
     child.stdout.take().unwrap().read_to_string(&mut shown).unwrap();
     assert_eq!(shown, recorded());

@@ -1,4 +1,4 @@
-//! A command that cannot finish writing leaves nothing, and does not change what was there.
+//! A command that cannot finish writing leaves no output and does not change existing files.
 #![cfg(unix)]
 
 use std::{
@@ -28,7 +28,7 @@ fn a_recording_that_was_killed_before_its_first_row_does_not_block_the_next() {
     }
     let header = fs::read_to_string(scratch.path("trial.csv")).unwrap();
     assert_eq!(header.lines().count(), 1);
-    // another process still records there
+    // Another process is still recording into this file.
     let mut second = stretch();
     second.current_dir(scratch.path("")).args(listen.split(' '));
     fails(&mut second, &["trial.csv", "another recording goes there"]);
@@ -41,7 +41,7 @@ fn a_recording_that_was_killed_before_its_first_row_does_not_block_the_next() {
     runs(&mut third);
     let recorded = fs::read_to_string(scratch.path("trial.csv")).unwrap();
     assert_eq!(recorded.lines().count(), 2, "{recorded}");
-    // a file with a row is not taken over by another process
+    // Another process does not overwrite a file that has a row.
     let mut fourth = stretch();
     fourth.current_dir(scratch.path("")).args(listen.split(' ')).write_stdin(frame);
     fails(&mut fourth, &["trial.csv", "it exists"]);
@@ -104,7 +104,7 @@ fn folders_that_hold_something_are_refused_and_replaced_when_forced() {
     );
     fs::create_dir(scratch.path("empty")).unwrap();
     runs(&mut said("simulate --protocol pulses --out empty"));
-    // the folder that one is in
+    // The current folder.
     let mut inside = stretch();
     inside
         .current_dir(scratch.path("bench"))
@@ -121,7 +121,7 @@ fn trials_of_two_data_sets_in_one_folder_are_refused() {
             .current_dir(scratch.path(""))
             .args("simulate --protocol arbitrary --seed 9 --out other".split(' ')),
     );
-    // a set of hand-made files has no digests: nothing is asked of it
+    // A data set without digests, as written by hand, is not checked.
     let index = fs::read_to_string(scratch.path("bench/dataset.toml")).unwrap();
     assert_eq!(index.matches("digest = ").count(), 1);
     fs::copy(scratch.path("other/arbitrary_1.csv"), scratch.path("bench/arbitrary_1.csv")).unwrap();
@@ -181,7 +181,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
     let mut stdin = stretch();
     stdin.current_dir(scratch.path("")).args("convert a.csv --out /dev/stdin".split(' '));
     fails(&mut stdin, &["/dev/stdin", "which is read"]);
-    // what is redirected into a file is written once, from its begin to its end
+    // Output that is redirected into a file is written once, from beginning to end.
     let shell = |script: &str| {
         let mut sh = Command::new("sh");
         sh.current_dir(scratch.path("")).args(["-c", script]).arg(program());
@@ -196,7 +196,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
     );
 }
 
-/// A separate file system of so many bytes, for as long as this lives.
+/// A separate file system with given mount options, unmounted on drop.
 struct Mount(PathBuf);
 
 impl Mount {
@@ -215,7 +215,7 @@ impl Drop for Mount {
     }
 }
 
-/// Commands with their output below a folder `disk`.
+/// Commands whose output is below a folder `disk`.
 const ONTO_A_DISK: [&str; 8] = [
     "simulate --protocol paper --out disk/new",
     "simulate --protocol paper --out disk/bench --force",
@@ -246,7 +246,7 @@ fn with_mount_a_disk_that_is_full_or_read_only_holds_what_it_held() {
         .unwrap();
         fs::write(disk.join("bench/notes.txt"), "mine").unwrap();
         if options == "size=64k" {
-            // what is left is less than any of them needs
+            // The remaining space is smaller than the output of any command.
             let _ = fs::write(disk.join("fill"), vec![0; 47_000]);
         } else {
             let status = Command::new("mount").args(["-o", "remount,ro"]).arg(&disk).status();
@@ -259,7 +259,7 @@ fn with_mount_a_disk_that_is_full_or_read_only_holds_what_it_held() {
                 command.current_dir(scratch.path("")).args(line.split(' ')).output().unwrap();
             let told = String::from_utf8(output.stderr).unwrap();
             if output.status.success() && line.starts_with("init") {
-                // it is small enough
+                // Its output is small enough to fit.
                 fs::write(disk.join("logs/problem.toml"), "an old one").unwrap();
                 continue;
             }
@@ -280,7 +280,7 @@ fn with_mount_a_disk_that_is_full_or_read_only_holds_what_it_held() {
 fn a_quota_that_is_reached_is_like_a_full_disk() {
     let scratch = prepared();
     let before = tree(&scratch.path(""));
-    // a limit of the size of a file acts as one; its signal is ignored, so that the write fails
+    // A file size limit acts like a full disk. Its signal is ignored, so that the write fails.
     for line in ["simulate --protocol paper --out bench --force", "demo --paper --out new"] {
         let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" {line}");
         let output = Command::new("bash")

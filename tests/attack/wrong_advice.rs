@@ -1,16 +1,17 @@
-//! The message about a wrong record names the actual fault and its place.
+//! The message about a wrong recording names the actual fault and its place.
 
 use std::{fmt::Write, fs, path::PathBuf};
 
 use crate::support::{Scratch, calibrate, fails, one_line, prints, runs, stretch};
 use testkit::random::noise;
 
-/// Rows of a trial with their columns' names.
+/// Rows of a trial with the names of the columns.
 type Rows = (Vec<String>, Vec<Vec<f64>>);
-/// What a record is called, what was done to it, and what must be said.
+/// Name of a recording, its change, and phrases that the message must contain.
 type Case<'a> = (&'a str, &'a dyn Fn(&mut Rows), &'a [&'a str]);
 
-/// A simulated data set of which every trial was changed, as by a recorder: without digests.
+/// Writes a simulated data set in which every trial is changed, without digests, as if a recorder
+/// had written it.
 fn changed(scratch: &Scratch, name: &str, change: &dyn Fn(&mut Rows)) -> PathBuf {
     let (bench, out) = (scratch.path("bench"), scratch.path(name));
     if !bench.exists() {
@@ -50,7 +51,7 @@ fn column(name: &'static str, change: impl Fn(f64, usize) -> f64) -> impl Fn(&mu
     }
 }
 
-/// Openings of so many rows before, or behind.
+/// Shifts the valve openings by a number of rows, forwards or backwards.
 fn shifted(by: isize) -> impl Fn(&mut Rows) {
     move |(_, rows)| {
         let valves: Vec<[f64; 2]> = rows.iter().map(|row| [row[1], row[2]]).collect();
@@ -207,7 +208,7 @@ fn a_log_is_named_in_what_is_wrong_with_it() {
     fails(two.arg(&logs[0]), &["constant_signal.csv and 1 more", "constant"]);
 }
 
-/// What turns the text around it, hides, or drives a terminal.
+/// Characters that reverse the text around them, that are invisible, or that control a terminal.
 const HOSTILE: [char; 6] = ['\u{202e}', '\u{2066}', '\u{200b}', '\u{feff}', '\u{1b}', '\u{9b}'];
 
 #[test]

@@ -1,7 +1,9 @@
-//! Tables of figures on the pages, written from the files that the gate and the evaluations write.
+//! Tables of figures on the documentation pages, generated from files written by the gate and the
+//! evaluations.
 //!
-//! A page has `<!-- figures: NAME -->` above a table and `<!-- end of figures -->` below it. NAME is a CSV file below
-//! `reference/`, or one of the tables made here. `STRETCH_PAGES=write cargo test --test it pages` writes all of them anew.
+//! A page has `<!-- figures: NAME -->` above a table and `<!-- end of figures -->` below it. NAME
+//! is a CSV file below `reference/`, or one of the tables generated here.
+//! `STRETCH_PAGES=write cargo test --test it pages` writes all of them anew.
 
 use std::{collections::BTreeMap, fs};
 
@@ -10,10 +12,11 @@ use super::markdown::{crate_pages, pages, read, root};
 const BEGIN: &str = "<!-- figures: ";
 const END: &str = "<!-- end of figures -->\n";
 
-/// Mean number of instructions of a step, by core and program.
+/// Mean number of instructions per step, by processor core and program.
 type Budget = BTreeMap<(String, String), f64>;
 
-/// What `firmware/gate.sh` measures and holds: Rust's steps under `model=`, those in C under `c=`.
+/// Reads the instruction counts that `firmware/gate.sh` checks: Rust programs under `model=`, C
+/// programs under `c=`.
 fn budget() -> Budget {
     let mut budget = Budget::new();
     for file in ["crates/stretch-calibrate/src/budget.txt", "firmware/c_budget.txt"] {
@@ -28,7 +31,7 @@ fn budget() -> Budget {
     budget
 }
 
-/// 12345.6 as 12,346.
+/// Formats 12345.6 as 12,346.
 fn grouped(x: f64) -> String {
     let digits = format!("{x:.0}");
     let from_end = |i: usize| digits.len() - i;
@@ -47,7 +50,7 @@ fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     text
 }
 
-/// The few models that the README of stretch-receptor shows.
+/// Returns the table of selected models for the README of stretch-receptor.
 fn instructions(budget: &Budget) -> String {
     let of = |program: &str| {
         let mean = budget.get(&("m3".to_owned(), program.to_owned()));
@@ -68,7 +71,7 @@ fn instructions(budget: &Budget) -> String {
     table(&header, &rows)
 }
 
-/// Every program that the firmware's gate measures.
+/// Returns the table of every program that the firmware's gate measures.
 fn all_instructions(budget: &Budget) -> String {
     let programs: Vec<&String> =
         budget.keys().filter(|(core, _)| core == "m3").map(|(_, p)| p).collect();
@@ -83,7 +86,7 @@ fn all_instructions(budget: &Budget) -> String {
     table(&["program", "Cortex-M3", "Cortex-M4F"], &rows)
 }
 
-/// The fields of a row of CSV; a field that holds a comma is quoted.
+/// Splits a CSV row into fields. A field that contains a comma is quoted.
 fn fields(row: &str) -> Vec<String> {
     let (mut fields, mut is_quoted) = (vec![String::new()], false);
     for c in row.chars() {
@@ -96,7 +99,7 @@ fn fields(row: &str) -> Vec<String> {
     fields
 }
 
-/// A file of CSV as a table; its comments are left out.
+/// Returns a CSV file as a table, without its comments.
 fn of_csv(name: &str) -> String {
     let text = read(name.as_ref());
     let mut rows = text.lines().filter(|line| !line.starts_with('#')).map(fields);
@@ -108,7 +111,7 @@ fn of_csv(name: &str) -> String {
     table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows)
 }
 
-/// A page with its tables as the files have them.
+/// Returns a page with its tables regenerated.
 fn renewed(page: &str) -> String {
     let mut parts = page.split(BEGIN);
     let mut text = parts.next().expect("a beginning").to_owned();

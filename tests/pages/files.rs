@@ -1,4 +1,5 @@
-//! The page on the files that the program writes and reads: its examples are such files.
+//! The page on the files that the program writes and reads. Its examples are real output of the
+//! program.
 
 use std::{fs, path::Path};
 
@@ -60,7 +61,7 @@ const RECORD: &str = "
 | `digest` | checksum of all other keys |
 ";
 
-/// The first lines of a text, with a note of what is left out.
+/// Returns the first lines of a text, followed by an ellipsis.
 fn first(text: &str, lines: usize) -> String {
     let shown: Vec<&str> = text.lines().take(lines).map(str::trim_end).collect();
     format!("{}\n...\n", shown.join("\n").trim_end())
@@ -70,7 +71,7 @@ fn toml(text: &str) -> String {
     format!("```toml\n{}\n```\n", text.trim())
 }
 
-/// Without sums of recordings, which change whenever a last bit of the simulation does.
+/// Removes the digests of recordings, which change with the last bit of the simulation.
 fn without_digests(text: &str) -> String {
     let kept = text.lines().filter(|line| !line.starts_with("digest"));
     kept.map(|line| format!("{line}\n")).collect()

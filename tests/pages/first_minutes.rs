@@ -1,11 +1,11 @@
-//! What stopped people in their first minutes.
+//! Problems that stopped new users in their first minutes.
 
 use std::{fmt::Write, fs, path::Path};
 
 use super::markdown::{blocks, read};
 use crate::support::{Scratch, fails, one_line, program, runs, stretch};
 
-/// A trial of a minute at 20 Hz in centimetres, with short names as people give them.
+/// A trial of one minute at 20 Hz in centimetres, with short column names.
 fn own_trial(header: &str, factor: f64) -> String {
     let mut text = format!("{header}\n");
     for n in 0..1200 {
@@ -57,13 +57,13 @@ fn a_diagnosis_says_as_much_as_is_asked_for() {
         runs(&mut command)
     };
     let (quiet, usual, verbose) = (said(&["-q"]), said(&[]), said(&["-v"]));
-    // the verdict, which all begin with
+    // All outputs begin with the verdict.
     assert!(
         one_line(&usual).starts_with(&one_line(&quiet)) && quiet.lines().count() < 5,
         "{quiet}"
     );
     assert!(!quiet.contains('|') && usual.contains('|'));
-    // one line on the parameters, and a line each with every detail
+    // By default one line on the parameters, and one line for each with -v.
     let lines = |text: &str| text.lines().filter(|line| line.starts_with("- ")).count();
     assert!(one_line(&usual).contains("-v says what is wrong with the others"), "{usual}");
     assert!(lines(&verbose) > lines(&usual), "{verbose}");
@@ -97,7 +97,7 @@ fn with_python_a_worker_that_takes_no_other_inputs_is_diagnosed_as_init_proposes
     let scratch = Scratch::new();
     let folder = scratch.path("recordings");
     fs::create_dir(&folder).expect("a folder");
-    // the worker of the tutorial, without what lets it take altered inputs
+    // The worker of the tutorial, without the declaration that it takes altered inputs.
     let page = read(Path::new("book/src/tutorials/worker.md"));
     for block in blocks(&page) {
         if let Some(file) = block.file {
@@ -124,6 +124,6 @@ fn with_python_a_worker_that_takes_no_other_inputs_is_diagnosed_as_init_proposes
     fs::write(&file, whole).expect("the problem");
     let told = one_line(&runs(stretch().arg("diagnose").arg(&file)));
     assert!(told.contains("nothing was looked for on the input's side"), "{told}");
-    // a brake in front of the servo is none of what can be behind it
+    // A brake in front of the servo is not among the effects behind it.
     assert!(told.starts_with("There is a gap in plant"), "{told}");
 }

@@ -1,16 +1,16 @@
-//! Markdown pages as far as these tests look into them: fenced blocks, links, tables between marks.
+//! A minimal parser for Markdown pages: fenced blocks, links, tables between marks.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// The folder of the project.
+/// Returns the folder of the project.
 pub(super) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The README and every page of the book, by paths below the project's folder.
+/// Returns the README and every page of the book, by paths relative to the project's folder.
 pub(super) fn pages() -> Vec<PathBuf> {
     let (mut found, mut folders) =
         (vec![PathBuf::from("README.md")], vec![root().join("book/src")]);
@@ -28,7 +28,7 @@ pub(super) fn pages() -> Vec<PathBuf> {
     found
 }
 
-/// The pages of the crates, which are the first pages of their documentation.
+/// Returns the READMEs of the crates, which are the first pages of their documentation.
 pub(super) fn crate_pages() -> Vec<PathBuf> {
     let entries = fs::read_dir(root().join("crates")).expect("the crates");
     let page = |entry: fs::DirEntry| Path::new("crates").join(entry.file_name()).join("README.md");
@@ -44,14 +44,15 @@ pub(super) fn read(page: &Path) -> String {
 /// A fenced block.
 #[derive(Debug, PartialEq)]
 pub(super) struct Block<'a> {
-    /// What follows the fence: the language.
+    /// The language after the opening fence.
     pub(super) language: &'a str,
     pub(super) text: String,
-    /// The file that the sentence above asks the reader to save the block as.
+    /// The file name, if the sentence above asks the reader to save the block.
     pub(super) file: Option<&'a str>,
 }
 
-/// The fenced blocks of a page. A block below a line that ends with "as `NAME`:" is the text of that file.
+/// Returns the fenced blocks of a page. A block after a line that ends with "as `NAME`:" is the
+/// text of that file.
 pub(super) fn blocks(page: &str) -> Vec<Block<'_>> {
     let (mut found, mut lines, mut above) = (Vec::new(), page.lines(), "");
     while let Some(line) = lines.next() {
@@ -68,7 +69,7 @@ pub(super) fn blocks(page: &str) -> Vec<Block<'_>> {
     found
 }
 
-/// Targets of the links of a page that are neither addresses nor places within the page.
+/// Returns the targets of a page's links, except web addresses and places within the page.
 pub(super) fn links(page: &str) -> Vec<&str> {
     let targets = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     let outside = |target: &&str| !target.contains("://") && !target.starts_with('#');

@@ -1,5 +1,5 @@
-//! The README and the book: what a reader types works in the order of the page, links lead somewhere, and
-//! figures are those of the files that the gate writes.
+//! Tests of the README and the book: the commands work in the order of each page, links have
+//! targets, and figures equal those in the files that the gate writes.
 
 mod figures;
 mod files;
@@ -25,7 +25,8 @@ fn links_of_readme_and_book_lead_somewhere() {
 
 #[test]
 fn the_book_links_to_nothing_outside_of_it() {
-    // a book that was built is separate: what leads to a file of the repository leads nowhere there
+    // The book is built separately, so links to other files of the repository would be broken
+    // there.
     let book = root().join("book/src").canonicalize().expect("the book");
     for page in pages().iter().filter(|page| page.starts_with("book")) {
         let folder = root().join(page).parent().expect("a folder").to_owned();
@@ -36,7 +37,8 @@ fn the_book_links_to_nothing_outside_of_it() {
     }
 }
 
-/// What an answer says in numbers: "24 of 27" as it is, else each number with its own word.
+/// Returns the numbers in an answer: "24 of 27" as it is, otherwise each number with the word next
+/// to it.
 fn figures(answer: &str) -> Vec<String> {
     let words: Vec<&str> =
         answer.split(' ').map(|word| word.trim_matches([',', ';', '(', ')'])).collect();

@@ -1,11 +1,11 @@
-//! The JSON Schema of a diagnosis, against what the program writes.
+//! Validates diagnoses written by the program against their JSON Schema.
 
 use std::process::Command;
 
 use super::markdown::root;
 use crate::support::{Scratch, json_to, runs, stretch};
 
-/// Reads a schema and documents, and says what does not conform.
+/// Python program that reads a schema and documents and prints the violations.
 const VALIDATOR: &str = r#"
 import json, sys, jsonschema
 schema, *documents = (json.load(open(path)) for path in sys.argv[1:])
@@ -25,7 +25,7 @@ fn with_jsonschema_a_diagnosis_conforms_to_its_schema() {
         simulate.args(["simulate", "--protocol", "pulses", "--force", "--out"]).arg(&bench);
         runs(simulate.args(effect.map(|effect| ["--effect", effect]).iter().flatten()));
         let gauge = ["--reference", "length_mm", "--signal", "bridge_v"];
-        // a whole rig, and its gauge alone
+        // A complete rig, and its gauge alone.
         for (place, columns) in
             [(bench.clone(), &gauge[..0]), (bench.join("pulses_1.csv"), &gauge[..])]
         {

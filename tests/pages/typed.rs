@@ -1,4 +1,4 @@
-//! Every line of shell in the README and in the book, typed in order in one empty folder a page.
+//! Runs every shell command in the README and the book, in order, in an empty folder for each page.
 
 use std::{
     fmt::Write,
@@ -10,7 +10,7 @@ use std::{
 use super::markdown::{blocks, pages, read, root};
 use crate::support::{Scratch, program};
 
-/// Beginnings of lines that are not typed, and why.
+/// Beginnings of commands that are not run, and the reasons.
 const NOT_TYPED: [(&str, &str); 11] = [
     ("cargo test", "these are its tests"),
     ("cargo install", "it installs a program"),
@@ -25,7 +25,8 @@ const NOT_TYPED: [(&str, &str); 11] = [
     ("cargo run --release -p stretch-challenge", "the challenge has a gate of its own"),
 ];
 
-/// The shell of a page as one script: files are written where the page asks the reader to save them.
+/// Returns the shell commands of a page as one script. Files are written where the page asks the
+/// reader to save them.
 fn script(page: &str) -> String {
     let mut script = String::new();
     for block in blocks(page) {
@@ -46,7 +47,7 @@ fn script(page: &str) -> String {
     script.replace("cargo run --release -- ", "stretch ")
 }
 
-/// Types the page in an empty folder, where the program is on the path and nothing else of the project is.
+/// Runs the commands of a page in an empty folder. Only the program itself is on the path.
 fn type_page(name: &str) {
     let scratch = Scratch::new();
     for folder in ["bin", "here"] {

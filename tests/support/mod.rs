@@ -1,4 +1,4 @@
-//! What the tests of the program share: a scratch folder, trials, running.
+//! Shared code of the program's tests: a scratch folder, trials, runs of the program.
 
 pub(crate) mod packed;
 pub(crate) mod round_trip;
@@ -13,19 +13,19 @@ use std::{
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// The program's path: the one that was built with the tests, or what `STRETCH_PROGRAM` names, which is a release build where
-/// `./ci.sh` runs the slow ones.
+/// Returns the path of the program: `STRETCH_PROGRAM`, otherwise the one built with the tests.
+/// `./ci.sh` runs the slow tests with a release build.
 pub(crate) fn program() -> PathBuf {
     std::env::var_os("STRETCH_PROGRAM")
         .map_or_else(|| env!("CARGO_BIN_EXE_stretch").into(), PathBuf::from)
 }
 
-/// The program.
+/// Returns a command that runs the program.
 pub(crate) fn stretch() -> Command {
     Command::new(program())
 }
 
-/// A folder that goes with the test.
+/// A temporary folder that is removed at the end of the test.
 pub(crate) struct Scratch(TempDir);
 
 impl Scratch {
@@ -33,7 +33,7 @@ impl Scratch {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// One where syncing takes no time, if there is such a place.
+    /// Creates the folder in memory if possible, because syncing takes no time there.
     pub(crate) fn in_memory() -> Self {
         match tempfile::tempdir_in("/dev/shm") {
             Ok(folder) => Self(folder),
@@ -51,7 +51,7 @@ impl Scratch {
         path
     }
 
-    /// Everything in the folder.
+    /// Returns the sorted names of everything in the folder.
     pub(crate) fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.0.path()).expect("the scratch folder");
         let mut names: Vec<String> =
@@ -60,7 +60,7 @@ impl Scratch {
         names
     }
 
-    /// A trial of a muscle that shortens and lengthens, with a lagging gauge.
+    /// Writes a trial of a muscle that shortens and lengthens, with a lagging gauge.
     pub(crate) fn loops(&self, name: &str, seconds: f64, speed: f64) -> PathBuf {
         let mut text = String::from("time_s,length_mm,bridge_v\n");
         for n in 0..(seconds * 100.0) as u32 {
@@ -72,7 +72,7 @@ impl Scratch {
         self.write(name, text)
     }
 
-    /// A calibration fitted to such a trial.
+    /// Writes a calibration fitted to such a trial.
     pub(crate) fn calibration(&self, name: &str) -> PathBuf {
         let trial = self.loops("for_calibration.csv", 40.0, 1.1);
         let out = self.path(name);
@@ -81,13 +81,13 @@ impl Scratch {
     }
 }
 
-/// Standard output as text.
+/// Returns standard output as text.
 pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).expect("UTF-8")
 }
 
-/// A text as it was before its lines were broken at a hundred columns: a line that had no room for the first word of the next
-/// goes on with it.
+/// Joins lines that were wrapped at 100 columns: a line is continued if it had no room for the
+/// first word of the next line.
 pub(crate) fn unbroken(text: &str) -> String {
     let mut told = String::new();
     let mut room = 100;
@@ -106,13 +106,13 @@ pub(crate) fn unbroken(text: &str) -> String {
     told
 }
 
-/// What a command says that succeeds, each sentence in a line.
+/// Runs a command that must succeed. Returns its output with each sentence in one line.
 #[track_caller]
 pub(crate) fn runs(command: &mut Command) -> String {
     unbroken(&prints(command))
 }
 
-/// What a command that succeeds says on standard error, in one line.
+/// Runs a command that must succeed. Returns its messages on standard error in one line.
 #[track_caller]
 pub(crate) fn warned(command: &mut Command) -> String {
     let output = command.output().expect("the program runs");
@@ -121,7 +121,7 @@ pub(crate) fn warned(command: &mut Command) -> String {
     told
 }
 
-/// What a command prints for other programs.
+/// Runs a command that must succeed. Returns its output unchanged.
 #[track_caller]
 pub(crate) fn prints(command: &mut Command) -> String {
     let output = command.output().expect("the program runs");
@@ -129,17 +129,17 @@ pub(crate) fn prints(command: &mut Command) -> String {
     stdout(&output)
 }
 
-/// The option that writes JSON into a file.
+/// Returns the option that writes JSON into a file.
 pub(crate) fn json_to(file: &Path) -> String {
     format!("--json={}", file.display())
 }
 
-/// A text in one line: how wide a terminal is says where its lines break.
+/// Joins a text to one line, because line breaks depend on the width of the terminal.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Runs to a failure with exit code 1 and a message that has all of `parts`.
+/// Runs a command that must fail with exit code 1 and a message that contains all of `parts`.
 #[track_caller]
 pub(crate) fn fails(command: &mut Command, parts: &[&str]) {
     let output = command.output().expect("the program runs");
@@ -151,7 +151,7 @@ pub(crate) fn fails(command: &mut Command, parts: &[&str]) {
     }
 }
 
-/// `calibrate` on a file.
+/// Returns the command `calibrate` on a file.
 pub(crate) fn calibrate(trial: &Path, out: &Path) -> Command {
     let mut command = stretch();
     command.arg("calibrate").arg(trial).arg("--out").arg(out);

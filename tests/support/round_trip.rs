@@ -1,4 +1,4 @@
-//! From a diagnosis to a rig file and back.
+//! Diagnosing, writing the corrected rig file, and replaying it.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::{Scratch, json_to, runs, stretch};
 
-/// A diagnosis with a rig file, or with the data set's own; writes what was found where that is asked for.
+/// Diagnoses with a rig file, or with the data set's own. If `fix` is given, writes the corrected
+/// rig file.
 pub(crate) fn diagnosed(
     scratch: &Scratch,
     folder: &Path,
@@ -30,9 +31,10 @@ pub(crate) fn is_agreed(diagnosis: &Value) -> bool {
     matches!(diagnosis["verdict"].as_str(), Some("no_gap" | "parameters"))
 }
 
-/// By column, how far a replay with a rig file lies off what was measured, root mean square in noises of the stock rig.
+/// Returns for each column the root mean square distance of a replay with a rig file from the
+/// measurement, relative to the noise of the stock rig.
 ///
-/// `commands` is a trial, or a whole folder, in which the trials have the same names.
+/// `commands` is a trial, or a folder with trials of the same names.
 pub(crate) fn replayed(
     scratch: &Scratch,
     rig: &Path,
@@ -43,7 +45,7 @@ pub(crate) fn replayed(
     let mut command = stretch();
     command.args(["simulate", "--noise", "off", "--force", "--rig"]).arg(rig);
     runs(command.arg("--protocol").arg(commands).arg("--out").arg(&out));
-    // Noise of the stock rig, and what its converters round.
+    // Noise of the stock rig, including the rounding of its converters.
     let noises = [("pressure_kpa", 1.2), ("length_mm", 0.0502), ("bridge_v", 0.00202)];
     let mut sums = [(0.0, 0.0); 3];
     for entry in fs::read_dir(&out).unwrap() {
@@ -65,7 +67,7 @@ pub(crate) fn replayed(
     seen.map(|((column, _), (sum, count))| ((*column).to_owned(), (sum / count).sqrt())).collect()
 }
 
-/// A column of a trial; empty where it has none.
+/// Reads a column of a trial. Returns an empty list if the column does not exist.
 fn read(path: &Path, column: &str) -> Vec<f64> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

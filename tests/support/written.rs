@@ -1,4 +1,4 @@
-//! Commands that write, what they work on, and what is there afterwards.
+//! Commands that write, their inputs, and the files afterwards.
 
 use std::{
     collections::BTreeMap,
@@ -12,7 +12,7 @@ use stretch_receptor::example_calibration;
 
 use super::Scratch;
 
-/// Every file below a folder, save for those under a temporary name.
+/// Returns every file below a folder, except those with a temporary name.
 pub(crate) fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap().flatten() {
@@ -30,7 +30,7 @@ pub(crate) fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-/// What every command works on, and what it replaces.
+/// Creates the inputs of all commands, and the files that they replace.
 pub(crate) fn prepared() -> Scratch {
     let scratch = Scratch::in_memory();
     scratch.loops("a.csv", 20.0, 1.1);

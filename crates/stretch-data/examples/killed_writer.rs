@@ -1,7 +1,8 @@
-//! A process that writes and is ended in the middle of it: `tests/faults` starts it.
+//! A process that is killed or interrupted while it writes. `tests/faults` starts it.
 //!
-//! `killed_writer kill JOB AT EXCHANGES FOLDER` dies before its call number AT on the file system, and
-//! `killed_writer ctrl-c FOLDER` does what a handler of Ctrl-C does while a file and a folder are written.
+//! `killed_writer kill JOB AT EXCHANGES FOLDER` aborts at its file-system call number AT, and
+//! `killed_writer ctrl-c FOLDER` runs the Ctrl-C handler while a file and a folder are being
+//! written.
 
 #[allow(dead_code)]
 #[path = "../tests/faults/job.rs"]
@@ -44,7 +45,7 @@ fn interrupted(folder: &Path) -> Result<Infallible, FileError> {
         write_whole(set.join("done.csv"), |out| out.write_all(b"x"))?;
         write_whole(set.join("half.csv"), |out| {
             out.write_all(&vec![b'x'; 1 << 20])?;
-            // as the thread of a signal's handler
+            // Runs in a separate thread, as the handler of a signal does.
             thread::spawn(|| clean_up_and_exit(130));
             thread::sleep(Duration::from_millis(50));
             out.write_all(&vec![b'x'; 1 << 20])

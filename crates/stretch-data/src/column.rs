@@ -1,8 +1,8 @@
-//! What the name of a column says of its unit, and of what it measures.
+//! Units and measured quantities, derived from the names of columns.
 
 use Quantity::{Angle, Current, Force, Length, Other, Pressure, Speed, Time, Torque, Voltage};
 
-/// What a column measures, as far as its unit and its name say.
+/// The physical quantity that a column measures, derived from its unit and its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// A length or a position.
@@ -23,23 +23,26 @@ pub enum Quantity {
     Pressure,
     /// A time.
     Time,
-    /// Anything else that has a unit; its unit in columns.
+    /// Any other quantity that has a unit. The value is the unit as written in column names.
     Other(&'static str),
 }
 
 impl Quantity {
-    /// Whether it is a force or a torque.
+    /// Whether the quantity is a force or a torque.
     pub fn is_force(self) -> bool {
         matches!(self, Force | Torque)
     }
 
-    /// Whether it is a length or an angle.
+    /// Whether the quantity is a length or an angle.
     pub fn is_position(self) -> bool {
         matches!(self, Length | Angle)
     }
 
-    /// What a column measures: by the unit that is stated of it, or else by its name. The last part of the name is its unit; where that is
-    /// none, or a single letter that may as well count motors, a word in the name decides.
+    /// Returns the quantity that a column measures.
+    ///
+    /// If `stated`, the unit given explicitly, is not empty, only that unit counts. Otherwise the
+    /// unit is the last part of the column's name. If that part is no unit, or a single letter that
+    /// could also be an index of a motor, a word in the name decides.
     ///
     /// ```
     /// use stretch_data::Quantity;
@@ -63,7 +66,8 @@ impl Quantity {
         }
     }
 
-    /// What a unit measures, as columns or as people spell it; none for an unknown unit.
+    /// Returns the quantity that a unit measures, in the spelling of columns or of people, or
+    /// `None` for an unknown unit.
     fn of_unit(unit: &str) -> Option<Self> {
         let mut factors = unit.split('/').flat_map(|part| part.split("_per_"));
         let known = |text: &str| {
@@ -80,11 +84,13 @@ impl Quantity {
     }
 }
 
-/// A unit: as columns spell it, as it is written, what it measures, how people spell it, and its names in small letters.
+/// One row of the unit table: the spelling in column names, the display form, the quantity, the
+/// case-sensitive spellings by people, and the lower-case names.
 type Unit =
     (&'static str, &'static str, Quantity, &'static [&'static str], &'static [&'static str]);
 
-/// All units. Letters keep their meaning by the whole word: mPa is not among them, MPa is.
+/// All units. Upper and lower case are distinguished where they change the meaning: MPa is listed,
+/// mPa is not.
 static UNITS: [Unit; 51] = [
     (
         "s",
@@ -157,7 +163,7 @@ static UNITS: [Unit; 51] = [
     ("ticks", "ticks", Other("ticks"), &[], &["tick", "ticks"]),
 ];
 
-/// Words of a name that say what is measured where no unit does.
+/// Words in a column's name that determine the quantity if no unit does.
 static NAMED: [(Quantity, &[&str]); 5] = [
     (Torque, &["torque", "torques", "moment", "tau"]),
     (Force, &["force", "forces"]),
@@ -195,7 +201,8 @@ fn named(word: &str) -> Option<Quantity> {
     NAMED.iter().find(|(_, words)| words.contains(&word)).map(|(quantity, _)| *quantity)
 }
 
-/// The words of a name, in small letters and without the numbers behind them: `joint`, `angle` for `jointAngle_2`.
+/// Splits a name into its words, in lower case and without numbers: `jointAngle_2` gives `joint`,
+/// `angle`.
 fn words(column: &str) -> impl Iterator<Item = String> {
     let mut parted = String::new();
     for c in column.chars() {
@@ -212,26 +219,30 @@ fn is_named(column: &str, is_one: impl Fn(Quantity) -> bool) -> bool {
     words(column).filter_map(|word| named(&word)).any(is_one)
 }
 
-/// `nm` in the name of a column is newton metres, as the reader spells them, unless the name speaks of a length alone.
+/// Returns the unit of a column, with `nm` resolved: it means newton metres, unless the name
+/// mentions a length and no force. Then the result is `nanom`.
 fn resolved<'a>(column: &str, unit: &'a str) -> &'a str {
     let is_length = || is_named(column, |q| q == Length) && !is_named(column, Quantity::is_force);
     if unit == "nm" && is_length() { "nanom" } else { unit }
 }
 
-/// Whether nothing in a column's name says that it measures anything but what `is_one` accepts.
+/// Whether the column's name does not indicate any quantity other than an angle or one that
+/// `is_one` accepts.
 pub(crate) fn measures_nothing_else(column: &str, is_one: impl Fn(Quantity) -> bool) -> bool {
     let is_unknown = unit(column).and_then(Quantity::of_unit).is_none_or(|unit| unit == Angle);
     Quantity::of(column, "").is_none_or(|q| q == Angle || is_unknown && is_one(q))
 }
 
-/// The row of a unit without a stroke as people spell it.
+/// Returns the table row of a simple unit (without `/` or `_per_`) in a spelling used by people.
 fn row_of(text: &str) -> Option<&'static Unit> {
     let low = text.to_lowercase();
     let exact = UNITS.iter().find(|row| row.3.contains(&text));
     exact.or_else(|| UNITS.iter().find(|row| row.4.contains(&&*low)))
 }
 
-/// The unit in a column's name as columns spell it: its last part, after an underscore. Newton metres may have one in between.
+/// Returns the unit in a column's name, as spelled there: the part after the last underscore. A
+/// unit with `_per_`, and newton metres written as `n_m`, include the underscores between their
+/// parts.
 ///
 /// ```
 /// use stretch_data::unit;
@@ -256,9 +267,10 @@ pub fn unit(column: &str) -> Option<&str> {
     Some(unit).filter(|unit| !unit.is_empty())
 }
 
-/// The unit of a column as it is written: `N` for `force_n`, `m/s` for `speed_m_per_s`.
+/// Returns the display form of a column's unit: `N` for `force_n`, `m/s` for `speed_m_per_s`.
 ///
-/// `nm` is newton metres, as the reader of recordings spells them, unless the name speaks of a length; `nanom` is always nanometres.
+/// `nm` means newton metres, unless the name mentions a length and no force. `nanom` always means
+/// nanometres.
 ///
 /// ```
 /// use stretch_data::unit_of;
@@ -274,7 +286,8 @@ pub fn unit_of(column: &str) -> String {
     factors.join("/")
 }
 
-/// A unit without a stroke as people write it, from how columns or people spell it; any other as it is.
+/// Returns the display form of a simple unit (without `/` or `_per_`), given in the spelling of
+/// columns or of people. An unknown unit is returned unchanged.
 ///
 /// ```
 /// assert_eq!(stretch_data::written_unit("kpa"), "kPa");
@@ -284,7 +297,8 @@ pub fn written_unit(spelt: &str) -> &str {
     UNITS.iter().find(|row| row.0 == spelt).or_else(|| row_of(spelt)).map_or(spelt, |row| row.1)
 }
 
-/// A unit without a stroke as columns spell it, from how people spell it; none for what is no unit.
+/// Returns the spelling in column names of a simple unit (without `/` or `_per_`), given in a
+/// spelling used by people. Returns `None` if the text is no unit.
 ///
 /// ```
 /// use stretch_data::spelt_unit;

@@ -1,4 +1,4 @@
-//! A folder of trials and what `dataset.toml` says of them.
+//! A data set: a folder of trials and their description in `dataset.toml`.
 
 use std::{
     fmt,
@@ -19,11 +19,11 @@ use crate::{
 /// The contents of `dataset.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DataSet {
-    /// What the data set is called.
+    /// Name of the data set.
     pub name: String,
-    /// Nominal samples a second.
+    /// Nominal sample rate, Hz.
     pub rate_hz: f64,
-    /// Rig file next to it; the built-in rig when absent.
+    /// Rig file, relative to the data set's folder. If absent, the built-in rig is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<String>,
     /// The trials in the order in which they were recorded.
@@ -36,17 +36,18 @@ pub struct DataSet {
 pub struct TrialEntry {
     /// File, relative to the data set's folder.
     pub file: String,
-    /// What was done in it.
+    /// What was done in the trial.
     pub kind: TrialKind,
-    /// Opening of the valve, 0..1, where one opening was held.
+    /// Opening of the valve, 0..1, if one opening was held during the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opening: Option<f64>,
     /// Seconds since the gauge was powered and the sleeve first stretched.
     #[serde(default)]
     pub start_s: f64,
-    /// Whether it may be fitted or only tested on.
+    /// Whether the trial may be fitted, or only used for testing.
     pub split: Split,
-    /// Digest of the file that the data set was written with; what was recorded by hand has none.
+    /// Digest of the trial's file when the data set was written. Absent for recordings that were
+    /// added by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
 }
@@ -55,9 +56,9 @@ pub struct TrialEntry {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrialKind {
-    /// Inlet held at one opening, from atmospheric pressure.
+    /// Inlet valve held at one opening, starting from atmospheric pressure.
     Inflation,
-    /// Outlet held at one opening, from full contraction.
+    /// Outlet valve held at one opening, starting from full contraction.
     Deflation,
     /// Random segments.
     Arbitrary,
@@ -78,12 +79,12 @@ pub enum Split {
     Test,
 }
 
-/// What the description of a data set is called in its folder.
+/// File name of the description in the data set's folder.
 const FILE: &str = "dataset.toml";
 
 impl DataSet {
-    /// Reads `dataset.toml` in a folder and checks it, as [`DataSet::parse`], and that the
-    /// files it names are there. Its trials are read by the crate `stretch-recording`.
+    /// Reads `dataset.toml` in a folder, checks it as [`DataSet::parse`] does, and checks that the
+    /// files it names exist. The crate `stretch-recording` reads the trials themselves.
     ///
     /// # Errors
     /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with the key.
@@ -104,9 +105,8 @@ impl DataSet {
 
     /// Parses the text of a `dataset.toml`; messages call the file `name`.
     ///
-    /// Each file is named once and is in the folder, `rate_hz` is above 0, openings are
-    /// 0..1, and there is at least one trial. Keys that the format does not know are passed
-    /// over.
+    /// Checks that each file is named once and lies in the folder, that `rate_hz` is above 0, that
+    /// openings are within 0..1, and that there is at least one trial. Unknown keys are ignored.
     ///
     /// # Errors
     /// [`DataError::NotToml`], or [`DataError::Key`] with the key.
@@ -127,12 +127,13 @@ impl DataSet {
         Self::from_file(&TomlFile::new(name, text))
     }
 
-    /// The trials of one split, in order.
+    /// Returns the trials of one split, in order.
     pub fn entries(&self, split: Split) -> impl Iterator<Item = &TrialEntry> {
         self.trials.iter().filter(move |entry| entry.split == split)
     }
 
-    /// A sentence with both where the stamps of a trial say another rate than [`DataSet::rate_hz`], by more than a twentieth.
+    /// Returns a sentence with both rates if the rate of a trial's time stamps differs from
+    /// [`DataSet::rate_hz`] by more than 5 %.
     ///
     /// ```
     /// use stretch_data::{DataSet, Trial};
@@ -155,7 +156,7 @@ impl DataSet {
         })
     }
 
-    /// The rig file next to it, if it names one.
+    /// Reads the rig file of the data set, if one is named.
     ///
     /// # Errors
     /// As [`RigFile::read`].
@@ -163,8 +164,8 @@ impl DataSet {
         self.rig.as_ref().map(|rig| RigFile::read(folder.as_ref().join(rig))).transpose()
     }
 
-    /// Takes down the digest of each trial's file in a folder: from then on a trial that was put
-    /// there from another data set is refused when it is loaded.
+    /// Stores the digest of each trial's file in a folder. From then on, loading a trial fails if
+    /// its file was replaced, for example by a file of another data set.
     ///
     /// # Errors
     /// [`DataError::File`] for a file that cannot be read.
@@ -177,10 +178,10 @@ impl DataSet {
         Ok(())
     }
 
-    /// Writes `dataset.toml` into a folder that exists, whole or not at all.
+    /// Writes `dataset.toml` into an existing folder, completely or not at all.
     ///
     /// # Errors
-    /// [`DataError::Key`] when it could not be read back, else as [`write_whole`].
+    /// [`DataError::Key`] if the text could not be read back, otherwise as [`write_whole`].
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<(), DataError> {
         let path = folder.as_ref().join(FILE);
         let text = self.to_toml();
@@ -188,11 +189,11 @@ impl DataSet {
         Ok(write_whole(path, |out| out.write_all(text.as_bytes()))?)
     }
 
-    /// Writes a folder with `dataset.toml`, the rig file, and each trial as `trial` makes it,
-    /// whole or not at all, as [`write_folder`](crate::files::write_folder).
+    /// Writes a folder with `dataset.toml`, the rig file, and each trial as returned by `trial`,
+    /// completely or not at all, as [`write_folder`](crate::files::write_folder).
     ///
     /// # Errors
-    /// As [`write_folder`](crate::files::write_folder), or what `trial` says.
+    /// As [`write_folder`](crate::files::write_folder), or an error of `trial`.
     pub fn write_folder<E: From<DataError> + From<FileError>>(
         &self,
         folder: impl AsRef<Path>,
@@ -212,7 +213,7 @@ impl DataSet {
         })
     }
 
-    /// The text of `dataset.toml`.
+    /// Returns the text of `dataset.toml`.
     pub fn to_toml(&self) -> String {
         Remarks::default().write(self)
     }
@@ -246,7 +247,7 @@ impl DataSet {
         Ok(set)
     }
 
-    /// The files that it names, each with its key.
+    /// Returns the files that the data set names, each with its key.
     fn files(&self) -> impl Iterator<Item = (String, &str)> {
         let trials = self.trials.iter().enumerate();
         let trials = trials.map(|(i, entry)| (format!("trial[{i}].file"), entry.file.as_str()));
@@ -254,13 +255,14 @@ impl DataSet {
     }
 }
 
-/// Whether a path can only lead to something inside the folder that it starts from.
+/// Whether a relative path cannot lead out of the folder in which it starts.
 fn stands_in_folder(path: &str) -> bool {
     let mut parts = Path::new(path).components().peekable();
     parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// The trials of a data set in a folder that are still what the program wrote, by their digests.
+/// Returns the trials of a data set whose files still have the digests with which they were
+/// written.
 pub(crate) fn unchanged_trials(folder: &Path) -> Vec<PathBuf> {
     let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
     let trials = DataSet::parse(FILE, &text).map_or(Vec::new(), |set| set.trials);
@@ -273,10 +275,11 @@ pub(crate) fn unchanged_trials(folder: &Path) -> Vec<PathBuf> {
 }
 
 impl TrialEntry {
-    /// Refuses a file that is not the one that the data set was written with, where that is known.
+    /// Checks that a trial's file is the one with which the data set was written, if its digest is
+    /// known.
     ///
     /// # Errors
-    /// [`DataError::Key`] with both digests; [`DataError::File`] where there is no such file.
+    /// [`DataError::Key`] with the digest found; [`DataError::File`] if the file does not exist.
     pub fn check_file(&self, folder: impl AsRef<Path>) -> Result<(), DataError> {
         let path = folder.as_ref().join(&self.file);
         let found = || File::open(&path).and_then(digest_of);
@@ -284,10 +287,11 @@ impl TrialEntry {
         self.check_digest(&folder.as_ref().join(FILE), found)
     }
 
-    /// The same for the bytes of a file that is in no folder.
+    /// Checks the bytes of a trial's file against its digest, as `TrialEntry::check_file` does
+    /// for a file in a folder.
     ///
     /// # Errors
-    /// [`DataError::Key`] with both digests.
+    /// [`DataError::Key`] with the digest found.
     pub fn check_bytes(&self, bytes: &[u8]) -> Result<(), DataError> {
         let found = || digest_of(bytes).map_err(|e| DataError::io(&self.file, "read it", e));
         self.check_digest(Path::new(FILE), found)
@@ -333,16 +337,16 @@ impl fmt::Display for Split {
     }
 }
 
-/// CRC-32C, as records have it.
+/// The checksum CRC-32C, which calibration files use as well.
 pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// What a digest begins with.
+/// Prefix of a digest.
 const KIND: &str = "crc32c ";
 
-/// The digest of a file's bytes: `crc32c`, and eight hexadecimal digits.
+/// Returns the digest of a file's bytes: `crc32c` and eight hexadecimal digits.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of reading.
 ///
 /// ```
 /// let digest = stretch_data::digest_of(&b"123456789"[..])?;
@@ -362,7 +366,7 @@ pub fn digest_of(mut file: impl Read) -> io::Result<String> {
     }
 }
 
-/// Whether a text can be a digest.
+/// Whether a text has the form of a digest.
 pub fn is_digest(text: &str) -> bool {
     let digits = text.strip_prefix(KIND).unwrap_or_default();
     digits.len() == 8 && digits.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))

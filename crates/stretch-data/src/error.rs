@@ -1,4 +1,5 @@
-//! What can be wrong with a file, with the evidence, and words for it: names in a row, and the name that was meant.
+//! Errors for wrong files, and helpers for messages: shortened fields, lists of names, and the
+//! nearest known name.
 
 use std::{fmt, fs, io, path::Path};
 
@@ -9,11 +10,11 @@ use crate::files::FileError;
 /// Rows count from 1 and include the header, as an editor shows them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// File, as it was given, or the name of a stream.
+    /// Path of the file as it was given, or the name of a stream.
     pub file: String,
     /// Row as an editor counts it: the header is row 1.
     pub row: u64,
-    /// Name of the column, or its number, the first being 1, where it has no name.
+    /// Name of the column, or its number (from 1) if it has no name.
     pub column: String,
 }
 
@@ -25,32 +26,32 @@ impl fmt::Display for Place {
 
 /// Why something could not be read or written.
 ///
-/// Each variant carries the evidence, and each message is one sentence that
-/// says where, what, and what to do.
+/// Each message is one sentence that states the place, the problem with the offending value, and
+/// the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
     /// A file or folder that could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A folder that is no data set.
+    /// A folder without a `dataset.toml`.
     #[error("{folder}: there is no dataset.toml in it; {hint}")]
     NoDataSet {
         /// The folder.
         folder: String,
-        /// What to do, by what is in it.
+        /// What to do, depending on the folder's contents.
         hint: String,
     },
-    /// A column that is needed is not there.
+    /// A required column that is missing.
     #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest), .present.join(", "))]
     MissingColumn {
         /// The file.
         file: String,
-        /// The column that is needed.
+        /// The required column.
         column: String,
-        /// The columns that are there.
+        /// The existing columns.
         present: Vec<String>,
-        /// The one whose name is nearest.
+        /// The existing column with the most similar name, if there is one.
         nearest: Option<String>,
     },
     /// NaN, an infinity, or a number too large for 64 bits.
@@ -58,10 +59,10 @@ pub enum DataError {
     NotFinite {
         /// Where.
         at: Place,
-        /// The field.
+        /// The text of the field.
         value: String,
     },
-    /// Time that stays the same or goes back.
+    /// A time stamp that is equal to or smaller than the one before.
     #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: leave that row out, or split the recording there", if .time_s == .previous_s { "stays the same" } else { "goes back" })]
     TimeNotRising {
         /// Where.
@@ -71,19 +72,19 @@ pub enum DataError {
         /// Seconds in the row before.
         previous_s: f64,
     },
-    /// Channels of a trial in memory that do not go with its time.
+    /// A channel of a trial in memory whose length differs from that of the time column.
     #[error("{trial}, column {column}: it has {found} values where time_s has {expected}")]
     Lengths {
         /// The trial.
         trial: String,
         /// The column.
         column: String,
-        /// Its values.
+        /// Number of its values.
         found: usize,
-        /// Time stamps.
+        /// Number of time stamps.
         expected: usize,
     },
-    /// A trial of another sample rate than the rest of its session.
+    /// A trial whose sample rate differs from that of the rest of its session.
     #[error(
         "{trial}, column time_s: {rate_hz:.2} samples a second where {usual_hz:.2} are usual; resample it to that rate or leave it out"
     )]
@@ -92,10 +93,10 @@ pub enum DataError {
         trial: String,
         /// Its rate.
         rate_hz: f64,
-        /// The rate asked for: that of the session's first trial.
+        /// The required rate: that of the session's first trial.
         usual_hz: f64,
     },
-    /// A test trial whose samples are those of a trial that may be fitted.
+    /// A test trial with the same samples as a trial that may be fitted.
     #[error(
         "{test} is a test trial, and it has the same samples as {fit}, which is fitted; a fitted trial cannot be a test: record another trial, or leave one of them out"
     )]
@@ -105,18 +106,18 @@ pub enum DataError {
         /// The test trial.
         test: String,
     },
-    /// More rows than a command takes in memory.
+    /// More rows than a command holds in memory.
     #[error(
         "the trials have {rows} rows together, and at most {most} are taken at once; thin them to fewer samples a second \
          (stretch convert --grid HZ), or give a part of the log"
     )]
     TooLong {
-        /// Rows of all trials.
+        /// Number of rows of all trials.
         rows: usize,
-        /// The most rows.
+        /// The largest permitted number of rows.
         most: usize,
     },
-    /// A session in which no trial has two samples.
+    /// A session in which no trial has two or more samples.
     #[error("no recording has two or more rows; give a recording that has")]
     NoSamples,
     /// TOML that cannot be parsed at all.
@@ -126,7 +127,7 @@ pub enum DataError {
         file: String,
         /// The row.
         row: u64,
-        /// What the parser said.
+        /// The parser's message.
         message: String,
     },
     /// A key that is missing or has an impossible value.
@@ -134,14 +135,14 @@ pub enum DataError {
     Key {
         /// The file.
         file: String,
-        /// The row, if the key is in one.
+        /// The row, if it is known.
         row: Option<u64>,
-        /// The key with the tables that contain it: `trial[2].file`.
+        /// The key with its tables: `trial[2].file`.
         key: String,
         /// What is wrong and what to do.
         problem: String,
     },
-    /// Something in memory that has no place in a file.
+    /// Data in memory that the file format cannot represent.
     #[error("{name} cannot be written: {problem}")]
     Unwritable {
         /// The trial or data set.
@@ -163,7 +164,8 @@ impl fmt::Display for Nearest<'_> {
 }
 
 impl DataError {
-    /// What a folder without a `dataset.toml` may be meant for.
+    /// Returns the error for a folder without a `dataset.toml`, with advice that depends on the CSV
+    /// files in it.
     pub(crate) fn no_data_set(folder: &Path) -> Self {
         let entries = fs::read_dir(folder).into_iter().flatten().flatten();
         let is_table = |name: &String| name.ends_with(".csv") || name.ends_with(".csv.gz");
@@ -193,7 +195,8 @@ impl DataError {
         FileError::io(path, action, cause).into()
     }
 
-    /// The error that names the columns that are there, and the nearest of them.
+    /// Returns the error for a missing column, with the existing columns and the one with the most
+    /// similar name.
     pub fn missing_column<'a>(
         file: &str,
         column: &str,
@@ -206,7 +209,7 @@ impl DataError {
     }
 }
 
-/// A field for a message: at most 40 characters, nothing that a terminal would obey.
+/// Prepares a field for a message: shortens it to 40 characters and replaces control characters.
 pub fn shown(content: &[u8]) -> String {
     const LONGEST: usize = 40;
     let mut text = String::new();
@@ -222,8 +225,9 @@ pub fn shown(content: &[u8]) -> String {
     }
 }
 
-/// The candidate nearest to `name` by edit distance, when it is near enough to be meant:
-/// at most two edits and less than half of the name, letter case apart, or the name without the unit at the end.
+/// Returns the candidate nearest to `name` by edit distance, ignoring case, if it is near enough to
+/// be meant: at most two edits and fewer than half the length of `name`. A candidate that equals
+/// `name` plus a unit (`_mm`) counts as zero edits.
 ///
 /// ```
 /// let names = ["time_s", "length_mm", "bridge_v"];
@@ -232,7 +236,8 @@ pub fn shown(content: &[u8]) -> String {
 /// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
 /// ```
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // no name is longer, and the time for the distance is proportional to the product of two lengths
+    // Names are cut to 64 characters because the time for an edit distance is proportional to the
+    // product of the lengths.
     let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
     let name = short(name);
     let edits = |one: &str| match one.strip_prefix(&name) {
@@ -245,7 +250,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, one)| one)
 }
 
-/// Names joined into a phrase: `a, b and c`, and `nothing` for no name.
+/// Joins names into a phrase: `a, b and c`, or `nothing` for an empty list.
 ///
 /// ```
 /// assert_eq!(stretch_data::listed(&["a", "b", "c"]), "a, b and c");

@@ -1,62 +1,68 @@
-//! A trial on an even grid of time: lost samples bridged, long gaps cut.
+//! Resampling of a trial to a uniform time grid: short gaps are bridged, long gaps split the trial.
 
 use std::{borrow::Cow, ops::Range};
 
 use crate::{DataError, Trial};
 
-/// Lost samples in a row that are bridged, as a live receptor bridges them; one more cuts the trial.
+/// Largest number of consecutive lost samples that is bridged, as in a live receptor. A longer gap
+/// splits the trial.
 const MOST_BRIDGED: usize = 3;
-/// A sample is on time within so many periods.
+/// Largest deviation of a sample from its grid point, in periods, at which the sample is taken
+/// unchanged.
 const ON_TIME: f64 = 0.2;
-/// Rates that differ by less than this share are one: no two clocks agree better.
+/// Rates with a smaller relative difference count as equal, because two clocks do not agree better
+/// than this.
 const CLOCKS: f64 = 1e-3;
-/// A rate that differs by more than this share is another rate.
+/// Relative difference of rates above which a trial is refused.
 const OTHER_RATE: f64 = 0.05;
-/// More gaps than these are reported in one sentence.
+/// If there are more gaps than this, one note summarizes all of them.
 const TOLD: usize = 3;
-/// Change of an opening that is a switch: one sample of it is more than noise. What is smaller is bridged well by whatever holds.
+/// Change of a valve opening that counts as a switch. Smaller changes may be noise, and a gap over
+/// them is bridged well by either value.
 const SWITCH: f64 = 0.05;
-/// Channels that a device holds from one sample to the next: commands of the valves.
+/// Channels whose values a device holds until the next sample: commands of the valves.
 const HELD: [&str; 2] = ["inlet", "outlet"];
 
-/// How a trial is brought onto an even grid.
+/// Settings for resampling a trial to a uniform grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvenSpec {
-    /// Samples a second of the grid.
+    /// Sample rate of the grid, Hz.
     pub rate_hz: f64,
-    /// Parts between two gaps with fewer samples are left out, and so is a trial.
+    /// Parts between gaps, and whole trials, with fewer samples than this are left out.
     pub shortest: usize,
-    /// Longest gap that is bridged, s, where the commands are the same on both sides of it; three samples always are then.
+    /// Longest gap that is bridged, s, if the commands are the same on both sides of it. In that
+    /// case, gaps of up to three samples are always bridged.
     pub bridged_s: f64,
-    /// Whether up to three missing samples are bridged even if a valve switched meanwhile at an unknown time.
+    /// Whether up to three missing samples are bridged even if a valve switched during the gap, at
+    /// an unknown time.
     pub over_switches: bool,
 }
 
-/// What became of a trial's rows.
+/// Counts of a trial's rows: read, bridged, left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Rows {
     /// Rows that were read.
     pub read: usize,
-    /// Samples that were lost and are bridged.
+    /// Lost samples that were bridged.
     pub bridged: usize,
-    /// Rows left out: parts between gaps that are too short.
+    /// Rows left out because their part between two gaps is too short.
     pub dropped: usize,
 }
 
 impl Rows {
-    /// Rows that are used.
+    /// Returns the number of rows that are used.
     pub fn used(&self) -> usize {
         self.read - self.dropped
     }
 
-    /// Adds those of another trial.
+    /// Adds the counts of another trial.
     pub fn add(&mut self, other: Self) {
         self.read += other.read;
         self.bridged += other.bridged;
         self.dropped += other.dropped;
     }
 
-    /// A sentence, unless every row was used as it is and none was lost.
+    /// Returns the counts as a sentence, or `None` if every row was used and no sample was bridged.
     pub fn note(&self) -> Option<String> {
         let Self { read, bridged, dropped } = self;
         (bridged + dropped > 0).then(|| {
@@ -69,60 +75,65 @@ impl Rows {
     }
 }
 
-/// A part of a trial without a gap, on an even grid.
+/// A part of a trial without gaps, on a uniform grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvenPart {
-    /// When it begins, s after the trial's first sample.
+    /// Start of the part, s after the trial's first sample.
     pub begin_s: f64,
-    /// Values of the columns that were asked for, in that order; all of one length.
+    /// Values of the requested columns, in the requested order; all have the same length.
     pub columns: Vec<Vec<f64>>,
-    /// Samples that were lost and bridged.
+    /// For each sample, whether it was lost and is bridged.
     pub is_lost: Vec<bool>,
 }
 
 impl EvenPart {
-    /// How many samples it has.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.columns.first().map_or(0, Vec::len)
     }
 
-    /// Whether it has none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// A trial on an even grid, and what had to be done for it.
+/// A trial on a uniform grid, with a report of the changes that were made.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Even {
     /// The trial, or its parts between gaps.
     pub parts: Vec<EvenPart>,
-    /// What became of its rows.
+    /// Counts of the trial's rows.
     pub rows: Rows,
-    /// By column, the turn by which it wrapped, in its unit: its values are unwrapped.
+    /// For each column that was unwrapped, the size of a turn in the column's unit.
     pub turns: Vec<Option<f64>>,
-    /// Sentences: gaps, parts left out, uneven time stamps, angles that wrapped. Empty if the trial was even.
+    /// Notes: gaps, parts left out, uneven time stamps, wrapped angles. Empty if nothing had to be
+    /// changed.
     pub notes: Vec<String>,
 }
 
 impl Trial {
-    /// Brings columns of the trial onto an even grid.
+    /// Resamples columns of the trial to a uniform grid.
     ///
-    /// - Samples within a fifth of a period of the grid are taken as they are.
-    /// - Up to three lost samples in a row are bridged, over a switch of a valve only with [`EvenSpec::over_switches`]. The
-    ///   channels `inlet` and `outlet` are commands, which the valves hold: they keep their last value. Anything else is
-    ///   measured and goes straight from the sample before the gap to the one behind it. A live receptor moves its last
-    ///   sample on by the last rate instead: it cannot see what comes, a log can, and a line between two samples cannot
-    ///   overshoot.
-    /// - So is a longer gap up to [`EvenSpec::bridged_s`] where the commands behind it are those before it.
-    /// - More lost samples cut the trial; parts with fewer than [`EvenSpec::shortest`] samples are left out.
-    /// - A column that jumps by a turn where the motion goes on is an angle that wraps ([`Wrap`](crate::Wrap)); it is unwrapped.
-    /// - Uneven stamps are resampled: measured channels by straight lines, of the commands the one that holds in the middle
-    ///   of each period.
-    ///
+    /// - Samples within a fifth of a period of a grid point are taken unchanged.
+    /// - Up to three consecutive lost samples are bridged; over a switch of a valve only with
+    ///   [`EvenSpec::over_switches`]. The channels `inlet` and `outlet` are commands, which the
+    ///   valves hold, so they keep their last value. All other channels are measured and are
+    ///   interpolated linearly. A live receptor instead extrapolates its last sample with the last
+    ///   rate, because it does not know the next sample. In a log the next sample is known, and
+    ///   interpolation cannot overshoot.
+    /// - A longer gap, up to [`EvenSpec::bridged_s`], is bridged in the same way if the commands on
+    ///   both sides of it are equal.
+    /// - Longer gaps split the trial. Parts with fewer than [`EvenSpec::shortest`] samples are left
+    ///   out.
+    /// - A column that jumps by a full turn although the motion continues is a wrapped angle
+    ///   ([`Wrap`](crate::Wrap)); it is unwrapped.
+    /// - Trials with uneven time stamps are resampled: measured channels by linear interpolation,
+    ///   commands by the value that holds in the middle of each period.
     /// # Errors
-    /// A column that is missing, of another length than the time, or holds what is no finite number; time that does
-    /// not rise; a rate that is not above zero; a trial whose rate is off by more than a twentieth.
+    /// A missing column; a column with another length than the time, or with a value that is not
+    /// finite; time that does not increase; a rate that is not above zero; a trial whose rate
+    /// differs from the grid's by more than 5 %.
     ///
     /// ```
     /// use stretch_data::{Channel, EvenSpec, Trial};
@@ -238,21 +249,21 @@ impl Even {
     }
 }
 
-/// Periods of a trial's own clock and of the grid, s.
+/// Sample periods of the grid and of a trial's recorder, s.
 #[derive(Debug, Clone, Copy)]
 struct Clock {
     period_s: f64,
     own_s: f64,
 }
 
-/// A point of the grid between two samples of a stretch.
+/// A grid point and the samples from which its values are computed.
 #[derive(Debug, Clone, Copy)]
 struct Point {
-    /// The sample at or before it.
+    /// Index of the last sample at or before the grid point.
     left: usize,
-    /// How far towards the next sample it lies, 0..1.
+    /// Fraction of the way to the next sample, 0..1.
     way: f64,
-    /// The sample whose command holds.
+    /// Index of the sample whose command holds at the grid point.
     holds: usize,
 }
 
@@ -268,7 +279,7 @@ impl Point {
 }
 
 impl Clock {
-    /// Samples that were lost between two neighbours.
+    /// Returns the number of samples that were lost between two consecutive samples.
     fn between(&self, step_s: f64) -> usize {
         ((step_s / self.own_s).round() as usize).saturating_sub(1)
     }
@@ -277,13 +288,14 @@ impl Clock {
         time_s.windows(2).map(|t| self.between(t[1] - t[0])).sum()
     }
 
-    /// Whether a point lies within a gap.
+    /// Whether a grid point lies within a gap.
     fn is_lost(&self, time_s: &[f64], point: &Point) -> bool {
         let next = time_s.get(point.left + 1);
         next.is_some_and(|t| point.way > 0.0 && self.between(t - time_s[point.left]) > 0)
     }
 
-    /// Parts between gaps that are not bridged: `most` says how many samples may be lost before a sample.
+    /// Splits a trial at gaps that are not bridged. `most(i)` is the largest number of lost samples
+    /// before sample `i` that is bridged.
     fn stretches(&self, time_s: &[f64], most: impl Fn(usize) -> usize) -> Vec<Range<usize>> {
         let is_gap = |i: &usize| self.between(time_s[*i] - time_s[*i - 1]) > most(*i);
         let mut out = Vec::new();
@@ -297,7 +309,8 @@ impl Clock {
         out
     }
 
-    /// The grid with every sample on a separate point; `None` if one comes too early or too late for that.
+    /// Returns a grid on which every sample has a separate point, or `None` if the time stamps
+    /// deviate too much from it.
     fn points(&self, time_s: &[f64]) -> Option<Vec<Point>> {
         let mut points: Vec<Point> = Vec::with_capacity(time_s.len());
         let (mut early, mut late) = (0.0_f64, 0.0_f64);
@@ -305,7 +318,7 @@ impl Clock {
             let periods = (t - time_s[0]) / self.period_s;
             let slot = periods.round() as usize;
             (early, late) = (early.min(periods - slot as f64), late.max(periods - slot as f64));
-            // The first sample may itself be off: the range counts.
+            // The first sample may itself be early or late, so the range of the deviations counts.
             if slot < points.len() || late - early > 2.0 * ON_TIME {
                 return None;
             }
@@ -320,10 +333,10 @@ impl Clock {
         Some(points)
     }
 
-    /// The grid between samples that come unevenly.
+    /// Returns a uniform grid over unevenly spaced samples.
     fn grid(&self, time_s: &[f64]) -> Vec<Point> {
         let last = time_s.len() - 1;
-        // Rounding must not cost the last sample.
+        // The small number keeps rounding from dropping the last sample.
         let count = ((time_s[last] - time_s[0]) / self.period_s + 1e-6) as usize + 1;
         let (mut left, mut holds) = (0, 0);
         (0..count)

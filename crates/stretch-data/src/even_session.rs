@@ -1,40 +1,44 @@
-//! A session: its trials on one even grid of time, in the order in which they were recorded.
+//! A session: the trials of a data set on one uniform time grid, in the order in which they were
+//! recorded.
 
 use std::collections::HashMap;
 
 use crate::{DataError, EvenSpec, Rows, Split, Trial, TrialKind};
 
-/// Pause between trials that do not say when they began, s.
+/// Assumed pause between trials whose start times are unknown, s.
 const PAUSE_S: f64 = 15.0;
-/// Rounding of time stamps: a rate this near to a whole number of hertz is that number.
+/// Relative rounding error of time stamps: a rate this close to an integer in hertz is taken as
+/// that integer.
 const STAMPED: f64 = 1e-6;
-/// Longest gap that is bridged where the commands are the same on both sides, s: a command that comes and goes within it is rare.
+/// Longest gap that is bridged if the commands on both sides are equal, s. A command that changes
+/// and returns within such a gap is rare.
 const BRIDGED_S: f64 = 0.5;
 
 /// A trial and its place in a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionTrial {
-    /// What was recorded.
+    /// The recorded data.
     pub trial: Trial,
-    /// What was done in it.
+    /// What was done in the trial.
     pub kind: TrialKind,
     /// Session time of its first sample, s.
     pub start_s: f64,
-    /// Whether it may be fitted or only tested on.
+    /// Whether the trial may be fitted, or only used for testing.
     pub split: Split,
-    /// What had to be done to read it.
+    /// Notes of the reader: what had to be changed to read the trial.
     pub notes: Vec<String>,
 }
 
 impl SessionTrial {
-    /// A trial that may be fitted, at the session's start; change what differs.
+    /// Returns a trial that may be fitted and starts at session time 0. Set the other fields as
+    /// needed.
     pub fn new(trial: Trial) -> Self {
         let notes = Vec::new();
         Self { trial, kind: TrialKind::Other, start_s: 0.0, split: Split::Fit, notes }
     }
 }
 
-/// A trial of an [`EvenSession`]: columns on an even grid, without a gap.
+/// A trial of an [`EvenSession`]: columns on a uniform grid, without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvenTrial {
     name: String,
@@ -47,43 +51,44 @@ pub struct EvenTrial {
 }
 
 impl EvenTrial {
-    /// What to call it; parts of a trial with gaps are numbered.
+    /// Returns the trial's name. Parts of a trial with gaps are numbered.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Which of the trials given it is, or is a part of.
+    /// Returns the index of the original trial in the list given to `EvenSession::new`.
     pub fn source(&self) -> usize {
         self.source
     }
 
-    /// What was done in it.
+    /// Returns what was done in the trial.
     pub fn kind(&self) -> TrialKind {
         self.kind
     }
 
-    /// Session time of its first sample, s.
+    /// Returns the session time of the first sample, s.
     pub fn start_s(&self) -> f64 {
         self.start_s
     }
 
-    /// Whether it is a test trial.
+    /// Whether the trial is a test trial.
     pub fn is_test(&self) -> bool {
         self.split == Split::Test
     }
 
-    /// Columns in the order in which they were asked for; each of one length and finite.
+    /// Returns the columns in the requested order; all values are finite and all lengths equal.
     pub fn columns(&self) -> &[Vec<f64>] {
         &self.columns
     }
 
-    /// Samples that were lost: their values bridge a gap.
+    /// For each sample, whether it was lost and its value bridges a gap.
     pub fn is_lost(&self) -> &[bool] {
         &self.is_lost
     }
 }
 
-/// Refuses a test trial that is one of those that may be fitted, whatever its name: the columns asked for have the same checksum.
+/// Refuses a test trial whose requested columns have the same checksum as those of a trial that may
+/// be fitted, whatever its name.
 fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataError> {
     let of = |split| {
         let own = trials.iter().filter(move |t| t.split == split);
@@ -98,7 +103,7 @@ fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataErr
     }
 }
 
-/// Trials on one even grid, in the order of time: what simulation and diagnosis are driven by.
+/// Trials on one uniform grid, in order of time: the input of simulation and diagnosis.
 ///
 /// ```
 /// use stretch_data::{Channel, EvenSession, SessionTrial, Trial};
@@ -128,15 +133,19 @@ pub struct EvenSession {
 }
 
 impl EvenSession {
-    /// Brings columns of trials onto one even grid, as [`Trial::even`]; the first trial's rate is the session's.
+    /// Resamples columns of trials to one uniform grid, as [`Trial::even`]. The first trial's rate
+    /// is the session's rate.
     ///
-    /// Trials go in the order of their `start_s`. Where that does not rise, they go in the order given, with pauses of 15 s.
-    /// Gaps of up to half a second are bridged if the commands are the same on both sides. They are not bridged if a valve switched meanwhile:
-    /// the time of the switch is unknown, and one sample of a wrong flow stays in the chamber for seconds.
-    /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
+    /// Trials are sorted by `start_s`. If start times are equal, the given order is kept, and
+    /// pauses of 15 s are assumed. Gaps of up to half a second are bridged if the commands are
+    /// equal on both sides. They are not bridged if a valve switched during the gap, because the
+    /// time of the switch is unknown, and the air of one sample with a wrong flow stays in the
+    /// chamber for seconds. Parts of a trial with gaps start at their true times and inherit the
+    /// trial's kind and split.
     ///
     /// # Errors
-    /// No trial, none with two samples, a test trial with the samples of one that may be fitted, and as [`Trial::even`].
+    /// No trial with two samples; a test trial with the same samples as a trial that may be fitted;
+    /// errors of [`Trial::even`].
     pub fn new(
         trials: &[SessionTrial],
         columns: &[&str],
@@ -144,7 +153,8 @@ impl EvenSession {
     ) -> Result<Self, DataError> {
         let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).ok_or(DataError::NoSamples)?;
         check_splits(trials, columns)?;
-        // Stamps are rounded: a rate of 100 Hz is computed as 100.000000000002, and a count of samples would be one less.
+        // Time stamps are rounded. A rate of 100 Hz is computed as 100.000000000002 Hz, and a count
+        // of samples would be too small by one.
         let whole = rate_hz.round();
         let is_whole = whole > 0.0 && (rate_hz / whole - 1.0).abs() < STAMPED;
         let rate_hz = if is_whole { whole } else { rate_hz };
@@ -178,7 +188,7 @@ impl EvenSession {
         Ok(session)
     }
 
-    /// Trials in order of time, and when each began.
+    /// Returns the trials in order of time, each with its start time.
     fn in_order<'a>(&mut self, trials: &'a [SessionTrial]) -> Vec<(&'a SessionTrial, f64)> {
         let mut order: Vec<_> = trials.iter().map(|t| (t, t.start_s)).collect();
         let rises = |order: &[(&SessionTrial, f64)]| order.windows(2).all(|t| t[1].1 > t[0].1);
@@ -205,27 +215,29 @@ impl EvenSession {
             .collect()
     }
 
-    /// The trials, in the order of time.
+    /// Returns the trials, in order of time.
     pub fn trials(&self) -> &[EvenTrial] {
         &self.trials
     }
 
-    /// Sample time of all of them, s; above zero.
+    /// Returns the sample period of all trials, s; above zero.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
     }
 
-    /// What became of the rows.
+    /// Returns the counts of rows of all trials.
     pub fn rows(&self) -> Rows {
         self.rows
     }
 
-    /// By column, the turn by which it wrapped in some trial, in its unit; its values are unwrapped.
+    /// For each column that was unwrapped in some trial, returns the size of a turn in the column's
+    /// unit.
     pub fn turns(&self) -> &[Option<f64>] {
         &self.turns
     }
 
-    /// What had to be done to them, in sentences; none for even trials that say when they began.
+    /// Returns notes on all changes that were made to the trials. Empty for gap-free, evenly
+    /// sampled trials with increasing start times.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

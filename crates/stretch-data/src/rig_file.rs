@@ -1,4 +1,4 @@
-//! A rig file: nominal parameters by stage, with tolerances, and effects that are on.
+//! A rig file: nominal parameters of each stage with tolerances, and the enabled effects.
 
 use std::{collections::BTreeMap, fmt, path::Path};
 
@@ -10,38 +10,38 @@ use serde::{
 
 use crate::{DataError, Remarks, TomlFile, files::write_whole};
 
-/// The contents of a `rig.toml`: the simulator checks the names.
+/// The contents of a `rig.toml`. The simulator checks the names.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RigFile {
-    /// `"gauge"` for a gauge alone; absent for a whole rig.
+    /// `"gauge"` for a rig that is only a gauge; absent for a complete rig.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
-    /// A table a stage; in it a parameter a key.
+    /// One table for each stage, with one key for each parameter.
     #[serde(flatten)]
     pub stages: BTreeMap<String, BTreeMap<String, Parameter>>,
-    /// Effects that are on, in the file's order.
+    /// Enabled effects, in the order of the file.
     #[serde(rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<EffectEntry>,
 }
 
-/// A nominal parameter and how far it may be wrong.
+/// A nominal parameter and its tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(
     deny_unknown_fields,
     expecting = "a table; write { value = ... }, with a tolerance or without"
 )]
 pub struct Parameter {
-    /// Nominal value, SI unless the name says otherwise.
+    /// Nominal value, in SI units unless the name states another unit.
     pub value: f64,
-    /// One standard deviation as a share of the value; exact when neither is given.
+    /// One standard deviation, relative to the value. Without any tolerance the parameter is exact.
     #[serde(default, deserialize_with = "from_zero", skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// One standard deviation in the unit of the value.
+    /// One standard deviation, in the unit of the value.
     #[serde(default, deserialize_with = "from_zero", skip_serializing_if = "Option::is_none")]
     pub tolerance_abs: Option<f64>,
 }
 
-/// Reads a standard deviation.
+/// Reads a standard deviation, which may not be negative.
 ///
 /// # Errors
 /// A number below 0.
@@ -69,7 +69,7 @@ pub struct EffectEntry {
     pub parameters: BTreeMap<String, f64>,
 }
 
-// `#[serde(flatten)]` would read the keys of stages and effects without their paths in errors.
+// Written by hand, because `#[serde(flatten)]` would lose the paths of keys in errors.
 
 impl<'de> Deserialize<'de> for RigFile {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
@@ -124,7 +124,7 @@ impl<'de> Deserialize<'de> for EffectEntry {
 }
 
 impl RigFile {
-    /// Reads a rig file. The simulator checks whether the names are those of a rig.
+    /// Reads a rig file. The simulator checks the names of stages and parameters.
     ///
     /// # Errors
     /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with the key.
@@ -153,7 +153,7 @@ impl RigFile {
         TomlFile::new(name, text).parse()
     }
 
-    /// Writes the rig file, whole or not at all; numbers read back to the same bits.
+    /// Writes the rig file, completely or not at all. Numbers read back to the same bits.
     ///
     /// # Errors
     /// As [`write_whole`].
@@ -161,12 +161,13 @@ impl RigFile {
         Ok(write_whole(path, |out| out.write_all(self.to_toml().as_bytes()))?)
     }
 
-    /// The text of the rig file.
+    /// Returns the text of the rig file.
     pub fn to_toml(&self) -> String {
         self.to_toml_with(&Remarks::default())
     }
 
-    /// The text of the rig file with comments at its entries; it reads back to the same.
+    /// Returns the text of the rig file with comments at its entries. It reads back to the same rig
+    /// file.
     pub fn to_toml_with(&self, remarks: &Remarks) -> String {
         remarks.write(self)
     }

@@ -20,12 +20,12 @@ use crate::{
     Channel, DataSet, EffectEntry, Parameter, RigFile, Split, Trial, TrialEntry, TrialKind,
 };
 
-/// Any finite number, from every magnitude that there is.
+/// Any finite number of any magnitude.
 pub fn number() -> impl Strategy<Value = f64> {
     any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |x| x.is_finite())
 }
 
-/// A trial that a file can hold: any names, any finite numbers, rising time.
+/// A trial that a file can hold: any names, any finite numbers, increasing time.
 pub fn any_trial() -> impl Strategy<Value = Trial> {
     (1..20_usize, vec("[ -~µ°]{1,12}", 0..5)).prop_flat_map(|(rows, mut names)| {
         names.retain(|name| !name.trim().is_empty() && name != "time_s");
@@ -47,7 +47,7 @@ pub fn any_trial() -> impl Strategy<Value = Trial> {
 }
 
 /// A trial as a rig records it at 100 Hz: `length_mm` moves between 150 and 180, and `bridge_v`
-/// rises as it shortens, with noise of 2 mV.
+/// rises as the length decreases, with noise of up to 2 mV.
 pub fn rig_trial(rows: Range<usize>) -> impl Strategy<Value = Trial> {
     (rows, 0.005..0.05, 0.0..6.0).prop_flat_map(|(rows, rate, phase): (usize, f64, f64)| {
         vec(-0.002..0.002, rows).prop_map(move |noise: Vec<f64>| {
@@ -76,7 +76,7 @@ pub fn parameter() -> impl Strategy<Value = Parameter> {
     })
 }
 
-/// A rig file of any names, quotation marks and dots among them.
+/// A rig file with any names, including quotation marks and dots.
 pub fn rig_file() -> impl Strategy<Value = RigFile> {
     let name = || {
         let free = |name: &String| !["kind", "effect", "name"].contains(&name.as_str());
@@ -108,7 +108,7 @@ pub fn data_set() -> impl Strategy<Value = DataSet> {
     )
 }
 
-/// Bytes that begin as a trial and go wrong in any way, or that never were one.
+/// Bytes of a CSV file with arbitrary faults, or arbitrary bytes.
 pub fn faulty_csv() -> impl Strategy<Value = Vec<u8>> {
     let rows = || vec("[-+0-9eE.,;\"\\t naif\\r]{0,20}", 0..12).prop_map(|rows| rows.join("\n"));
     prop_oneof![

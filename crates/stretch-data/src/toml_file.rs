@@ -1,4 +1,5 @@
-//! A TOML file that people write, read through serde: errors name the file, the row, the key and the value.
+//! TOML files written by people, read through serde. Errors name the file, the row, the key and the
+//! value.
 
 use std::{fmt::Display, io, path::Path};
 
@@ -18,10 +19,10 @@ use toml::{
 
 use crate::{DataError, files::read_whole, nearest};
 
-/// Largest TOML file that is read: these files are written by people.
+/// Largest TOML file that is read, bytes. People write these files, so they are small.
 const LARGEST_BYTES: usize = 4 << 20;
 
-/// The text of a TOML file, and what to call it in messages.
+/// The text of a TOML file, and its name in messages.
 ///
 /// ```
 /// use serde::Deserialize;
@@ -51,16 +52,17 @@ pub struct TomlFile {
 }
 
 impl TomlFile {
-    /// A text; messages call it `file`. A byte-order mark is passed over.
+    /// Wraps a text that messages call `file`. A byte-order mark is ignored.
     pub fn new(file: &str, text: &str) -> Self {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         Self { file: file.to_owned(), text: text.to_owned() }
     }
 
-    /// Reads a file, `-` being standard input.
+    /// Reads a file; `-` is standard input.
     ///
     /// # Errors
-    /// [`DataError::File`], also for what is larger than 4 MiB, and [`DataError::NotToml`] for what is not UTF-8.
+    /// [`DataError::File`], also for a file of more than 4 MiB; [`DataError::NotToml`] for text
+    /// that is not UTF-8.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataError> {
         let path = path.as_ref();
         let is_stdin = path.as_os_str() == "-";
@@ -81,10 +83,11 @@ impl TomlFile {
         }
     }
 
-    /// The value that the text holds. A single text is read as a list of one text, and numbers are finite.
+    /// Deserializes the text. A single string is accepted as a list of one string, and numbers must
+    /// be finite.
     ///
     /// # Errors
-    /// [`DataError::NotToml`], or [`DataError::Key`] for what `T` does not accept.
+    /// [`DataError::NotToml`], or [`DataError::Key`] for a value that `T` does not accept.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, DataError> {
         let top = self.top()?;
         serde_path_to_error::deserialize(Node(&top)).map_err(|error| {
@@ -105,7 +108,7 @@ impl TomlFile {
         })
     }
 
-    /// The error that something is wrong with the value at a key, such as `trial[0].file`.
+    /// Returns an error about the value at a key, such as `trial[0].file`.
     pub fn error(&self, key: &str, problem: impl Into<String>) -> DataError {
         let parts = key.split(['.', '[', ']']).filter(|part| !part.is_empty());
         let start = self.top().ok().and_then(|top| find(&top, parts.map(str::to_owned)).0);
@@ -128,7 +131,7 @@ impl TomlFile {
     }
 }
 
-/// The row in which the text behind some bytes begins.
+/// Returns the row in which the text after some bytes starts.
 fn row_after(bytes: &[u8]) -> u64 {
     1 + bytes.iter().filter(|&&b| b == b'\n').count() as u64
 }
@@ -141,7 +144,8 @@ fn part(segment: &Segment) -> String {
     }
 }
 
-/// The innermost value along a path that is there, and where it begins; the top begins nowhere.
+/// Returns the innermost existing value along a path, and its position. The top-level table has no
+/// position.
 fn find<'a, 'i>(
     top: &'a DeValue<'i>,
     path: impl Iterator<Item = String>,
@@ -160,7 +164,8 @@ fn find<'a, 'i>(
     found
 }
 
-/// A value; a single text is read as a list of one text, and every number is finite.
+/// A TOML value as a deserializer. A single string is accepted as a list of one string, and every
+/// number must be finite.
 #[derive(Clone, Copy)]
 struct Node<'de>(&'de DeValue<'de>);
 
@@ -212,7 +217,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
         visitor.visit_newtype_struct(self)
     }
 
-    /// A derived struct would take a list for its fields in order.
+    /// A derived struct would accept a list as its fields in order, so lists are refused here.
     fn deserialize_struct<V: Visitor<'de>>(
         self,
         _: &'static str,
@@ -253,10 +258,10 @@ impl<'de> Deserializer<'de> for Node<'de> {
     }
 }
 
-/// Why serde refuses a value.
+/// The error of `Node`: why serde refuses a value.
 #[derive(Debug)]
 struct Refusal {
-    /// The key that is missing, where that is why.
+    /// The missing key, if that is the reason.
     missing: Option<&'static str>,
     problem: String,
 }
@@ -284,7 +289,7 @@ impl Error for Refusal {
             Unexpected::Map => "a table".to_owned(),
             other => other.to_string(),
         };
-        // what is expected may say where the value goes: write { value = ... }
+        // The expectation may contain a template for the value: write { value = ... }.
         Self::custom(format!("{found} is not {}", words(expected).replace("...", &found)))
     }
 
@@ -311,7 +316,7 @@ fn meant(given: &str, known: &[&str]) -> String {
         .map_or(String::new(), |one| format!(" (did you mean {one}?)"))
 }
 
-/// What serde expects, in words for people.
+/// Returns serde's description of what it expects in plain words.
 fn words(expected: &dyn Expected) -> String {
     let expected = expected.to_string();
     match expected.as_str() {

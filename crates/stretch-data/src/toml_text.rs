@@ -1,4 +1,4 @@
-//! A value as the text of a TOML file, with comments.
+//! Serialization to TOML with comments.
 
 use std::{collections::BTreeMap, mem};
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 use stretch_core::is_hidden;
 use toml_edit::{Item, Table};
 
-/// Comments for the entries of a rig file or a problem's file.
+/// Comments for the entries of a rig file or a problem file.
 ///
 /// ```
 /// use stretch_data::{Remarks, RigFile};
@@ -21,21 +21,21 @@ use toml_edit::{Item, Table};
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Remarks {
-    /// Lines at the top of the file.
+    /// Comment lines at the top of the file.
     pub head: Vec<String>,
-    /// Behind a parameter: by stage and name in a rig file, by `parameter` and name in a problem's file. Behind a parameter of an effect: by
-    /// the name of the effect and its own.
+    /// Comments after parameters. The key is (stage, name) in a rig file, (`parameter`, name) in a
+    /// problem file, and (effect, name) for a parameter of an effect.
     pub parameters: BTreeMap<(String, String), String>,
-    /// Lines above an effect: by its name.
+    /// Comment lines above an effect, by the effect's name.
     pub effects: BTreeMap<String, Vec<String>>,
 }
 
 impl Remarks {
-    /// A value as TOML with these comments: tables at the top have their own header, tables inside are written in one line. Numbers read back
-    /// to the same bits.
+    /// Serializes a value to TOML with these comments. Top-level tables have a header each; tables
+    /// inside them are written inline. Numbers read back to the same bits.
     ///
     /// # Panics
-    /// Never for structs and maps of numbers, texts and lists.
+    /// Never for structs and maps of numbers, strings and lists.
     pub fn write(&self, value: &impl Serialize) -> String {
         let mut document = toml_edit::ser::to_document(value).expect("a table");
         for (key, item) in document.iter_mut() {
@@ -53,7 +53,8 @@ impl Remarks {
         format!("{head}{gap}{document}")
     }
 
-    /// Adds the comments of a table; `owner` is its key, or the effect that it is an argument of.
+    /// Adds the comments of a table. `owner` is the key of the table, or the effect whose argument
+    /// the table is.
     fn comment(&self, table: &mut Table, owner: &str) {
         let name = table.get("name").and_then(Item::as_str).map(str::to_owned);
         if let Some((mut key, lines)) =
@@ -78,7 +79,8 @@ impl Remarks {
     }
 }
 
-/// Gives lists of tables a header each, and does something to these and to a table.
+/// Turns a list of tables into tables with headers, and calls `each` with each of them or with a
+/// single table.
 fn with_header(item: &mut Item, each: &mut dyn FnMut(&mut Table)) {
     *item = mem::take(item).into_array_of_tables().map_or_else(|item| item, Item::ArrayOfTables);
     match item {
@@ -88,7 +90,7 @@ fn with_header(item: &mut Item, each: &mut dyn FnMut(&mut Table)) {
     }
 }
 
-/// A text as a line of comment. It ends with that line, whatever names it has in it.
+/// Returns a text as one comment line. Line breaks and other control characters become spaces.
 ///
 /// ```
 /// assert_eq!(stretch_data::toml_comment("deg\nname = 'b'"), "# deg name = 'b'\n");

@@ -6,15 +6,15 @@ use crate::{DataError, Place, data_set::CRC};
 
 /// A recording: time stamps and named channels of the same length.
 ///
-/// Channels carry their unit as the last part of their name (`length_mm`,
-/// `bridge_v`, `angle_deg`), as in the file they came from.
+/// The last part of a channel's name is its unit (`length_mm`, `bridge_v`, `angle_deg`), as in the
+/// file from which it was read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trial {
-    /// What to call it in messages: the file's name without its folder.
+    /// Name in messages: the file's name without its folder.
     pub name: String,
-    /// Seconds; finite and strictly rising.
+    /// Time stamps, s; finite and strictly increasing.
     pub time_s: Vec<f64>,
-    /// Channels in the order of the file; each as long as `time_s`.
+    /// Channels in the order of the file; each has the length of `time_s`.
     pub channels: Vec<Channel>,
 }
 
@@ -27,10 +27,10 @@ pub struct Channel {
     pub values: Vec<f64>,
 }
 
-/// Refuses trials that are too long to be held in memory by what follows.
+/// Refuses trials that are too long to be processed in memory.
 ///
 /// # Errors
-/// [`DataError::TooLong`] for more than `most` rows of all trials together.
+/// [`DataError::TooLong`] if all trials together have more than `most` rows.
 ///
 /// ```
 /// use stretch_data::{Trial, check_rows};
@@ -47,22 +47,22 @@ pub fn check_rows<'a>(
 }
 
 impl Trial {
-    /// How many samples it has.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    /// Whether it has no sample.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
-    /// The channel called `name`, if there is one.
+    /// Returns the channel called `name`, if there is one.
     pub fn channel(&self, name: &str) -> Option<&[f64]> {
         self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// The channel called `name`, or the error that names those that are there.
+    /// Returns the channel called `name`, or an error that lists the existing channels.
     ///
     /// # Errors
     /// [`DataError::MissingColumn`].
@@ -86,8 +86,9 @@ impl Trial {
         })
     }
 
-    /// CRC-32C of the values of some columns, row by row: what tells a trial whatever it is called, whenever it began and in whatever
-    /// format it is stored. `None` without a sample, or where a column is missing.
+    /// Returns the CRC-32C of the values of some columns, row by row. It identifies a trial
+    /// independently of its name, its start time and its file format. Returns `None` if the trial
+    /// is empty or a column is missing.
     ///
     /// ```
     /// use stretch_data::{Channel, Trial};
@@ -108,7 +109,7 @@ impl Trial {
         (!self.is_empty()).then(|| checksum.finalize())
     }
 
-    /// Seconds from the first sample to the last; 0 for fewer than two.
+    /// Returns the time from the first sample to the last, s; 0 for fewer than two samples.
     pub fn duration_s(&self) -> f64 {
         match self.time_s[..] {
             [first, .., last] => last - first,
@@ -116,10 +117,10 @@ impl Trial {
         }
     }
 
-    /// Samples a second; `None` for fewer than two samples.
+    /// Returns the sample rate, Hz, or `None` for fewer than two samples.
     ///
-    /// One over the mean of the steps that are shorter than one and a half median steps: it is the rate
-    /// of the recorder even where samples are missing or the stamps are rounded.
+    /// It is the rate of the recorder, even if samples are missing or the time stamps are rounded.
+    /// See `rate_of`.
     ///
     /// ```
     /// use stretch_data::Trial;
@@ -131,10 +132,11 @@ impl Trial {
         rate_of(&self.time_s)
     }
 
-    /// Whether every channel is as long as the time: what is put together in memory need not be.
+    /// Checks that every channel is as long as the time column. A trial that was built in memory
+    /// may violate this.
     ///
     /// # Errors
-    /// [`DataError::Lengths`] with the channel.
+    /// [`DataError::Lengths`] for the first channel that is not.
     ///
     /// ```
     /// use stretch_data::{Channel, Trial};
@@ -154,7 +156,8 @@ impl Trial {
         }
     }
 
-    /// Refuses what no file could hold: channels of other lengths, time that does not rise, numbers that are none.
+    /// Refuses a trial that no file could hold: channels of other lengths, time that does not
+    /// increase, numbers that are not finite.
     pub(crate) fn check_samples(&self) -> Result<(), DataError> {
         // The header is row 1.
         let place = |sample: usize, column: &str| Place {
@@ -188,7 +191,8 @@ impl Trial {
     }
 }
 
-/// Least and greatest of the values that are numbers; +infinity and -infinity where none is.
+/// Returns the smallest and the largest value, ignoring NaN. Without any number they are +infinity
+/// and -infinity.
 ///
 /// ```
 /// assert_eq!(stretch_data::ends(&[3.0, f64::NAN, -1.0]), (-1.0, 3.0));
@@ -197,15 +201,18 @@ pub fn ends<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
     values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
 }
 
-/// Steps over which the mean interval of stamps that come early and late is taken.
+/// Number of steps over which the mean interval of time stamps with jitter is taken.
 const JITTERED_OVER: usize = 50;
-/// Standard deviation of the steps, in medians, above which single steps do not tell the interval.
+/// Standard deviation of the steps, relative to their median, above which single steps do not
+/// determine the interval.
 const JITTER: f64 = 0.1;
 
-/// Samples a second of rising time stamps; none for fewer than two.
+/// Returns the sample rate of increasing time stamps, Hz, or `None` for fewer than two.
 ///
-/// It is the mean of the steps that skip no sample, shorter than 1.5 medians. Where stamps come early and late by much of a step, so that
-/// a step does not tell whether it skips a sample, it is the median over stretches of 50 steps.
+/// The sample interval is the mean of the steps shorter than 1.5 medians, which skip no sample. If
+/// the jitter of the time stamps exceeds a tenth of the median step, single steps do not show
+/// whether a sample is missing. Then the interval is derived from the median length of stretches of
+/// 50 steps.
 pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
@@ -228,14 +235,15 @@ pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     Some(rate).filter(|rate| rate.is_finite())
 }
 
-/// The samples that must be left out for the others to be in order; as few as possible.
+/// Returns the indices of the fewest samples whose removal leaves the others in order.
 ///
 /// ```
 /// assert_eq!(stretch_data::out_of_order(&[9.0, 0.0, 0.1, 0.3, 0.2, 0.4]), [0, 3]);
 /// assert!(stretch_data::out_of_order(&[0.0, 0.1, 0.1]).is_empty());
 /// ```
 pub fn out_of_order(times: &[f64]) -> Vec<usize> {
-    // longest run that does not fall: the last sample of the best run of each length, and what comes before each sample
+    // Finds the longest subsequence that does not decrease. `ends` holds the last sample of the
+    // best run of each length, `before` the predecessor of each sample.
     let (mut ends, mut before): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
     for (i, time) in times.iter().enumerate() {
         let length = ends.partition_point(|end| times[*end] <= *time);
@@ -258,8 +266,8 @@ pub fn out_of_order(times: &[f64]) -> Vec<usize> {
     left_out
 }
 
-/// A time that was computed from others of up to `largest_s`, with the fewest decimals that say it: a difference of two units in the last
-/// place of the largest is no measurement.
+/// Rounds a time computed from other times of up to `largest_s` to the fewest decimals that are
+/// within rounding error: two units in the last place of `largest_s`.
 ///
 /// ```
 /// use stretch_data::tidy_time;

@@ -1,4 +1,4 @@
-//! Angles that wrap: a column that jumps by a turn where the motion goes on.
+//! Wrapped angles: columns that jump by a full turn although the motion continues.
 
 use std::{borrow::Cow, f64::consts::TAU};
 
@@ -7,39 +7,44 @@ use crate::{
     column::{Quantity, measures_nothing_else, unit, written_unit},
 };
 
-/// Steps of at least this share of a turn are no motion between two samples.
+/// Steps of at least this fraction of a turn are not motion between two samples.
 const STEP: f64 = 0.25;
-/// A jump differs from a turn by at most so many usual steps: the motion between the two samples.
+/// A jump may differ from a turn by this many usual steps, because of the motion between the two
+/// samples.
 const USUAL_STEPS: f64 = 3.0;
-/// Share of the steps that are no greater than a usual one.
+/// Fraction of the steps that are not larger than a usual step.
 const USUAL: f64 = 0.99;
-/// One in so many great steps may be none of a turn, and one in so many samples lie outside of the turn.
+/// Up to one in `ODD` large steps may differ from a turn, and up to one in `OUTLIERS` samples may
+/// lie outside the turn.
 const ODD: usize = 4;
 const OUTLIERS: usize = 100;
-/// A sample follows another within so many sample times; between others the motion is unknown.
+/// Two samples are consecutive if they are at most this many sample periods apart. Over a longer
+/// gap the motion is unknown.
 const NEXT: f64 = 1.5;
 
-/// How a column wraps.
+/// The way in which a column wraps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrap {
-    /// A turn, in the unit of the column.
+    /// Size of a turn, in the unit of the column.
     pub turn: f64,
     /// Number of jumps by a turn.
     pub jumps: usize,
     unit: &'static str,
-    /// Greatest deviation of a jump from a turn.
+    /// Largest deviation of a jump from a turn.
     tolerance: f64,
-    /// Where a turn begins, and where it ends.
+    /// Lower and upper end of the range of one turn, widened by the tolerance.
     window: [f64; 2],
 }
 
 impl Wrap {
-    /// How a column wraps; `None` if it does not.
+    /// Detects how a column wraps. Returns `None` if it does not.
     ///
-    /// The unit in the column's name says what a turn is, in degrees or radians. A column without a unit has a turn of 360 or 2 pi, and lies
-    /// within (-1/2, 1/2) or (0, 1) turns. The jumps of a column that wraps are a turn, but for the motion between two samples; the
-    /// column lies within a turn, and hardly any other step is as great as a quarter of one. Steps of exactly a turn are commands, and
-    /// so is a column that does nothing but jump.
+    /// The unit in the column's name, degrees or radians, determines the size of a turn. A column
+    /// without a unit may have a turn of 360 or 2 pi, if its range is (-1/2, 1/2) or (0, 1) turns.
+    /// A column wraps if its jumps equal a turn apart from the motion between two samples, if its
+    /// values lie within one turn, and if hardly any other step is as large as a quarter of a turn.
+    /// Steps of exactly a turn are taken for commands, so a column with mostly such steps is not a
+    /// wrapped angle. Neither is a column with more jumps than small steps.
     ///
     /// ```
     /// use stretch_data::Wrap;
@@ -70,7 +75,7 @@ impl Wrap {
     }
 
     fn by((turn, unit): (f64, &'static str), values: &[f64], time_s: &[f64]) -> Option<Self> {
-        // most columns have not one step that is nearly a turn
+        // Most columns have no step of nearly a turn.
         if !values.windows(2).any(|w| (w[1] - w[0]).abs() > turn * (1.0 - STEP)) {
             return None;
         }
@@ -104,13 +109,14 @@ impl Wrap {
         is_one.then_some(Self { turn, jumps, unit, tolerance, window })
     }
 
-    /// Whether a turn begins at its half or at nothing.
+    /// Whether the range of a turn starts at minus half a turn or at zero.
     fn is_usual(&self) -> bool {
         let end = self.window[1] - self.tolerance;
         [0.5, 1.0].iter().any(|share| (end - share * self.turn).abs() <= self.tolerance)
     }
 
-    /// Lets values go on where they jump by a turn; a value outside of the turn, as -999, is left as it is.
+    /// Unwraps values: removes the jumps by a turn. A value outside the range of a turn, such as
+    /// -999, is left unchanged.
     pub fn unwrap(&self, values: &mut [f64], time_s: &[f64]) {
         let is_next = is_next(time_s);
         let (mut turned, mut last) = (0.0, None);
@@ -130,7 +136,7 @@ impl Wrap {
         }
     }
 
-    /// What was done to a column, in a sentence.
+    /// Returns a sentence about the unwrapping of a column.
     pub(crate) fn note(&self, column: &str) -> String {
         let turn = match self.unit {
             "rad" => "2 pi".to_owned(),
@@ -147,7 +153,7 @@ impl Wrap {
 }
 
 impl Trial {
-    /// A channel as it is or, where it is an angle that wraps, unwrapped.
+    /// Returns a channel, unwrapped if it is a wrapped angle.
     ///
     /// # Errors
     /// [`DataError::MissingColumn`](crate::DataError::MissingColumn).
@@ -173,13 +179,15 @@ impl Trial {
     }
 }
 
-/// Whether the sample behind that of an index follows it at once.
+/// Returns a function that tells whether the sample after index `i` follows within 1.5 sample
+/// periods.
 fn is_next(time_s: &[f64]) -> impl Fn(usize) -> bool {
     let longest_s = crate::rate_of(time_s).map_or(f64::INFINITY, |hz| NEXT / hz);
     move |i| time_s.get(i + 1).is_some_and(|next| next - time_s[i] <= longest_s)
 }
 
-/// Lets an angle that was computed go on where it jumps by more than half a turn, and takes the turn in which it begins nearest to a record.
+/// Unwraps a computed angle: removes jumps by more than half a turn, and shifts it by whole turns
+/// so that it starts nearest to `record`, a measured angle.
 ///
 /// ```
 /// let mut computed = [179.0, -179.0, -177.0];
@@ -204,13 +212,14 @@ mod tests {
         (0..n).map(|i| 0.01 * i as f64).collect()
     }
 
-    /// Noise between -0.5 and 0.5.
+    /// Returns pseudo-random noise between -0.5 and 0.5.
     fn noise(i: usize) -> f64 {
         let i = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         ((i ^ (i >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f64 / (1 << 24) as f64 - 0.5
     }
 
-    /// An angle that turns both ways and rests at 180 deg, in degrees.
+    /// An angle that turns in both directions and rests at 540 deg (180 deg when wrapped), in
+    /// degrees.
     fn motion() -> Vec<f64> {
         let way = |i: usize| match i {
             0..600 => 540.0 * (i as f64 / 600.0 * 0.5 * std::f64::consts::PI).sin(),
@@ -286,7 +295,8 @@ mod tests {
     fn an_outlier_or_a_gap_costs_no_turn() {
         let truth: Vec<f64> = (0..2000).map(|i| 2.0 * i as f64).collect();
         let mut values: Vec<f64> = truth.iter().map(|x| wrapped(*x, -180.0, 360.0)).collect();
-        // one in the midst of the motion and one at a seam; the sensor is gone for half a second
+        // One outlier in the middle of the motion and one at a wrap. The sensor is lost for half a
+        // second.
         (values[500], values[450]) = (-999.0, -999.0);
         let mut time_s = time_s(2000);
         let lost = 880..930;

@@ -1,4 +1,4 @@
-//! A trial to a file or a stream.
+//! Writing of trials to files and streams.
 
 use std::{
     io::{self, Write},
@@ -8,12 +8,12 @@ use std::{
 use crate::{Channel, DataError, Trial, files::write_whole};
 
 impl Trial {
-    /// Writes the trial to a file, whole or not at all: `time_s`, then the channels.
+    /// Writes the trial to a file, completely or not at all: `time_s`, then the channels.
     ///
-    /// Numbers are written with as many digits as it takes to read the same bits back.
+    /// Numbers are written with the fewest digits that read back to the same bits.
     ///
     /// # Errors
-    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else as [`write_whole`].
+    /// As [`Trial::check`] and [`write_whole`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
         self.check()?;
         Ok(write_whole(path, |out| self.write_rows(out))?)
@@ -22,17 +22,17 @@ impl Trial {
     /// Writes the trial to a stream, which should be buffered.
     ///
     /// # Errors
-    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else [`DataError::File`].
+    /// As [`Trial::check`], otherwise [`DataError::File`].
     pub fn write_to(&self, mut out: impl Write) -> Result<(), DataError> {
         self.check()?;
         self.write_rows(&mut out).map_err(|e| DataError::io(&self.name, "write it", e))
     }
 
-    /// Whether the trial is one that a file can hold: channels as long as the time, names
-    /// that are there once, finite numbers, rising time, at least one sample.
+    /// Checks that a file can hold the trial: channels as long as the time column, valid and unique
+    /// names, finite numbers, increasing time, at least one sample.
     ///
     /// # Errors
-    /// [`DataError::Unwritable`], [`DataError::Lengths`], or the sample that is at fault.
+    /// [`DataError::Unwritable`], [`DataError::Lengths`], or the error of the first wrong sample.
     pub fn check(&self) -> Result<(), DataError> {
         let fail =
             |problem: String| Err(DataError::Unwritable { name: self.name.clone(), problem });
@@ -92,7 +92,7 @@ pub fn push_number(line: &mut Vec<u8>, value: f64) {
     };
 }
 
-/// Appends a name, in quotation marks where a reader would stumble without.
+/// Appends a name, in quotation marks if it contains separators or leading or trailing spaces.
 pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
     if name.contains([',', ';', '"']) || name.trim() != name {
         line.push(b'"');
@@ -103,7 +103,7 @@ pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
     }
 }
 
-/// Whether a channel can be called so: a name that is there, no control characters, and not the time's.
+/// Whether a channel may have this name: not blank, no control characters, and not `time_s`.
 pub fn can_name(name: &str) -> bool {
     !(name.trim().is_empty() || name == "time_s" || name.contains(char::is_control))
 }

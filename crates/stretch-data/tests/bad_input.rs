@@ -1,4 +1,4 @@
-//! Every way in which a data set or a rig file can be wrong, and the sentence that says so.
+//! Every fault of a data set or a rig file, and the error message for it.
 
 use stretch_data::{DataSet, RigFile};
 

@@ -1,4 +1,4 @@
-//! Trials and sessions on an even grid.
+//! Trials and sessions on a uniform grid.
 
 use stretch_data::{
     Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial, rate_of,
@@ -7,7 +7,7 @@ use stretch_data::{
 const SPEC: EvenSpec =
     EvenSpec { rate_hz: 100.0, shortest: 10, bridged_s: 0.0, over_switches: true };
 
-/// A trial of a line in time, and of a command that is 1 from half a second on.
+/// A trial with a length that is linear in time, and a command that is 1 from 0.5 s on.
 fn trial(time_s: Vec<f64>) -> Trial {
     let length = time_s.iter().map(|t| 180.0 - 20.0 * t).collect();
     let inlet = time_s.iter().map(|t| f64::from(u8::from(*t > 0.4999))).collect();
@@ -20,7 +20,7 @@ fn stamps(count: usize) -> Vec<f64> {
     (0..count).map(|i| 0.01 * i as f64).collect()
 }
 
-/// Rounding of straight lines between numbers of this size.
+/// Rounding error of linear interpolation between numbers of this size.
 const ROUNDING: f64 = 1e-9;
 
 #[test]
@@ -74,14 +74,15 @@ fn uneven_stamps_are_resampled_and_told() {
     for (i, x) in part.columns[0].iter().enumerate() {
         assert!((x - (180.0 - 0.2 * i as f64)).abs() < ROUNDING, "{i}: {x}");
     }
-    // A command is one of those that were given.
+    // A command keeps one of the values that were given.
     assert!(part.columns[1].iter().all(|u| *u == 0.0 || *u == 1.0));
     assert!(even.notes.iter().any(|n| n.contains("unevenly")), "{:?}", even.notes);
 }
 
 #[test]
 fn another_clock_is_followed_and_another_rate_is_refused() {
-    // Two clocks that part by 0.01 % and by 2 %: as it is, and brought to the grid.
+    // Clocks that differ by 0.01 % and by 2 %: the first trial is used unchanged, the second is
+    // resampled.
     for (rate_hz, is_resampled) in [(100.01, false), (102.0, true)] {
         let even = trial((0..1000).map(|i| i as f64 / rate_hz).collect());
         let even = even.even(&["length_mm"], SPEC).expect("even");
@@ -107,7 +108,7 @@ fn parts_that_are_too_short_are_left_out_and_counted() {
 fn a_session_keeps_order_split_and_pauses() {
     let at = |start_s: f64, split| {
         let mut trial = trial(stamps(200));
-        // what is tested on is another trial
+        // A test trial must have other samples than the fitted one.
         trial.channels[0].values[0] += if split == Split::Test { 1.0 } else { 0.0 };
         SessionTrial { start_s, split, ..SessionTrial::new(trial) }
     };
@@ -134,7 +135,7 @@ fn a_test_trial_with_the_samples_of_one_that_is_fitted_is_refused() {
     let (fit, copy) = (named("a", Split::Fit), named("b", Split::Test));
     let told = of(&[copy.clone(), fit.clone()]).expect_err("a copy").to_string();
     assert!(told.starts_with("b is a test trial, and it has the same samples as a"), "{told}");
-    // one sample makes it another
+    // A change of one sample makes it a different trial.
     let mut other = copy;
     other.trial.channels[0].values[7] += 1e-9;
     assert!(of(&[fit.clone(), other]).is_ok());
@@ -143,7 +144,7 @@ fn a_test_trial_with_the_samples_of_one_that_is_fitted_is_refused() {
 
 #[test]
 fn stamps_that_jitter_have_the_rate_of_long_stretches_and_lost_samples_do_not_count() {
-    // the mean of the steps below 1.5 medians would be a rate of 141 Hz
+    // The mean of the steps below 1.5 medians would give a rate of 141 Hz.
     let early_or_late = |i: u32| [0.0, 0.004, -0.004][(11 * i * i / 5 % 3) as usize];
     let jittered = |i: u32| 0.01 * f64::from(i) + early_or_late(i);
     let rate_hz = rate_of(&(0..3000).map(jittered).collect::<Vec<_>>()).expect("a rate");

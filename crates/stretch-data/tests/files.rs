@@ -1,4 +1,4 @@
-//! Files and folders are written whole or not at all.
+//! Files and folders are written completely or not at all.
 
 use std::{fs, io, path::Path};
 
@@ -139,7 +139,8 @@ fn a_folder_that_fails_midway_is_as_it_was() {
     write_folder(&out, false, fail).expect_err("full");
     assert!(names(parent.path()).is_empty(), "the parents that it made are gone, too");
 
-    // One of its files is a folder there: the first file has moved and must come back.
+    // A folder is in the place of one of its files: the first file has been moved and must be
+    // restored.
     fs::create_dir_all(out.join("sub/b/mine")).expect("made");
     fs::write(out.join("a"), "old a").expect("written");
     let error = write_folder(&out, true, two_files).expect_err("a folder in the way");
@@ -244,7 +245,7 @@ fn a_pipe_is_written_to_and_one_without_a_reader_is_refused() {
         let pipe = pipe.clone();
         move || fs::read(pipe).expect("read")
     });
-    // more than a pipe holds, so that it waits for its reader
+    // More than the buffer of a pipe, so that the writer waits for the reader.
     let text = vec![b'x'; 1 << 18];
     write_whole(&pipe, |out| out.write_all(&text)).expect("written");
     assert!(read.join().expect("no panic") == text);

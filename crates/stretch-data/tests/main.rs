@@ -1,4 +1,5 @@
-//! The tests of stretch-data from outside, one program: linking takes longer than most of them.
+//! Integration tests of stretch-data in one program, because linking takes longer than most of the
+//! tests.
 
 mod bad_input;
 mod even;
@@ -9,7 +10,8 @@ mod whole;
 
 use proptest::{prelude::ProptestConfig, test_runner::RngSeed};
 
-/// A number of cases that are the same in every run.
+/// Returns a configuration with this number of cases and a fixed seed, so that every run tests the
+/// same cases.
 fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
 }

@@ -1,4 +1,4 @@
-//! What is written reads back to the bit, and nothing that is read panics.
+//! Written files read back to the same bits, and reading arbitrary input never panics.
 
 use proptest::prelude::*;
 use stretch_data::{DataSet, RigFile, strategies};

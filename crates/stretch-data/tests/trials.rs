@@ -1,4 +1,4 @@
-//! Trials, rates and grids of time: properties over drawn recordings.
+//! Property tests of trials, sample rates and time grids on random recordings.
 
 use proptest::prelude::*;
 use stretch_data::{
@@ -8,7 +8,7 @@ use stretch_data::{
 
 use crate::cases;
 
-/// Samples of a recording at 100 Hz that were not lost, the first and the last among them.
+/// Sample numbers of a recording at 100 Hz that were not lost, including the first and the last.
 fn kept() -> impl Strategy<Value = Vec<usize>> {
     prop::collection::vec((1..40_usize, prop_oneof![4 => 1..4_usize, 1 => 4..30_usize]), 1..8)
         .prop_map(|stretches| {
@@ -21,7 +21,7 @@ fn kept() -> impl Strategy<Value = Vec<usize>> {
         })
 }
 
-/// A length that moves on a parabola, and a command that switches every half second.
+/// A trial with a length that follows a parabola, and a command that switches every half second.
 fn trial_of(samples: &[usize], begin_s: f64) -> Trial {
     let time_s: Vec<f64> = samples.iter().map(|i| begin_s + 0.01 * *i as f64).collect();
     let length = samples.iter().map(|i| 150.0 + 1e-4 * (*i * *i) as f64).collect();
@@ -37,7 +37,8 @@ const SPEC: EvenSpec =
 proptest! {
     #![proptest_config(cases(128))]
 
-    /// Every row is used or counted as left out, every kept sample appears with its value, and what is bridged lies between its neighbours.
+    /// Every row is used or counted as left out, every kept sample appears with its value, and
+    /// bridged samples lie between their neighbours.
     #[test]
     fn an_even_grid_accounts_for_every_row(samples in kept()) {
         let trial = trial_of(&samples, 0.0);
@@ -56,14 +57,14 @@ proptest! {
                 prop_assert_eq!(at.is_err(), *is_lost, "{}", first + i);
                 match at {
                     Ok(at) => prop_assert_eq!(length[i], trial.channels[0].values[at]),
-                    // A parabola rises, and a command is one of those that were given.
+                    // The parabola rises, and a command keeps one of the values that were given.
                     Err(_) => prop_assert!(length[i] > length[i - 1] && length[i] < length[i + 1] && inlet[i] == inlet[i - 1]),
                 }
             }
         }
     }
 
-    /// When a recording began does not matter.
+    /// The start time of a recording does not matter.
     #[test]
     fn an_even_grid_begins_with_its_trial(samples in kept(), begin_s in 0..1000_u32) {
         let even = |begin_s: f64| trial_of(&samples, begin_s).even(&["length_mm", "inlet"], SPEC);
@@ -76,7 +77,7 @@ proptest! {
         }
     }
 
-    /// Trials of a session go in the order of time, in whatever order they are given.
+    /// Trials of a session are sorted by time, in whatever order they are given.
     #[test]
     fn a_session_has_one_order(shuffled in Just(vec![0, 1, 2, 3]).prop_shuffle(), pause_s in 1.0..100.0_f64) {
         let at = |i: usize| SessionTrial {
@@ -94,18 +95,18 @@ proptest! {
         prop_assert_eq!(shuffled.trials().len(), 4);
     }
 
-    /// The rate is that of the recorder: in any unit of time, from any moment, with lost samples.
+    /// The rate is that of the recorder, for any rate and start time, and with lost samples.
     #[test]
     fn a_rate_is_that_of_the_recorder(samples in kept(), hz in 0.1..5000.0_f64, begin_s in -1e3..1e3_f64) {
         let stamps: Vec<f64> = samples.iter().map(|i| begin_s + *i as f64 / hz).collect();
         let whole = samples.windows(2).filter(|pair| pair[1] - pair[0] == 1).count();
         prop_assume!(2 * whole > samples.len());
         let found = rate_of(&stamps).expect("a rate");
-        // Rounding of the stamps, in periods.
+        // Rounding error of the time stamps, in periods.
         prop_assert!((found / hz - 1.0).abs() <= 1e-9 + 4.0 * f64::EPSILON * 1e3 * hz, "{} for {}", found, hz);
     }
 
-    /// A checksum tells every value and every place, and neither name nor time.
+    /// A checksum depends on every value and its place, but not on name and time.
     #[test]
     fn a_checksum_tells_values_and_places(trial in strategies::rig_trial(2..40), at in any::<prop::sample::Index>(), later_s in 0.0..1e3_f64) {
         let both = ["length_mm", "bridge_v"];
@@ -121,7 +122,8 @@ proptest! {
         prop_assert_ne!(sum, other.checksum(&both));
     }
 
-    /// A trial that a file can hold is refused once a channel is too short, time turns back, or a value is no number.
+    /// A trial that a file can hold is refused once a channel is too short, time decreases, or a
+    /// value is not a number.
     #[test]
     fn a_trial_with_a_fault_is_refused(trial in strategies::rig_trial(3..20), at in any::<prop::sample::Index>(), fault in 0..4) {
         prop_assert!(trial.check().is_ok());
@@ -147,7 +149,7 @@ proptest! {
         prop_assert!(text.len() <= 25, "{}", text);
     }
 
-    /// A digest does not depend on the pieces in which a file is read, and tells every bit.
+    /// A digest does not depend on the pieces in which a file is read, and changes with every bit.
     #[test]
     fn a_digest_tells_every_bit(bytes in prop::collection::vec(any::<u8>(), 1..300), bit in 0..8_u32, at in any::<prop::sample::Index>()) {
         let digest = digest_of(&bytes[..]).expect("memory");
@@ -160,7 +162,8 @@ proptest! {
         prop_assert_ne!(digest_of(&other[..]).expect("memory"), digest);
     }
 
-    /// A name is nearest to itself, to itself with one slip, and to nothing that shares no letter with it.
+    /// A name is nearest to itself, to itself with one typing error, and not to a name that shares
+    /// no letter with it.
     #[test]
     fn a_slip_is_understood(names in prop::collection::btree_set("[a-m]{6,12}", 1..6), which in any::<prop::sample::Index>(), at in any::<prop::sample::Index>()) {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -173,7 +176,7 @@ proptest! {
         prop_assert_eq!(nearest("zzzzzz", names), None);
     }
 
-    /// Rounding is taken off a time, and nothing else.
+    /// `tidy_time` removes rounding errors from a time and changes nothing else.
     #[test]
     fn a_tidy_time_is_the_same_time(ticks in 0..100_000_u32, from in 0..100_000_u32, exact in 0.0..1e3_f64) {
         let [t, begin] = [ticks, from].map(|n| 0.01 * f64::from(n));
@@ -182,7 +185,8 @@ proptest! {
         prop_assert_eq!(tidy_time(exact, 0.0), exact);
     }
 
-    /// The unit of a column is the text after its last underscore, with every `per` before it.
+    /// The unit of a column is the text after its last underscore, including every preceding
+    /// `_per_`.
     #[test]
     fn a_unit_ends_a_name(name in "[a-z]{1,6}(_[a-o]{1,4})?", top in "[a-o]{1,3}", below in prop::option::of("[q-z]{1,3}")) {
         let spelt = below.map_or(top.clone(), |below| format!("{top}_per_{below}"));

@@ -1,4 +1,4 @@
-//! Files and folders that are written whole: properties over drawn files, folders and failures.
+//! Property tests of the functions that write files and folders, with random contents and failures.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,10 +15,10 @@ use stretch_data::{
 
 use crate::cases;
 
-/// Files of a folder by name, with `/` between the names of folders.
+/// Contents of the files of a folder by path, with `/` as separator.
 type Tree = BTreeMap<String, Vec<u8>>;
 
-/// Names of which none is both a file and a folder.
+/// Paths of which none is both a file and a folder.
 const NAMES: [&str; 6] = ["a", "b", "c", "sub/a", "sub/b", "sub/deep/a"];
 
 fn trees() -> impl Strategy<Value = Tree> {
@@ -35,7 +35,7 @@ fn write_tree(folder: &Path, tree: &Tree) {
     }
 }
 
-/// All files below a folder, temporary ones too.
+/// Reads all files below a folder, including temporary ones.
 fn read_tree(folder: &Path) -> Tree {
     let mut tree = Tree::new();
     for entry in fs::read_dir(folder).into_iter().flatten() {
@@ -59,7 +59,7 @@ fn fill(folder: &Path, tree: &Tree) -> Result<(), FileError> {
 proptest! {
     #![proptest_config(cases(24))]
 
-    /// Of several files either all are new or, if one of them fails, all are as they were.
+    /// Either all of several files are new, or, if one of them fails, all are unchanged.
     #[test]
     fn outputs_are_kept_together(
         old in trees(),
@@ -90,7 +90,7 @@ proptest! {
         }
     }
 
-    /// What is written is what is read, and a second writer replaces the first or changes nothing.
+    /// A file reads back as written, and a second writer either replaces it or changes nothing.
     #[test]
     fn a_file_is_one_of_those_that_were_written(
         first in prop::collection::vec(any::<u8>(), 0..3000),
@@ -110,7 +110,7 @@ proptest! {
         prop_assert_eq!(read_tree(folder.path()).len(), 1, "no temporary name stays");
     }
 
-    /// A folder that is replaced has every new file, and every other file of the old one.
+    /// A replaced folder has every new file, and every other file of the old one.
     #[test]
     fn a_folder_is_new_over_old(old in trees(), new in trees(), force in any::<bool>(), fails in any::<bool>()) {
         let parent = tempfile::tempdir().expect("a folder");
@@ -133,7 +133,7 @@ proptest! {
         prop_assert!(left.iter().all(|name| name == "set"), "{:?}", left);
     }
 
-    /// A data set that is written reads back, with digests that tell every change of a trial's file.
+    /// A written data set reads back, with digests that detect every change of a trial's file.
     #[test]
     fn a_data_set_on_the_disk_is_checked_byte_by_byte(
         trials in prop::collection::vec(strategies::rig_trial(2..20), 1..4),

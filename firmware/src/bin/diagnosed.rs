@@ -1,4 +1,4 @@
-//! Volts to millimetres by named defects and a filter, in `f32`.
+//! Volts to millimetres with a model of diagnosed effects and a filter, in `f32`.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! A step that does nothing: what the replay and its printing take by themselves.
+//! A step that does nothing. It measures the cost of the replay and its printing.
 #![no_std]
 #![no_main]
 

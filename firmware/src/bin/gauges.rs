@@ -1,4 +1,5 @@
-//! Four gauges in volts to a joint's angle, in `f32`: what a channel costs, and that it is watched.
+//! Volts of four gauges to the angle of a joint, in `f32`. It measures the cost of a channel and of
+//! its monitoring.
 #![no_std]
 #![no_main]
 

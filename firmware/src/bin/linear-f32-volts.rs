@@ -1,4 +1,4 @@
-//! Volts to millimetres by a line, all in `f32`: the straight version.
+//! Volts to millimetres with a line, all in `f32`: the direct implementation.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Codes to millimetres by a line: an integer rate, the rest in `f32`.
+//! Converter codes to millimetres with a line. The rate is computed in integers, the rest in `f32`.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Codes to micrometres by a line, in fixed point.
+//! Converter codes to micrometres with a line, in fixed point.
 #![no_std]
 #![no_main]
 

@@ -1,7 +1,7 @@
-//! The example to copy: a sample every 10 ms in, a line of the live link out.
+//! An example to copy: reads a sample every 10 ms and sends a line of the live link.
 //!
-//! What belongs to a board is in `main`; `run` is the same on any.
-//! `stretch listen` shows and records what comes out.
+//! Code that depends on the board is in `main`; `run` is the same on every board. `stretch listen`
+//! shows and records the lines.
 #![no_std]
 #![no_main]
 
@@ -16,8 +16,7 @@ use stretch_receptor::{
     code::{AdcCode, CodeReading, FixedCalibration, FixedReceptor},
 };
 
-/// What `stretch export --fixed` writes: the calibration over this board's
-/// converter, in integers.
+/// Output of `stretch export --fixed`: the calibration for this board's converter, in integers.
 static RECORD: &[u8] = include_bytes!("../../data/poly13-fixed.postcard");
 
 const CORE_HZ: u32 = 25_000_000;
@@ -36,13 +35,13 @@ impl Pace {
     }
 
     fn wait(&mut self) {
-        // the flag is cleared by reading it: a period that was missed is not made up
+        // Reading the flag clears it. A missed period is not made up for.
         while !self.0.has_wrapped() {}
     }
 }
 
-/// A sample that the converter fails to give is sent as missing; only what
-/// `is_end` accepts ends the loop.
+/// Converts and sends samples. A sample that the converter fails to give is sent as missing. The
+/// loop ends only with an error for which `is_end` is true.
 fn run<C: Converter>(
     receptor: impl Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
     converter: &mut C,
@@ -65,7 +64,8 @@ fn run<C: Converter>(
             code: code.0,
             answer: receptor.step(code).into(),
         };
-        // a port that fails loses a line, which the counter tells; the loop goes on
+        // A failing port loses a line, which the receiver detects by the counter. The loop
+        // continues.
         let _ = port.write_all(frame.encode(&mut [0; Frame::LONGEST]));
         counter = counter.wrapping_add(1);
     }
@@ -76,7 +76,7 @@ fn main() -> ! {
     let core = cortex_m::Peripherals::take().expect("taken once");
     let calibration: FixedCalibration<11, 2> =
         stretch_core::record::load(RECORD).expect("a sound record");
-    // SAFETY: an MPS2 board, emulated; the port is used here alone.
+    // SAFETY: this is an emulated MPS2 board, and the port is used only here.
     let mut port = unsafe { Uart::take() };
     let mut pace = Pace::new(core.SYST);
     run(FixedReceptor::new(calibration), &mut Replay::new(), &mut port, &mut pace, |Ended| true);

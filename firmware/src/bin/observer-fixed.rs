@@ -1,4 +1,4 @@
-//! Codes to micrometres by the gauge's forward model and a filter, in integers.
+//! Converter codes to micrometres with the gauge's forward model and a filter, in integers.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres by the gauge's forward model and a filter, in `f32`.
+//! Volts to millimetres with the gauge's forward model and a filter, in `f32`.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres in `f32`, with the rate of an alpha-beta tracker.
+//! Volts to millimetres in `f32`, with the rate from an alpha-beta tracker.
 #![no_std]
 #![no_main]
 
@@ -7,7 +7,7 @@ use stretch_filter::{Tracker, TrackerSpec};
 use stretch_firmware::program;
 use stretch_receptor::StretchReceptor;
 
-/// The receptor takes the rate alone.
+/// A tracker that outputs only the rate, which the receptor needs.
 #[derive(Clone, Copy)]
 struct Rate(Tracker<f32>);
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres by the paper's surfaces, all in `f32`: the straight version.
+//! Volts to millimetres with the paper's surfaces, all in `f32`: the direct implementation.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! Codes to millimetres by the paper's surfaces: an integer rate, the rest in `f32`.
+//! Converter codes to millimetres with the paper's surfaces. The rate is computed in integers, the
+//! rest in `f32`.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Codes to micrometres by the paper's surfaces, in fixed point.
+//! Converter codes to micrometres with the paper's surfaces, in fixed point.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! The headers of `stretch export`, compiled by a C compiler and replayed as the Rust steps are.
+//! The headers of `stretch export`, compiled by a C compiler and replayed in the same way as the
+//! Rust steps.
 #![no_std]
 #![no_main]
 
@@ -11,7 +12,7 @@ use stretch_firmware::{
 };
 use stretch_receptor::{Domain, Withheld, code::CodeReading};
 
-/// `stretch_reading` in integers.
+/// The C type `stretch_reading` in integers.
 #[repr(C)]
 struct Fixed {
     estimate: i32,
@@ -20,7 +21,7 @@ struct Fixed {
     domain: u8,
 }
 
-/// `stretch_reading` in `float`.
+/// The C type `stretch_reading` in `float`.
 #[repr(C)]
 struct Float {
     estimate: f32,
@@ -30,7 +31,7 @@ struct Float {
     domain: u8,
 }
 
-/// `stretch_reading` in `float`, of a model that knows how sure it is.
+/// The C type `stretch_reading` in `float`, for a model that computes a standard deviation.
 #[repr(C)]
 struct FloatSd {
     estimate: f32,
@@ -41,7 +42,7 @@ struct FloatSd {
     domain: u8,
 }
 
-/// `stretch_reading` of several gauges.
+/// The C type `stretch_reading` for several gauges.
 #[repr(C)]
 struct Gauges {
     estimate: f32,
@@ -51,7 +52,7 @@ struct Gauges {
     clamped: u8,
 }
 
-/// Room for any `stretch_state`, in words, so that it is aligned.
+/// Space for any `stretch_state`, in words for alignment.
 const WORDS: usize = 64;
 
 fn answer<E: Length>(estimate: E, status: u8, branch: u8, domain: u8) -> Answer<E> {
@@ -71,7 +72,7 @@ fn answer<E: Length>(estimate: E, status: u8, branch: u8, domain: u8) -> Answer<
     }
 }
 
-/// Replays a header of this type of reading.
+/// Replays a header whose readings have this type.
 macro_rules! model {
     ($symbol:ident, $name:literal, $reading:ty, $sample:ty, $input:expr) => {
         model!(

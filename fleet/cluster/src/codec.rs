@@ -1,9 +1,9 @@
-//! Plans that state the release of their functions.
+//! Query plans that carry the release of our functions.
 //!
-//! A plan names a function only by its name, and another machine may compute something else under
-//! that name. Therefore the release is sent with it, and a receiver refuses a plan of another
-//! release with an error that names it: the scheduler for plans of a client, an executor for plans
-//! of the scheduler.
+//! A plan identifies a function only by its name, and another machine may compute something else
+//! under that name. Therefore the release is sent with the plan, and a receiver refuses a plan of
+//! another release with an error that names both releases. The scheduler checks plans of clients,
+//! and an executor checks plans of the scheduler.
 
 use std::{fmt::Debug, sync::Arc};
 
@@ -23,17 +23,17 @@ use datafusion_proto::{
 
 const MARK: &str = "stretch-fleet ";
 
-/// A release of the functions, and who has it.
+/// A release of the functions, and the process that has it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Release {
-    /// Such as `executor 10.0.0.7:50051`.
+    /// The process, such as `executor 10.0.0.7:50051`.
     pub who: String,
-    /// Such as `0.1.0`.
+    /// The release, such as `0.1.0`.
     pub version: String,
 }
 
 impl Release {
-    /// The release that this program was built with.
+    /// Returns the release with which this program was built.
     pub fn own(who: impl Into<String>) -> Self {
         Self { who: who.into(), version: stretch_fleet::VERSION.to_owned() }
     }
@@ -45,7 +45,7 @@ impl Release {
         }
     }
 
-    /// Whether a function of the plan is one of ours, and of our release.
+    /// Checks that a function in a plan is one of ours, and of our release.
     fn check(&self, function: &str, buffer: &[u8]) -> Result<()> {
         let text = std::str::from_utf8(buffer).ok().and_then(|text| text.strip_prefix(MARK));
         match text {
@@ -69,7 +69,7 @@ fn scalar(name: &str) -> Option<Arc<ScalarUDF>> {
     stretch_fleet::scalars().into_iter().find(|function| function.name() == name)
 }
 
-/// A codec of Ballista's, with the release on every function of ours.
+/// A codec of Ballista, extended by the release on every function of ours.
 #[derive(Debug)]
 pub(crate) struct Marked<C> {
     release: Release,

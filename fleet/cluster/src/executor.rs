@@ -68,7 +68,7 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let seen_as = address_towards(host, scheduler_port)?;
     let listens_on = options.bind_host.as_deref().map_or(Ok(seen_as), address)?;
     guard("executor", listens_on, options.insecure)?;
-    // the address that others receive must be the one it listens on
+    // The announced address must be the one on which the executor listens.
     ensure!(
         options.external_host.is_some() || !listens_on.is_loopback() || seen_as.is_loopback(),
         "--bind-host {listens_on}: no other machine reaches it there, and the scheduler at {host} would send them; leave it out, \
@@ -82,7 +82,7 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
         release.version = version;
     }
     let functions = BallistaFunctionRegistry::from(&state_with_functions().build());
-    // removed when the executor stops, but not when it is killed
+    // Removed when the executor stops, but not when it is killed.
     let temporary = tempfile::Builder::new().prefix("stretch-executor-").tempdir()?;
     let work_dir = options.work_dir.unwrap_or_else(|| temporary.path().to_owned());
     let defaults = ExecutorProcessConfig::default();

@@ -57,12 +57,12 @@ pub async fn connect(
         ));
     let state = state_with_functions().with_config(config).with_runtime_env(runtime).build();
     let session = SessionContext::remote_with_state(&format!("df://{address}"), state).await?;
-    // the functions of a state are replaced by those of Ballista
+    // Ballista replaces the functions of the state, so ours are registered again.
     stretch_fleet::register(&session);
     Ok(session)
 }
 
-/// The state of a session with our functions: of a client, a scheduler or an executor.
+/// Returns the session state with our functions, for a client, a scheduler or an executor.
 pub(crate) fn state_with_functions() -> SessionStateBuilder {
     SessionStateBuilder::new()
         .with_aggregate_functions(stretch_fleet::aggregates())

@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::{Context, ensure};
 
-/// The address of a host.
+/// Resolves a host name to an address, preferring IPv4.
 pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
     let host = host.trim_start_matches('[').trim_end_matches(']');
     let found = (host, 0).to_socket_addrs().with_context(|| format!("{host} is no address"))?;
@@ -16,7 +16,7 @@ pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
     Ok(found.with_context(|| format!("{host} has no address"))?.ip())
 }
 
-/// An address in the form that precedes a port.
+/// Formats an address so that a port can follow it.
 pub(crate) fn before_port(address: IpAddr) -> String {
     match address {
         IpAddr::V4(address) => address.to_string(),
@@ -24,7 +24,7 @@ pub(crate) fn before_port(address: IpAddr) -> String {
     }
 }
 
-/// The address under which another machine sees this one; nothing is sent.
+/// Returns the local address from which another machine would be reached. No packet is sent.
 pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
     let to = address(host)?;
     let any: IpAddr = match to {
@@ -37,8 +37,8 @@ pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
     Ok(socket.local_addr().with_context(told)?.ip())
 }
 
-/// Refuses to listen on an address that other machines reach unless that was requested, and prints
-/// a clear warning.
+/// Refuses to listen on an address that other machines can reach, unless the user requested it. In
+/// that case prints a clear warning.
 pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow::Result<()> {
     if listens_on.is_loopback() {
         return Ok(());
@@ -48,7 +48,7 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
         "a {who} on {listens_on} obeys everyone who reaches it: nothing is encrypted, no caller is authenticated, and queries \
          read and write files as this user. Listen on 127.0.0.1, or give the cluster a separate network and say --insecure"
     );
-    // if even this cannot be written, the error cannot be reported
+    // If the warning cannot be written, there is no way to report that.
     let _ = writeln!(
         io::stderr().lock(),
         "WARNING: INSECURE: this {who} on {listens_on} obeys everyone who reaches it; keep that network closed"
@@ -56,8 +56,8 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
     Ok(())
 }
 
-/// The port itself, or a free one for 0, because what is announced to others must be known before
-/// it is bound.
+/// Returns the given port, or a free one for 0. A free port is chosen in advance, because it is
+/// announced to others before it is bound.
 pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     if port != 0 {
         return Ok(port);
@@ -67,7 +67,7 @@ pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     Ok(listener.local_addr()?.port())
 }
 
-/// Prints its address; a closed standard output is ignored.
+/// Prints a line to standard output. A closed standard output is ignored.
 pub(crate) fn say(line: fmt::Arguments<'_>) {
     let _ = writeln!(io::stdout().lock(), "{line}");
 }

@@ -52,7 +52,7 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
         bind_host: before_port(host),
         external_host: before_port(host),
         bind_port: address.port(),
-        // executors ask for work, so a hanging one is never waited for
+        // Executors ask for work, so the scheduler never waits for a hanging one.
         scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: timeout,
         expire_dead_executor_interval_seconds: (timeout / 2).max(1),

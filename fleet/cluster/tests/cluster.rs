@@ -1,4 +1,5 @@
-//! A scheduler and executors as processes on this machine: the same answers, whatever happens to them.
+//! Tests with a scheduler and executors as processes on this machine. The results must be the same,
+//! even if executors fail.
 
 use std::{
     io::{BufRead, BufReader},
@@ -20,11 +21,11 @@ use datafusion::{
 use stretch_fleet_cluster::connect;
 use tempfile::TempDir;
 
-/// Seconds after which a silent executor is given up: more than it may be delayed on a shared
-/// machine.
+/// Time after which a silent executor is given up, in seconds. A shared machine does not delay an
+/// executor for that long.
 const TIMEOUT_S: u64 = 15;
 
-/// No test takes longer, however slow the machine, so a hang is detected.
+/// Time limit of a test, longer than any test takes on a slow machine. It detects a hang.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 const FILES: usize = 12;
@@ -45,7 +46,7 @@ impl Drop for Process {
 }
 
 impl Process {
-    /// Starts a program, and the first line that it prints.
+    /// Starts a program, and returns it with the first line that it prints.
     fn start(program: &str, args: &[&str]) -> (Self, String) {
         let mut child = Command::new(program)
             .args(args)
@@ -82,7 +83,7 @@ impl Cluster {
         Self { url, folder, executors: Vec::new(), _scheduler: scheduler }
     }
 
-    /// Starts executors of one task at once; the folder of each has its number.
+    /// Starts executors that run one task at a time. Each has a numbered working folder.
     fn with_executors(mut self, count: usize, more: &[&str]) -> Self {
         for _ in 0..count {
             let work = self.work_dir(self.executors.len());
@@ -107,7 +108,7 @@ impl Cluster {
         self.folder.path().join(executor.to_string())
     }
 
-    /// Waits until an executor has done a part of a query, and says which.
+    /// Waits until an executor has finished a part of a query, and returns it.
     fn first_at_work(&self) -> &Process {
         let begin = Instant::now();
         let has_file =
@@ -127,7 +128,7 @@ impl Cluster {
     }
 }
 
-/// A lake of flat files, each with rows of eight gauges.
+/// Creates a lake of Parquet files in one folder, each with rows of eight gauges.
 async fn lake(rows: usize) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let session = SessionContext::new();
@@ -167,7 +168,7 @@ async fn lake(rows: usize) -> TempDir {
     folder
 }
 
-/// Numbers of every sensor: its rows, then RMSE and coefficients.
+/// For every sensor, its number of rows, the RMSE and the coefficients.
 type Answer = Vec<(i64, Vec<f64>)>;
 
 async fn ask(session: &SessionContext, lake: &TempDir) -> datafusion::error::Result<Answer> {
@@ -195,7 +196,7 @@ async fn alone(lake: &TempDir) -> Answer {
     ask(&session, lake).await.unwrap()
 }
 
-/// Triangles merged in another order have other rounding; nothing else differs.
+/// Asserts equality up to rounding, which depends on the order in which triangles are merged.
 fn assert_same(found: &Answer, expected: &Answer) {
     assert_eq!(found.len(), expected.len());
     for ((sensor, found), (its, expected)) in found.iter().zip(expected) {
@@ -220,7 +221,8 @@ async fn three_executors_answer_as_one_machine() {
     assert_same(&found, &alone(&lake).await);
 }
 
-/// Starts a query, disturbs the executor that has first done a part of it, and waits for the answer.
+/// Starts a query, sends a signal to the executor that first finishes a part of it, and waits for
+/// the result.
 async fn disturbed(signal: &str) {
     let lake = Arc::new(lake(60_000).await);
     let cluster = Cluster::new().with_executors(3, &[]);
@@ -267,7 +269,7 @@ async fn a_scheduler_that_is_not_there_is_an_error() {
     }
 }
 
-/// What a program says that does not begin to listen.
+/// Runs a program that must refuse to start, and returns its error message.
 fn refused(program: &str, args: &[&str]) -> String {
     let output = Command::new(program).args(args).output().unwrap();
     assert!(!output.status.success() && output.stdout.is_empty(), "{args:?} was not refused");
@@ -296,8 +298,8 @@ fn nobody_listens_to_other_machines_unless_that_was_asked_for() {
     assert!(line.starts_with("WARNING: INSECURE: this scheduler on 0.0.0.0 obeys"), "{line}");
 }
 
-/// An executor listens where the scheduler sees it, and says so. If it could not be found there, it
-/// does not start.
+/// An executor listens on the address under which the scheduler sees it, and announces that
+/// address. If the scheduler's address is invalid, it does not start.
 #[test]
 fn an_executor_listens_where_it_is_said_to_be() {
     let executor = env!("CARGO_BIN_EXE_stretch-executor");

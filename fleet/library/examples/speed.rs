@@ -1,4 +1,4 @@
-//! How long fits take, compared with reading the columns alone.
+//! Measures the time of fits, compared with only reading the columns.
 //!
 //! ```sh
 //! cargo build --release -p stretch-fleet --example speed
@@ -29,10 +29,10 @@ use stretch_fit::{Sample, SurfaceAccumulator};
 /// Rows of a file.
 const FILE: usize = 1 << 20;
 
-/// Repetitions, of which the shortest counts.
+/// Number of repetitions, of which the fastest counts.
 const TIMES: usize = 7;
 
-/// What is asked of rows.
+/// The timed queries.
 const QUERIES: [(&str, &str); 7] = [
     ("scan", "select sum(rate), sum(bridge_v), sum(contraction) from trials"),
     (
@@ -68,7 +68,7 @@ fn schema() -> SchemaRef {
     ]))
 }
 
-/// Rate, signal and reference of a gauge, with noise in all digits as in measured numbers.
+/// Returns rate, signal and reference of a gauge, with noise in all digits as in measured numbers.
 fn row(k: usize) -> [f64; 3] {
     let noise = |salt: u64| {
         let mixed = (k as u64 ^ salt).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -81,7 +81,7 @@ fn row(k: usize) -> [f64; 3] {
     [rate, signal, 0.1 * signal - 0.02 * signal * signal + 0.003 * rate * signal + 1e-3 * noise(3)]
 }
 
-/// Rows `from..to` with the sensor that each is of.
+/// Returns the rows `from..to`; `sensor` maps a row to its sensor.
 fn batch(from: usize, to: usize, sensor: impl Fn(usize) -> usize) -> Result<RecordBatch> {
     let sensors: Int64Array = (from..to).map(|k| Some(sensor(k) as i64)).collect();
     let column = |at: usize| -> ArrayRef {
@@ -98,23 +98,24 @@ fn session(threads: usize) -> SessionContext {
     session
 }
 
-/// CPU seconds of all threads of this process, which are what counts on a shared machine.
+/// Returns the CPU time of all threads of this process, s. On a shared machine it is the relevant
+/// time.
 fn computed_s() -> f64 {
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields = stat.rsplit(") ").next().unwrap_or_default().split_whitespace();
-    // ticks of a hundredth, in user and in system
+    // In units of 1/100 s: user time and system time.
     fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
-/// Peak memory of this process, in megabytes.
+/// Returns the peak memory of this process, MB.
 fn most_memory_mb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok()).unwrap_or(0) / 1024
 }
 
-/// Runs queries in turn, so that other load on the machine affects all of them alike, and reports
-/// the shortest time of each.
+/// Runs queries in alternation, so that other load on the machine affects all of them alike, and
+/// reports the shortest time of each.
 async fn timed(
     session: &SessionContext,
     (threads, rows, times): (usize, usize, usize),
@@ -141,7 +142,7 @@ async fn timed(
     Ok(())
 }
 
-/// The fit in one thread over numbers in memory: the best that an aggregate can achieve.
+/// Measures the fit in one thread over numbers in memory, the best that an aggregate can achieve.
 fn plain(rows: usize) {
     let numbers: Vec<[f64; 3]> = (0..rows.min(FILE)).map(row).collect();
     let mut shortest = f64::INFINITY;
@@ -165,7 +166,7 @@ fn plain(rows: usize) {
     );
 }
 
-/// Writes the files that are missing.
+/// Writes the missing files.
 fn lake(folder: &Path, rows: usize, sensors: usize) -> Result<()> {
     fs::create_dir_all(folder)?;
     let each = rows.div_ceil(sensors);
@@ -200,7 +201,7 @@ fn write(path: &Path, batch: &RecordBatch) -> Result<()> {
     Ok(())
 }
 
-/// Rows of all sensors in turn, in memory: the worst order for groups.
+/// Measures rows of all sensors in alternation, in memory: the worst order for groups.
 async fn groups(sensors: usize, each: usize) -> Result<()> {
     let rows = sensors * each;
     let batches =
@@ -218,7 +219,7 @@ async fn groups(sensors: usize, each: usize) -> Result<()> {
         .await
 }
 
-/// Stored states, a day's rows behind each, and the fits of all days.
+/// Measures merging of stored states, one per sensor and day, into the fits of all days.
 async fn states(folder: &Path, sensors: usize, days: usize) -> Result<()> {
     fs::create_dir_all(folder)?;
     let session = session(2);
@@ -235,7 +236,7 @@ async fn states(folder: &Path, sensors: usize, days: usize) -> Result<()> {
         Field::new("sensor", DataType::Int64, false),
         Field::new("state", DataType::Binary, false),
     ]));
-    // a file a day, as an ingest of days would write them
+    // One file per day, as a daily ingest would write them.
     for day in 0..days {
         let path = folder.join(format!("{day:05}.parquet"));
         let sensor: Int64Array = (0..sensors).map(|k| Some(k as i64)).collect();

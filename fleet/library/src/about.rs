@@ -1,4 +1,4 @@
-//! What a record says of its columns in addition to numbers.
+//! Information about the columns of a fit that is stored with a calibration.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use datafusion::{
 use serde::{Deserialize, Serialize};
 use stretch_core::{RateEstimator, SampleRate};
 
-/// Metadata of a field: samples a second at which the trial's rates were estimated, as text.
+/// Metadata key of a field: the sample rate at which the trial's rates were estimated, Hz, as text.
 pub const SAMPLE_RATE_KEY: &str = "stretch.sample_rate_hz";
 
-/// Metadata of a field: the estimator of the rates, the JSON of [`RateEstimator`].
+/// Metadata key of a field: the rate estimator, as JSON of [`RateEstimator`].
 pub const RATE_ESTIMATOR_KEY: &str = "stretch.rate_estimator";
 
 /// The columns of a fit, and how their rates were estimated.
@@ -27,7 +27,8 @@ pub(crate) struct About {
 }
 
 impl About {
-    /// Of the last two of the columns; what is known of rates is stored with any of them.
+    /// Reads the names of the last two columns. Information on the rates may be stored with any
+    /// column.
     pub(crate) fn new(fields: &[FieldRef]) -> Result<Self> {
         let [.., signal, reference] = fields else {
             return Err(plan_datafusion_err!("a fit takes a signal and a reference"));
@@ -46,12 +47,12 @@ impl About {
     }
 
     pub(crate) fn text(&self) -> Arc<str> {
-        // a struct of texts and numbers is always JSON
+        // A struct of texts and numbers can always be serialized to JSON.
         serde_json::to_string(self).unwrap_or_default().into()
     }
 }
 
-/// The estimator that a field names.
+/// Returns the rate estimator in the metadata of the fields.
 pub(crate) fn rate_estimator(fields: &[FieldRef]) -> Result<Option<RateEstimator>> {
     let text = said(fields, RATE_ESTIMATOR_KEY);
     let parsed = text

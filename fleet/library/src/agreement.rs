@@ -1,4 +1,4 @@
-//! `agreement(reference, estimate)`: the metrics as an aggregate.
+//! `agreement(reference, estimate)`: error metrics as an aggregate function.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::one::{One, state_of_each_row, states};
 
 const NAME: &str = "agreement";
 
-/// What is reported of a group in addition to its counts.
+/// Result columns in addition to the counts.
 const FIGURES: [(&str, Figure); 13] = [
     ("bias", |a| a.errors().bias()),
     ("mae", |a| a.errors().mae()),
@@ -53,7 +53,7 @@ struct AgreementFunction {
     signature: Signature,
 }
 
-/// The function.
+/// Returns the aggregate function.
 pub(crate) fn function() -> Arc<AggregateUDF> {
     let signature = Signature::exact(vec![DataType::Float64; 2], Volatility::Immutable);
     Arc::new(AggregateUDF::new_from_impl(AgreementFunction { signature }))
@@ -94,7 +94,7 @@ impl AggregateUDFImpl for AgreementFunction {
     }
 }
 
-/// The agreements of many groups: 200 bytes each.
+/// The agreements of many groups, 200 bytes each.
 #[derive(Debug, Default)]
 struct Agreements(Vec<Agreement<f64>>);
 
@@ -118,7 +118,7 @@ impl GroupsAccumulator for Agreements {
             let value = |array: &datafusion::arrow::array::Float64Array| {
                 if array.is_valid(row) { array.value(row) } else { f64::NAN }
             };
-            // what is not finite is left out, and counted there
+            // `push` skips values that are not finite, and counts them.
             self.0[group].push(value(reference), value(estimate));
         }
         Ok(())
@@ -174,7 +174,8 @@ impl GroupsAccumulator for Agreements {
     }
 }
 
-/// Counts and numbers, little-endian. Passed between the stages of one query, never stored.
+/// Serializes counts and sums, little-endian. They are passed between the stages of one query, and
+/// never stored.
 fn write(agreement: &Agreement<f64>) -> Vec<u8> {
     let AgreementSpec { count, skipped, errors, truth, estimate, products } = agreement.spec();
     let numbers = errors.iter().chain(&truth).chain(&estimate).chain(&products);

@@ -1,4 +1,4 @@
-//! What a fit answers, a row a group: numbers, and the calibration that `stretch apply` takes.
+//! Result of a fit, one row per group: numbers, and a calibration for `stretch apply`.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::{
 const NUMBERS: [&str; 7] =
     ["rmse", "rate_min", "rate_max", "signal_min", "signal_max", "reference_min", "reference_max"];
 
-/// The fields of a fit's answer.
+/// Returns the fields of a fit's result.
 pub(crate) fn fields() -> Fields {
     let number = |name: &str| Field::new(name, DataType::Float64, true);
     let count = |name: &str| Field::new(name, DataType::UInt64, true);
@@ -37,7 +37,7 @@ pub(crate) fn fields() -> Fields {
         .collect()
 }
 
-/// A fit's answer.
+/// The result of a fit.
 #[derive(Default)]
 struct Answer {
     rows: u64,
@@ -49,7 +49,7 @@ struct Answer {
     refused: Option<String>,
 }
 
-/// The results of many groups, as an array of structs. A line has no rate.
+/// Converts the results of many groups to an array of structs. A line has no rate.
 pub(crate) fn answers<const TERMS: usize>(
     degree: Degree,
     is_line: bool,
@@ -102,7 +102,7 @@ fn answer<const TERMS: usize>(degree: Degree, is_line: bool, outcome: &Outcome<T
             let dof = sides.iter().fold(0, |dof: u64, side| dof.saturating_add(side.fit.dof()));
             let sse: f64 = sides.iter().map(|side| side.fit.sse()).sum();
             let whole = Whole { sides: &sides, polarity, span };
-            // a text that this library wrote; damaged bytes tell nothing
+            // This library wrote the text. If its bytes are damaged, there is no calibration.
             let about = serde_json::from_str::<About>(&partial.about).ok();
             let record = about.map_or(Ok(None), |about| whole.record(&about));
             Answer {
@@ -119,7 +119,7 @@ fn answer<const TERMS: usize>(degree: Degree, is_line: bool, outcome: &Outcome<T
     }
 }
 
-/// The fits of all sides, inflation first, and how signal and reference move together.
+/// Fits all sides, inflation first, and determines whether signal and reference rise together.
 fn fitted<const TERMS: usize>(
     degree: Degree,
     is_line: bool,
@@ -168,7 +168,7 @@ fn one_branch(moves: &str, have: &str, rows: u64) -> String {
     format!("the signal never {moves} (all {rows} rows have {have}): one branch is no calibration")
 }
 
-/// Whether the signal rises with the reference: the sign of the slope over all rows.
+/// Returns the sign of the slope of the signal over the reference, from a line through all rows.
 fn polarity<const TERMS: usize>(
     mut factors: impl Iterator<Item = Factor<f64, TERMS>>,
 ) -> Result<Polarity, String> {
@@ -182,7 +182,7 @@ fn polarity<const TERMS: usize>(
     Ok(if falls { Polarity::Falling } else { Polarity::Rising })
 }
 
-/// A branch of a fit, or the one line.
+/// A branch of a fit, or the single line.
 struct Side<const TERMS: usize> {
     factor: Factor<f64, TERMS>,
     span: Span,
@@ -193,11 +193,11 @@ struct Side<const TERMS: usize> {
 struct Whole<'a, const TERMS: usize> {
     sides: &'a [Side<TERMS>],
     polarity: Polarity,
-    /// Of all sides.
+    /// Ranges of the rows of all sides.
     span: Span,
 }
 
-/// Everything of a record but its model's numbers.
+/// All parts of a calibration except the numbers of its model.
 struct Frame {
     sample_rate_hz: SampleRate,
     rate_estimator: RateEstimator,
@@ -210,10 +210,12 @@ const SIGNAL: usize = 1;
 const REFERENCE: usize = 2;
 
 impl<const TERMS: usize> Whole<'_, TERMS> {
-    /// The record in JSON, sealed; `None` if it is unknown how the rates were estimated.
+    /// Returns the calibration as JSON with its checksum, or `None` if the rate estimator is
+    /// unknown.
     ///
-    /// Signal and target are normalised to 0..1 over the range of the rows, and the surfaces are
-    /// about the smallest signal, because coefficients about zero volts would cancel.
+    /// Signal and target are normalised to 0..1 over the range of the rows. The surfaces are
+    /// expanded about the smallest signal, because coefficients about zero volts would suffer from
+    /// cancellation.
     fn record(&self, about: &About) -> Result<Option<String>, String> {
         let (Some(hz), Some(rate_estimator)) = (about.sample_rate_hz, about.rate_estimator) else {
             return Ok(None);
@@ -264,7 +266,7 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
     }
 
     fn branch(&self, side: &Side<TERMS>, frame: &Frame) -> Result<BranchSurface, String> {
-        // the sign with which a positive rate means a rising target
+        // With this sign, a positive rate means a rising target.
         let mut signed = side.span;
         if self.polarity == Polarity::Falling {
             (signed.least[RATE], signed.most[RATE]) =
@@ -281,8 +283,8 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
     }
 }
 
-/// The surface over normalised signal and rate, to the normalised target; `rate` is the factor from
-/// a normalised rate to one of the signal.
+/// Returns the surface from normalised signal and rate to the normalised target. `rate` is the
+/// factor from a normalised rate to a rate of the signal.
 fn normalised<const TERMS: usize>(
     side: &Side<TERMS>,
     frame: &Frame,

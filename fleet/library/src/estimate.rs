@@ -1,4 +1,4 @@
-//! `strain_estimate(record, rate, signal)`: a calibration over rows.
+//! `strain_estimate(record, rate, signal)`: applies a calibration to rows.
 
 use std::{iter::repeat_n, sync::Arc};
 
@@ -27,7 +27,7 @@ struct EstimateFunction {
     signature: Signature,
 }
 
-/// The function.
+/// Returns the scalar function.
 pub(crate) fn function() -> Arc<ScalarUDF> {
     use DataType::{Float64, LargeUtf8, Utf8, Utf8View};
     let of = |text| TypeSignature::Exact(vec![text, Float64, Float64]);
@@ -67,7 +67,7 @@ impl ScalarUDFImpl for EstimateFunction {
                 Box::new(texts.as_string_view().iter())
             }
         };
-        // the map of the latest row, because rows of one sensor are adjacent
+        // Only the calibration of the latest row is kept, because rows of one sensor are adjacent.
         let mut latest: Option<(&str, Map)> = None;
         let estimates = records.enumerate().map(|(at, record)| {
             let known = record.filter(|_| rate.is_valid(at) && signal.is_valid(at));
@@ -82,7 +82,7 @@ impl ScalarUDFImpl for EstimateFunction {
     }
 }
 
-/// A calibration that needs no memory: a line, or one surface per branch.
+/// A calibration without memory: a line, or one surface per branch.
 struct Map {
     receptor: StretchReceptor<f64, ()>,
     sign: f64,
@@ -119,8 +119,8 @@ impl Map {
         })
     }
 
-    /// The estimate of a row. Inside the dead band a live receptor keeps its branch. Here only the
-    /// sign of the rate decides, because rows have no order.
+    /// Returns the estimate of a row. A live receptor keeps its branch inside the dead band. Here
+    /// only the sign of the rate selects the branch, because rows have no order.
     fn at(&self, rate: f64, signal: f64) -> Option<f64> {
         if !(rate.is_finite() && signal.is_finite()) {
             return None;

@@ -1,4 +1,5 @@
-//! Fits as aggregates: `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state`, `poly13_merge`.
+//! Fits as aggregate functions: `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state`,
+//! `poly13_merge`.
 
 use std::sync::Arc;
 
@@ -24,11 +25,11 @@ use crate::{
     triangles::{Outcome, Triangles},
 };
 
-/// Capacity for the terms of the fits that most queries need.
+/// Numbers of terms of the most frequent fits, used as capacities.
 const LINE: usize = Degree::LINE.terms();
 const POLY13: usize = Degree::POLY13.terms();
 
-/// Which fit.
+/// The aggregate functions of this file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Kind {
     Poly13,
@@ -60,20 +61,20 @@ impl Kind {
         Signature::new(types, Volatility::Immutable)
     }
 
-    /// Arguments before the columns.
+    /// Returns the number of arguments before the columns.
     fn literals(self) -> usize {
         if self == Self::PolyIj { 2 } else { 0 }
     }
 }
 
-/// A fit by its name in SQL.
+/// An aggregate function of SQL.
 #[derive(Debug, PartialEq, Eq, Hash)]
 struct FitFunction {
     kind: Kind,
     signature: Signature,
 }
 
-/// All fits.
+/// Returns all aggregate functions of this file.
 pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
     [Kind::Poly13, Kind::Line, Kind::PolyIj, Kind::State, Kind::Merge].into_iter().map(|kind| {
         let signature = kind.signature();
@@ -110,10 +111,10 @@ impl FitFunction {
     }
 }
 
-/// A power that is written in the query.
+/// Returns a power that is written as a literal in the query.
 fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
-    // a literal can be evaluated without rows; evaluating it also works for expressions of another
-    // library
+    // A literal can be evaluated without rows. Evaluating it also works for expression types of
+    // another library.
     let nothing = RecordBatch::new_empty(Arc::new(Schema::empty()));
     match expr.evaluate(&nothing) {
         Ok(ColumnarValue::Scalar(ScalarValue::Int64(Some(power))))
@@ -225,7 +226,7 @@ impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
         }
         let columns = values[self.kind.literals()..].iter().map(|array| as_float64_array(array));
         let columns = match columns.collect::<Result<Vec<_>>>()?[..] {
-            // a line has no rate: the signal takes its place and is multiplied by nothing
+            // A line has no rate. The signal is passed in place of it, and is not used.
             [signal, reference] => [signal, signal, reference],
             [rate, signal, reference] => [rate, signal, reference],
             _ => return Err(plan_datafusion_err!("{}: columns are missing", self.kind.name())),

@@ -19,20 +19,20 @@ use datafusion::{
 pub use about::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
 pub use state::{STATE_VERSION, StateError, poly13_factors};
 
-/// The release of the functions. All machines that answer one query together must have the same.
+/// Release of the functions. All machines that take part in a query must have the same release.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The aggregates, for a session or the registry of an executor.
+/// Returns the aggregate functions, for a session or the registry of an executor.
 pub fn aggregates() -> Vec<Arc<AggregateUDF>> {
     fit::functions().chain([agreement::function()]).collect()
 }
 
-/// The scalar functions, for a session or the registry of an executor.
+/// Returns the scalar functions, for a session or the registry of an executor.
 pub fn scalars() -> Vec<Arc<ScalarUDF>> {
     vec![estimate::function()]
 }
 
-/// Makes all functions known to a session.
+/// Registers all functions in a session.
 pub fn register(session: &SessionContext) {
     for aggregate in aggregates() {
         session.register_udaf(aggregate.as_ref().clone());

@@ -1,4 +1,5 @@
-//! What the aggregates share: queries without groups, rows as groups, and arrays of stored states.
+//! Code shared by the aggregates: queries without groups, a state for each row, and arrays of
+//! stored states.
 
 use std::fmt;
 
@@ -12,12 +13,12 @@ use datafusion::{
     logical_expr::{Accumulator, EmitTo, GroupsAccumulator},
 };
 
-/// Stored states, whatever kind of binary the file had.
+/// Returns stored states as binary arrays, whatever binary type the file has.
 pub(crate) fn states(array: &ArrayRef) -> Result<BinaryArray> {
     Ok(cast(array, &DataType::Binary)?.as_binary::<i32>().clone())
 }
 
-/// The state of each row, by an accumulator of no group.
+/// Computes a state for each row, using an accumulator without groups.
 pub(crate) fn state_of_each_row(
     mut groups: impl GroupsAccumulator,
     values: &[ArrayRef],
@@ -29,7 +30,7 @@ pub(crate) fn state_of_each_row(
     groups.state(EmitTo::All)
 }
 
-/// The accumulator of one group, by the one of many.
+/// An accumulator of a single group, implemented with an accumulator of many groups.
 pub(crate) struct One<G> {
     name: String,
     groups: G,
@@ -47,7 +48,7 @@ impl<G: GroupsAccumulator + Sync> One<G> {
         Self { name: name.to_owned(), groups, zeros: Vec::new() }
     }
 
-    /// As many rows of the one group.
+    /// Assigns all rows to the one group.
     fn indices(&mut self, values: &[ArrayRef]) {
         self.zeros.resize(values.first().map_or(0, |array| array.len()), 0);
     }
@@ -64,8 +65,8 @@ impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
         self.groups.merge_batch(states, &self.zeros, 1)
     }
 
-    /// The result so far. A window asks again after more rows, so the state must survive the
-    /// answer.
+    /// Returns the result so far. A window function evaluates repeatedly while rows are added, so
+    /// the state must be preserved.
     fn evaluate(&mut self) -> Result<ScalarValue> {
         let state = self.state()?;
         let arrays = state.iter().map(ScalarValue::to_array).collect::<Result<Vec<_>>>()?;
@@ -76,7 +77,7 @@ impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
     }
 
     fn state(&mut self) -> Result<Vec<ScalarValue>> {
-        // a group even where there were no rows
+        // Creates the group even if there were no rows.
         self.groups.merge_batch(&[], &[], 1)?;
         let state = self.groups.state(EmitTo::All)?;
         state.iter().map(|array| ScalarValue::try_from_array(array, 0)).collect()

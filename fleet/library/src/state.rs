@@ -1,6 +1,6 @@
-//! The bytes of a partial fit.
+//! The stored bytes of a partial fit.
 //!
-//! All numbers are little-endian, whatever the machine:
+//! All numbers are little-endian on every machine:
 //!
 //! ```text
 //! 4   magic "STRF"
@@ -32,19 +32,19 @@ const REFUSAL: u8 = 255;
 /// Smallest and largest rate, signal and reference of some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Span {
-    /// Rate, signal, reference.
+    /// Smallest rate, signal and reference.
     pub least: [f64; 3],
-    /// The same.
+    /// Largest rate, signal and reference.
     pub most: [f64; 3],
 }
 
 impl Span {
-    /// Of no rows.
+    /// The span of no rows.
     pub(crate) const EMPTY: Self = Self { least: [f64::INFINITY; 3], most: [f64::NEG_INFINITY; 3] };
 
-    /// Takes in values of one column, which are numbers.
+    /// Extends the span by values of one column, which must not be NaN.
     pub(crate) fn widen(&mut self, column: usize, values: &[f64]) {
-        // four side by side, and comparisons that are one instruction each
+        // Four values in parallel, with comparisons that compile to one instruction each.
         let less = |a: f64, b: f64| if a < b { a } else { b };
         let more = |a: f64, b: f64| if a > b { a } else { b };
         let (mut least, mut most) = ([self.least[column]; 4], [self.most[column]; 4]);
@@ -59,7 +59,7 @@ impl Span {
         self.most[column] = most.into_iter().chain(rest.iter().copied()).fold(most[0], more);
     }
 
-    /// The span of both.
+    /// Returns the span that covers both.
     pub(crate) fn joined(&self, other: &Self) -> Self {
         let mut joined = *self;
         for column in 0..3 {
@@ -69,13 +69,13 @@ impl Span {
         joined
     }
 
-    /// From the least to the greatest of a column.
+    /// Returns the difference between the largest and the smallest value of a column.
     pub(crate) fn width(&self, column: usize) -> f64 {
         self.most[column] - self.least[column]
     }
 }
 
-/// A partial fit: a side, or one a branch.
+/// A partial fit, with one side (a line) or one side per branch.
 #[derive(Debug, Clone)]
 pub(crate) struct Partial<const TERMS: usize> {
     pub left_out: u64,
@@ -90,10 +90,10 @@ pub(crate) enum Stored<const TERMS: usize> {
     Refusal(String),
 }
 
-/// Why bytes are no state that can be used.
+/// Why bytes are not a usable state.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StateError {
-    /// Bytes that no aggregate of this library wrote.
+    /// Bytes that were not written by an aggregate of this library.
     #[error("it does not begin with \"STRF\": these bytes are no state of a fit")]
     NoState,
     /// A state of another release.
@@ -107,23 +107,23 @@ pub enum StateError {
     /// A state of another fit.
     #[error("it is of {found}, where {expected} is merged")]
     Kind {
-        /// What it is a state of.
+        /// The fit to which the state belongs.
         found: String,
-        /// What was to be merged.
+        /// The fit that was to be merged.
         expected: String,
     },
     /// A state of other columns, or of rates of another estimator.
     #[error("it is of {found}, where {expected} is merged: merge them apart")]
     Columns {
-        /// What it is of.
+        /// Columns and rates of the state.
         found: String,
-        /// What was merged before.
+        /// Columns and rates of the states merged before.
         expected: String,
     },
-    /// A state that records a refusal.
+    /// A state that stores a refusal.
     #[error("{sentence}")]
     Refused {
-        /// Why.
+        /// The reason for the refusal.
         sentence: String,
     },
     /// Too few or too many bytes, or numbers that no fit can produce.
@@ -149,7 +149,7 @@ pub(crate) fn write<const TERMS: usize>(
     out.extend_from_slice(&[STATE_VERSION, kind, degree.rate(), degree.volts()]);
     out.extend_from_slice(&partial.left_out.to_le_bytes());
     let about = partial.about.as_bytes();
-    // a text of names and an estimator; a longer one is ignored
+    // A text of names and an estimator. A text that is too long is dropped.
     let about = if about.len() <= usize::from(u16::MAX) { about } else { &[] };
     out.extend_from_slice(&(about.len() as u16).to_le_bytes());
     out.extend_from_slice(about);
@@ -172,14 +172,15 @@ pub(crate) fn write<const TERMS: usize>(
     }
 }
 
-/// Appends the state of a fit that is refused already.
+/// Appends the state of a fit that was already refused.
 pub(crate) fn write_refusal(out: &mut Vec<u8>, sentence: &str) {
     out.extend_from_slice(MAGIC);
     out.extend_from_slice(&[STATE_VERSION, REFUSAL]);
     out.extend_from_slice(sentence.as_bytes());
 }
 
-/// A state of `kind` and `degree`; the text of `known` is shared where it is the same.
+/// Reads a state, which must have this `kind` and `degree`. If its text equals `known`, the
+/// allocation of `known` is shared.
 pub(crate) fn read<const TERMS: usize>(
     bytes: &[u8],
     kind: u8,
@@ -222,11 +223,12 @@ pub(crate) fn read<const TERMS: usize>(
     Ok(Stored::Partial(Partial { left_out, about, sides }))
 }
 
-/// The triangles of a state of `poly13_state`, of rows whose rate is not below zero and of those
-/// below. Use them for tests between stored states, one per day.
+/// Returns the triangular factors of a state written by `poly13_state`: first of rows with a rate
+/// of at least zero, then of rows with a negative rate. Use them for tests between stored states,
+/// for example one per day.
 ///
 /// # Errors
-/// [`StateError`]; a refused fit counts as another kind.
+/// [`StateError`]. A refused fit is reported as a state of another kind.
 pub fn poly13_factors(
     state: &[u8],
 ) -> Result<[Option<Factor<f64, { Degree::POLY13.terms() }>>; 2], StateError> {
@@ -242,7 +244,7 @@ fn damaged(what: &'static str) -> StateError {
     StateError::Damaged { what }
 }
 
-/// What is left to read.
+/// The remaining bytes.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {

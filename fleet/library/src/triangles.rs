@@ -1,4 +1,4 @@
-//! Partial fits of many groups at once.
+//! Partial fits of many groups, stored as triangular factors.
 
 use std::{mem, sync::Arc};
 
@@ -16,37 +16,38 @@ use crate::{
     state::{Partial, Span, StateError, Stored, read, write, write_refusal},
 };
 
-/// Rows of a group and branch that are collected before they are folded together.
+/// Number of rows of a group and branch that are collected before they are folded into the factor
+/// together.
 pub(crate) const ROWS: usize = 128;
 
-/// The largest accepted number, because powers of larger ones overflow `f64`.
+/// Largest accepted number, because powers of larger ones overflow `f64`.
 const MOST: f64 = 1e15;
 
-/// Rows that wait: rates, signals, references.
+/// Collected rows: rates, signals, references.
 type Waiting = [[f64; ROWS]; 3];
 
-/// A branch of a group, or its one line.
+/// A branch of a group, or the line of a group.
 #[derive(Debug, Clone, Copy)]
 struct Side<const TERMS: usize> {
     factor: Factor<f64, TERMS>,
     span: Span,
-    /// Rows that wait.
+    /// Number of collected rows.
     filled: u8,
 }
 
-/// What the sides of a group share.
+/// Data shared by the sides of a group.
 #[derive(Debug, Clone)]
 struct Group {
     left_out: u64,
-    /// Metadata of the columns: of these rows, and of merged states.
+    /// Metadata of the columns, from these rows or from merged states.
     about: Arc<str>,
     refused: Option<Box<str>>,
 }
 
-/// Partial fits, flat: place `group * sides + side` holds a side of a group.
+/// Partial fits of all groups. Index `group * sides + side` holds a side of a group.
 ///
-/// A group costs a triangle and, once it receives rows, `3 ROWS` numbers a side: 7.4 kB for poly13,
-/// 14 kB for the widest surface. All groups share the block that folds.
+/// A group needs a triangle per side and, once it receives rows, `3 ROWS` numbers per side: 7.4 kB
+/// for poly13, 14 kB for the largest surface. All groups share the work space for folding.
 #[derive(Debug)]
 pub(crate) struct Triangles<const TERMS: usize> {
     degree: Degree,
@@ -56,15 +57,15 @@ pub(crate) struct Triangles<const TERMS: usize> {
     own: Arc<str>,
     groups: Vec<Group>,
     places: Vec<Side<TERMS>>,
-    /// Of the same places, but only where rows come.
+    /// Collected rows, with the same indices; empty until rows arrive.
     waiting: Vec<Waiting>,
 }
 
-/// What a group came to.
+/// The outcome of a group: a partial fit, or the reason for a refusal.
 pub(crate) type Outcome<const TERMS: usize> = std::result::Result<Partial<TERMS>, Box<str>>;
 
 impl<const TERMS: usize> Triangles<TERMS> {
-    /// Of no group, for a line (one side) or a surface a branch (two).
+    /// Creates fits without any group, for a line (one side) or a surface per branch (two sides).
     pub(crate) fn new(degree: Degree, sides: usize, about: &About) -> Result<Self, FitError> {
         let block = Box::new(SurfaceAccumulator::new(degree)?);
         Ok(Self {
@@ -79,7 +80,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         })
     }
 
-    /// The same of no group.
+    /// Returns fits with the same settings and without any group.
     pub(crate) fn of_no_group(&self) -> Self {
         Self {
             block: self.block.clone(),
@@ -95,7 +96,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         self.degree
     }
 
-    /// Room for so many groups.
+    /// Makes room for this number of groups.
     fn grow(&mut self, groups: usize) {
         if self.groups.len() < groups {
             let group = Group { left_out: 0, about: self.own.clone(), refused: None };
@@ -106,7 +107,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
     }
 
     /// Takes rows: `rate` of a surface, `signal` and `reference`. Values that are null, not finite
-    /// or larger than [`MOST`] are left out and counted; rows that the filter drops do not count.
+    /// or larger than [`MOST`] are left out and counted. Rows dropped by the filter do not count.
     pub(crate) fn rows(
         &mut self,
         [rate, signal, reference]: [&Float64Array; 3],
@@ -121,7 +122,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         let columns = [rate, signal, reference].map(|column| &column.values()[..groups.len()]);
         let sides = self.sides;
         let is_row = |row: usize| filter.is_none_or(|kept| kept.is_valid(row) && kept.value(row));
-        // false for NaN, too
+        // This is false for NaN, too.
         let is_sound = |row: usize| {
             let [r, v, x] = columns.map(|values| values[row].abs() <= MOST);
             r & v & x & nulls.as_ref().is_none_or(|nulls| nulls.is_valid(row))
@@ -132,7 +133,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         while row < groups.len() {
             let mut end = row + 1;
             if is_row(row) && is_sound(row) {
-                // rows of a trial are consecutive, and a branch lasts for many of them
+                // Rows of a trial are consecutive, and a branch lasts for many rows.
                 let own = place(row);
                 while end < groups.len() && is_row(end) && is_sound(end) && place(end) == own {
                     end += 1;
@@ -147,7 +148,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// Takes a place's rows in.
+    /// Collects rows of one side.
     fn take(&mut self, place: usize, mut columns: [&[f64]; 3]) -> Result<()> {
         while !columns[0].is_empty() {
             let filled = usize::from(self.places[place].filled);
@@ -165,7 +166,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// Folds what waits at a place.
+    /// Folds the collected rows of one side into its factor.
     fn fold(&mut self, place: usize) -> Result<()> {
         let side = &mut self.places[place];
         let filled = usize::from(mem::take(&mut side.filled));
@@ -184,8 +185,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// Takes stored states, one per group index; a null is no state. An unusable state refuses its
-    /// group with an error text.
+    /// Takes stored states, each with its group index; a null is no state. An unusable state makes
+    /// its group a refusal with an error text.
     pub(crate) fn states<'a>(
         &mut self,
         states: impl Iterator<Item = Option<&'a [u8]>>,
@@ -217,7 +218,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
         let places = &mut self.places[group * self.sides..(group + 1) * self.sides];
         let group = &mut self.groups[group];
         if *other.about != *group.about {
-            // the columns of a merge are states; the first one states its source columns
+            // The columns of a merge are states. The first state provides the names of the source
+            // columns.
             let is_fresh = places.iter().all(|side| side.factor.samples() == 0);
             if !is_fresh || group.left_out > 0 {
                 let (found, expected) = (other.about.to_string(), group.about.to_string());
@@ -236,7 +238,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// What the groups came to; they are gone then.
+    /// Returns the outcomes of groups and removes them.
     pub(crate) fn outcomes(&mut self, emit: EmitTo) -> Result<Vec<Outcome<TERMS>>> {
         let groups = match emit {
             EmitTo::All => self.groups.len(),
@@ -271,7 +273,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(groups.into_iter().zip(sides.chunks(self.sides)).map(outcome).collect())
     }
 
-    /// The bytes of a group's outcome.
+    /// Serializes the outcome of a group.
     pub(crate) fn write(&self, out: &mut Vec<u8>, outcome: &Outcome<TERMS>) {
         match outcome {
             Ok(partial) => write(out, self.sides as u8, self.degree, partial),
@@ -279,7 +281,7 @@ impl<const TERMS: usize> Triangles<TERMS> {
         }
     }
 
-    /// Bytes held.
+    /// Returns the memory in use, bytes.
     pub(crate) fn size(&self) -> usize {
         fn of<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()

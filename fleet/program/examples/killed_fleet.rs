@@ -1,7 +1,7 @@
-//! The program of the fleet, which aborts before its call number N on the file system:
+//! The program of the fleet, aborted before its file-system call number N:
 //! `killed_fleet N COMMAND...`.
 //!
-//! Tests start it, and check what a kill at that place leaves.
+//! Tests start it, and check which files such a kill leaves.
 
 use std::{
     env,
@@ -19,14 +19,14 @@ fn main() -> ExitCode {
     let calls = AtomicUsize::new(0);
     assert!(ask_before_disk_calls(move |_| {
         if calls.fetch_add(1, Relaxed) + 1 == last {
-            // as by kill -9: nothing is cleaned up
+            // As after kill -9, nothing is cleaned up.
             std::process::abort();
         }
         Ok(())
     }));
     let is_ingest = env::args().nth(2).is_some_and(|command| command == "ingest");
     match stretch_fleet_program::run(program.into_iter().chain(words)) {
-        // an ingest has refused a file, which is a status
+        // An ingest ends with status 1 if it has refused a file. That is no failure here.
         _ if is_ingest => ExitCode::SUCCESS,
         status => status,
     }

@@ -1,4 +1,5 @@
-//! Answers of a query: as plain columns, as a table, as CSV, and as records that `stretch apply` takes.
+//! Results of a query: as flat columns, as a table, as CSV, and as calibration files for
+//! `stretch apply`.
 
 use std::{collections::HashSet, path::Path, sync::Arc};
 
@@ -17,7 +18,7 @@ use stretch_core::{Calibration, Label, Provenance, Target};
 
 use crate::lake::{Lake, LakeFile, Refused, check_name};
 
-/// Fields that are too long for a table.
+/// Columns that are too long for a table.
 const LONG: [&str; 2] = ["record", "state"];
 
 /// Merges all batches into one without structs. A field keeps its name if the name is unique,
@@ -48,7 +49,7 @@ pub(crate) fn flat(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
     Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
 }
 
-/// The column whose name, or the last part of it, is this.
+/// Returns the column with this name, or whose name after the last dot is this.
 fn column<'a>(batch: &'a RecordBatch, name: &str) -> Option<&'a ArrayRef> {
     let schema = batch.schema();
     let is_it = |own: &str| own == name || own.rsplit('.').next() == Some(name);
@@ -56,7 +57,8 @@ fn column<'a>(batch: &'a RecordBatch, name: &str) -> Option<&'a ArrayRef> {
     Some(batch.column(place))
 }
 
-/// As a table; columns that are too long for one are left out if there is anything else.
+/// Formats the result as a table. Columns that are too long are left out, unless there are no
+/// others.
 pub(crate) fn table(batch: &RecordBatch) -> anyhow::Result<String> {
     let schema = batch.schema();
     let is_short = |i: &usize| {
@@ -69,7 +71,7 @@ pub(crate) fn table(batch: &RecordBatch) -> anyhow::Result<String> {
     Ok(pretty_format_batches(&[shown])?.to_string())
 }
 
-/// As CSV, with a header line.
+/// Formats the result as CSV, with a header line.
 pub(crate) fn csv(batch: &RecordBatch) -> anyhow::Result<String> {
     let columns = batch.columns().iter().map(texts).collect::<anyhow::Result<Vec<_>>>()?;
     let mut out = csv::Writer::from_writer(Vec::new());
@@ -80,15 +82,15 @@ pub(crate) fn csv(batch: &RecordBatch) -> anyhow::Result<String> {
     Ok(String::from_utf8(out.into_inner()?)?)
 }
 
-/// The texts of a column, empty where there is none.
+/// Formats the values of a column; nulls are empty.
 fn texts(array: &ArrayRef) -> anyhow::Result<Vec<String>> {
     let options = FormatOptions::default();
     let format = ArrayFormatter::try_new(array.as_ref(), &options)?;
     (0..array.len()).map(|row| Ok(format.value(row).try_to_string()?)).collect()
 }
 
-/// Writes one record per row, in folders of site and rig if the answer has them; refused rows are
-/// returned with the reason.
+/// Writes one calibration file per row, in folders of site and rig if the result has these columns.
+/// Refused rows are returned with the reason.
 pub(crate) fn write_records(
     lake: &Lake,
     answer: &RecordBatch,
@@ -115,8 +117,7 @@ pub(crate) fn write_records(
             keys.iter().map(|(key, own)| (*key, own[row].as_str())).collect();
         let names: Vec<&str> = of.iter().map(|(_, name)| *name).collect();
         let name = if names.is_empty() { "record".to_owned() } else { names.join("/") };
-        // A query may return anything as a sensor name, so check that its record gets its own place in
-        // the folder.
+        // A query may return anything as a sensor name, so the name is checked and must be unique.
         let place = of.iter().try_for_each(|(key, name)| check_name(key, name));
         let place = place.and_then(|()| match taken.insert(name.clone()) {
             true => Ok(()),
@@ -143,11 +144,11 @@ pub(crate) fn write_records(
     Ok((written, refused))
 }
 
-/// A fit's record with the lake's knowledge: the length that belongs to a contraction, the dead
+/// Completes a fit's calibration with data of the lake: the rest length of a contraction, the dead
 /// band, and the trials.
 ///
-/// Sums do not determine a dead band. It is the median of the dead bands of the trials, three
-/// standard deviations of their rate's noise, as calibrate takes it.
+/// Sums do not determine a dead band. It is set to the median over the trials of three standard
+/// deviations of their rate noise, which is the definition in `stretch calibrate`.
 fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<String> {
     let is_of = |file: &&LakeFile| {
         of.iter().all(|(key, value)| match *key {

@@ -1,4 +1,4 @@
-//! `stretch-fleet calibrate`: a record a sensor.
+//! `stretch-fleet calibrate`: writes a calibration file for each sensor.
 
 use std::{collections::BTreeSet, path::PathBuf};
 
@@ -15,7 +15,7 @@ use crate::{
     states::bring_up,
 };
 
-/// Sensors that a table on the terminal shows.
+/// Number of sensors in the table on the terminal.
 const SHOWN: usize = 20;
 
 /// Fit a calibration to every sensor of a lake
@@ -45,7 +45,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What came out.
+/// Summary of the run.
 #[derive(Debug, Serialize)]
 struct Summary {
     months_computed: usize,
@@ -68,7 +68,8 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
              where date between date '{from}' and date '{to}'{of} group by site, rig, sensor order by site, rig, sensor"
         )
     };
-    // threads share the rigs, and merge the days of each in their order: the same bits in every run
+    // Threads share the rigs, and merge the days of each rig in order, so that results are
+    // bit-identical in every run.
     let rigs: BTreeSet<[&str; 2]> =
         lake.files.iter().map(|f| [f.place.site.as_str(), f.place.rig.as_str()]).collect();
     let condition = |own: &[[&str; 2]]| {

@@ -1,4 +1,4 @@
-//! Files that may become trials of a lake, and which of them are copies.
+//! Files to be added to a lake, and detection of copies among them.
 
 use std::{collections::HashMap, ffi::OsString, path::Path};
 
@@ -9,7 +9,7 @@ use crate::{
     sources::Source,
 };
 
-/// A file that is to be a trial of the lake.
+/// A file to be added to the lake.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate<'a> {
     pub source: &'a Source,
@@ -18,7 +18,7 @@ pub(crate) struct Candidate<'a> {
     pub digest: String,
 }
 
-/// The files that can be read and whose place is known, and for the others the reason.
+/// Returns the readable files with a known place, and for the others the reason.
 pub(crate) fn candidates(sources: &[Source]) -> (Vec<Candidate<'_>>, Vec<(&Path, String)>) {
     sources.par_iter().partition_map(|source| match candidate(source) {
         Ok(one) => Either::Left(one),
@@ -35,8 +35,9 @@ fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
     Ok(Candidate { source, place, digest })
 }
 
-/// Why each file is a byte-identical copy of another one, or `None` if it is the one that counts.
-/// That is the file at the place where the lake has it, otherwise the first of the list.
+/// Returns for each file the reason why it is a byte-identical copy of another one, or `None` if it
+/// is not. Of several identical files, the one at the place where the lake already has it counts,
+/// otherwise the first of the list.
 pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<String>> {
     let in_lake: HashMap<&str, &LakeFile> =
         there.iter().map(|file| (file.footer.digest.as_str(), file)).collect();
@@ -66,12 +67,12 @@ pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<St
     all.iter().map(why).collect()
 }
 
-/// Trials of a lake, those of the run that writes among them.
+/// The trials of a lake, including those written in this run.
 #[derive(Debug, Default)]
 pub(crate) struct Known {
-    /// Where a trial came from, by the digest of its samples.
+    /// Source file of a trial, by the digest of its samples.
     by_samples: HashMap<String, String>,
-    /// Where a trial came from, by its place and its name without ending.
+    /// Source file of a trial, by its place and its name without extension.
     by_name: HashMap<(Place, OsString), String>,
 }
 
@@ -82,8 +83,8 @@ impl Known {
         known
     }
 
-    /// Adds a trial that is about to be written, or says in which other file the lake already has
-    /// it.
+    /// Registers a trial that is about to be written. If the lake already has it, returns an error
+    /// that names its source file.
     pub(crate) fn claim(&mut self, footer: &Footer, place: &Place) -> Result<(), String> {
         if let Some(other) = self.by_samples.get(&footer.samples) {
             return Err(format!(

@@ -1,4 +1,4 @@
-//! Trials of a lake as they were recorded, by sensor and time.
+//! The trials of a lake in recorded form, grouped by sensor and time.
 
 use std::{
     collections::BTreeMap,
@@ -39,12 +39,12 @@ pub(crate) enum By {
     Sensor,
 }
 
-/// Site, rig, sensor, and which time of it.
+/// Site, rig, sensor, and the day or month (or `all`).
 pub(crate) type Name = [String; 4];
 
-/// A lake that holds trials; files that it cannot use are reported.
+/// Opens a lake that contains trials. Files that cannot be used are reported.
 pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
-    // no answer is written over what it was made from
+    // No output may overwrite a file of the lake.
     guard_inputs([])?;
     let lake = Lake::open(folder)?;
     lake.files.iter().try_for_each(|file| is_input(&file.path))?;
@@ -57,7 +57,7 @@ pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
     Ok(lake)
 }
 
-/// The files of each data set.
+/// Groups the files of a lake into data sets.
 pub(crate) fn data_sets(lake: &Lake, by: By) -> BTreeMap<Name, Vec<&LakeFile>> {
     let mut sets: BTreeMap<Name, Vec<&LakeFile>> = BTreeMap::new();
     for file in &lake.files {
@@ -72,7 +72,7 @@ pub(crate) fn data_sets(lake: &Lake, by: By) -> BTreeMap<Name, Vec<&LakeFile>> {
     sets
 }
 
-/// The trials of a data set in the order in which they were recorded, counted from its first day.
+/// Returns the trials of a data set in order of time. Times count from its first day.
 pub(crate) fn trials(files: &[&LakeFile]) -> anyhow::Result<Vec<SessionTrial>> {
     let first = files.iter().map(|file| file.place.date).min();
     let mut trials = Vec::new();
@@ -88,7 +88,7 @@ pub(crate) fn trials(files: &[&LakeFile]) -> anyhow::Result<Vec<SessionTrial>> {
     Ok(trials)
 }
 
-/// A trial as it was recorded: lost samples are marked as lost again.
+/// Reads a trial as it was recorded: bridged samples are removed again.
 fn trial(file: &LakeFile) -> anyhow::Result<SessionTrial> {
     let shown = || file.path.display().to_string();
     let batch = read(std::slice::from_ref(&file.path))?;
@@ -124,7 +124,7 @@ fn trial(file: &LakeFile) -> anyhow::Result<SessionTrial> {
     })
 }
 
-/// All rows of some files of one layout.
+/// Reads all rows of some files with the same layout.
 pub(crate) fn read(paths: &[PathBuf]) -> anyhow::Result<RecordBatch> {
     let mut batches = Vec::new();
     for path in paths {

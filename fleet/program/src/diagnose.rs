@@ -1,4 +1,4 @@
-//! `stretch-fleet diagnose`: every partition of a lake as a data set.
+//! `stretch-fleet diagnose`: diagnoses every partition of a lake as a data set.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -65,7 +65,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let sets = data_sets(&lake, args.by);
     let parts = args.out.join("verdicts");
     std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
-    // shares are written in parallel, so no process has the folder alone
+    // Several processes write their shares into the folder in parallel, so it is not locked.
     remove_abandoned(&args.out, 1)?;
     let (which, of) = args.share;
     let open: Vec<_> = sets
@@ -106,7 +106,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// The name of a verdict, which changes with its trials.
+/// Returns the file name of a verdict. It contains a digest of the trials and the seed.
 fn part(name: &Name, files: &[&LakeFile], seed: u64) -> String {
     let seed = seed.to_le_bytes();
     let of = files.iter().map(|file| file.footer.digest.as_bytes());
@@ -114,7 +114,7 @@ fn part(name: &Name, files: &[&LakeFile], seed: u64) -> String {
     format!("{}-{}.parquet", name.join(","), &of[..16])
 }
 
-/// The diagnosis of a data set, or why there is none.
+/// Diagnoses a data set.
 fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diagnosis> {
     let trials = trials(files)?;
     let options = Options { threads: args.threads, seed: args.seed, ..Options::default() };
@@ -136,8 +136,8 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
     Ok(problem.examine(&options, false, &|_| (), &|| false)?.diagnosis)
 }
 
-/// A verdict as a row: the named effects, their probability, the share of the held-out gap that
-/// they close, and what is left.
+/// Returns a verdict as a row: the named effects, their probability, the share of the held-out gap
+/// that they close, and the remaining share.
 fn row(
     name: &Name,
     trials: usize,

@@ -1,4 +1,4 @@
-//! `stretch-fleet drift`: which sensors moved from one month to another.
+//! `stretch-fleet drift`: finds sensors that changed between two months.
 
 use std::{
     path::{Path, PathBuf},
@@ -54,22 +54,22 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// The first day of a month.
+/// Parses a month and returns its first day.
 fn month(text: &str) -> Result<NaiveDate, String> {
     NaiveDate::parse_from_str(&format!("{text}-01"), "%Y-%m-%d")
         .map_err(|_| format!("{text:?} is no month: write 2026-01"))
 }
 
-/// A sensor and its days.
+/// A sensor and its days in both months.
 struct Gauge {
     name: [String; 3],
     first: Vec<Day>,
     second: Vec<Day>,
-    /// A state that cannot be used.
+    /// Error of a state that cannot be used.
     problem: Option<String>,
 }
 
-/// A sensor and what was found.
+/// The result for a sensor.
 struct Row {
     gauge: Gauge,
     compared: Result<Compared, String>,
@@ -123,7 +123,8 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     tell(&args, &rows, &batch)
 }
 
-/// Sensors with their days; those from `second` on are of the later month, which is the first where `is_turned`.
+/// Groups the states by sensor. Days from `second` on belong to the later month. If `is_turned`,
+/// the later month is the `first` one of the comparison.
 fn gauges(
     batches: &[RecordBatch],
     second: NaiveDate,

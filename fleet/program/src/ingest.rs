@@ -1,4 +1,4 @@
-//! `stretch-fleet ingest`: trials into a lake.
+//! `stretch-fleet ingest`: adds trials to a lake.
 
 use std::{
     collections::{BTreeMap, HashMap, HashSet},
@@ -66,7 +66,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What became of the trials.
+/// Summary of the run.
 #[derive(Debug, Default, Serialize)]
 struct Summary {
     written: usize,
@@ -82,7 +82,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     fs::create_dir_all(&args.lake).with_context(|| args.lake.display().to_string())?;
     let _lock = Lock::of(&args.lake, usize::MAX)?;
     let mut sources = sources(&args.trials, &args.places)?;
-    // a file that was named twice is one
+    // A file that was named twice counts once.
     let mut named = HashSet::new();
     sources.retain(|source| {
         let path = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
@@ -115,7 +115,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let rests = rest_lengths(&there);
     let bar = bar("trials", sources.len());
     let summary = Mutex::new(summary);
-    // trials of one sensor in order, because the first one defines its rest length
+    // Trials of one sensor are processed in order, because the first one defines its rest length.
     by_gauge.par_iter().try_for_each(|(gauge, candidates)| {
         let mut rest = rests.get(gauge).copied();
         for candidate in candidates {
@@ -163,8 +163,8 @@ impl Args {
     }
 }
 
-/// The lake's description of itself; for a new lake the requested one, at the rate of the first
-/// readable trial.
+/// Returns the description of the lake. For a new lake, uses the requested one, with the sample
+/// rate of the first readable trial.
 fn about(args: &Args, sources: &[Source]) -> anyhow::Result<About> {
     let there = About::read(&args.lake)?;
     let said = |given: &Option<String>, own: Option<&String>, usual: &str| {
@@ -208,13 +208,13 @@ fn rest_lengths(lake: &Lake) -> HashMap<[String; 3], f64> {
     lake.files.iter().filter_map(known).collect()
 }
 
-/// What trials are brought into.
+/// Settings and state of an ingest.
 struct Ingest<'a> {
     folder: &'a Path,
     about: &'a About,
     options: ReadOptions,
     rest_length: Option<f64>,
-    /// Digests of what the files of the lake came from.
+    /// Digests of the source files of the lake's trials.
     there: HashSet<&'a str>,
     known: Mutex<Known>,
 }
@@ -233,7 +233,7 @@ impl Ingest<'_> {
     ) -> anyhow::Result<Done> {
         let refused = |why: &str| refuse(self.folder, &source.path, why).map(Done::Refused);
         if self.there.contains(digest.as_str()) {
-            // a run that was killed may not have come to this
+            // A killed run may have written the trial without removing an old refusal.
             accept(self.folder, &source.path)?;
             return Ok(Done::There);
         }
@@ -263,7 +263,8 @@ impl Ingest<'_> {
         Ok(Done::Written(rows))
     }
 
-    /// Rows and description of a trial; `known` is the sensor's rest length where the lake has it.
+    /// Returns the rows and the description of a trial. `known` is the sensor's rest length, if the
+    /// lake has it.
     fn samples(
         &self,
         trial: Trial,
@@ -335,7 +336,7 @@ impl Ingest<'_> {
     }
 }
 
-/// A digest of time stamps and channels that does not depend on the format they were recorded in.
+/// Returns a digest of time stamps and channels, independent of the file format.
 fn samples_digest(trial: &Trial) -> String {
     let mut bytes = Vec::new();
     let mut take = |name: &str, values: &[f64]| {

@@ -1,4 +1,4 @@
-//! Lakes of trials: what the program `stretch-fleet` does.
+//! The program `stretch-fleet`, for lakes of trials.
 
 mod answers;
 mod calibrate;
@@ -50,7 +50,7 @@ enum Command {
 /// Exit status if Ctrl-C ended the program.
 const INTERRUPTED: u8 = 130;
 
-/// The program `stretch-fleet`, called with its name and arguments.
+/// Runs the program with its name and arguments.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = Cli::parse_from(words);
     tell_in_a_line();
@@ -78,7 +78,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
         }
     };
-    // a panic of a query, for example on damaged rows, ends the command like any other error
+    // A panic in a query, for example on damaged rows, ends the command like any other error.
     let result = catch_unwind(AssertUnwindSafe(|| runtime.block_on(work)));
     match result.unwrap_or_else(|panic| Err(gave_up(panic.as_ref()))) {
         Ok(()) => ExitCode::SUCCESS,
@@ -96,7 +96,7 @@ fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
     )
 }
 
-/// The error and its causes; a cause that the text already contains is not repeated.
+/// Joins the error and its causes. A cause that the text already contains is not repeated.
 fn sentence(error: &anyhow::Error) -> String {
     let mut told = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -111,7 +111,7 @@ fn sentence(error: &anyhow::Error) -> String {
 mod tests {
     use super::*;
 
-    /// The commands on the documentation pages are valid: words, options and values.
+    /// The commands on the documentation pages are valid.
     #[test]
     fn every_command_of_the_pages_is_one() {
         let pages = [

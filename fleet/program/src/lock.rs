@@ -1,4 +1,5 @@
-//! Only one command at a time writes into a folder, and leftovers of killed commands are removed.
+//! Locks a folder, so that only one command at a time writes into it, and removes leftovers of
+//! killed commands.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -10,13 +11,13 @@ use anyhow::Context;
 
 use crate::{lake::below, show::warn};
 
-/// The file whose lock is held; it is empty and stays.
+/// The locked file. It is empty and is not removed.
 const FILE: &str = ".stretch-lock";
 
-/// Depth of the records of a calibration below their folder: site, rig, sensor.
+/// Depth of calibration files below their folder: site, rig, sensor.
 pub(crate) const RECORDS_DEPTH: usize = 3;
 
-/// A folder into which no other command of the fleet writes while this exists.
+/// A folder into which no other command of the fleet writes while this value exists.
 ///
 /// The operating system holds the lock and releases it when the process ends, however it ends.
 /// Therefore a lock never outlives its owner.
@@ -53,8 +54,8 @@ impl Lock {
     }
 }
 
-/// Removes temporary files whose writers have ended: a writer holds the lock of its file as long as
-/// it has that name.
+/// Removes temporary files whose writers have ended. A writer locks its file as long as the file
+/// has its temporary name.
 ///
 /// # Errors
 /// A folder that cannot be read, a file that cannot be removed.
@@ -64,7 +65,7 @@ pub(crate) fn remove_abandoned(folder: &Path, depth: usize) -> anyhow::Result<()
         let is_dead = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
         if is_dead {
             match fs::remove_file(path) {
-                // another process found it dead as well
+                // Another process has removed it in the meantime.
                 Err(e) if e.kind() == ErrorKind::NotFound => {}
                 removed => removed.with_context(|| path.display().to_string())?,
             }
@@ -73,7 +74,8 @@ pub(crate) fn remove_abandoned(folder: &Path, depth: usize) -> anyhow::Result<()
     Ok(())
 }
 
-/// Whether a file has the name that `stretch_data::files` writes under: `.stretch-`, six letters or digits, `.tmp`.
+/// Whether a path has a temporary name of `stretch_data::files`: `.stretch-`, six letters or
+/// digits, `.tmp`.
 fn is_temporary(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let letters = name.strip_prefix(".stretch-").and_then(|rest| rest.strip_suffix(".tmp"));

@@ -1,4 +1,4 @@
-//! `stretch-fleet make`: a lake of simulated sensors, as large as is asked for.
+//! `stretch-fleet make`: creates a lake of simulated sensors.
 
 use std::{
     path::PathBuf,
@@ -69,14 +69,14 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What was made, and which sensors drift.
+/// Summary of the run, with the sensors that drift.
 #[derive(Debug, Serialize)]
 struct Made {
     seed: u64,
     sensors: u32,
     days: u32,
-    /// For all sensors and days, including existing ones, because a killed command may have made
-    /// some.
+    /// Rows of all sensors and days. Existing ones are included, because a killed command may have
+    /// made them.
     rows: u64,
     drifting: Vec<String>,
 }
@@ -132,8 +132,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Random generator of a sensor and a day. Each begins at a different number, because neighbouring
-/// streams of one seed are copies of each other, shifted by a few draws.
+/// Returns the random generator of a sensor and a day. Each starts at a different number, because
+/// neighbouring streams of one seed are copies of each other, shifted by a few draws.
 fn dice(seed: u64, of: [u32; 2]) -> RandomGenerator {
     let seed = of.iter().fold(seed, |seed, &part| RandomGenerator::new(seed, part.into()).bits());
     RandomGenerator::new(seed, 0)
@@ -165,7 +165,7 @@ impl Gauge {
         }
     }
 
-    /// Writes a day's trial; how many rows that were.
+    /// Writes the trial of a day. Returns the number of rows written.
     fn day(&self, args: &Args, about: &About, day: u32) -> anyhow::Result<u64> {
         let Some(date) = args.from.checked_add_days(Days::new(day.into())) else {
             anyhow::bail!("{} days after {} there is no date", day, args.from);
@@ -214,7 +214,8 @@ impl Gauge {
         Ok(args.rows.into())
     }
 
-    /// v = offset + gain (c(t - lag) + bend c^2), with noise of a millivolt; c the contraction.
+    /// Simulates v = offset + gain (c(t - lag) + bend c^2) with noise of 1 mV, where c is the
+    /// contraction.
     fn trial(&self, args: &Args, day: u32) -> Trial {
         let mut dice = dice(args.seed, [self.number, day + 1]);
         let moved = if self.drifts && day >= args.days / 2 { 1.0 - args.drift } else { 1.0 };

@@ -1,25 +1,26 @@
-//! Whether a sensor's fit of one month is that of another, and which of many such tests to believe.
+//! Tests whether a sensor's fit has changed between two months, and corrects for many such tests.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use stretch_fit::{Factor, Fit};
 
-/// The triangles of a day: rows whose rate is not below zero, and those below.
+/// The triangular factors of a day: of rows with a rate of at least zero, and of rows with a
+/// negative rate.
 pub(crate) type Day = [Option<Factor<f64, TERMS>>; 2];
 
 const TERMS: usize = stretch_core::Degree::POLY13.terms();
 
-/// Fewest days of a month from which its scatter can be estimated.
+/// Smallest number of days in a month from which its scatter can be estimated.
 const LEAST_DAYS: usize = 4;
 
-/// What a comparison of two months says.
+/// The result of comparing two months.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Compared {
     /// Root mean square change of the fit over the rows of both months, in units of the reference.
     pub change: f64,
-    /// Rows that weigh as much as one independent one.
+    /// Design effect: number of rows with the weight of one independent row.
     pub design_effect: f64,
-    /// Statistic, and its degrees of freedom.
+    /// F statistic. `freedom` holds its two degrees of freedom.
     pub f: f64,
     pub freedom: [f64; 2],
     /// Probability of at least this change if the sensor has not moved.
@@ -28,16 +29,17 @@ pub(crate) struct Compared {
 
 /// Tests whether one pair of surfaces fits both months.
 ///
-/// Let `u_d` be the score of a day at the fit to both months, `U` their sum over the first month,
-/// and `H` its share of the information. Then `Q = U^T (H (1 - H))^-1 U` is what two fits explain
-/// more than one. If residuals were white, `Q` would be chi-square. They are not, because rows of a
-/// day share its temperature, its donning and its slow motion. Therefore days are treated as
-/// independent, but rows are not. The scatter of the `u_d` about their month's mean gives the
-/// covariance of `U`, and the eigenvalues of `K = (H (1 - H))^-1 Cov(U)` are its design effects.
-/// `Q` over their sum is compared with F with `(tr K)^2 / tr K^2` degrees of freedom, and that
-/// times the days minus two (Rao and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas
-/// and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of both branches are tested as one model, each
-/// in units of its residual.
+/// Let `u_d` be the score vector of a day at the fit to both months, `U` the sum of the scores over
+/// the first month, and `H` the first month's share of the information. Then
+/// `Q = U^T (H (1 - H))^-1 U` is the improvement of two fits over one. If residuals were white, `Q`
+/// would have a chi-square distribution. They are not, because rows of a day share its temperature,
+/// its donning and its slow motion. Therefore days are treated as independent, but rows are not.
+/// The scatter of the `u_d` about their month's mean gives the covariance of `U`, and the
+/// eigenvalues of `K = (H (1 - H))^-1 Cov(U)` are its design effects. `Q` over their sum is
+/// compared with an F distribution. Its degrees of freedom are `(tr K)^2 / tr K^2`, and that number
+/// times the number of days minus two (Rao and Scott 1984, doi 10.1214/aos/1176346391, second
+/// order; Thomas and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of both branches are tested as
+/// one model, each in units of its residual.
 pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String> {
     for (which, days) in [("first", first), ("second", second)] {
         if days.len() < LEAST_DAYS {
@@ -89,9 +91,9 @@ pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String>
 struct Branch {
     place: usize,
     fit: Fit<f64, TERMS>,
-    /// Share of the first month of the information.
+    /// The first month's share of the information.
     share: DMatrix<f64>,
-    /// Standard deviation of residuals about the fits of the months.
+    /// Standard deviation of the residuals about the separate fits of the months.
     deviation: f64,
 }
 
@@ -125,7 +127,7 @@ impl Branch {
     }
 }
 
-/// The scores of a day at both fits, in units of the residuals.
+/// Returns the scores of a day for both branches, in units of the residuals.
 fn score(branches: &[Branch; 2], day: &Day) -> Result<DVector<f64>, String> {
     let mut all = DVector::zeros(TERMS * branches.len());
     for (i, branch) in branches.iter().enumerate() {
@@ -138,7 +140,7 @@ fn score(branches: &[Branch; 2], day: &Day) -> Result<DVector<f64>, String> {
     Ok(all)
 }
 
-/// Covariance of the sum of the scores of independent days.
+/// Returns the covariance of the sum of the scores, with days as independent samples.
 fn scatter(scores: &[DVector<f64>]) -> DMatrix<f64> {
     let count = scores.len() as f64;
     let mean = scores.iter().sum::<DVector<f64>>() / count;
@@ -146,7 +148,7 @@ fn scatter(scores: &[DVector<f64>]) -> DMatrix<f64> {
     squares.sum::<DMatrix<f64>>() * (count / (count - 1.0))
 }
 
-/// `sqrt(sum over rows of the change of the fit squared, by rows)`.
+/// Returns the root mean square change of the fit over all rows.
 fn change(branches: &[Branch; 2], apart: &DVector<f64>) -> f64 {
     let own = branches.iter().enumerate().map(|(i, branch)| {
         let part = apart.rows(i * TERMS, TERMS);
@@ -157,10 +159,10 @@ fn change(branches: &[Branch; 2], apart: &DVector<f64>) -> f64 {
     (squares / rows).sqrt()
 }
 
-/// The q-value of each P: the smallest false-discovery rate at which it would be reported
-/// (Benjamini and Hochberg 1995, doi 10.1111/j.2517-6161.1995.tb02031.x). Of those with q up to
-/// 0.05 one in twenty is expected to be a false alarm, whether the tests are independent or
-/// positively correlated.
+/// Returns the q-value of each p-value: the smallest false-discovery rate at which it would be
+/// reported (Benjamini and Hochberg 1995, doi 10.1111/j.2517-6161.1995.tb02031.x). Among the tests
+/// with q up to 0.05, one in twenty is expected to be a false alarm, if the tests are independent
+/// or positively correlated.
 pub(crate) fn q_values(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[b].total_cmp(&p[a]));
@@ -181,7 +183,8 @@ mod tests {
     use stretch_fit::{Sample, SurfaceAccumulator};
     use stretch_gap::RandomGenerator;
 
-    /// A day whose rows share an error, plus a slow one: white noise would be a wrong null.
+    /// A day whose rows share a constant error and a slow error, so that a test that assumes white
+    /// noise would be wrong.
     fn day(dice: &mut RandomGenerator, gain: f64) -> Day {
         let degree = Degree::POLY13;
         let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, TERMS>::new(degree).unwrap());
@@ -204,9 +207,10 @@ mod tests {
         (0..days).map(|_| day(dice, gain)).collect()
     }
 
-    /// Under the null P is below 0.05 for a twentieth of the sensors, whatever rows of a day share:
-    /// 20 +- 4.4 of 400 if P is exact. The F of the second order is an approximation, so up to
-    /// twice as many are accepted; white noise would report nearly all of them.
+    /// Under the null hypothesis, p is below 0.05 for 5 % of the sensors, even if rows of a day are
+    /// correlated: 20 +- 4.4 of 400 if p is exact. The second-order F test is an approximation, so
+    /// up to twice as many are accepted. A test that assumes white noise would report nearly all of
+    /// them.
     #[test]
     fn p_is_what_it_says_where_nothing_has_moved() {
         let mut dice = RandomGenerator::new(5, 0);
@@ -230,7 +234,7 @@ mod tests {
         let mut dice = RandomGenerator::new(6, 0);
         let compared = compare(&month(&mut dice, 20, 1.0), &month(&mut dice, 20, 1.05)).unwrap();
         assert!(compared.p < 1e-3, "{compared:?}");
-        // five hundredths of what moves between 0 and about 0.2
+        // 5 % of a value that moves between 0 and about 0.2.
         assert!((0.002..0.02).contains(&compared.change), "{compared:?}");
     }
 
@@ -243,7 +247,8 @@ mod tests {
         assert!(compare(&whole, &half).unwrap_err().contains("no rows with a falling signal"));
     }
 
-    /// As R's p.adjust(c(0.01, 0.02, 0.03, 0.04, 0.05), "BH") and of unordered ones with ties.
+    /// Expected values from R: p.adjust(c(0.01, 0.02, 0.03, 0.04, 0.05), "BH"), and unordered
+    /// values with ties.
     #[test]
     fn q_values_are_those_of_the_textbook() {
         let q = q_values(&[0.01, 0.02, 0.03, 0.04, 0.05]);

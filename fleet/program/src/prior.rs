@@ -1,4 +1,4 @@
-//! `stretch-fleet prior`: a prior for the next sensor, learnt from all sensors of a lake.
+//! `stretch-fleet prior`: learns a prior for new sensors from all sensors of a lake.
 
 use std::path::PathBuf;
 
@@ -81,11 +81,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// What a sensor is of, from the coarsest to the finest.
+/// Levels of the hierarchy, from the coarsest to the finest.
 const LEVELS: [&str; 3] = ["site", "rig", "sensor"];
 
-/// Number of levels with only one name, before the first that has several, because nothing varies
-/// there.
+/// Returns the number of leading levels that have only one name. They are left out of the prior,
+/// because nothing varies there.
 fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
     let is_one = |level: &usize| {
         let mut all = names.clone().map(|name| &name[*level]);
@@ -95,7 +95,7 @@ fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
     (0..LEVELS.len() - 1).take_while(is_one).count()
 }
 
-/// A data set as the sums that a prior is learnt from.
+/// Converts a data set to the sums from which a prior is learnt.
 fn session(lake: &Lake, name: &Name, above: usize, files: &[&LakeFile]) -> anyhow::Result<Session> {
     let recorded: Vec<Trial> = trials(files)?.into_iter().map(|t| t.trial).collect();
     let of = name[above..LEVELS.len()].join("/");

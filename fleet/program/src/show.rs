@@ -1,4 +1,4 @@
-//! What is printed: answers, warnings, how far work is, and panics in a line.
+//! Output of the program: results, warnings, progress bars, and panics as one line.
 
 use std::{
     any::Any,
@@ -14,10 +14,10 @@ use serde::Serialize;
 
 use crate::lake::Refused;
 
-/// Files that are listed one by one.
+/// Number of refused files that are listed.
 const MOST_TOLD: usize = 20;
 
-/// Prints a line; a reader that has gone is no error.
+/// Prints a line. A closed standard output is no error.
 pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(e.into()),
@@ -30,13 +30,13 @@ pub(crate) fn say_json(value: &impl Serialize) -> anyhow::Result<()> {
     say(serde_json::to_string_pretty(value)?)
 }
 
-/// Writes a message to standard error, separate from the answer.
+/// Writes a message to standard error.
 pub(crate) fn warn(text: impl std::fmt::Display) {
-    // if even this cannot be written, the error cannot be reported
+    // If the message cannot be written, there is no way to report that.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// Says which files were refused, the first of many.
+/// Prints which files were refused; of many, only the first ones.
 pub(crate) fn warn_of(what: &str, refused: &[Refused]) {
     for Refused { file, why } in refused.iter().take(MOST_TOLD) {
         warn(format!("{what} {file}: {why}"));
@@ -46,10 +46,10 @@ pub(crate) fn warn_of(what: &str, refused: &[Refused]) {
     }
 }
 
-/// A bar on standard error, seen on a terminal only.
+/// Returns a progress bar on standard error. It is visible on a terminal only.
 pub(crate) fn bar(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
-    // the template is a constant; if it were wrong, the plain bar is shown
+    // The template is a constant. If it were wrong, the plain bar would be shown.
     if let Ok(style) =
         ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go")
     {
@@ -60,12 +60,12 @@ pub(crate) fn bar(what: &'static str, steps: usize) -> ProgressBar {
 }
 
 thread_local! {
-    /// Whether the caller of this thread's work reports its panic as an error.
+    /// Whether [`caught`] is running on this thread, which reports a panic as an error.
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// From here on a panic is one line on standard error, without a backtrace, and nothing if
-/// [`caught`] makes it an error.
+/// From now on, a panic prints one line on standard error, without a backtrace. It prints nothing
+/// if [`caught`] turns it into an error.
 pub(crate) fn tell_in_a_line() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -78,7 +78,7 @@ pub(crate) fn tell_in_a_line() {
     });
 }
 
-/// What a reader answers; its panic concerns only one file and is reported as its error.
+/// Runs a reader and turns its panic into an error, because a panic concerns only one file.
 ///
 /// The readers of Parquet and of the Arrow schema in its footer panic on some damaged files:
 /// `arrow-ipc` has an `unimplemented!` or an `unwrap` for invalid schemas. No option switches that
@@ -94,7 +94,7 @@ pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> anyhow::Result<T> {
     answer.map_err(|panic| anyhow::anyhow!("its reader gave up: {}", message(panic.as_ref())))
 }
 
-/// What a panic says.
+/// Returns the message of a panic.
 pub(crate) fn message(panic: &(dyn Any + Send)) -> &str {
     let owned = panic.downcast_ref::<String>().map(String::as_str);
     owned.or(panic.downcast_ref::<&str>().copied()).unwrap_or("it does not say why")

@@ -1,4 +1,4 @@
-//! Which trials are to be added to a lake, and where each belongs.
+//! The trials to be added to a lake, and the place of each.
 
 use std::{
     fs,
@@ -13,8 +13,8 @@ use stretch_recording::{ReadOptions, Recording, RecordingError};
 
 use crate::lake::{COLUMNS, Place};
 
-/// A pattern of the last parts of a path: `{site}/{rig}/{sensor}/{date}_*.csv`. `*` matches
-/// anything within a part. A name and `*` end where the text behind them first occurs.
+/// A pattern for the last parts of a path: `{site}/{rig}/{sensor}/{date}_*.csv`. `*` matches
+/// anything within a part. A name or `*` ends at the first occurrence of the text that follows it.
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern(Regex);
 
@@ -57,7 +57,8 @@ impl FromStr for Pattern {
 }
 
 impl Pattern {
-    /// What a path says of site, rig, sensor and date; `None` if it does not match the pattern.
+    /// Returns site, rig, sensor and date from a path, or `None` if the path does not match the
+    /// pattern.
     fn read(&self, path: &Path) -> Option<[Option<String>; 4]> {
         let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy()).collect();
         let path = parts.join("/");
@@ -107,13 +108,13 @@ impl Where {
     }
 }
 
-/// A trial as it lies on a disk.
+/// A file or an entry of a data set to be read as a trial.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub path: PathBuf,
-    /// Where it belongs, or why that is unknown.
+    /// The place of the trial, or why it is unknown.
     pub place: anyhow::Result<Place>,
-    /// Its line in a dataset.toml, and the folder of that.
+    /// The folder of its data set and its entry in `dataset.toml`.
     entry: Option<(PathBuf, TrialEntry)>,
 }
 
@@ -123,7 +124,7 @@ impl Source {
         Self { path, place, entry }
     }
 
-    /// Whether it is a device or a pipe, which may have no end.
+    /// Whether the path is a device or a pipe, which may have no end.
     pub(crate) fn is_endless(&self) -> bool {
         fs::metadata(&self.path).is_ok_and(|about| !about.is_file())
     }
@@ -148,8 +149,8 @@ impl Source {
     }
 }
 
-/// The trials of some paths: a file is one trial, a folder with a dataset.toml gives its trials,
-/// any other folder every file below it.
+/// Returns the trials of some paths: a file is one trial, a folder with a `dataset.toml`
+/// contributes its trials, and any other folder every file below it.
 pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<Source>> {
     let mut found = Vec::new();
     let mut rest: Vec<PathBuf> = paths.iter().rev().cloned().collect();
@@ -165,7 +166,7 @@ pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<S
             let mut below = Vec::new();
             for entry in fs::read_dir(&path).with_context(|| path.display().to_string())? {
                 let entry = entry?;
-                // temporary files of a killed writer are no trials
+                // Temporary files of a killed writer are no trials.
                 if !entry.file_name().to_string_lossy().starts_with(".stretch-") {
                     below.push(entry.path());
                 }
@@ -192,7 +193,7 @@ mod tests {
         let told = ["ulm", "r2", "0042", "20260103"].map(|x| Some(x.to_owned()));
         assert_eq!(found, Some(told));
         let found = read("sleeve-{sensor}-{date}.csv", "sleeve-a-7-2026-01-03.csv").unwrap();
-        // the first occurrence of the text behind a name ends the name
+        // The first occurrence of the text after a name ends the name.
         assert_eq!(found[2].as_deref(), Some("a"));
         assert_eq!(found[3].as_deref(), Some("7-2026-01-03"));
         assert_eq!(read("{site}/{sensor}.csv", "ulm/7.npz"), None);

@@ -1,4 +1,5 @@
-//! `stretch-fleet sql`: any question of a lake, and where questions are answered: here, or on a cluster.
+//! `stretch-fleet sql`: runs a query on a lake. Also the options for running queries on this
+//! machine or on a cluster.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -62,8 +63,8 @@ pub(crate) struct On {
 }
 
 impl On {
-    /// Opens the lake, reports its problems, and returns it with a session in which it is the table
-    /// `trials`. Nothing is written.
+    /// Opens the lake and returns it with a session that has the table `trials`. Problems of the
+    /// lake are reported, and nothing is written.
     pub(crate) async fn open(&self) -> anyhow::Result<(Lake, SessionContext)> {
         let lake = lake_with_trials(&self.lake)?;
         lake.notes.iter().for_each(|note| warn(format!("note: {note}")));
@@ -72,14 +73,14 @@ impl On {
         Ok((lake, session))
     }
 
-    /// Number of threads of this machine among which a command shares its work; `None` if a cluster
-    /// answers.
+    /// Returns the number of threads on this machine that share the work of a command, or `None` if
+    /// a cluster runs the queries.
     pub(crate) fn shares(&self) -> Option<usize> {
         self.cluster.is_none().then(|| stretch_gap::threads(self.threads.unwrap_or(0)))
     }
 
-    /// The same for a command that writes partial fits into the lake: no other command writes until
-    /// the lock is released.
+    /// As `On::open`, for a command that writes partial fits into the lake. No other command
+    /// writes until the lock is released.
     pub(crate) async fn open_to_write(&self) -> anyhow::Result<(Lock, Lake, SessionContext)> {
         ensure!(self.lake.is_dir(), "{}: there is no such folder", self.lake.display());
         let lock = Lock::of(&self.lake, usize::MAX)?;
@@ -126,19 +127,20 @@ fn is_of_writing(error: &DataFusionError) -> bool {
     matches!(error.find_root(), DataFusionError::Plan(text) if text.contains("not supported: "))
 }
 
-/// Size of the cached listing of a lake: about a hundred bytes per file.
+/// Size of the cached file listing of a lake, bytes; about a hundred bytes per file.
 const LISTING_BYTES: usize = 256 << 20;
 
-/// A session with the functions of the library.
+/// Returns a session with the functions of the library.
 ///
 /// # Errors
-/// A URL that names no scheduler. A scheduler that does not answer is an error of the first query.
+/// A URL that is not that of a scheduler. A scheduler that does not answer is an error of the first
+/// query.
 pub(crate) async fn session(
     cluster: Option<&str>,
     threads: Option<usize>,
 ) -> anyhow::Result<SessionContext> {
-    // Statistics of a file ignore NaN: a column of one number and NaN would be read as that number
-    // throughout.
+    // File statistics ignore NaN. With them, a column that contains one number and NaN would be
+    // read as that number in every row.
     let mut config =
         SessionConfig::new().with_information_schema(true).with_collect_statistics(false);
     if let Some(threads) = threads {
@@ -153,10 +155,10 @@ pub(crate) async fn session(
     Ok(session)
 }
 
-/// The answers to a question of all of `all`, which are in order.
+/// Runs a query about the items of `all`, which are sorted, and returns its results in order.
 ///
-/// On this machine one question a share of them is asked, and `question` has the condition of a
-/// share. A cluster answers one question of all.
+/// On this machine the items are divided into shares, and one query is run for each. `question`
+/// returns the query for the condition of a share. A cluster runs one query about all items.
 pub(crate) async fn ask_in_shares<T: Copy>(
     session: &SessionContext,
     shares: Option<usize>,
@@ -172,10 +174,10 @@ pub(crate) async fn ask_in_shares<T: Copy>(
     in_order(session, shares.map(|own| question(&condition(own))).collect()).await
 }
 
-/// Answers of several questions, one after the other.
+/// Runs several queries and returns their results in order.
 ///
-/// Each query is answered by one thread, which takes files and rows in their order, and all queries
-/// run at once. Therefore sums have the same bits in every run, however many queries there are.
+/// Each query runs in one thread, which processes files and rows in order, and all queries run in
+/// parallel. Therefore sums have the same bits in every run, however many queries there are.
 async fn in_order(
     session: &SessionContext,
     questions: Vec<String>,

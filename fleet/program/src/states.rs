@@ -1,4 +1,4 @@
-//! Partial fits, one per day: computed once, stored, and merged by each query.
+//! Partial fits, one per sensor and day: computed once, stored, and merged by each query.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -24,10 +24,10 @@ use crate::{
     sql::ask_in_shares,
 };
 
-/// The key of what a file of states was computed from.
+/// Metadata key of the digest of a file's sources.
 const SOURCES: &str = "stretch.sources";
 
-/// Trials of a rig in a month: the content of one file of states.
+/// Trials of a rig in a month, whose states are stored in one file.
 struct Unit<'a> {
     path: PathBuf,
     month: String,
@@ -35,7 +35,7 @@ struct Unit<'a> {
 }
 
 impl Unit<'_> {
-    /// A digest of the trials and of the functions' release; it changes with either.
+    /// Returns a digest of the trials and of the functions' release. It changes with either.
     fn sources(&self) -> String {
         let version = format!("poly13 {} {}", stretch_fleet::VERSION, stretch_fleet::STATE_VERSION);
         let names = self.files.iter().map(|file| file.footer.digest.as_bytes());
@@ -51,7 +51,8 @@ impl Unit<'_> {
         own == Some(self.sources())
     }
 
-    /// Computes the states of all sensors and days in one pass, and writes them whole.
+    /// Computes the states of all sensors and days in one pass, and writes the file completely or
+    /// not at all.
     ///
     /// Threads of this machine share the sensors. Each takes the rows of its sensors in their
     /// order, so that sums have the same bits in every run. Machines of a cluster share the rows,
@@ -88,7 +89,7 @@ impl Unit<'_> {
     }
 }
 
-/// The states as this program stores them, whatever types the engine used for texts.
+/// Returns the schema of stored states. The query engine may use other types for texts.
 fn schema() -> SchemaRef {
     Arc::new(Schema::new(vec![
         Field::new("sensor", DataType::Utf8, true),
@@ -108,9 +109,10 @@ fn plain(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
 }
 
 /// Computes missing states, and those whose trials have changed, and registers all of them as the
-/// table `states`: site, rig, sensor, date, state. Returns how many months were computed.
+/// table `states`: site, rig, sensor, date, state. Returns the number of months that were computed.
 ///
-/// A month of a rig is written completely, so the next run only computes what a kill left undone.
+/// A month of a rig is written completely, so the next run only computes the months that a kill
+/// left out.
 pub(crate) async fn bring_up(
     lake: &Lake,
     session: &SessionContext,
@@ -125,7 +127,7 @@ pub(crate) async fn bring_up(
         let unit = units.entry(path.clone());
         unit.or_insert(Unit { path, month, files: Vec::new() }).files.push(file);
     }
-    // states of trials that are gone
+    // Removes states of trials that do not exist any more.
     for path in crate::lake::files(&folder)? {
         if !units.contains_key(&path) {
             std::fs::remove_file(&path).with_context(|| path.display().to_string())?;

@@ -1,4 +1,4 @@
-//! FMUs that are built here, and a problem of the servo in them.
+//! FMUs built for the tests, and a problem with the servo that they simulate.
 #![allow(dead_code)]
 
 use std::{
@@ -64,23 +64,23 @@ pub(crate) struct Built {
     pub(crate) file: PathBuf,
 }
 
-/// What is to be wrong with an FMU.
+/// The fault to build into an FMU.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wrong {
     Nothing,
-    /// Its library has no function for a step.
+    /// Its library lacks the function for a step.
     Function,
     /// Its library is for another machine.
     Platform,
-    /// Its library is none.
+    /// Its library is not a valid library file.
     Library,
-    /// It is not the one that its description is of.
+    /// Its token differs from that of the description.
     Token,
-    /// It has no description.
+    /// It has no model description.
     Description,
-    /// It is of the first version.
+    /// It is of FMI 1.
     Version,
-    /// It brings no solver.
+    /// It contains no solver.
     Exchange,
 }
 
@@ -134,7 +134,7 @@ fn skipped(why: &str) -> Option<Built> {
     None
 }
 
-/// The servo in Rust, each trial from rest.
+/// The equations of the servo in Rust. Each trial starts at rest.
 pub(crate) fn angle(dt_s: f64, gain: f64, tau: f64, brake: f64, u: &[f64]) -> Vec<f64> {
     let mut angle = 0.0_f64;
     let one = |u: &f64| {
@@ -146,7 +146,7 @@ pub(crate) fn angle(dt_s: f64, gain: f64, tau: f64, brake: f64, u: &[f64]) -> Ve
     u.iter().map(one).collect()
 }
 
-/// Answers an ask as the FMU has to.
+/// Computes the expected answer of the FMU.
 pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, SourceError> {
     let session = problem.session();
     let samples = session.samples(ask.trials);
@@ -157,7 +157,7 @@ pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, Sourc
     Ok(trials.flat_map(|t| angle(session.dt_s, gain, tau, brake, &u[t.samples.clone()])).collect())
 }
 
-/// Two recordings of a servo that brakes with 2 degrees, and a simulator with a brake that is off.
+/// Two recordings of a servo with a brake of 2 degrees, and a simulator whose brake is off.
 pub(crate) fn spec() -> ProblemSpec {
     let trial = |index: u64| {
         let mut random = RandomGenerator::new(3, index);

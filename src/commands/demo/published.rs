@@ -1,4 +1,4 @@
-//! A knee in a knitted sleeve, as its authors published it.
+//! Reader for published recordings of a knee in a knitted sleeve, in the authors' file format.
 
 use std::{
     io::{BufRead, BufReader, Read},
@@ -8,27 +8,28 @@ use std::{
 use anyhow::{Context, bail, ensure};
 use stretch_data::{Channel, Trial, files::open_input};
 
-/// Where the files are.
+/// Repository of the files.
 pub(super) const REPOSITORY: &str = "github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve";
-/// The version of them that was read.
+/// Commit of the repository for which this reader was written.
 pub(super) const COMMIT: &str = "47369abac95fd43a10ada4156dd22cae91ee7f70";
 
-/// The columns that are read; accelerometer and gyroscope follow.
+/// The columns that are read. Columns of accelerometer and gyroscope follow.
 const COLUMNS: [&str; 6] = ["angle_deg", "s1", "s2", "s3", "s4", "s5"];
-/// No line of such a file is as long, bytes.
+/// Limit for the length of a line, bytes; real lines are shorter.
 const LONGEST: u64 = 64 << 10;
 /// The authors' sample rate.
 const RATE_HZ: f64 = 100.0;
 
-/// The sessions of a published file; none when its first line is no row of numbers.
+/// Reads the sessions of a published file. Returns `None` if its first line does not start with a
+/// number.
 ///
-/// The file has no header and no time: knee angle in degrees, five changes of resistance
-/// over the resistance at rest, six columns of an inertial sensor; 100 rows a second.
-/// Sessions follow each other. The resistances at rest are those of a session's first row,
-/// so that all five changes are exactly zero there: that is where the file is cut.
+/// The file has no header and no time column. A row holds the knee angle in degrees, five relative
+/// changes of resistance (change over resistance at rest), and six columns of an inertial sensor.
+/// There are 100 rows per second. Sessions follow each other. The resistance at rest is that of a
+/// session's first row, so all five changes are exactly zero there. The file is split at such rows.
 ///
 /// # Errors
-/// A file that cannot be read, and fields that are not numbers.
+/// Files that cannot be read, and fields that are not numbers.
 pub(super) fn sessions(path: &Path) -> anyhow::Result<Option<Vec<Trial>>> {
     let told = || format!("{}: cannot read it as text", path.display());
     let mut file = BufReader::new(open_input(path).with_context(told)?);
@@ -36,7 +37,7 @@ pub(super) fn sessions(path: &Path) -> anyhow::Result<Option<Vec<Trial>>> {
     let mut line = String::new();
     for number in 1.. {
         line.clear();
-        // what has no lines may have no end either
+        // The limit is needed because a binary file may contain no line end.
         let length = (&mut file).take(LONGEST).read_line(&mut line).with_context(told)?;
         let text = line.trim_start_matches('\u{feff}').trim();
         if number == 1

@@ -1,4 +1,4 @@
-//! What the job is done on: a data set, a folder of sessions, or published files.
+//! Input of the demo: a data set, a folder of sessions, or published files.
 
 use std::{
     collections::BTreeMap,
@@ -16,36 +16,38 @@ use stretch_sim::Catalogue;
 use super::published::{self, COMMIT, REPOSITORY};
 use crate::commands::shared::short_name;
 
-/// References and signals that need no naming, the first that is there.
+/// Columns of the reference that need not be named; the first existing one is used.
 const REFERENCES: [&str; 2] = ["length_mm", "angle_deg"];
 const SIGNAL: &str = "bridge_v";
-/// Columns that are neither.
+/// Columns that are neither reference nor signal.
 const OTHERS: [&str; 3] = ["inlet", "outlet", "pressure_kpa"];
 
 /// Trials to fit and to test on.
 pub(super) struct Sessions {
-    /// What the data are called.
+    /// Name of the data.
     pub(super) name: String,
     /// Column of the reference.
     pub(super) reference: String,
-    /// Columns to choose the signal from.
+    /// Columns among which the signal is chosen.
     pub(super) signals: Vec<String>,
-    /// Everything that may be fitted.
+    /// Trials that may be fitted.
     pub(super) fit: Vec<(TrialKind, Trial)>,
-    /// What is judged on.
+    /// Trials used for testing.
     pub(super) test: Vec<(TrialKind, Trial)>,
-    /// Where they come from, in sentences.
+    /// Notes on the origin of the data.
     pub(super) notes: Vec<String>,
-    /// The data set's folder, where it is one.
+    /// Folder of the data set, if the input is one.
     folder: Option<PathBuf>,
 }
 
 impl Sessions {
-    /// Reads a folder with a `dataset.toml`; a folder of CSV files, of which those that differ
-    /// in a last `_1`, `_2`, ... belong together, or one such group of it by its name; or one file with several sessions.
+    /// Reads a folder with a `dataset.toml`; a folder of CSV files, in which files that differ only
+    /// in a final `_1`, `_2`, ... form a group; one such group by its name; or one file with
+    /// several sessions.
     ///
     /// # Errors
-    /// What cannot be read, has no session to test on, or needs naming.
+    /// Files that cannot be read; no session to test on; a reference or signal that has to be
+    /// named.
     pub(super) fn read(
         path: &Path,
         reference: Option<&str>,
@@ -90,7 +92,8 @@ impl Sessions {
         Ok(Self { name, reference: reference.to_owned(), signals, fit, test, notes, folder })
     }
 
-    /// What the paper's calibrations are fitted on: its ramps, where there are any.
+    /// Returns the trials to which the paper's calibrations are fitted: its ramps, or all trials if
+    /// there are no ramps.
     pub(super) fn ramps(&self) -> Vec<Trial> {
         let is_ramp = |kind: TrialKind| matches!(kind, TrialKind::Inflation | TrialKind::Deflation);
         let any = self.fit.iter().any(|(kind, _)| is_ramp(*kind));
@@ -98,7 +101,7 @@ impl Sessions {
         kept.map(|(_, trial)| trial.clone()).collect()
     }
 
-    /// The rig, or the gauge alone, with its simulator.
+    /// Returns the diagnosis problem: the rig, or the gauge alone, with its simulator.
     ///
     /// # Errors
     /// Trials that cannot be diagnosed.
@@ -111,7 +114,8 @@ impl Sessions {
             let reading = Reading { columns, ..Reading::default() };
             return Ok(Problem::read(folder, &reading)?.named(&self.name));
         }
-        // A session has its own zero, and the pause before the next is unknown.
+        // Only the first session is used. Each session has a different zero, and the pause before
+        // the next one is unknown.
         let first = self.fit.iter().take(1);
         let trials: Vec<SessionTrial> =
             first.map(|(_, trial)| SessionTrial::new(trial.clone())).collect();
@@ -126,7 +130,7 @@ impl Sessions {
     }
 }
 
-/// Name, trials to fit, trials to test on, and a sentence.
+/// Name, trials to fit, trials to test on, and a note.
 type Parts = (String, Vec<(TrialKind, Trial)>, Vec<(TrialKind, Trial)>, String);
 
 fn data_set(folder: &Path) -> anyhow::Result<Parts> {
@@ -147,14 +151,14 @@ fn data_set(folder: &Path) -> anyhow::Result<Parts> {
     Ok((name_of(folder), of(Split::Fit)?, of(Split::Test)?, note))
 }
 
-/// Whether a folder has groups of sessions, and no `dataset.toml`.
+/// Whether a folder has groups of sessions and no `dataset.toml`.
 fn has_groups(folder: &Path) -> bool {
     folder.is_dir()
         && !folder.join("dataset.toml").exists()
         && groups(folder).is_ok_and(|groups| !groups.is_empty())
 }
 
-/// One group of files without a `dataset.toml`: the last session is tested on.
+/// Reads one group of files without a `dataset.toml`. The last session is used for testing.
 fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
     let groups = groups(path)?;
     let names: Vec<&str> = groups.keys().map(String::as_str).collect();
@@ -197,7 +201,7 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
     Ok((name.to_owned(), fit, test, note))
 }
 
-/// CSV files by their names without a last `_1`, `_2`, ...
+/// Groups CSV files by their names without a final `_1`, `_2`, ...
 fn groups(path: &Path) -> anyhow::Result<BTreeMap<String, Vec<PathBuf>>> {
     let mut files = vec![path.to_owned()];
     if path.is_dir() {

@@ -1,4 +1,4 @@
-//! The port: bytes from a serial line that may go away and come back.
+//! The port: reads bytes from a serial line that may disconnect and reconnect.
 
 use std::{
     fs::{File, OpenOptions},
@@ -9,26 +9,26 @@ use std::{
     time::Duration,
 };
 
-/// What the port has to say.
+/// An event of the port.
 pub(crate) enum Heard {
     Bytes(Vec<u8>),
     Connected,
-    /// With the reason; it is opened again until the user stops listening.
+    /// With the reason. The port is reopened until the user stops listening.
     Disconnected(String),
-    /// The end of a stream that does not come back: a pipe or a file.
+    /// The end of a stream that cannot reconnect: a pipe or a file.
     Ended,
 }
 
-/// How long to wait before a port that went away is opened again.
+/// Delay before reopening a disconnected port.
 const RETRY: Duration = Duration::from_millis(200);
 
-/// Pieces that may wait: a port that is faster than what is made of it waits itself.
+/// Largest number of queued events. If the queue is full, reading the port waits.
 const WAITING: usize = 64;
 
-/// Reads a port from now on, `-` for standard input.
+/// Starts to read a port; `-` is standard input.
 ///
 /// # Errors
-/// When the port cannot be opened the first time, or is a folder.
+/// A port that cannot be opened the first time, or that is a folder.
 pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
     let (sender, heard) = sync_channel(WAITING);
     if path.as_os_str() == "-" {
@@ -40,14 +40,14 @@ pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
     }
     let first = open(path, baud)?;
     if first.metadata()?.is_dir() {
-        // it opens, and no byte ever comes
+        // A folder can be opened, but delivers no bytes.
         return Err(io::Error::new(
             io::ErrorKind::IsADirectory,
             "it is a folder; name a serial port",
         ));
     }
     let path = path.to_owned();
-    // Reading blocks; the thread ends with the program, or when the receiver is gone.
+    // Reading blocks. The thread ends with the program, or when the receiver is dropped.
     thread::spawn(move || keep_reading(first, path, baud, &sender));
     Ok(heard)
 }
@@ -100,7 +100,8 @@ fn open(path: &Path, baud: u32) -> io::Result<File> {
 
     let mut options = OpenOptions::new();
     options.read(true);
-    // a terminal must not become ours, where its Ctrl-C would be
+    // Without NOCTTY the port would become the controlling terminal, and a Ctrl-C byte on the line
+    // would interrupt the program.
     let port = options.custom_flags(OFlags::NOCTTY.bits() as i32).open(path)?;
     if termios::isatty(&port) {
         let mut settings = termios::tcgetattr(&port)?;
@@ -113,6 +114,6 @@ fn open(path: &Path, baud: u32) -> io::Result<File> {
 
 #[cfg(not(unix))]
 fn open(path: &Path, _baud: u32) -> io::Result<File> {
-    // set up beforehand (mode COM3 ...)
+    // The user sets the speed beforehand (mode COM3 ...).
     OpenOptions::new().read(true).open(path)
 }

@@ -1,4 +1,4 @@
-//! The trial that is recorded: a line a sample, on the disk as it comes.
+//! The recorded trial: each sample is written to disk as one line when it arrives.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -12,13 +12,13 @@ use stretch_receptor::code::{Adc, AdcCode};
 
 use super::Twin;
 
-/// One sample as it is shown and recorded.
+/// One sample, as shown and recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub time_s: f64,
-    /// In the signal's unit; `None` for a sample that the board did not get.
+    /// In the unit of the signal; `None` for a sample that the board did not get.
     pub signal: Option<f64>,
-    /// In the reference's unit; `None` when withheld.
+    /// In the unit of the reference; `None` if the board withholds the estimate.
     pub estimate: Option<f64>,
     pub frame: Frame,
 }
@@ -32,19 +32,19 @@ impl Sample {
         Self { time_s, signal: adc.volts(AdcCode(frame.code)), estimate, frame }
     }
 
-    /// `time_s,signal,code,estimate,branch,domain`, empty where there is nothing.
+    /// Appends `time_s,signal,code,estimate,branch,domain`; missing values are empty.
     pub(crate) fn push_line(&self, line: &mut Vec<u8>) {
         push_number(line, self.time_s);
         line.push(b',');
         if let Some(signal) = self.signal {
             push_number(line, signal);
         }
-        // writing to memory cannot fail
+        // Writing to memory cannot fail.
         let _ = writeln!(line, ",{},{}", self.frame.code, self.frame.answer);
     }
 }
 
-/// The header of the lines, in the names of the calibration.
+/// Returns the header of the lines, with the names from the calibration.
 pub(crate) fn header(twin: &Twin) -> String {
     let estimate = match twin.unit.as_str() {
         "" => "estimate".to_owned(),
@@ -53,19 +53,19 @@ pub(crate) fn header(twin: &Twin) -> String {
     format!("time_s,{},adc_code,{estimate},branch,domain\n", twin.signal)
 }
 
-/// A trial file that grows by whole lines; one without a row goes when this does.
+/// A trial file that grows by complete lines. It is removed on drop if it has no row.
 pub(crate) struct TrialFile {
     path: PathBuf,
     file: File,
     line: Vec<u8>,
-    /// Bytes of whole lines.
+    /// Length of the complete lines, bytes.
     whole: u64,
     rows: u64,
 }
 
 impl TrialFile {
-    /// A new file; one that exists is not touched, save for what a recording that was killed before
-    /// its first row has left.
+    /// Creates the file. An existing file is refused, unless it contains only the header of a
+    /// recording that was killed before its first row.
     pub(crate) fn create(path: &Path, header: &str) -> io::Result<Self> {
         let file = match OpenOptions::new().write(true).create_new(true).open(path) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => without_a_row(path)?
@@ -76,7 +76,7 @@ impl TrialFile {
                 })?,
             other => other?,
         };
-        // where files cannot be locked, two recordings into one file look like one after the other
+        // If files cannot be locked, two recordings into one file cannot be detected.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(io::Error::other("another recording goes there"));
         }
@@ -87,13 +87,13 @@ impl TrialFile {
         Ok(recording)
     }
 
-    /// Rows so far.
+    /// Returns the number of rows so far.
     pub(crate) fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// One write a sample, so that a program that is killed leaves whole lines.
-    /// A sample without a signal is no row of a trial: its time is a gap.
+    /// Writes a sample with a single call, so that a killed program leaves complete lines. A sample
+    /// without a signal is not written. It remains a gap in time.
     pub(crate) fn push(&mut self, sample: &Sample) -> io::Result<()> {
         if sample.signal.is_none() {
             return Ok(());
@@ -109,7 +109,8 @@ impl TrialFile {
         let written = self.file.write_all(&self.line);
         match written {
             Ok(()) => self.whole += self.line.len() as u64,
-            // a disk that is full took a part of the line: the error reports why, not that this truncation failed too
+            // A full disk may have taken a part of the line, which is cut off again. The first
+            // error is reported, not one of the truncation.
             Err(_) => drop(self.file.set_len(self.whole)),
         }
         written
@@ -120,9 +121,9 @@ impl TrialFile {
     }
 }
 
-/// A file that holds nothing but a header of ours, opened at its begin.
+/// Opens a file that contains nothing but a header of this program, positioned at its start.
 fn without_a_row(path: &Path) -> io::Result<Option<File>> {
-    // to open a pipe would wait for its reader
+    // Opening a pipe would wait for its reader.
     if !fs::symlink_metadata(path)?.is_file() {
         return Ok(None);
     }
@@ -142,7 +143,7 @@ fn without_a_row(path: &Path) -> io::Result<Option<File>> {
 }
 
 impl Drop for TrialFile {
-    /// A header alone would block the next try.
+    /// Removes a file that contains only a header, because it would block the next attempt.
     fn drop(&mut self) {
         if self.rows == 0 {
             let _ = fs::remove_file(&self.path);

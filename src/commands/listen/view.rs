@@ -1,6 +1,7 @@
-//! What is seen while `listen` runs: CSV rows on standard output, a status line on a terminal.
+//! Display of `listen`: CSV rows on standard output, and a status line on a terminal.
 //!
-//! A separate thread writes both, so that a slow reader or a stopped terminal cannot hold up a recording.
+//! A separate thread writes both, so that a slow reader or a stopped terminal cannot delay a
+//! recording.
 
 use std::{
     io::{self, BufWriter, IsTerminal, Write},
@@ -22,30 +23,30 @@ use crate::{
     display::{Output, shows_progress, warn},
 };
 
-/// Blocks that may wait for a reader of standard output while a recording goes on. A block is what was read from the port at
-/// once, 4096 bytes at most, so that all of them are 64 MB at most.
+/// Largest number of blocks queued for standard output while a recording continues. A block is the
+/// result of one read of the port, at most 4096 bytes, so the queue holds at most 64 MB.
 const WAITING: usize = 16_384;
 
-/// How long Ctrl-C leaves a reader of standard output that does not read.
+/// After Ctrl-C, time to wait for a reader of standard output that does not read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Time between two states of the status line.
+/// Minimum time between updates of the status line.
 const REFRESH: Duration = Duration::from_millis(100);
 
 pub(crate) struct View {
     blocks: SyncSender<Shown>,
-    /// Whether rows go to standard output at all.
+    /// Whether rows are written to standard output.
     has_rows: bool,
     /// Set once a write to standard output failed.
     gone: Arc<AtomicBool>,
     done: Receiver<()>,
-    /// Without a recording the port waits for the reader of the rows.
+    /// Whether the port waits for the reader of the rows, which is the case without a recording.
     waits: bool,
     unseen: u64,
     refreshed: Instant,
 }
 
-/// What the thread gets to write.
+/// Items for the writing thread.
 enum Shown {
     Rows(Vec<u8>),
     Note(String),
@@ -53,7 +54,8 @@ enum Shown {
 }
 
 impl View {
-    /// `has_rows`: whether samples go to standard output. `waits`: whether the port waits for their reader.
+    /// Starts the thread. `has_rows`: whether samples are written to standard output. `waits`:
+    /// whether the port waits for their reader.
     pub(crate) fn open(header: &str, has_rows: bool, waits: bool) -> Self {
         let (blocks, shown) = sync_channel(WAITING);
         let (finished, done) = channel();
@@ -68,7 +70,7 @@ impl View {
                     Shown::Status(text) => bar.set_message(text),
                     Shown::Note(text) => bar.suspend(|| warn(format!("stretch: {text}"))),
                     Shown::Rows(_) if is_gone.load(SeqCst) => {}
-                    // `Output` keeps the failure, and the end of the program reports it
+                    // `Output` stores the error, and it is reported at the end of the program.
                     Shown::Rows(rows) => {
                         if out.write_all(&rows).and_then(|()| out.flush()).is_err() {
                             is_gone.store(true, SeqCst);
@@ -82,7 +84,7 @@ impl View {
         Self { blocks, has_rows, gone, done, waits, unseen: 0, refreshed: Instant::now() }
     }
 
-    /// Whether the reader of the rows has gone.
+    /// Whether the reader of the rows has closed standard output.
     pub(crate) fn is_gone(&self) -> bool {
         self.gone.load(SeqCst)
     }
@@ -94,19 +96,19 @@ impl View {
         let mut rows = Vec::with_capacity(64 * samples.len());
         samples.iter().for_each(|sample| sample.push_line(&mut rows));
         if self.waits {
-            // the thread lives as long as this does
+            // This cannot fail, because the thread lives as long as this value.
             let _ = self.blocks.send(Shown::Rows(rows));
         } else if let Err(TrySendError::Full(_)) = self.blocks.try_send(Shown::Rows(rows)) {
             self.unseen += samples.len() as u64;
         }
     }
 
-    /// A note on standard error, which is dropped if too much waits already.
+    /// Queues a note for standard error. It is dropped if the queue is full.
     pub(crate) fn note(&self, text: &str) {
         let _ = self.blocks.try_send(Shown::Note(text.to_owned()));
     }
 
-    /// Renews the status line, ten times a second at most.
+    /// Updates the status line, at most ten times per second.
     pub(crate) fn refresh(&mut self, status: &Status) {
         if self.refreshed.elapsed() >= REFRESH {
             self.refreshed = Instant::now();
@@ -114,7 +116,8 @@ impl View {
         }
     }
 
-    /// Waits until all is shown, after Ctrl-C for a second at most; returns how many samples were not shown.
+    /// Waits until everything is written, after Ctrl-C for at most one second. Returns the number
+    /// of samples that were not shown.
     pub(crate) fn close(self) -> u64 {
         drop(self.blocks);
         let mut asked = None;
@@ -128,8 +131,8 @@ impl View {
     }
 }
 
-/// A line on standard error that is drawn again and again. Nothing is drawn if that is no terminal, or if rows scroll by on a
-/// terminal.
+/// Returns a status line on standard error. It is hidden if standard error is not a terminal, or if
+/// rows are written to the terminal.
 fn status_line(has_rows: bool) -> ProgressBar {
     let bar = ProgressBar::no_length();
     if let Ok(style) = ProgressStyle::with_template("{wide_msg}") {
@@ -141,36 +144,37 @@ fn status_line(has_rows: bool) -> ProgressBar {
     bar
 }
 
-/// How the link does.
+/// State of the link.
 #[derive(Debug, Default)]
 pub(crate) struct Status {
     pub(super) connected: bool,
     pub(super) counts: Counts,
-    /// Samples that the board did not get.
+    /// Samples that the board did not get from its converter.
     pub(super) missing: u64,
-    /// Codes that a converter of `adc_bits` cannot give, and the largest.
+    /// Number of codes outside the range of a converter of `adc_bits`, and the largest of them.
     pub(super) beyond: u64,
     pub(super) largest: i32,
     pub(super) adc_bits: u8,
-    /// How many estimates of the board's were compared with those here, and the largest
-    /// difference; `None` if the calibration cannot answer.
+    /// Number of the board's estimates that were compared with those computed here, and the largest
+    /// difference; `None` if the calibration has no live estimates.
     pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,
-    /// The last estimate of the board's.
+    /// The board's latest estimate.
     pub(super) newest: Option<f64>,
-    /// Frames at which the board's clock had not advanced although the calibration's period is a tick of it or more.
+    /// Frames at which the board's clock had not advanced, although the sample period is at least
+    /// one tick of the clock.
     pub(super) standing: u64,
-    /// Rows that were recorded, at the end of a recording.
+    /// Number of recorded rows, set at the end of a recording.
     pub(super) rows: Option<u64>,
 }
 
 impl Status {
-    /// Nothing has come yet.
+    /// Returns the state before the first byte.
     pub(super) fn of(unit: &str) -> Self {
         Self { unit: unit.to_owned(), ..Self::default() }
     }
 
-    /// What one line of a terminal shows while samples come.
+    /// Returns the status line for a terminal.
     pub(super) fn live_line(&self) -> String {
         let newest = self.newest.map_or_else(
             || "no estimate yet".to_owned(),

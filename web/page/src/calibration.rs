@@ -1,4 +1,4 @@
-//! A calibration, step by step as `stretch calibrate` makes it.
+//! Calibration in the same steps as `stretch calibrate`.
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
@@ -18,7 +18,7 @@ use crate::{
     said::{Said, to_json},
 };
 
-/// What a user chose, and what earlier steps found out.
+/// The user's choices, and results of earlier steps.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Choices {
@@ -47,7 +47,8 @@ impl Choices {
         })
     }
 
-    /// Trials to fit, without samples that no motion can have caused, and the removed samples.
+    /// Returns the trials to fit, without samples that no motion can have caused, and notes on the
+    /// removed samples.
     fn trials(&self, files: &Files) -> Result<(Vec<Trial>, Vec<String>), Said> {
         let trials = files.trials(Split::Fit)?;
         if trials.is_empty() {
@@ -57,7 +58,7 @@ impl Choices {
     }
 }
 
-/// What models that build on a diagnosis build on.
+/// The effects on which the models of a diagnosis are based, with notes.
 #[derive(Debug, Serialize)]
 pub(crate) struct Built {
     causes: Vec<Cause>,
@@ -84,7 +85,7 @@ pub(crate) fn judge(
     Ok(judge_model(&trials, &options, model.parse()?).map_err(|error| Said::from(error).0))
 }
 
-/// A calibration and what it rests on.
+/// A calibration with its data and options.
 #[derive(Debug)]
 pub(crate) struct Made {
     options: Options,
@@ -94,7 +95,8 @@ pub(crate) struct Made {
     judged: Option<(Calibrated, Judgement)>,
 }
 
-/// Errors, what makes one doubt them, and whether they are those of trials that were not fitted.
+/// Errors of a calibration, doubts about them, and whether they were measured on trials that were
+/// not fitted.
 #[derive(Debug, Serialize)]
 pub(crate) struct Judgement {
     evaluation: Evaluation,
@@ -142,7 +144,7 @@ impl Made {
         })
     }
 
-    /// The calibration with where its movements turned.
+    /// Returns the calibration together with the levels at which movements turned.
     fn gauge(&self) -> Result<GaugeCalibration, Said> {
         let calibration = self.calibrated.calibration.clone();
         Ok(calibrate_gauge(calibration, &self.trials, &self.options)?)
@@ -157,8 +159,8 @@ impl Made {
         Ok(gauge_header(&self.gauge()?, &options)?.text)
     }
 
-    /// Errors on the fitted trials if no trial is for testing, together with those of a line, the
-    /// baseline for every surface.
+    /// Evaluates the calibration on the test trials, or on the fitted trials if there are no test
+    /// trials. Also evaluates a line, the baseline for every surface.
     pub(crate) fn judged(&mut self, files: &Files) -> Result<&Judgement, Said> {
         if self.judged.is_none() {
             let options = Options { model: ModelKind::Linear, ..self.options.clone() };
@@ -173,7 +175,7 @@ impl Made {
             let judged_on = if held_out { &test } else { &self.trials };
             let evaluation = evaluate(&shown, judged_on)?;
             let mut doubts = evaluation_doubts(&shown, judged_on, &evaluation);
-            // the page says itself that without a test trial the fitted ones are judged
+            // The page itself states that without a test trial the fitted trials are evaluated.
             doubts.retain(|doubt| held_out || doubt.code != "fitted_trials");
             self.judged = Some((linear, Judgement { evaluation, doubts, held_out }));
         }
@@ -206,7 +208,7 @@ impl Made {
     }
 }
 
-/// The choice among models that workers judged.
+/// Chooses among the models that the page's workers have judged.
 fn chosen(
     trials: &[Trial],
     options: &Options,

@@ -1,4 +1,4 @@
-//! A diagnosis as `stretch diagnose` makes it.
+//! Diagnosis as in `stretch diagnose`.
 
 use serde::{Deserialize, Serialize};
 use stretch_gap::Options;
@@ -13,12 +13,12 @@ use crate::{files::Files, progress, said::Said};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Milliseconds of the browser's clock.
+    /// Returns the time of the browser's clock, ms.
     #[wasm_bindgen(js_namespace = performance)]
     fn now() -> f64;
 }
 
-/// What is asked.
+/// The user's choices for a diagnosis.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Asked {
     reference: String,
@@ -33,22 +33,22 @@ fn first() -> u64 {
     1
 }
 
-/// What was found.
+/// A diagnosed problem and the result.
 #[derive(Debug)]
 pub(crate) struct Found {
     problem: Problem,
     examined: Examined,
 }
 
-/// The first ten seconds of it.
+/// Summary of a diagnosis that the page shows first.
 #[derive(Serialize)]
 pub(crate) struct Told {
     sentence: String,
     notes: Vec<String>,
     seconds: f64,
-    /// Candidates with what they close of the gap.
+    /// Candidates, each with its probability and the share of the gap that it closes.
     candidates: Vec<(String, f64, f64)>,
-    /// Why no rig file can be written.
+    /// The reason why no rig file can be written.
     no_rig: Option<String>,
 }
 
@@ -78,7 +78,7 @@ impl Found {
         diagnosis_page(&Subject::of(&self.problem, &self.examined))
     }
 
-    /// The diagnosis as `stretch calibrate --from` reads it.
+    /// Returns the diagnosis in the format of `stretch calibrate --from`.
     pub(crate) fn json(&self) -> Result<String, Said> {
         Ok(serde_json::to_string_pretty(&self.examined.to_json())? + "\n")
     }
@@ -89,7 +89,7 @@ impl Found {
     }
 }
 
-/// What was dropped, as something to diagnose.
+/// Builds the problem from the dropped files.
 fn problem(files: &Files, asked: &Asked) -> Result<Problem, Said> {
     let (session, catalogue) = (files.session()?, Catalogue::default());
     let file = files.rig()?;

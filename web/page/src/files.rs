@@ -1,4 +1,4 @@
-//! Files that were dropped: recordings, and what says of them how they belong together.
+//! Files dropped on the page: recordings, and the files that describe how they belong together.
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::calibration_from_json;
@@ -7,7 +7,7 @@ use stretch_recording::{ReadOptions, Recording, TimeUnit};
 
 use crate::{Read, said::Said};
 
-/// How recordings are read that do not say all of themselves; empty texts ask for nothing.
+/// Reading options for recordings that are not self-describing. Empty texts select the defaults.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Asked {
@@ -15,7 +15,7 @@ pub(crate) struct Asked {
     time_unit: String,
     columns: String,
     sample_rate_hz: Option<f64>,
-    /// Columns that must be there, and hold numbers throughout.
+    /// Columns that must exist and contain only numbers.
     require: Vec<String>,
 }
 
@@ -38,7 +38,7 @@ impl Asked {
     }
 }
 
-/// What there is to say of a recording.
+/// Description of a recording for the page.
 #[derive(Debug, Serialize)]
 pub(crate) struct About {
     name: String,
@@ -76,18 +76,18 @@ impl About {
     }
 }
 
-/// All that was read so far.
+/// All files read so far.
 #[derive(Debug, Default)]
 pub(crate) struct Files {
     set: Option<DataSet>,
     rigs: Vec<(String, RigFile)>,
     recordings: Vec<(String, Recording)>,
-    /// Recordings that are only tested on, where no `dataset.toml` says which.
+    /// Names of recordings used only for testing, if there is no `dataset.toml`.
     held: Vec<String>,
 }
 
 impl Files {
-    /// Reads a file; one of the same name is replaced.
+    /// Reads a file. It replaces an earlier one with the same name.
     pub(crate) fn take(&mut self, name: &str, bytes: &[u8], asked: &Asked) -> Result<Read, Said> {
         if name.ends_with(".toml") {
             return self.take_toml(name, bytes);
@@ -132,7 +132,7 @@ impl Files {
         Ok(Read::Rig { name: name.to_owned(), gauge })
     }
 
-    /// What the data are called.
+    /// Returns a name for the data.
     pub(crate) fn name(&self) -> String {
         match (&self.set, self.recordings.as_slice()) {
             (Some(set), _) => set.name.clone(),
@@ -142,7 +142,7 @@ impl Files {
         }
     }
 
-    /// The rig file that the data set names.
+    /// Returns the rig file that the data set names.
     pub(crate) fn rig(&self) -> Result<Option<&RigFile>, Said> {
         let Some(name) = self.set.as_ref().and_then(|set| set.rig.as_ref()) else {
             return Ok(None);
@@ -154,7 +154,7 @@ impl Files {
         }
     }
 
-    /// Every trial: those that `dataset.toml` lists, else all that were dropped.
+    /// Returns all trials: those listed in `dataset.toml`, otherwise all recordings.
     pub(crate) fn session(&self) -> Result<Vec<SessionTrial>, Said> {
         let all = || self.recordings.iter();
         match &self.set {
@@ -172,18 +172,19 @@ impl Files {
         SessionTrial { split, ..trial }
     }
 
-    /// Keeps these recordings to test on: none of them is fitted.
+    /// Reserves these recordings for testing, so that they are not fitted.
     pub(crate) fn hold(&mut self, names: Vec<String>) {
         self.held = names;
     }
 
-    /// Trials that may be fitted, or those that are only tested on.
+    /// Returns the trials that may be fitted, or those used only for testing.
     pub(crate) fn trials(&self, split: Split) -> Result<Vec<Trial>, Said> {
         let session = self.session()?.into_iter();
         Ok(session.filter(|one| one.split == split).map(|one| one.trial).collect())
     }
 
-    /// At most `most` rows of a recording, evenly taken: time and two columns, flat.
+    /// Returns at most `most` evenly spaced rows of a recording, as a flat list of time and two
+    /// columns.
     pub(crate) fn points(&self, name: &str, columns: [&str; 2], most: usize) -> Vec<f64> {
         let found = self.recordings.iter().find(|(own, _)| own == name);
         let Some(trial) = found.map(|(_, recording)| &recording.trial) else { return Vec::new() };

@@ -1,5 +1,5 @@
-//! The same bits here as on a computer and on boards: every receptor of `firmware/` replays the
-//! trial that boards replay.
+//! Checks that the browser computes the same bits as a computer and boards: every receptor of
+//! `firmware/` replays the trial that boards replay.
 
 use std::fmt::Write;
 
@@ -26,17 +26,17 @@ mod trial;
 
 use checksum::{Bits, Checksum};
 
-/// A record of `firmware/data`, its seal checked.
+/// Loads a calibration file of `firmware/data` and checks its checksum.
 macro_rules! record {
     ($name:expr) => {
         load(include_bytes!(concat!("../../../firmware/data/", $name, ".postcard")))?
     };
 }
 
-/// What a desk answers, and boards.
+/// Expected checksums, equal on computers and boards.
 const GOLDEN: &str = include_str!("../../../firmware/golden.txt");
 
-/// How many receptors answer here as there.
+/// Returns the number of receptors if all their checksums are as expected.
 pub(crate) fn sound() -> Result<usize, Said> {
     let golden = GOLDEN.lines().filter(|line| !line.starts_with('#'));
     let found = checksums()?;
@@ -49,7 +49,7 @@ pub(crate) fn sound() -> Result<usize, Said> {
     }
 }
 
-/// A line a receptor: `model=NAME checksum=HEX`.
+/// Returns one line per receptor: `model=NAME checksum=HEX`.
 pub(crate) fn checksums() -> Result<String, Said> {
     let mut out = String::new();
     let poly13: Calibration = record!("poly13");
@@ -107,7 +107,7 @@ fn load<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Said> {
     Ok(record::load(bytes)?)
 }
 
-/// From converter codes.
+/// Replays the trial as converter codes.
 fn codes<R, E: Bits>(out: &mut String, model: &str, receptor: R)
 where
     R: Stage<AdcCode, Out = Result<CodeReading<E>, Withheld>>,
@@ -117,7 +117,7 @@ where
     line(out, model, checksum);
 }
 
-/// From volts.
+/// Replays the trial as volts.
 fn volts<R>(out: &mut String, model: &str, receptor: R)
 where
     R: Stage<Volts<f32>, Out = Result<Reading<f32>, Withheld>>,
@@ -135,6 +135,6 @@ where
 }
 
 fn line(out: &mut String, model: &str, Checksum(sum): Checksum) {
-    // a string takes every write
+    // Writing to a string cannot fail.
     let _ = writeln!(out, "model={model} checksum={sum:08x}");
 }

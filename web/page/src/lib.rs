@@ -1,7 +1,7 @@
-//! The crates of stretch behind a page: recordings in, calibrations and diagnoses out.
+//! The crates of stretch for a web page: reads recordings, and returns calibrations and diagnoses.
 //!
-//! Only bytes and JSON cross the border to JavaScript. This crate does not know the page and
-//! contains no mathematics. Errors are the sentences of the program.
+//! Only bytes and JSON are exchanged with JavaScript. This crate does not depend on the page and
+//! contains no mathematics. Errors have the same sentences as in the program.
 
 mod calibration;
 mod diagnosis;
@@ -21,7 +21,7 @@ use said::{Said, from_json, to_json};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Called with a text that describes the progress.
+    /// Called with a progress message.
     #[wasm_bindgen(js_name = stretchProgress)]
     fn progress(text: &str);
     /// Called with the reason why the program ended.
@@ -40,38 +40,40 @@ pub struct Desk {
 
 #[wasm_bindgen]
 impl Desk {
-    /// An empty one.
+    /// Creates an empty state.
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         std::panic::set_hook(Box::new(|info| failed(&info.to_string())));
         Self::default()
     }
 
-    /// Reads a file that was dropped: a recording in any format that is built in, `dataset.toml`, a rig file, or a record.
+    /// Reads a dropped file: a recording in a built-in format, `dataset.toml`, a rig file, or a
+    /// calibration file.
     ///
     /// # Errors
-    /// What the program says of it.
+    /// Errors of reading, as in the program.
     pub fn read(&mut self, name: &str, bytes: &[u8], asked: &str) -> Result<String, JsError> {
         let asked: Asked = from_json(asked)?;
         Ok(to_json(&self.files.take(name, bytes, &asked)?)?)
     }
 
-    /// Keeps the recordings with these names, a JSON list, for testing; a `dataset.toml` decides
-    /// this itself.
+    /// Reserves the recordings with these names, a JSON list, for testing. Without effect if there
+    /// is a `dataset.toml`, which contains the split.
     ///
     /// # Errors
-    /// What is no list of names.
+    /// A text that is not a list of names.
     pub fn hold(&mut self, names: &str) -> Result<(), JsError> {
         self.files.hold(from_json(names)?);
         Ok(())
     }
 
-    /// Some points of two columns of a recording: time, reference and signal, flat.
+    /// Returns some points of two columns of a recording as a flat list: time, reference and
+    /// signal.
     pub fn points(&self, name: &str, reference: &str, signal: &str, most: usize) -> Vec<f64> {
         self.files.points(name, [reference, signal], most)
     }
 
-    /// The effects that a diagnosis of the gauge alone names, for models that build on it.
+    /// Returns the effects that a diagnosis of the gauge alone names, for models based on them.
     ///
     /// # Errors
     /// Files that do not belong together.
@@ -80,19 +82,19 @@ impl Desk {
         Ok(to_json(&calibration::causes(&self.files, &choices)?)?)
     }
 
-    /// The models that the automatic choice judges.
+    /// Returns the names of the models that the automatic choice compares.
     ///
     /// # Errors
-    /// A choice that is not understood.
+    /// Invalid choices.
     pub fn models(&self, choices: &str) -> Result<String, JsError> {
         let choices: Choices = from_json(choices)?;
         Ok(to_json(&calibration::models(&choices)?)?)
     }
 
-    /// Judges one of them: workers share them out.
+    /// Evaluates one model of `Desk::models`. The page distributes the models over its workers.
     ///
     /// # Errors
-    /// A choice that is not understood.
+    /// Invalid choices.
     pub fn judge(&self, choices: &str, model: &str) -> Result<String, JsError> {
         let choices: Choices = from_json(choices)?;
         Ok(to_json(&calibration::judge(&self.files, &choices, model)?)?)
@@ -101,7 +103,7 @@ impl Desk {
     /// Fits a calibration.
     ///
     /// # Errors
-    /// What the program says.
+    /// Errors of the fit, as in the program.
     pub fn calibrate(&mut self, choices: &str) -> Result<String, JsError> {
         let made = Made::of(&self.files, &from_json(choices)?)?;
         let told = made.told()?;
@@ -109,24 +111,24 @@ impl Desk {
         Ok(told)
     }
 
-    /// Errors of the calibration, of the raw signal and of a line.
+    /// Returns the errors of the calibration, of the raw signal and of a line.
     ///
     /// # Errors
-    /// What the program says.
+    /// Errors of the evaluation, as in the program.
     pub fn evaluate(&mut self) -> Result<String, JsError> {
         let made = self.made.as_mut().ok_or_else(nothing)?;
         Ok(to_json(made.judged(&self.files)?)?)
     }
 
-    /// The record, as `stretch calibrate --out` writes it.
+    /// Returns the calibration file, as written by `stretch calibrate --out`.
     ///
     /// # Errors
-    /// Before there is one.
+    /// A call before `Desk::calibrate`.
     pub fn record(&self) -> Result<String, JsError> {
         Ok(self.made.as_ref().ok_or_else(nothing)?.record()?)
     }
 
-    /// The C header of the record, as `stretch export` writes it.
+    /// Returns the C header of the calibration, as written by `stretch export`.
     ///
     /// # Errors
     /// A model without a form in C.
@@ -134,10 +136,10 @@ impl Desk {
         Ok(self.made.as_ref().ok_or_else(nothing)?.header(adc)?)
     }
 
-    /// The report of the calibration.
+    /// Returns the report of the calibration.
     ///
     /// # Errors
-    /// What the program says.
+    /// Errors of the evaluation, as in the program.
     pub fn report(&mut self) -> Result<String, JsError> {
         let made = self.made.as_mut().ok_or_else(nothing)?;
         Ok(made.report(&self.files)?)
@@ -146,7 +148,7 @@ impl Desk {
     /// Diagnoses the rig or the gauge alone.
     ///
     /// # Errors
-    /// What the program says.
+    /// Errors of the diagnosis, as in the program.
     pub fn diagnose(&mut self, choices: &str) -> Result<String, JsError> {
         let found = Found::of(&self.files, &from_json(choices)?)?;
         let told = to_json(&found.told())?;
@@ -154,10 +156,10 @@ impl Desk {
         Ok(told)
     }
 
-    /// The report, the JSON or the rig file of the diagnosis.
+    /// Returns the report, the JSON or the rig file of the diagnosis.
     ///
     /// # Errors
-    /// What cannot be written, and why.
+    /// The reason why a part cannot be written.
     pub fn diagnosis(&self, part: &str) -> Result<String, JsError> {
         let found = self.found.as_ref().ok_or_else(nothing)?;
         Ok(match part {
@@ -172,46 +174,48 @@ fn nothing() -> Said {
     Said("nothing has been worked out yet".to_owned())
 }
 
-/// The sample for new users: the paper's session, simulated. A list of files.
+/// Returns the sample data for new users, the paper's session simulated, as a list of files.
 ///
 /// # Errors
-/// None that a sound build gives.
+/// Never in a correct build.
 #[wasm_bindgen]
 pub fn sample(seed: u32) -> Result<String, JsError> {
     Ok(to_json(&sample::files(seed.into())?)?)
 }
 
-/// Names of models that may be asked for.
+/// Returns the names of the models that can be selected.
 #[wasm_bindgen]
 pub fn model_names() -> String {
     stretch_calibrate::ModelKind::named().iter().map(|kind| format!("{kind}\n")).collect()
 }
 
-/// Checksums of every receptor over the trial that boards replay, in the form of `firmware/golden.txt`.
+/// Returns the checksums of all receptors over the trial that boards replay, in the format of
+/// `firmware/golden.txt`.
 ///
 /// # Errors
-/// None that a sound build gives.
+/// Never in a correct build.
 #[wasm_bindgen]
 pub fn golden() -> Result<String, JsError> {
     Ok(golden::checksums()?)
 }
 
-/// Number of receptors whose bits here equal those on a computer and on boards.
+/// Returns the number of receptors, after checking that they compute the same bits as on a computer
+/// and on boards.
 ///
 /// # Errors
-/// A browser in which one does not.
+/// A browser in which a receptor computes other bits.
 #[wasm_bindgen]
 pub fn sound() -> Result<usize, JsError> {
     Ok(golden::sound()?)
 }
 
-/// The release.
+/// Returns the version of the release.
 #[wasm_bindgen]
 pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()
 }
 
-/// An event and its kind.
+/// The result of reading a file.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum Read {

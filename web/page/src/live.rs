@@ -1,5 +1,5 @@
-//! A board's live link, or one number per line: shown, recorded, and estimated if there is a
-//! record.
+//! A board's live link, or lines of numbers: received, recorded, and converted to estimates if
+//! there is a calibration.
 
 use std::fmt::Write;
 
@@ -15,17 +15,17 @@ use wasm_bindgen::prelude::*;
 
 use crate::said::Said;
 
-/// Longest line of bare numbers.
+/// Longest line of numbers, bytes.
 const LONGEST: usize = 256;
 
-/// What listens to a port.
+/// The receiver for a port.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Live {
     source: Source,
     signal: String,
     unit: String,
-    /// Lines of the recording that were not fetched yet.
+    /// Lines of the recording since the last call of `Live::lines`.
     lines: String,
 }
 
@@ -37,21 +37,22 @@ enum Source {
 
 #[wasm_bindgen]
 impl Live {
-    /// Listens for the frames of a board with a converter of `adc`; `record` may be empty.
+    /// Receives the frames of a board whose converter is described by `adc`. `record` is a
+    /// calibration file or empty.
     ///
     /// # Errors
-    /// A record or a converter that is none.
+    /// An invalid calibration file or converter.
     pub fn frames(adc: &str, record: &str) -> Result<Self, JsError> {
         let calibration = read(record)?;
         let frames = Frames::new(parse_adc(adc).map_err(Said::from)?, calibration.as_ref())?;
         Ok(Self::of(Source::Frames(Box::new(frames)), calibration))
     }
 
-    /// Listens for lines of numbers: a signal; time in seconds and signal; or time, reference and signal. A signal alone is
-    /// one of `rate_hz` a second.
+    /// Receives lines of numbers: a signal; time in seconds and signal; or time, reference and
+    /// signal. If there is only a signal, its sample rate is `rate_hz`.
     ///
     /// # Errors
-    /// A record that is none, or whose rate looks ahead.
+    /// An invalid calibration file, or one whose rate estimator needs future samples.
     pub fn numbers(rate_hz: f64, record: &str) -> Result<Self, JsError> {
         let calibration = read(record)?;
         let numbers = Numbers::new(rate_hz, calibration.as_ref())?;
@@ -65,8 +66,8 @@ impl Live {
         Self { source, signal, unit, lines: String::new() }
     }
 
-    /// Takes the received bytes, at a time of the browser's clock; returns time, signal and
-    /// estimate of each sample, flat, NaN for a missing value.
+    /// Takes the bytes received at a time of the browser's clock. Returns a flat list of time,
+    /// signal and estimate of each sample, with NaN for a missing value.
     pub fn take(&mut self, bytes: &[u8], now_s: f64) -> Vec<f64> {
         let mut out = Vec::new();
         for &byte in bytes {
@@ -81,12 +82,12 @@ impl Live {
         out
     }
 
-    /// The lines of the recording since the last call.
+    /// Returns the lines of the recording since the last call.
     pub fn lines(&mut self) -> String {
         std::mem::take(&mut self.lines)
     }
 
-    /// The header of these lines.
+    /// Returns the header of these lines.
     pub fn header(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!("_{}", self.unit) };
         match &self.source {
@@ -97,7 +98,7 @@ impl Live {
         }
     }
 
-    /// How the link does, in a sentence.
+    /// Returns the state of the link as a sentence.
     pub fn status(&self) -> String {
         match &self.source {
             Source::Frames(frames) => frames.status(&self.unit),
@@ -107,7 +108,8 @@ impl Live {
         }
     }
 
-    /// What makes one doubt the estimates so far, as `stretch apply` says it of a stream: a sentence a line.
+    /// Returns doubts about the estimates so far, one sentence per line, as `stretch apply` does
+    /// for a stream.
     pub fn doubts(&self) -> String {
         let applied = match &self.source {
             Source::Numbers(numbers) => numbers.applied.as_ref(),
@@ -125,18 +127,18 @@ fn read(record: &str) -> Result<Option<Calibration>, Said> {
     }
 }
 
-/// Frames of the live link, on one time line across restarts of the board.
+/// Frames of the live link, on one continuous time line even if the board restarts.
 #[derive(Debug)]
 struct Frames {
     decoder: Decoder,
     adc: Adc,
     time_line: TimeLine,
     twin: Option<Runner<Receptor<f64>>>,
-    /// Estimates compared with those computed here, and the largest difference.
+    /// Number of estimates compared with those computed here, and the largest difference.
     compared: (u64, f64),
-    /// Samples that the board did not get.
+    /// Samples that the board did not get from its converter.
     missing: u64,
-    /// Codes that the converter cannot give, and the largest.
+    /// Number of codes outside the converter's range, and the largest of them.
     beyond: (u64, i32),
     /// Frames at which the board's clock had stopped.
     standing: u64,
@@ -162,7 +164,7 @@ impl Frames {
         let event = self.decoder.push(byte)?;
         let frame = event.frame()?;
         if let Some(twin) = self.twin.as_mut().filter(|_| !matches!(event, Event::Frame(_))) {
-            // the board has seen samples that did not arrive here
+            // The board has seen samples that did not arrive here.
             twin.reset();
         }
         let time_s = self.time_line.time_s(&event, now_s);
@@ -179,7 +181,7 @@ impl Frames {
             }
             _ => f64::NAN,
         };
-        // a sample without a known time becomes no row
+        // A sample without a known time becomes no row.
         let Some(time_s) = time_s else {
             self.standing += 1;
             return None;
@@ -224,12 +226,12 @@ impl Frames {
     }
 }
 
-/// A row as `stretch listen` records it.
+/// Appends a row in the format of `stretch listen`.
 fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame) {
     push(lines, time_s);
     lines.push(',');
     push(lines, signal);
-    // a string takes every write
+    // Writing to a string cannot fail.
     let _ = writeln!(lines, ",{},{}", frame.code, frame.answer);
 }
 
@@ -239,7 +241,7 @@ fn push(lines: &mut String, value: f64) {
     lines.push_str(&String::from_utf8_lossy(&number));
 }
 
-/// Bare numbers, a line a sample.
+/// Lines of numbers, one sample per line.
 #[derive(Debug)]
 struct Numbers {
     line: Vec<u8>,
@@ -250,12 +252,12 @@ struct Numbers {
     applied: Option<Applied>,
 }
 
-/// A calibration on these numbers.
+/// A calibration applied to these numbers.
 #[derive(Debug)]
 struct Applied {
     receptor: LiveReceptor,
     seen: Seen,
-    /// That samples come at another rate.
+    /// The doubt that samples arrive at another rate than that of the calibration.
     pace: Option<Doubt>,
 }
 
@@ -317,7 +319,7 @@ impl Numbers {
         Some([time_s, signal, reading.map_or(f64::NAN, |r| r.estimate)])
     }
 
-    /// Time, reference and signal of a line.
+    /// Parses a line to time, reference and signal.
     fn parse(&self, line: &[u8]) -> Option<(f64, Option<f64>, f64)> {
         let text = std::str::from_utf8(line).ok()?;
         let fields = text.split([',', ';', ' ', '\t']).map(str::trim).filter(|f| !f.is_empty());

@@ -1,10 +1,10 @@
-//! Errors as the program says them, and JSON.
+//! Errors with the same sentences as in the program, and JSON.
 
 use std::{error::Error, fmt};
 
 use serde::{Serialize, de::DeserializeOwned};
 
-/// A sentence: what is wrong, where, and what to do.
+/// An error as one sentence that states the problem, its place, and the remedy.
 #[derive(Debug)]
 pub(crate) struct Said(pub(crate) String);
 
@@ -21,7 +21,7 @@ impl From<Said> for wasm_bindgen::JsError {
 }
 
 impl<E: Error> From<E> for Said {
-    /// The error and its causes; a cause that the text already contains is not repeated.
+    /// Joins the error and its causes. A cause that the text already contains is not repeated.
     fn from(error: E) -> Self {
         let mut told = error.to_string();
         let mut cause = error.source();

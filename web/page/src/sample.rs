@@ -1,4 +1,5 @@
-//! The sample: the paper's session on a rig with the paper's effects, as `stretch simulate --rig paper` writes it.
+//! Sample data: the paper's session on a rig with the paper's effects, as written by
+//! `stretch simulate --rig paper`.
 
 use serde::Serialize;
 use stretch_data::DataSet;
@@ -6,14 +7,15 @@ use stretch_sim::{Rig, RunSettings, Session, TrialPlan, paper_preset};
 
 use crate::{progress, said::Said};
 
-/// A file as it would be on a disk.
+/// A file of the data set.
 #[derive(Debug, Serialize)]
 pub(crate) struct File {
     name: String,
     text: String,
 }
 
-/// All files of the data set except the rig's own with its effects, because that is the answer.
+/// Returns all files of the data set except the rig file with the effects, because it contains the
+/// solution.
 pub(crate) fn files(seed: u64) -> Result<Vec<File>, Said> {
     let rig = paper_preset()?;
     let settings = RunSettings { seed, ..RunSettings::default() };

@@ -1,4 +1,5 @@
-//! A file or folder under a temporary name, and the lock under which such names are made, renamed and removed.
+//! A file or folder under a temporary name, and the lock that protects making, renaming and
+//! removing such names.
 
 use std::{
     fs::{self, File},
@@ -16,17 +17,19 @@ use super::{
     folder::{lock, replace},
 };
 
-/// Temporary names of this process with the paths that they will replace. Those of folders stay here because messages may name them.
+/// Temporary names of this process, with the paths that they will replace. Those of folders are
+/// kept, because messages may contain them.
 ///
-/// The lock is held while a temporary name is made or becomes a target's name. Ctrl-C takes it and never gives it back: what has
-/// its name by then keeps it, and nothing gets one afterwards.
+/// The lock is held while a temporary name is made or renamed to its target. The handler of Ctrl-C
+/// takes the lock and never releases it. Therefore a target renamed before keeps its name, and none
+/// is renamed afterwards.
 static NAMES: Mutex<Vec<(PathBuf, PathBuf)>> = Mutex::new(Vec::new());
 
 fn names() -> MutexGuard<'static, Vec<(PathBuf, PathBuf)>> {
     NAMES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes everything unfinished and leaves the process. A handler of Ctrl-C calls it:
+/// Removes everything unfinished and exits. A handler of Ctrl-C calls this function:
 ///
 /// ```no_run
 /// // ctrlc::set_handler(...):
@@ -35,7 +38,7 @@ fn names() -> MutexGuard<'static, Vec<(PathBuf, PathBuf)>> {
 pub fn clean_up_and_exit(status: u8) -> ! {
     let names = names();
     for (temporary, _) in names.iter() {
-        // another thread may be writing into the folder while it is removed
+        // Another thread may be writing into the folder while it is removed.
         for _ in 0..100 {
             if remove(temporary).is_ok() || fs::symlink_metadata(temporary).is_err() {
                 break;
@@ -50,7 +53,7 @@ fn remove(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(|_| fs::remove_dir_all(path))
 }
 
-/// A message in which a folder that is being built has the name that it will have.
+/// Replaces temporary names of folders in a message by the names of their targets.
 ///
 /// ```
 /// # use stretch_data::files::{FileError, without_temporary_names, write_folder};
@@ -71,21 +74,23 @@ pub fn without_temporary_names(text: &str) -> String {
     })
 }
 
-/// What is built under a temporary name, and removed if it is dropped before it has its name.
+/// A file or folder that is built under a temporary name. It is removed if it is dropped before it
+/// was renamed.
 #[derive(Debug)]
 pub(super) struct Draft {
-    /// The target as the user called it.
+    /// The target as given by the user.
     path: PathBuf,
     /// The target without links and dots.
     pub(super) real: PathBuf,
     pub(super) temporary: PathBuf,
-    /// Locked while this exists, so that a cleaning program can distinguish it from what a killed program left; none for a folder.
+    /// Open file, locked while this value exists, so that a cleanup can distinguish it from the
+    /// remains of a killed program. `None` for a folder.
     pub(super) file: Option<File>,
-    /// Whether a folder replaces one that holds something.
+    /// Whether a folder may replace one that is not empty.
     force: bool,
     /// The folder that is replaced, locked.
     replaced: Option<File>,
-    /// Removed after the draft, if it is still empty.
+    /// Folders made for the target. They are removed after the draft if they are still empty.
     _parents: Option<Parents>,
 }
 
@@ -94,19 +99,19 @@ impl Draft {
         Self::new(path, false, None)
     }
 
-    /// Makes the parents of the folder, too.
+    /// Makes the draft of a folder, and its missing parent folders.
     pub(super) fn folder(path: &Path, force: bool) -> io::Result<Self> {
         Self::new(path, force, Some(Parents::make(folder_of(path))?))
     }
 
-    /// A folder if it has parents, else a file.
+    /// Makes the draft of a folder if `parents` is given, otherwise of a file.
     fn new(path: &Path, force: bool, parents: Option<Parents>) -> io::Result<Self> {
         let real = real(path);
         let mut builder = Builder::new();
         builder.prefix(".stretch-").suffix(".tmp");
         #[cfg(unix)]
         {
-            // narrowed by the umask, as for any new file or folder
+            // The umask restricts these permissions, as for any new file or folder.
             let mode = if parents.is_some() { 0o777 } else { 0o666 };
             builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
         }
@@ -117,7 +122,7 @@ impl Draft {
         } else {
             let made = builder.tempfile_in(folder_of(&real)).map_err(without_path)?;
             let (file, temporary) = made.keep()?;
-            // if files cannot be locked, no process cleans up
+            // If files cannot be locked, no process cleans up.
             let _ = file.try_lock();
             (temporary, Some(file))
         };
@@ -126,19 +131,20 @@ impl Draft {
         Ok(Self { path, real, temporary, file, force, replaced: None, _parents: parents })
     }
 
-    /// Waits until no other writer replaces the same folder, and keeps others waiting until this is dropped.
+    /// Waits until no other writer replaces the same folder, and makes other writers wait until
+    /// this draft is dropped.
     pub(super) fn lock(&mut self) {
         self.replaced = self.replaced.take().or_else(|| lock(&self.real));
     }
 
-    /// Gives everything its name; Ctrl-C waits for all of them.
+    /// Renames all drafts to their targets. Ctrl-C waits until all are renamed.
     pub(super) fn rename(drafts: &mut [Self]) -> Result<(), FileError> {
         use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
         let _names = names();
         for draft in drafts {
             let is_folder = draft.file.is_none();
             if is_folder && cfg!(windows) {
-                // elsewhere a folder that is renamed replaces an empty one
+                // On other systems, renaming a folder replaces an empty one.
                 let _ = fs::remove_dir(&draft.real);
             }
             let renamed = match draft.force && draft.real.is_dir() {
@@ -146,7 +152,7 @@ impl Draft {
                 false => rename(&draft.temporary, &draft.real),
             };
             renamed.map_err(|cause| match cause.kind() {
-                // another writer was faster
+                // Another writer was faster.
                 AlreadyExists | DirectoryNotEmpty | NotADirectory if is_folder => {
                     FileError::exists(&draft.path)
                 }
@@ -170,7 +176,8 @@ impl Drop for Draft {
     }
 }
 
-/// Folders that were made for a target, the innermost first: those that are empty go when this is dropped.
+/// Folders that were made for a target, the innermost first. Those that are empty are removed on
+/// drop.
 #[derive(Debug)]
 struct Parents(Vec<PathBuf>);
 
@@ -189,7 +196,7 @@ impl Drop for Parents {
     }
 }
 
-/// The cause alone, because the name of a temporary file would only puzzle.
+/// Returns the cause without the path, because the name of a temporary file would confuse the user.
 fn without_path(error: io::Error) -> io::Error {
     match error.to_string().rsplit_once(" at path ") {
         Some((cause, _)) => io::Error::new(error.kind(), cause.to_owned()),
@@ -197,7 +204,7 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// A path without links and dots, also where nothing is there yet.
+/// Returns a path without links and dots, even if it does not exist yet.
 pub(super) fn real(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| match path.file_name() {
         Some(name) => real(folder_of(path)).join(name),
@@ -205,7 +212,7 @@ pub(super) fn real(path: &Path) -> PathBuf {
     })
 }
 
-/// The folder that a path is in.
+/// Returns the folder that contains a path.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -220,7 +227,8 @@ pub(super) fn sync(file: &File) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Makes names durable, where the system can: not every one syncs folders.
+/// Syncs a folder to disk, so that its names are durable. Errors are ignored, because not every
+/// system can sync folders.
 pub(super) fn sync_folder(folder: &Path) {
     let synced = ask("sync_folder").and_then(|()| File::open(folder)?.sync_all());
     drop(synced);
@@ -230,8 +238,8 @@ type Hook = Box<dyn Fn(&'static str) -> io::Result<()> + Send + Sync>;
 
 static HOOK: OnceLock<Hook> = OnceLock::new();
 
-/// For tests: from now on `hook` is asked before each call of a writer on the file system, once in the life of a process. An
-/// error is the call's answer, and the call is not made.
+/// For tests: installs a hook that is called before each file-system call of a writer, once in the
+/// life of a process. If the hook returns an error, the call is not made and returns that error.
 #[doc(hidden)]
 pub fn ask_before_disk_calls(
     hook: impl Fn(&'static str) -> io::Result<()> + Send + Sync + 'static,
@@ -239,7 +247,7 @@ pub fn ask_before_disk_calls(
     HOOK.set(Box::new(hook)).is_ok()
 }
 
-/// Whether the call may be made.
+/// Calls the hook, if there is one, and returns its answer.
 pub(super) fn ask(call: &'static str) -> io::Result<()> {
     HOOK.get().map_or(Ok(()), |hook| hook(call))
 }

@@ -1,4 +1,4 @@
-//! Folders: what may be replaced, and what of an old one stays.
+//! Replacement of folders: which folders may be replaced, and which files of the old one are kept.
 
 use std::{
     collections::BTreeSet,
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::data_set::unchanged_trials;
 
-/// Refuses a folder that cannot be written, or that holds something unless `force` is set.
+/// Refuses a folder that cannot be written, or that is not empty unless `force` is set.
 pub(super) fn check(path: &Path, force: bool) -> Result<(), FileError> {
     let fail = |cause| Err(FileError::io(path.display(), "write it", cause));
     if path.as_os_str() == "-" {
@@ -44,14 +44,15 @@ fn is_inside(here: &Path, folder: &Path) -> bool {
     fs::canonicalize(folder).is_ok_and(|folder| here.starts_with(folder))
 }
 
-/// Locks a folder that is to be replaced, so that writers which replace the same folder wait for each other.
+/// Locks a folder that is to be replaced, so that several writers of the same folder wait for each
+/// other.
 ///
-/// None if there is no folder, or if the system cannot lock one.
+/// Returns `None` if the folder does not exist or cannot be locked.
 pub(super) fn lock(folder: &Path) -> Option<File> {
     loop {
         let locked = File::open(folder).ok()?;
         locked.lock().ok()?;
-        // the writer before may have replaced the folder that is locked now
+        // The previous writer may have replaced the folder that is now locked.
         if is_still(folder, &locked) {
             return Some(locked);
         }
@@ -70,7 +71,7 @@ fn is_still(_: &Path, _: &File) -> bool {
     true
 }
 
-/// Links what is the user's in the old folder into the new one, and waits until all is on the disk.
+/// Links the user's own files in the old folder into the new one, and syncs the new folder to disk.
 pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     if let Ok(meta) = fs::metadata(old) {
         carry(old, new, &mut BTreeSet::new(), check_output)?;
@@ -79,7 +80,7 @@ pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     sync_tree(new)
 }
 
-/// All names and files below a folder, on the disk.
+/// Syncs all files and folders below a folder to disk.
 fn sync_tree(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -87,7 +88,7 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
         if kind.is_dir() {
             sync_tree(&entry.path())?;
         } else if kind.is_file() {
-            // Windows flushes only what was opened to be written
+            // Windows flushes only files that were opened for writing.
             sync(&File::options().read(true).write(cfg!(windows)).open(entry.path())?)?;
         }
     }
@@ -95,14 +96,14 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Gives a complete folder the name of the one that is there.
+/// Renames a complete folder to its target, which exists.
 pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
     draft.lock();
     let (new, real) = (&draft.temporary, &draft.real);
     exchange(new, real)?;
-    // what came into the old folder in the meantime
+    // Carries over files that were added to the old folder in the meantime.
     carry(new, real, &mut BTreeSet::new(), |_, _| Ok(())).map_err(|why| {
-        // not removed, because something of the user's is in it
+        // The old folder is not removed, because it contains files of the user.
         let left = std::mem::take(&mut draft.temporary);
         io::Error::other(format!("all is written, but {why}; the old folder is {}", left.display()))
     })
@@ -127,17 +128,18 @@ fn exchange(new: &Path, real: &Path) -> io::Result<()> {
             exchanged => return exchanged,
         }
     }
-    // in three steps, where it cannot be one
+    // In three steps, on systems that cannot swap names in one.
     let aside = new.with_extension("old");
     rename(real, &aside)?;
     rename(new, real).inspect_err(|_| drop(rename(&aside, real)))?;
     rename(&aside, new)
 }
 
-/// Brings every file of `old` whose name is not in `new` into `new`: as a second name, or a copy where there is no such thing.
+/// Carries every file of `old` whose name is not in `new` over to `new`, as a hard link or, if
+/// links are impossible, as a copy.
 ///
-/// If `new` is a data set, unchanged trials of the old data set (`replaced`) are left behind. `check` is asked of every file that is not
-/// carried over.
+/// If `new` is a data set, unchanged trials of the old data set (`replaced`) are not carried over.
+/// `check` is called for every file that is not carried over.
 fn carry(
     old: &Path,
     new: &Path,
@@ -166,7 +168,7 @@ fn carry(
             Err(_) => {
                 ask("link")?;
                 match fs::hard_link(&from, &to) {
-                    // a copy onto another name of the same file would empty it
+                    // A copy to another name of the same file would empty it.
                     Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                     linked => linked.or_else(|_| fs::copy(&from, &to).map(drop))?,
                 }

@@ -1,4 +1,4 @@
-//! What a command reads it does not write over, whatever the two paths look like.
+//! A guard against overwriting the inputs of a command, under whatever name they appear as outputs.
 
 use std::{
     collections::BTreeMap,
@@ -10,7 +10,8 @@ use std::{
 
 use super::{FileError, draft::real, is_standard_output};
 
-/// None in a process that runs no single command, such as one of Python: there a file may be read now and replaced an hour later.
+/// The guard of this process. `None` in a process that does not run a single command, such as a
+/// Python interpreter: it may read a file now and legitimately replace it an hour later.
 static GUARD: Mutex<Option<Guard>> = Mutex::new(None);
 
 fn guard() -> MutexGuard<'static, Option<Guard>> {
@@ -19,23 +20,23 @@ fn guard() -> MutexGuard<'static, Option<Guard>> {
 
 #[derive(Debug, Default)]
 struct Guard {
-    /// What is going to be written: the option with its path, and the file that is there before.
+    /// The outputs: the option with its path, and the identity of the file that exists there.
     outputs: Vec<(String, Option<Identity>)>,
-    /// What was read, as it was called.
+    /// The files that were read, with their paths as given.
     inputs: BTreeMap<Identity, PathBuf>,
 }
 
-/// What a file keeps under all its names: device and number, elsewhere the path without links and dots.
+/// Identity of a file under all its names: device and inode on Unix, elsewhere the canonical path.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Identity(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] PathBuf);
 
-/// `None` for what holds no data itself: pipes, devices, folders, missing files.
+/// Returns `None` for anything that is not a regular file: pipes, devices, folders, missing files.
 #[cfg(unix)]
 fn identity_of(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
     meta.is_file().then(|| Identity(numbers(meta)))
 }
 
-/// Device and number of a file or folder.
+/// Returns device and inode of a file or folder.
 #[cfg(unix)]
 pub(super) fn numbers(meta: &fs::Metadata) -> [u64; 2] {
     use std::os::unix::fs::MetadataExt;
@@ -51,7 +52,7 @@ fn identity(path: &Path) -> Option<Identity> {
     identity_of(path, &fs::metadata(path).ok()?)
 }
 
-/// The file that standard input comes from.
+/// Returns the identity of the file from which standard input is redirected.
 fn standard_input() -> Option<Identity> {
     #[cfg(unix)]
     {
@@ -62,13 +63,15 @@ fn standard_input() -> Option<Identity> {
     None
 }
 
-/// From now on this process writes over nothing that it reads: [`open_input`] refuses what one of these outputs would replace, and every
-/// function that writes refuses what was read.
+/// Guards the inputs of this process against being overwritten: [`open_input`] refuses a file that
+/// one of these outputs would replace, and every function that writes refuses a file that was read.
 ///
-/// A program calls it once, with the options that name outputs, before its command begins. Without this call nothing is refused.
+/// A program calls this function once, with the options that name outputs, before its command
+/// starts. Without this call nothing is refused.
 ///
 /// # Errors
-/// Two outputs that are one file, or a file in a folder that is written as well; an output that is standard input.
+/// Two outputs that are the same file, or of which one lies in the other; an output that is also
+/// standard input.
 pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Result<(), FileError> {
     let mut guarded = Guard::default();
     let mut before: Vec<(String, PathBuf)> = Vec::new();
@@ -99,15 +102,16 @@ pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Res
     Ok(())
 }
 
-/// Whether this process runs one command, which guards what it reads.
+/// Whether [`guard_inputs`] was called.
 pub(super) fn are_guarded() -> bool {
     guard().is_some()
 }
 
-/// Opens a file that is read. Everything that a command reads is opened here, or named to [`is_input`].
+/// Opens a file for reading. Every input of a command is opened here, or registered with
+/// [`is_input`].
 ///
 /// # Errors
-/// What the system says; a file that the command is going to write over ([`guard_inputs`]).
+/// Errors of the system; a file that the command is going to overwrite ([`guard_inputs`]).
 ///
 /// ```
 /// use stretch_data::files::{guard_inputs, open_input, write_whole};
@@ -130,15 +134,17 @@ pub fn open_input(path: impl AsRef<Path>) -> io::Result<File> {
     File::open(path)
 }
 
-/// Says that a file is read without [`open_input`], by another program such as a simulator.
+/// Registers a file that is read without [`open_input`], for example by another program such as a
+/// simulator.
 ///
 /// # Errors
-/// A file that the command is going to write over.
+/// A file that the command is going to overwrite.
 pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     let path = path.as_ref();
     let mut guard = guard();
     let (Some(guard), Some(own)) = (guard.as_mut(), identity(path)) else { return Ok(()) };
-    // first of all, so that a caller who ignores an error still does not overwrite it
+    // Registered before the check, so that a caller who ignores the error still cannot overwrite
+    // the file.
     guard.inputs.insert(own.clone(), path.to_owned());
     match guard.outputs.iter().find(|(_, there)| there.as_ref() == Some(&own)) {
         Some((shown, _)) => Err(io::Error::other(format!(
@@ -148,14 +154,14 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     }
 }
 
-/// Says that a file is written again in its own place, by design, after it was read.
+/// Permits that a file is overwritten after it was read, because the command updates it in place.
 pub fn rewrites(path: impl AsRef<Path>) {
     if let (Some(guard), Some(own)) = (guard().as_mut(), identity(path.as_ref())) {
         guard.inputs.remove(&own);
     }
 }
 
-/// Refuses a file that was read.
+/// Refuses to write a file that was read.
 pub(super) fn check_output(path: &Path, meta: &fs::Metadata) -> io::Result<()> {
     let guard = guard();
     let input = || guard.as_ref()?.inputs.get(&identity_of(path, meta)?);

@@ -1,8 +1,9 @@
-//! Files and folders that are written whole or not at all.
+//! Files and folders that are written completely or not at all.
 //!
-//! Everything is built under a temporary name in the folder of its target, reaches the disk, and is then renamed. After an error,
-//! a full disk or Ctrl-C the target is as it was and no temporary name stays. A process that is killed outright may leave a
-//! `.stretch-*.tmp` behind, which holds nothing that is needed.
+//! Everything is built under a temporary name in the folder of its target, synced to disk, and then
+//! renamed. After an error, a full disk or Ctrl-C the target is unchanged and no temporary file
+//! remains. A process that is killed outright may leave a `.stretch-*.tmp` behind, which can be
+//! deleted.
 
 mod draft;
 mod folder;
@@ -25,9 +26,9 @@ pub use inputs::{guard_inputs, is_input, open_input, rewrites};
 pub use outputs::{Outputs, write_folder, write_whole};
 pub use stream::is_standard_output;
 
-/// Why a file or folder could not be written, or read.
+/// Why a file or folder could not be written or read.
 ///
-/// Each message is one sentence that says where, what, and what to do.
+/// Each message is one sentence that states the place, the problem and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
@@ -36,22 +37,22 @@ pub enum FileError {
     Io {
         /// The file or folder.
         path: String,
-        /// What was tried: `open it`, `write it`.
+        /// The attempted action: `open it`, `write it`.
         action: &'static str,
-        /// What the system said.
+        /// The system's error.
         #[source]
         cause: io::Error,
     },
-    /// Something that is in the way of a folder.
+    /// A target of a folder that exists and is not an empty folder.
     #[error("{path}: it exists and is not an empty folder; choose another name")]
     Exists {
-        /// What is there.
+        /// The path.
         path: String,
     },
 }
 
 impl FileError {
-    /// What the system said when `action` (`open it`, `write it`) was tried.
+    /// Returns an error with the system's `cause`. `action` is `open it` or `write it`.
     pub fn io(path: impl fmt::Display, action: &'static str, cause: io::Error) -> Self {
         Self::Io { path: path.to_string(), action, cause }
     }
@@ -61,23 +62,27 @@ impl FileError {
     }
 }
 
-/// A cause without Rust's `(os error 28)`.
+/// Returns the text of a cause without Rust's `(os error 28)`.
 fn without_number(cause: &io::Error) -> String {
     let text = cause.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_owned()
 }
 
-/// The largest file that is read as one piece, bytes: records, settings and diagnoses have kilobytes.
+/// Largest file that is read in one piece, bytes. Calibration files, settings and diagnoses have
+/// kilobytes.
 const LARGEST: u64 = 64 << 20;
 
-/// What came on standard input and through pipes, because it comes only once and may be asked for twice.
+/// Bytes from standard input and pipes, kept because a stream can be read only once and may be
+/// needed twice.
 static STREAMS: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
-/// Reads a file, `-` being standard input. What came there is kept, and a second reader gets the same; so is what came through a pipe
-/// (`<(...)` of a shell) in a process that runs one command, which says so with [`guard_inputs`].
+/// Reads a file; `-` is standard input. Bytes from standard input are kept, so that a second reader
+/// gets the same. In a process that has called [`guard_inputs`], this also holds for pipes
+/// (`<(...)` of a shell).
 ///
 /// # Errors
-/// What the system says, a file of more than 64 MiB or a stream that goes on so long, and a file that the command writes over.
+/// Errors of the system; a file or stream larger than 64 MiB; a file that the command is going to
+/// overwrite.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;

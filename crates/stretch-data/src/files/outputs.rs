@@ -1,4 +1,4 @@
-//! One file, one folder, or several that belong together.
+//! Output of one file, one folder, or several that belong together.
 
 use std::{
     fs,
@@ -15,18 +15,19 @@ use super::{
     stream::open_stream,
 };
 
-/// Writes a file whole or not at all.
+/// Writes a file completely or not at all.
 ///
-/// `fill` writes into a temporary file next to the target, which takes the target's name
-/// only when everything has reached the disk. After any error (a full disk, a folder that may
-/// not be written to, an error of `fill`) the old file is still there. A symbolic link stays one: the
+/// `fill` writes into a temporary file next to the target. The file is renamed to the target only
+/// after everything has reached the disk. After any error (a full disk, a folder without write
+/// permission, an error of `fill`) the old file is unchanged. If the target is a symbolic link, the
 /// file that it points to is replaced. Output is buffered.
 ///
-/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
-/// the bytes come; a pipe without a reader is refused after two seconds, and so are standard
-/// input and disks. What a reader of these does not take because it has gone is no error.
+/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to
+/// directly. A pipe without a reader is refused after two seconds. Standard input and disks are
+/// refused. It is no error if the reader of a pipe or of standard output closes it early.
 ///
-/// A file that this process has read as an input is not written over ([`guard_inputs`](super::guard_inputs)).
+/// A file that this process has read as an input is not overwritten
+/// ([`guard_inputs`](super::guard_inputs)).
 ///
 /// # Errors
 /// [`FileError::Io`] with path and cause.
@@ -49,18 +50,20 @@ pub fn write_whole(
     outputs.keep()
 }
 
-/// Writes a folder whole or not at all.
+/// Writes a folder completely or not at all.
 ///
-/// `fill` gets an empty folder next to the target and writes into it; then all of it is
-/// synced and takes the target's name. After any error the target is as it was.
+/// `fill` writes into an empty folder next to the target. Then the folder is synced to disk and
+/// renamed to the target. After any error the target is unchanged.
 ///
-/// A target that holds something is refused unless `force` is set. With `force` it is replaced: files of the same name
-/// are replaced, and so are the trials that a data set was written with. All else in it is the user's, and stays. On Linux and
-/// macOS the two folders swap their names in one step, so that a kill leaves the old one or the new one. Elsewhere the old one
-/// is moved aside first.
+/// A target that is not an empty folder is refused unless `force` is set. With `force`, files of
+/// the same name are replaced. If the new folder is a data set, trials listed in the old
+/// `dataset.toml` with a matching digest are removed. All other files in the old folder are the
+/// user's and are kept. On Linux and macOS the two folders swap their names in one step, so a kill
+/// leaves either the old folder or the new one. On other systems the old folder is moved aside
+/// first.
 ///
 /// # Errors
-/// [`FileError::Exists`], [`FileError::Io`], or what `fill` says.
+/// [`FileError::Exists`], [`FileError::Io`], or an error of `fill`.
 ///
 /// ```
 /// use stretch_data::files::{FileError, write_folder, write_whole};
@@ -87,9 +90,11 @@ pub fn write_folder<E: From<FileError>>(
     Ok(outputs.keep()?)
 }
 
-/// What one command writes: all of it is on the disk under temporary names before any of it gets its name.
+/// The outputs of one command. All of them are on the disk under temporary names before any of them
+/// is renamed to its target.
 ///
-/// When a part cannot be written nothing is. A kill between two names leaves each file whole, the old one or the new one.
+/// If one cannot be written, none is. A kill between two renames leaves each file complete, either
+/// the old or the new one.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;
@@ -105,10 +110,11 @@ pub fn write_folder<E: From<FileError>>(
 pub struct Outputs(Vec<Draft>);
 
 impl Outputs {
-    /// Writes a file next to its target. What goes to standard output or into a pipe is written at once.
+    /// Writes a file next to its target. Output to standard output or a pipe is written
+    /// immediately.
     ///
     /// # Errors
-    /// As [`write_whole`]; two files of one name.
+    /// As [`write_whole`]; two files with the same name.
     pub fn file(
         &mut self,
         path: impl AsRef<Path>,
@@ -135,7 +141,7 @@ impl Outputs {
         if let Some(stream) = open_stream(path, meta.as_ref())? {
             let mut out = BufWriter::new(stream);
             let written = fill(&mut out).and_then(|()| out.flush());
-            // what could not be written is not tried again
+            // What could not be written is not tried again.
             let _ = out.into_parts();
             return written;
         }
@@ -166,7 +172,7 @@ impl Outputs {
     /// Writes a folder next to its target, as [`write_folder`].
     ///
     /// # Errors
-    /// As [`write_folder`], or what `fill` says.
+    /// As [`write_folder`], or an error of `fill`.
     pub fn folder<E: From<FileError>>(
         &mut self,
         path: impl AsRef<Path>,
@@ -184,7 +190,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Gives everything its name.
+    /// Renames all files and folders to their targets.
     ///
     /// # Errors
     /// [`FileError::Io`] with path and cause, [`FileError::Exists`].

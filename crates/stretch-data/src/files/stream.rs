@@ -1,4 +1,4 @@
-//! Outputs that are no files: standard output, pipes, devices.
+//! Outputs that are not files: standard output, pipes, devices.
 
 use std::{
     fs::{File, Metadata},
@@ -13,7 +13,7 @@ fn is_one_of(path: &Path, names: [&str; 3]) -> bool {
     cfg!(unix) && names.iter().any(|name| path == Path::new(name))
 }
 
-/// Whether a path is standard output, as a file that is written: `-`, `/dev/stdout`.
+/// Whether an output path means standard output: `-`, `/dev/stdout`.
 ///
 /// ```
 /// use stretch_data::files::is_standard_output;
@@ -24,10 +24,11 @@ pub fn is_standard_output(path: impl AsRef<Path>) -> bool {
     path.as_ref().as_os_str() == "-" || is_one_of(path.as_ref(), STDOUT)
 }
 
-/// A target that takes bytes as they come; `None` if the path is that of a file, or does not exist yet.
+/// Opens a target that takes bytes directly. Returns `None` if the path is a regular file or does
+/// not exist yet.
 ///
-/// Standard output is not opened again: where it is redirected into a file, that would
-/// begin to write at its start again.
+/// Standard output is not opened again: if it is redirected into a file, writing would start again
+/// at the beginning of that file.
 pub(super) fn open_stream(
     path: &Path,
     meta: Option<&Metadata>,
@@ -45,8 +46,8 @@ pub(super) fn open_stream(
     }
 }
 
-/// Standard output, or a pipe. Where its reader has gone, as `head` does, the rest is let go without a word: what else a command writes is
-/// still asked for.
+/// Standard output or a pipe. If its reader has closed it, as `head` does, the remaining bytes are
+/// discarded without an error, because the other outputs of the command are still wanted.
 struct Stream<W> {
     out: W,
     has_gone: bool,
@@ -82,9 +83,10 @@ fn open_device(path: &Path, meta: &Metadata) -> io::Result<File> {
     if meta.file_type().is_block_device() {
         return Err(io::Error::other("it is a disk; name a file"));
     }
-    // to open a pipe waits for its reader, to open a serial port for a carrier, for ever
+    // Without NONBLOCK, opening a pipe could wait for its reader forever, and opening a serial port
+    // for a carrier.
     let flags = OFlags::WRONLY | OFlags::CLOEXEC | OFlags::NOCTTY;
-    // a reader may begin two seconds later
+    // A reader may start up to two seconds later.
     for _ in 0..200 {
         match open(path, flags | OFlags::NONBLOCK, Mode::empty()) {
             Err(Errno::NXIO) if meta.file_type().is_fifo() => {

@@ -1,4 +1,4 @@
-//! Ways to write, and a file system that fails.
+//! The write operations under test, and a file system that fails.
 
 use std::{
     fs,
@@ -9,14 +9,14 @@ use std::{
 
 use stretch_data::files::{FileError, Outputs, write_folder, write_whole};
 
-/// What the next calls come to.
+/// Which of the next file-system calls fail.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Plan {
     /// Number of the first call that fails; 0 for none.
     pub(crate) at: usize,
-    /// Whether all later ones fail, too.
+    /// Whether all later calls fail, too.
     pub(crate) and_on: bool,
-    /// Whether the process ends there instead.
+    /// Whether the process aborts at that call instead.
     pub(crate) kills: bool,
     /// Whether two names can be swapped in one step.
     pub(crate) exchanges: bool,
@@ -31,10 +31,10 @@ pub(crate) fn hook(call: &'static str) -> io::Result<()> {
     *calls += 1;
     if *calls == plan.at || (plan.and_on && plan.at > 0 && *calls > plan.at) {
         if plan.kills {
-            // as by kill -9: nothing is cleaned up
+            // As after kill -9, nothing is cleaned up.
             std::process::abort();
         }
-        // no space left on the device
+        // No space left on device (ENOSPC).
         return Err(io::Error::from_raw_os_error(28));
     }
     match call {
@@ -43,7 +43,7 @@ pub(crate) fn hook(call: &'static str) -> io::Result<()> {
     }
 }
 
-/// Runs something under a plan; whether the plan came to act.
+/// Runs a function under a plan. Also returns whether the plan's call number was reached.
 pub(crate) fn under<T>(plan: Plan, run: impl FnOnce() -> T) -> (T, bool) {
     *STATE.lock().unwrap() = (plan, 0);
     let answer = run();
@@ -53,7 +53,7 @@ pub(crate) fn under<T>(plan: Plan, run: impl FnOnce() -> T) -> (T, bool) {
     (answer, acted)
 }
 
-/// A way to write.
+/// A write operation under test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Job {
     File,
@@ -65,7 +65,7 @@ pub(crate) enum Job {
 pub(crate) const JOBS: [Job; 4] = [Job::File, Job::NewFolder, Job::Folder, Job::Together];
 
 impl Job {
-    /// What is there before.
+    /// Creates the files that exist before the operation.
     pub(crate) fn prepare(self, at: &Path) {
         if self == Self::NewFolder {
             return;
@@ -74,7 +74,7 @@ impl Job {
         for name in ["set/a", "set/own/notes", "set/mine"] {
             fs::write(at.join(name), format!("old {name}")).unwrap();
         }
-        // what the last data set was written with, and what was changed in it since
+        // A `dataset.toml` with the digests of two trials, of which one was changed afterwards.
         let digest = |name: &str, digest: &str| {
             format!(
                 "[[trial]]\nfile = '{name}'\nkind = 'other'\nsplit = 'fit'\ndigest = 'crc32c {digest}'\n"

@@ -1,8 +1,8 @@
 //! A file system that fails at any of its calls, once or from then on, and a program that is killed
-//! before any of them: what is written is old or new, never between.
+//! before any of them. The output must be old or new, never a mixture.
 //!
-//! The hook that fails is set once in the life of a process, so that all failures are one test. What is killed is the example
-//! `killed_writer`.
+//! The failing hook is set once in the life of a process, so all failures are in one test. The
+//! program that is killed is the example `killed_writer`.
 #![cfg(unix)]
 
 mod job;
@@ -19,14 +19,14 @@ use stretch_data::files::ask_before_disk_calls;
 
 type Files = BTreeMap<String, String>;
 
-/// Where syncing takes no time, if there is such a place.
+/// Returns a temporary folder, in memory if possible, because syncing takes no time there.
 fn scratch() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
     made.unwrap()
 }
 
-/// Text of every file below a folder.
+/// Returns the text of every file below a folder.
 fn tree(folder: &Path) -> Files {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -41,14 +41,14 @@ fn tree(folder: &Path) -> Files {
     files
 }
 
-/// What is there under no temporary name.
+/// Returns the files that do not have a temporary name.
 fn kept(at: &Path) -> Files {
     let mut files = tree(at);
     files.retain(|name, _| !name.split('/').any(|part| part.starts_with(".stretch-")));
     files
 }
 
-/// Files before and after a job, as they should be.
+/// Returns the files expected before and after a job.
 fn expected(job: Job) -> [Files; 2] {
     let [before, after] = [(); 2].map(|()| scratch());
     for folder in [&before, &after] {
@@ -58,10 +58,11 @@ fn expected(job: Job) -> [Files; 2] {
     [before, after].map(|folder| tree(folder.path()))
 }
 
-/// Whether all files are as before or all as after the job, as far as it can promise that.
+/// Whether all files are as before the job or all as after it, as far as the job promises that.
 ///
-/// Several files get their names one after the other: each of them is old or new. Where two names cannot be swapped in one step, a
-/// folder that is replaced may be aside when the process dies or nothing works any more.
+/// Several files are renamed one after the other, so each of them is old or new. If two names
+/// cannot be swapped in one step, a folder that is replaced may still be aside when the process
+/// dies or all calls fail.
 fn is_old_or_new(job: Job, exchanges: bool, at: &Path, [before, after]: &[Files; 2]) -> bool {
     let found = kept(at);
     if job == Job::Together {
@@ -75,7 +76,8 @@ fn is_old_or_new(job: Job, exchanges: bool, at: &Path, [before, after]: &[Files;
         || (job == Job::Folder && !exchanges && is_aside(at, before))
 }
 
-/// Whether the old folder is whole under another name, where it waits while the new one takes its place.
+/// Whether the complete old folder is aside, under the temporary name it has while the new one
+/// takes its place.
 fn is_aside(at: &Path, before: &Files) -> bool {
     let inside = tree(at).into_iter().filter_map(|(name, text)| {
         let (temporary, path) = name.split_once(".old/")?;
@@ -92,7 +94,7 @@ fn fails_at_every_call(job: Job, and_on: bool, exchanges: bool) -> usize {
         let plan = Plan { at, and_on, exchanges, kills: false };
         let (result, acted) = under(plan, || job.run(scratch.path()));
         let case = format!("{job:?}, {plan:?}: {result:?}");
-        // one failure can always be taken back
+        // A single failure can always be undone.
         let is_aside_allowed = exchanges || !and_on;
         let found = kept(scratch.path());
         assert!(
@@ -107,7 +109,7 @@ fn fails_at_every_call(job: Job, and_on: bool, exchanges: bool) -> usize {
             assert_eq!(message.matches("No space left on device").count(), 1, "{message}");
         }
         if !acted {
-            // no file is left next to it
+            // No other file remains next to the target.
             assert_eq!(tree(scratch.path()), expected[1], "{case}");
             return at;
         }
@@ -115,7 +117,7 @@ fn fails_at_every_call(job: Job, and_on: bool, exchanges: bool) -> usize {
     0
 }
 
-/// The example that is killed, which `cargo test` builds with the tests.
+/// Returns the command of the example that is killed. `cargo test` builds it with the tests.
 fn killed_writer() -> Command {
     let tests = std::env::current_exe().unwrap();
     let folder: PathBuf = tests.ancestors().nth(2).unwrap().join("examples");
@@ -140,7 +142,7 @@ fn is_killed_before_every_call(job: Job, exchanges: bool) -> usize {
             assert_eq!(tree(scratch.path()), expected[1], "{case}");
             return at;
         }
-        // the next run is not blocked, and what is the user's is still there
+        // The next run is not blocked, and the user's files still exist.
         if job == Job::Folder && exchanges {
             job.run(scratch.path()).expect(&case);
             assert_eq!(kept(scratch.path()), expected[1], "{case}");

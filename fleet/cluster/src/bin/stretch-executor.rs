@@ -1,4 +1,4 @@
-//! `stretch-executor`: see the crate.
+//! The program `stretch-executor`. See the crate's documentation.
 
 use clap::Parser;
 use stretch_fleet_cluster::{ExecutorOptions, run_executor};

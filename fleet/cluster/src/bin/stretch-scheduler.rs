@@ -1,4 +1,4 @@
-//! `stretch-scheduler`: see the crate.
+//! The program `stretch-scheduler`. See the crate's documentation.
 
 use clap::Parser;
 use stretch_fleet_cluster::{SchedulerOptions, run_scheduler};

@@ -1,4 +1,4 @@
-//! Stored states that are old, foreign or damaged.
+//! Stored states of other releases, of other fits, or with damaged bytes.
 
 use std::sync::LazyLock;
 
@@ -48,7 +48,7 @@ fn states_of_other_rates_are_not_merged() {
     let ours = state();
     let text = String::from_utf8_lossy(&ours).into_owned();
     let at = text.find("\"window\":11").unwrap() + "\"window\":".len();
-    // the text begins after bytes that may be no UTF-8: look for it in them
+    // The text follows bytes that may not be UTF-8, so it is searched for in the bytes.
     let at = ours.windows(11).position(|w| w == b"\"window\":11").unwrap_or(at) + 9;
     let mut theirs = ours.clone();
     theirs[at..at + 2].copy_from_slice(b"15");
@@ -77,7 +77,7 @@ fn every_way_to_cut_a_state_is_told() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
 
-    /// No bytes make a panic, nor a number that is none.
+    /// Damaged bytes never cause a panic or a result that is not a number.
     #[test]
     fn spoilt_bytes_never_panic(
         spoilt in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12),

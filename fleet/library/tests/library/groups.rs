@@ -1,4 +1,4 @@
-//! Many groups, in little memory, and the same as one by one.
+//! Many groups need little memory, and give the same results as one group at a time.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use datafusion::{
 
 use crate::support::{Row, ask, assert_close, fit, fits, gauge, session};
 
-/// Rows of many sensors, mixed so that neighbours belong to different ones.
+/// Rows of many sensors, interleaved so that neighbouring rows belong to different sensors.
 fn mixed(sensors: usize, rows: usize) -> Vec<Row> {
     let each: Vec<_> = (0..sensors).map(|sensor| gauge(rows, sensor as u64 + 1)).collect();
     (0..rows).flat_map(|k| each.iter().map(move |rows| rows[k])).collect()
@@ -40,8 +40,8 @@ fn groups_are_what_each_is_alone() {
     }
 }
 
-/// Ten thousand groups in a pool of 512 MB: nothing is spilled, because there is no place to spill
-/// to.
+/// Ten thousand groups in a pool of 512 MB. Nothing can be spilled, because no place for spilled
+/// data is configured.
 #[test]
 fn ten_thousand_groups_are_held_in_little_memory() {
     let rows = mixed(10_000, 20);
@@ -67,7 +67,7 @@ fn ten_thousand_groups_are_held_in_little_memory() {
     assert!(fits(batch.column(2)).iter().all(|fit| fit.rows == 20));
 }
 
-/// As many groups as rows: states are passed on without being collected.
+/// As many groups as rows. The engine then passes states on without aggregating them.
 #[test]
 fn a_group_a_row_is_answered_like_any_other() {
     let rows: Vec<Row> = gauge(300_000, 3)
@@ -82,7 +82,7 @@ fn a_group_a_row_is_answered_like_any_other() {
     assert_eq!(batch.column(0).as_primitive::<Int64Type>().value(0), 300_000);
     let sum = datafusion::arrow::util::display::array_value_to_string(batch.column(1), 0).unwrap();
     assert_eq!(sum, "300000");
-    // with one row, the signal is what it is in all rows
+    // With a single row the signal is constant.
     let least =
         datafusion::arrow::util::display::array_value_to_string(batch.column(2), 0).unwrap();
     assert!(least.contains("in all 1 rows"), "{least}");
@@ -103,7 +103,7 @@ fn a_filter_is_no_row_left_out() {
     assert_close(&[found.rmse.unwrap()], &[alone.rmse.unwrap()]);
 }
 
-/// Rows of a window that only grows: the aggregate continues after an answer.
+/// A window that only grows: the aggregate continues after it was evaluated.
 #[test]
 fn a_growing_window_asks_again_and_again() {
     let rows = gauge(200, 6);

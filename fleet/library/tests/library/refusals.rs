@@ -1,4 +1,4 @@
-//! Columns without a fit become rows that say so; meaningless queries are refused.
+//! Columns without a fit give rows with an error text; meaningless queries are refused.
 
 use crate::support::{Row, ask, fit, fits, gauge, session};
 
@@ -52,7 +52,7 @@ fn rows_without_a_number_are_left_out_and_counted() {
         gauge(600, 1).into_iter().enumerate().filter(|(k, _)| k % 10 > 3).map(|(_, r)| r).collect();
     let found = fit(&session(&rows, 1), POLY13);
     assert_eq!((found.rows, found.left_out), (360, 240));
-    // the same rows in the same order: the same bits
+    // The same rows in the same order give the same bits.
     assert_eq!(found.coefficients, fit(&session(&sound, 1), POLY13).coefficients);
 }
 

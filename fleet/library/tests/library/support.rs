@@ -1,4 +1,4 @@
-//! Tables in memory, and what a query answers.
+//! Tables in memory, and access to the results of queries.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -17,14 +17,14 @@ use datafusion::{
 };
 use stretch_fleet::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
 
-/// Relative, because triangles merged in another order have other rounding; fits here are well
-/// conditioned.
+/// Relative rounding error, which depends on the order in which triangles are merged. The fits in
+/// these tests are well conditioned.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
 /// A row: sensor, rate, signal, reference.
 pub(crate) type Row = (i64, Option<f64>, Option<f64>, Option<f64>);
 
-/// A gauge that goes up and down: signal and reference with a loop between, row by row.
+/// A gauge with hysteresis that is stretched and released: signal and reference, row by row.
 pub(crate) fn gauge(rows: usize, seed: u64) -> Vec<Row> {
     let mut chance = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     let mut noise = || {
@@ -73,7 +73,8 @@ fn batch(rows: &[Row]) -> RecordBatch {
     RecordBatch::try_new(schema(), columns).unwrap()
 }
 
-/// A session that knows the functions, with rows as the table `trials`, in `parts` partitions.
+/// Returns a session with the functions registered, and the rows as the table `trials` in `parts`
+/// partitions.
 pub(crate) fn session(rows: &[Row], parts: usize) -> SessionContext {
     let each = rows.len().div_ceil(parts).max(1);
     let mut partitions: Vec<_> =
@@ -99,7 +100,7 @@ pub(crate) fn add_states(session: &SessionContext, states: &[Option<Vec<u8>>]) {
     session.register_table("states", Arc::new(table)).unwrap();
 }
 
-/// All rows of a query's answer.
+/// Returns all rows of a query's result.
 pub(crate) fn ask(session: &SessionContext, sql: &str) -> Result<RecordBatch> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).build().unwrap();
     runtime.block_on(async {
@@ -110,7 +111,7 @@ pub(crate) fn ask(session: &SessionContext, sql: &str) -> Result<RecordBatch> {
     })
 }
 
-/// One fit's answer.
+/// The result of one fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answer {
     pub rows: u64,
@@ -122,7 +123,7 @@ pub(crate) struct Answer {
     pub refused: Option<String>,
 }
 
-/// The structs of a column of fits.
+/// Converts a column of fits to results.
 pub(crate) fn fits(column: &ArrayRef) -> Vec<Answer> {
     let all: &StructArray = column.as_struct();
     let number = |name: &str, at: usize| {
@@ -153,14 +154,14 @@ pub(crate) fn fits(column: &ArrayRef) -> Vec<Answer> {
     (0..all.len()).map(one).collect()
 }
 
-/// The one fit that a query without groups answers.
+/// Returns the fit of a query without groups.
 pub(crate) fn fit(session: &SessionContext, sql: &str) -> Answer {
     let batch = ask(session, sql).unwrap();
     assert_eq!(batch.num_rows(), 1);
     fits(batch.column(0)).remove(0)
 }
 
-/// Whether vectors are the same to [`ROUNDING`] of their length.
+/// Asserts that two vectors agree up to [`ROUNDING`] times their length.
 pub(crate) fn assert_close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     let length = expected.iter().map(|x| x * x).sum::<f64>().sqrt();

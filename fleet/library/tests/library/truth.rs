@@ -1,4 +1,4 @@
-//! Compares the aggregates with the crates that they use.
+//! Compares the aggregates with the crates on which they are based.
 
 use datafusion::arrow::array::AsArray;
 use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
@@ -10,7 +10,7 @@ use stretch_metrics::Agreement;
 
 use crate::support::{Row, add_states, ask, assert_close, fit, gauge, session};
 
-/// Both branches of a degree, fitted in one pass: rates at or above zero first.
+/// Fits both branches of a degree in one pass. The branch with rates of at least zero comes first.
 fn direct(rows: &[Row], degree: Degree) -> (Vec<f64>, f64) {
     let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64>::new(degree).unwrap());
     for (_, rate, signal, reference) in rows {
@@ -68,7 +68,7 @@ fn a_line_is_the_fit_of_one_pass() {
 
 #[test]
 fn a_record_gives_what_the_surfaces_give() {
-    // a signal that falls as the reference rises, too: its branches change places
+    // A signal that falls as the reference rises is tested, too. Its branches are exchanged.
     for sign in [1.0, -1.0] {
         let mut rows = gauge(4000, 10);
         rows.iter_mut().for_each(|row| row.3 = row.3.map(|x| sign * x));
@@ -131,7 +131,7 @@ fn agreement_is_the_metrics_of_one_pass() {
     assert_eq!(rows, 2500);
 }
 
-/// The states of parts of the rows, cut at these places.
+/// Computes the states of parts of the rows, cut at these indices.
 fn states(rows: &[Row], cuts: &[usize]) -> Vec<Option<Vec<u8>>> {
     let mut ends: Vec<usize> = cuts.iter().map(|cut| cut % rows.len()).collect();
     ends.extend([0, rows.len()]);
@@ -169,7 +169,7 @@ proptest! {
         let merged = fit(&session, "select poly13_merge(state) from states");
         assert_eq!((merged.rows, merged.left_out), (whole.rows, whole.left_out));
         assert_eq!((merged.signal, &merged.refused), (whole.signal, &None));
-        // terms are determined to 1e3 here, and rounding is given in units of that
+        // The condition of the fit here is about 1e3, and the bound allows for rounding times that.
         let (a, b) = (merged.coefficients.unwrap(), whole.coefficients.unwrap());
         let length = b.iter().map(|x| x * x).sum::<f64>().sqrt();
         let off = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! Lakes of trials: `stretch-fleet`.
+//! The program `stretch-fleet`, for lakes of trials.
 
 use std::process::ExitCode;
 

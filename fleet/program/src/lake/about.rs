@@ -1,4 +1,5 @@
-//! What all trials of a lake have in common, and what the footer of a trial's file says of it.
+//! Properties shared by all trials of a lake, and the description of a trial in the footer of its
+//! file.
 
 use std::{
     collections::BTreeMap,
@@ -17,23 +18,23 @@ use stretch_data::{Split, TrialKind};
 /// The file that makes a folder a lake.
 const FILE: &str = "lake.json";
 
-/// The layout that this release writes and reads.
+/// Version of the layout that this release writes and reads.
 const SCHEMA: u32 = 1;
 
-/// The signal of the rates, and how they were computed: the same for every file, so that one query
-/// may read them all.
+/// Signal, reference and rate estimator. They are the same for every file, so that one query can
+/// read all files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct About {
     schema: u32,
-    /// Column that rates are of.
+    /// Column from which the rates are computed.
     pub signal: String,
-    /// Column of what is to be estimated.
+    /// Column that is to be estimated.
     pub reference: String,
-    /// Whether the reference is a length, and the files also have its contraction.
+    /// Whether the reference is a length, so that the files also contain its contraction.
     pub is_contraction: bool,
-    /// What computed the rates.
+    /// Estimator of the rates.
     pub rate: RateEstimator,
-    /// Samples a second of every trial's grid.
+    /// Sample rate of every trial's grid, Hz.
     pub sample_rate_hz: f64,
 }
 
@@ -54,7 +55,7 @@ impl About {
         }
     }
 
-    /// The lake's description of itself; `None` if the folder is no lake yet.
+    /// Reads the description of a lake. Returns `None` if the folder is not a lake yet.
     pub(crate) fn read(lake: &Path) -> anyhow::Result<Option<Self>> {
         let path = lake.join(FILE);
         let bytes = match stretch_data::files::read_whole(&path) {
@@ -79,17 +80,19 @@ impl About {
         Ok(stretch_data::files::write_whole(lake.join(FILE), |out| out.write_all(text.as_bytes()))?)
     }
 
-    /// The fitted column: the contraction of a length, otherwise the reference itself.
+    /// Returns the column to be fitted: the contraction of a length, otherwise the reference
+    /// itself.
     pub(crate) fn target(&self) -> &str {
         if self.is_contraction { "contraction" } else { &self.reference }
     }
 
-    /// The grid of every trial.
+    /// Returns the sample rate of every trial.
     pub(crate) fn sample_rate(&self) -> anyhow::Result<SampleRate> {
         Ok(SampleRate::new(self.sample_rate_hz)?)
     }
 
-    /// Refuses trials whose rates could not be distinguished from the lake's in a query.
+    /// Refuses trials whose signal, reference or rates differ from the lake's, because a query
+    /// could not distinguish them.
     pub(crate) fn check(&self, other: &Self) -> Result<(), String> {
         let differs = |what: &str, own: &str, other: &str| {
             format!(
@@ -110,7 +113,7 @@ impl About {
     }
 }
 
-/// A rate estimator as `--rate` takes it.
+/// Formats a rate estimator as in the option `--rate`.
 pub(crate) fn spelled(rate: RateEstimator) -> String {
     match rate {
         RateEstimator::CentralDifference => "central".to_owned(),
@@ -126,40 +129,40 @@ pub(crate) fn spelled(rate: RateEstimator) -> String {
     }
 }
 
-/// The key of a footer in its file's metadata.
+/// Key of the description in the file's metadata.
 pub(crate) const KEY: &str = "stretch";
 
-/// The description of a trial, in JSON.
+/// Description of a trial, stored as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Footer {
-    /// What its rates are of, and what computed them.
+    /// Signal, reference and rate estimator.
     pub about: About,
-    /// The trial's name: that of the file it came from.
+    /// The trial's name, which is the name of its source file.
     pub trial: String,
-    /// What was done in it.
+    /// What was done in the trial.
     pub kind: TrialKind,
-    /// Whether it may be fitted or only tested on.
+    /// Whether the trial may be fitted, or only used for testing.
     pub split: Split,
     /// Seconds since the gauge was powered.
     pub start_s: f64,
-    /// Unit of each column, where its name says one.
+    /// Unit of each column whose name contains one.
     pub units: BTreeMap<String, String>,
-    /// Length at a contraction of zero, where there is a contraction.
+    /// Length at a contraction of zero, if the file has a contraction.
     pub rest_length: Option<f64>,
-    /// Three standard deviations of the rate's noise, in units of the signal a second.
+    /// Dead band: three standard deviations of the rate's noise, in units of the signal per second.
     pub dead_band: f64,
-    /// The file it came from.
+    /// Path of the source file.
     pub source: String,
-    /// SHA-256 of that file.
+    /// SHA-256 of the source file.
     pub digest: String,
-    /// SHA-256 of time stamps and channels, whatever the format of the file.
+    /// SHA-256 of time stamps and channels, independent of the format of the source file.
     pub samples: String,
-    /// What had to be done to read it.
+    /// Notes of the reader: what had to be changed to read the trial.
     pub notes: Vec<String>,
 }
 
 impl Footer {
-    /// The footer of a file that is open.
+    /// Returns the description in the footer of a Parquet file.
     pub(crate) fn of(parquet: &ArrowReaderMetadata) -> anyhow::Result<Self> {
         let pairs = parquet.metadata().file_metadata().key_value_metadata();
         let pair = pairs.into_iter().flatten().find(|pair| pair.key == KEY);
@@ -172,17 +175,17 @@ impl Footer {
     }
 }
 
-/// SHA-256 of some bytes, in hexadecimal digits.
+/// Returns the SHA-256 of some bytes, in hexadecimal digits.
 pub(crate) fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut sha = Sha256::new();
     parts.into_iter().for_each(|part| sha.update(part));
     hexadecimal(sha)
 }
 
-/// The same for a file, one piece at a time in memory.
+/// Returns the SHA-256 of a file, reading it piece by piece.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of reading.
 pub(crate) fn digest_of_file(path: &Path) -> io::Result<String> {
     let (mut file, mut piece, mut sha) = (File::open(path)?, vec![0; 1 << 20], Sha256::new());
     loop {

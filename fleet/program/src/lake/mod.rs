@@ -40,13 +40,13 @@ use crate::show::caught;
 pub(crate) struct Lake {
     pub folder: PathBuf,
     pub about: About,
-    /// Every trial, in the order of places.
+    /// Every trial, ordered by place.
     pub files: Vec<LakeFile>,
-    /// Columns of all files; what a file lacks is null there.
+    /// Columns of all files. A column that a file lacks is null in its rows.
     pub schema: SchemaRef,
-    /// Files below `trials` that no query could read together with the others.
+    /// Files below `trials` that no query can read together with the others.
     pub unfit: Vec<Unfit>,
-    /// What was noticed.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -54,9 +54,10 @@ pub(crate) struct Lake {
 #[derive(Debug)]
 pub(crate) struct Unfit {
     pub path: PathBuf,
-    /// Why, and what to do.
+    /// The reason, and what to do.
     pub why: String,
-    /// Whether it could be read, but its rates are not those that lake.json names.
+    /// Whether the file is readable, but its signal, reference or rates differ from those in
+    /// lake.json.
     pub is_of_another_lake: bool,
 }
 
@@ -70,8 +71,8 @@ pub(crate) struct LakeFile {
 }
 
 impl Lake {
-    /// Reads every footer, and writes nothing. A file that cannot be read, or that no query could
-    /// read together with the others, is left out.
+    /// Reads the footers of all files, without writing anything. A file that cannot be read, or
+    /// that no query can read together with the others, is left out.
     pub(crate) fn open(folder: &Path) -> anyhow::Result<Self> {
         let shown = folder.display();
         let Some(about) = About::read(folder)? else {
@@ -121,23 +122,24 @@ impl LakeFile {
     }
 }
 
-/// Content of the footer of a Parquet file, with the schema that is embedded in it.
+/// Reads the footer of a Parquet file, including the embedded Arrow schema.
 ///
 /// # Errors
-/// A file that cannot be read, or on which its reader panics.
+/// A file that cannot be read, or on which the reader panics.
 pub(crate) fn metadata(path: &Path) -> anyhow::Result<ArrowReaderMetadata> {
     let file = File::open(path)?;
     Ok(caught(|| ArrowReaderMetadata::load(&file, Default::default()))??)
 }
 
-/// Every Parquet file below a folder, in order.
+/// Returns every Parquet file below a folder, sorted.
 pub(crate) fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = below(folder, usize::MAX)?;
     found.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
     Ok(found)
 }
 
-/// Every file at most `depth` folders below a folder, in order; empty if the folder does not exist.
+/// Returns every file at most `depth` folders below a folder, sorted. The result is empty if the
+/// folder does not exist.
 pub(crate) fn below(folder: &Path, depth: usize) -> anyhow::Result<Vec<PathBuf>> {
     let (mut found, mut folders) = (Vec::new(), vec![(folder.to_owned(), depth)]);
     while let Some((folder, depth)) = folders.pop() {
@@ -158,7 +160,8 @@ pub(crate) fn below(folder: &Path, depth: usize) -> anyhow::Result<Vec<PathBuf>>
     Ok(found)
 }
 
-/// The columns of all files, numbers as f64, and which files lack some.
+/// Returns the columns of all files, with numbers as f64, and notes on files that lack some of
+/// them.
 fn common(about: &About, files: &[LakeFile]) -> (SchemaRef, Vec<String>) {
     let mut lacking: BTreeMap<&str, Vec<&LakeFile>> = BTreeMap::new();
     let mut fields: Vec<Field> = Vec::new();
@@ -213,12 +216,12 @@ fn common(about: &About, files: &[LakeFile]) -> (SchemaRef, Vec<String>) {
 pub(crate) struct Refused {
     /// The file.
     pub file: String,
-    /// Why, and what to do.
+    /// The reason, and what to do.
     pub why: String,
 }
 
-/// Writes the error of a refused file into `refused/`, one file each, so that a user finds there
-/// what is missing.
+/// Writes the error of a refused file into `refused/`, one text file each, so that a user finds
+/// there which files are missing and why.
 pub(crate) fn refuse(lake: &Path, file: &Path, why: &str) -> anyhow::Result<Refused> {
     let refused = Refused { file: file.display().to_string(), why: why.to_owned() };
     let folder = lake.join("refused");
@@ -230,7 +233,7 @@ pub(crate) fn refuse(lake: &Path, file: &Path, why: &str) -> anyhow::Result<Refu
     Ok(refused)
 }
 
-/// Removes the refusal of a file that is in the lake now.
+/// Removes the stored error of a file that is now in the lake.
 pub(crate) fn accept(lake: &Path, file: &Path) -> std::io::Result<()> {
     match fs::remove_file(lake.join("refused").join(note(file))) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(e),
@@ -238,12 +241,12 @@ pub(crate) fn accept(lake: &Path, file: &Path) -> std::io::Result<()> {
     }
 }
 
-/// Moves the files that no query could read into `refused/`, under names that hold their former
+/// Moves the files that no query can read into `refused/`, under names that contain their former
 /// path.
 ///
 /// # Errors
-/// If lake.json does not fit more files than it fits, it is wrong rather than the files, and all
-/// stay where they are.
+/// More files that contradict lake.json than files that agree with it. In that case lake.json
+/// itself is wrong, and all files are left where they are.
 pub(crate) fn set_aside(lake: &Lake) -> anyhow::Result<Vec<Refused>> {
     let others: Vec<&Unfit> = lake.unfit.iter().filter(|file| file.is_of_another_lake).collect();
     if let Some(Unfit { path, why, .. }) = others.first() {
@@ -273,7 +276,7 @@ pub(crate) fn set_aside(lake: &Lake) -> anyhow::Result<Vec<Refused>> {
     lake.unfit.iter().map(one).collect()
 }
 
-/// A name that stays with the path.
+/// Returns a name for the stored error of a file, which depends only on its path.
 fn note(file: &Path) -> String {
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
     let path = file.display().to_string();

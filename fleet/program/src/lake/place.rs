@@ -1,4 +1,5 @@
-//! Place of a trial: site, rig, sensor and date; and tables of a session, which have them from the folders of files.
+//! The place of a trial: site, rig, sensor and date; and the registration of Parquet files as
+//! tables, whose folders provide these columns.
 
 use std::{
     collections::BTreeSet,
@@ -22,8 +23,8 @@ use super::Lake;
 /// Columns of the place, in the order of the folders.
 pub(crate) const COLUMNS: [&str; 4] = ["site", "rig", "sensor", "date"];
 
-/// Longest name of a site, rig or sensor, such that with its column and its ending as a record it
-/// is a valid file name everywhere.
+/// Longest name of a site, rig or sensor. With the name of its column, or with the extension of a
+/// calibration file, it is still a valid file name on every system.
 const MOST_LETTERS: usize = 100;
 
 /// Refuses a name that cannot be a folder, or that would lead out of one.
@@ -39,7 +40,8 @@ pub(crate) fn check_name(what: &str, name: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the folders `site=..`, `rig=..`, `sensor=..` and `date=..` say that a path begins with.
+/// Returns the values of the folders `site=..`, `rig=..`, `sensor=..` and `date=..` at the
+/// beginning of a path.
 fn folder_values(path: &Path) -> Option<[String; 4]> {
     let mut parts = path.components().map(|c| c.as_os_str().to_string_lossy());
     let mut values = [const { String::new() }; 4];
@@ -59,7 +61,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Names that can be those of folders, and a date as 2026-11-21 or 20261121.
+    /// Checks the names, which become folders, and parses a date such as 2026-11-21 or 20261121.
     pub(crate) fn new([site, rig, sensor, date]: [&str; 4]) -> anyhow::Result<Self> {
         for (what, name) in COLUMNS.iter().zip([site, rig, sensor]) {
             check_name(what, name)?;
@@ -73,20 +75,20 @@ impl Place {
         Ok(Self { site, rig, sensor, date })
     }
 
-    /// Folder below `trials`.
+    /// Returns the folder of the place below `trials`.
     pub(crate) fn folder(&self) -> PathBuf {
         let Self { site, rig, sensor, date } = self;
         PathBuf::from(format!("site={site}/rig={rig}/sensor={sensor}/date={date}"))
     }
 
-    /// The place that a path below `trials` names.
+    /// Parses the place of a path below `trials`.
     pub(crate) fn of(path: &Path) -> anyhow::Result<Self> {
         let named = folder_values(path).filter(|_| path.components().count() == COLUMNS.len() + 1);
         let named = named.context("it is in no folder site=../rig=../sensor=../date=..")?;
         Self::new(named.each_ref().map(String::as_str))
     }
 
-    /// The sensor, whatever the day.
+    /// Returns site, rig and sensor, without the date.
     pub(crate) fn gauge(&self) -> [&str; 3] {
         [&self.site, &self.rig, &self.sensor]
     }
@@ -115,7 +117,7 @@ pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<
         session.register_table("trials", whole)?;
         return Ok(());
     }
-    // Files in the folder of an unfit file are read one by one, all others as a folder.
+    // Files in the same folder as an unfit file are listed one by one, all others as a folder.
     let mut spoilt = BTreeSet::new();
     for file in &lake.unfit {
         spoilt.extend(partition(file.path.strip_prefix(&folder)?)?);
@@ -148,13 +150,13 @@ pub(crate) fn register(session: &SessionContext, lake: &Lake) -> anyhow::Result<
     Ok(())
 }
 
-/// The text of a folder as its column has it.
+/// Returns the value of a folder as a literal with the type of its column.
 fn value(column: &str, text: &str) -> Expr {
     if column == "date" { cast(lit(text), DataType::Date32) } else { lit(text) }
 }
 
-/// The folder values that a query would give to a file's rows; `None` for a file that no query
-/// reads.
+/// Returns the folder values that a query would assign to a file's rows, or `None` for a file that
+/// no query reads.
 fn partition(path: &Path) -> anyhow::Result<Option<[String; 4]>> {
     let values = folder_values(path);
     let is_place = |values: &[String; 4]| {
@@ -168,7 +170,8 @@ fn partition(path: &Path) -> anyhow::Result<Option<[String; 4]>> {
     Ok(values)
 }
 
-/// Makes a folder of Parquet files a table; `places` are the names of its folders, `date` being a date.
+/// Registers a folder of Parquet files as a table. `places` are the names of its folder levels;
+/// `date` has the type date.
 pub(crate) fn register_folder(
     session: &SessionContext,
     name: &str,
@@ -186,7 +189,8 @@ fn folder_url(folder: &Path) -> anyhow::Result<ListingTableUrl> {
     Ok(ListingTableUrl::parse(format!("{}/", folder.display()))?)
 }
 
-/// Parquet files as a table; `places` are the names of their folders, `date` being a date.
+/// Returns Parquet files as a table. `places` are the names of their folder levels; `date` has the
+/// type date.
 fn listing(
     urls: Vec<ListingTableUrl>,
     places: &[&str],

@@ -1,5 +1,5 @@
-//! Lakes with arbitrary file content: an error for each unfit file, no panic, and nothing is
-//! written.
+//! Lakes with arbitrary file contents: each unfit file gives an error, nothing panics, and nothing
+//! is written.
 
 use std::{fs, path::Path};
 
@@ -10,9 +10,9 @@ use stretch_data::{Split, TrialKind};
 use super::{About, Footer, Lake, Place, Samples, write};
 use crate::{show::caught, sql::session};
 
-/// The folder of a lake with two trials of a place, and the paths of the two.
+/// Creates a lake with two trials of one place, and returns the paths of the two files.
 fn lake() -> (tempfile::TempDir, [std::path::PathBuf; 2]) {
-    // where syncing takes no time, if there is such a place
+    // In memory if possible, because syncing takes no time there.
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
     let folder = folder.unwrap();
@@ -51,7 +51,7 @@ fn lake() -> (tempfile::TempDir, [std::path::PathBuf; 2]) {
     (folder, paths)
 }
 
-/// A change of a file: bytes that are overwritten, and where it is cut off.
+/// A change of a file: bytes that are overwritten, and the place where it is cut off.
 fn change() -> impl Strategy<Value = (Vec<(Index, u8)>, Option<Index>)> {
     (vec((any::<Index>(), any::<u8>()), 0..8), proptest::option::weighted(0.2, any::<Index>()))
 }
@@ -71,7 +71,7 @@ fn changed(
     bytes
 }
 
-/// Opens a lake of which one file is damaged: the other is there, and no byte has changed.
+/// Opens a lake in which one file is damaged. The other file is found, and no byte changes.
 fn opens(folder: &Path, [damaged, other]: &[std::path::PathBuf; 2], bytes: &[u8]) {
     fs::write(damaged, bytes).unwrap();
     let before = fs::read(other).unwrap();
@@ -83,18 +83,20 @@ fn opens(folder: &Path, [damaged, other]: &[std::path::PathBuf; 2], bytes: &[u8]
     assert!(!folder.join("refused").exists());
 }
 
-/// Position of the embedded Arrow schema in a file: its value under `ARROW:schema`, in base64.
+/// Returns the position of the embedded Arrow schema in a file: the value of `ARROW:schema`, in
+/// base64.
 fn embedded(file: &[u8]) -> std::ops::Range<usize> {
     let key = b"ARROW:schema";
     let from = file.windows(key.len()).position(|part| part == key).unwrap() + key.len();
     let is_base64 = |byte: &u8| byte.is_ascii_alphanumeric() || b"+/=".contains(byte);
-    // two bytes at least say what follows and how long it is; the text itself begins with the mark of a message, 0xffffffff
+    // At least two bytes before it encode the type and length of the value. The value starts with
+    // the marker of a message, 0xffffffff.
     let from = from + file[from..].windows(5).position(|part| part == b"/////").unwrap();
     from..from + file[from..].iter().take_while(|byte| is_base64(byte)).count()
 }
 
-/// Changes every byte of an embedded schema: some are those of a type, and its reader panics on an
-/// unknown one.
+/// Changes every byte of an embedded schema. Some bytes encode a type, and the reader panics on an
+/// unknown type.
 #[test]
 fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
     let (folder, paths) = lake();
@@ -109,12 +111,12 @@ fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
             gave_up += lake.unfit.iter().filter(|file| file.why.contains("gave up")).count();
         }
     }
-    // the case that this is about was met
+    // At least one change has caused such a panic.
     assert!(gave_up > 0);
 }
 
-/// A query of a lake with damaged rows has an answer or an error; a panic of the engine is an
-/// error, as in the program.
+/// Queries a lake with damaged rows. The result is an answer or an error; a panic of the engine
+/// becomes an error, as in the program.
 fn asks(folder: &Path, bytes: &[u8], damaged: &Path) {
     fs::write(damaged, bytes).unwrap();
     let lake = Lake::open(folder).unwrap();
@@ -139,7 +141,7 @@ proptest! {
         asks(folder.path(), &changed(whole, 4, &(change.0, None)), &paths[0]);
     }
 
-    /// The footer is the last part of the file and defines the meaning of all of it.
+    /// The footer is at the end of the file, and defines the meaning of the rest.
     #[test]
     fn a_damaged_footer_is_one_unfit_file(change in change()) {
         let (folder, paths) = lake();
@@ -153,7 +155,7 @@ proptest! {
     fn any_bytes_are_an_unfit_file(inside in vec(any::<u8>(), 0..300), length in any::<u32>()) {
         let (folder, paths) = lake();
         opens(folder.path(), &paths, &inside);
-        // and as what a reader looks for at both ends
+        // The changed footer alone, between the magic numbers that a reader expects at both ends.
         let file = [&b"PAR1"[..], &inside, &length.to_le_bytes(), b"PAR1"].concat();
         opens(folder.path(), &paths, &file);
     }

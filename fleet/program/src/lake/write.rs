@@ -1,4 +1,4 @@
-//! A trial as a Parquet file, written whole.
+//! Writing of a trial as a Parquet file, completely or not at all.
 
 use std::{path::Path, sync::Arc};
 
@@ -17,7 +17,7 @@ use datafusion::{
 
 use super::{Footer, about::KEY};
 
-/// Largest row group: what one core reads at once.
+/// Largest row group, which is the unit that one core reads.
 const GROUP_ROWS: usize = 1 << 20;
 
 /// The rows of a trial.
@@ -28,7 +28,7 @@ pub(crate) struct Samples {
     pub channels: Vec<(String, Vec<f64>)>,
     /// Rate of the signal; `None` while the estimator warms up.
     pub rate: Vec<Option<f64>>,
-    /// Contraction of the reference, where that is a length.
+    /// Contraction, if the reference is a length.
     pub contraction: Option<Vec<f64>>,
     /// Whether the sample was lost and is bridged.
     pub is_bridged: Vec<bool>,
@@ -52,14 +52,14 @@ impl Samples {
     }
 }
 
-/// Writes a trial, whole or not at all; the folder is made.
+/// Writes a trial, completely or not at all. The folder is created if necessary.
 pub(crate) fn write(path: &Path, footer: &Footer, samples: Samples) -> anyhow::Result<()> {
     let about = KeyValue::new(KEY.to_owned(), serde_json::to_string(footer)?);
     let batch = samples.batch(&footer.trial)?;
     write_parquet(path, &batch, vec![about], Some("time_s"))
 }
 
-/// Writes a table, whole or not at all; the folder is made.
+/// Writes a table, completely or not at all. The folder is created if necessary.
 ///
 /// Measured numbers neither repeat nor compress, so they are stored plain, which is the fastest to
 /// read.

@@ -1,4 +1,4 @@
-//! Unexpected content of lakes: one error sentence each, and no failed query.
+//! Unexpected contents of lakes: each gives one error message, and no query fails.
 
 use std::{fs, path::Path, sync::Arc};
 
@@ -12,7 +12,7 @@ use crate::support::{
 const FIT: &str = "select sensor, fit['rows'] as n, fit['rows_left_out'] as lost, fit['rmse'] as rmse, fit['refused'] as why from \
      (select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor) order by sensor";
 
-/// A lake of sensors 1 and 2, a trial each.
+/// Creates a lake of sensors 1 and 2, with one trial each.
 fn lake(folder: &Path) -> std::path::PathBuf {
     let lake = folder.join("lake");
     for sensor in [1, 2] {
@@ -82,10 +82,10 @@ fn a_sensor_with_too_little_is_a_row_that_says_so() {
     let rate = datafusion::arrow::array::AsArray::as_primitive::<
         datafusion::arrow::datatypes::Float64Type,
     >(rate.as_ref());
-    // one branch only
+    // A single branch.
     let only_up = numbers(rate.iter().map(|rate| rate.unwrap_or(f64::NAN).abs()));
     altered(&of_sensor(&lake, 1), "rate", Some(only_up), &same);
-    // five rows that can be fitted
+    // Five rows that can be fitted.
     let five = numbers((0..600).map(|n| if n < 5 { 0.1 } else { f64::NAN }));
     altered(&of_sensor(&lake, 2), "rate", Some(five), &same);
     let found = rows(&lake, FIT);
@@ -106,7 +106,7 @@ fn nan_is_left_out_and_counted() {
     );
     altered(&of_sensor(&lake, 1), "bridge_v", Some(holes), &same);
     let found = rows(&lake, FIT);
-    // 200 holes, and ten rows without a rate of which four are holes as well
+    // 200 missing samples, and ten rows without a rate, of which four are also missing.
     assert_eq!((found[0][1].as_str(), found[0][2].as_str()), ("394", "206"));
     assert_eq!((found[1][1].as_str(), found[1][2].as_str()), ("590", "10"));
 }
@@ -122,7 +122,7 @@ fn rates_of_another_estimator_are_refused() {
     );
     let sentence = "its rate estimator is difference:8 at 100 Hz, and that of the lake is savgol:11,2 at 100 Hz";
     assert!(told.contains(sentence), "{told}");
-    // a record of rates that the lake has not
+    // A calibration for rates that the lake does not have.
     let out = folder.path().join("out");
     said("calibrate --lake {} --out {}", &[&lake, &out]);
     let record = stretch_calibrate::read_calibration(&out.join("site/rig/1.json")).unwrap();
@@ -137,7 +137,7 @@ fn rates_of_another_estimator_are_refused() {
         .unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && told.contains("estimator"), "{told}");
-    // a file of such rates that was added by hand
+    // A file with such rates that was copied into the lake.
     altered(&of_sensor(&lake, 2), "-", None, &|text| {
         text.replace(
             r#"{"savitzky_golay":{"window":11,"degree":2,"delay":0}}"#,
@@ -157,7 +157,7 @@ fn a_sensor_has_one_rest_length() {
     let told = warned(&format!("{line} --rest-length 190"), &[&path, &lake]);
     assert!(told.contains("and --rest-length says 190: one fit cannot have two zeros"), "{told}");
     assert!(said(line, &[&path, &lake]).contains("1 trials written"));
-    // (L0 - L)/L0 is the same line for both
+    // (L0 - L)/L0 has the same L0 for both trials.
     let rests = "select max(r) - min(r) from (select length_mm / (1.0 - contraction) as r from trials where sensor = '1')";
     let spread: f64 = rows(&lake, rests)[0][0].parse().unwrap();
     assert!(spread < 1e-9, "{spread}");
@@ -199,7 +199,7 @@ fn a_damaged_file_of_the_lake_is_set_aside() {
     assert!(told.contains("1 records of 1 sensors"), "{told}");
     assert!(path.exists(), "a question moved a file");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
-    // an ingest sets it aside, adds its trial again, and reports this
+    // The next ingest moves the file to `refused`, adds its trial again, and reports this.
     let line = "ingest {} --lake {} --sensor 2 --date 2026-01-01";
     let told = warned(line, &[&folder.path().join("2.csv"), &lake]);
     assert!(told.contains("1 trials written (600 rows), 0 there already, 1 refused"), "{told}");
@@ -210,7 +210,8 @@ fn a_damaged_file_of_the_lake_is_set_aside() {
     assert!(told.contains("1 there already, 0 refused"), "{told}");
 }
 
-/// Trials of the day of a damaged one are still read, each with its place, and fitted as if the damaged one were not there.
+/// Trials of the same day as a damaged one are still read, with their places, and fitted without
+/// the damaged one.
 #[test]
 fn what_stands_beside_a_damaged_file_is_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -235,7 +236,7 @@ fn what_stands_beside_a_damaged_file_is_read() {
     assert!(told.contains("left out:") && told.contains("2 records of 2 sensors"), "{told}");
 }
 
-/// If a description fits no trial, the description is wrong: queries report this and no trial is
+/// If lake.json contradicts all trials, lake.json is wrong: queries report this, and no trial is
 /// moved.
 #[test]
 fn a_wrong_number_in_lake_json_moves_nothing() {

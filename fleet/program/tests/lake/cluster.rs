@@ -1,4 +1,4 @@
-//! The ready commands on a cluster: a scheduler, three executors and the program.
+//! The commands of the program on a cluster of a scheduler and three executors.
 
 use std::{
     io::{BufRead, BufReader},
@@ -8,7 +8,7 @@ use std::{
 
 use crate::support::{PROGRAM, bytes, only, parquet, said};
 
-/// Processes that end with the test.
+/// Processes that are killed at the end of the test.
 struct Cluster(Vec<Child>);
 
 impl Drop for Cluster {
@@ -20,7 +20,7 @@ impl Drop for Cluster {
     }
 }
 
-/// A cluster and its URL.
+/// Starts a cluster and returns its URL.
 fn cluster() -> (Cluster, String) {
     let beside = |name: &str| Path::new(PROGRAM).with_file_name(name);
     let [scheduler, executor] = ["stretch-scheduler", "stretch-executor"].map(beside);
@@ -42,7 +42,7 @@ fn cluster() -> (Cluster, String) {
     (all, url)
 }
 
-/// A cluster adds sums in another order, so rounding differs.
+/// Asserts that fits agree up to rounding, because a cluster adds sums in another order.
 fn assert_same_fits(here: &Path, there: &Path) {
     let rmse = |out: &Path| {
         let (rows, _) = parquet(&out.join("calibrations.parquet"));
@@ -77,7 +77,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     assert_eq!(bytes(&here).len(), bytes(&there).len());
     assert_same_fits(&here, &there);
     assert_eq!(said(&format!("{drift} --cluster {url}"), &[&lake]), moved);
-    // a damaged file is left out by executors as well
+    // Executors leave out a damaged file, too.
     std::fs::write(only(&lake.join("trials")), "PAR1 and nothing else").unwrap();
     let told = said("calibrate --lake {} --out {}", &[&lake, &here]);
     assert!(told.contains("left out:") && told.contains("1 months of rigs computed now"), "{told}");
@@ -87,7 +87,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     assert_same_fits(&here, &there);
 }
 
-/// Two machines joined by a cable: network namespaces, which are removed on drop.
+/// Two simulated machines with a network connection: network namespaces, which are removed on drop.
 struct Machines([String; 2]);
 
 impl Machines {
@@ -107,7 +107,7 @@ impl Machines {
         machines
     }
 
-    /// A program on one of them.
+    /// Returns the command that runs a program on one of them.
     fn on(&self, machine: usize, program: &Path) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.0[machine]]).arg(program);
@@ -127,7 +127,8 @@ fn ip(words: &[&str]) {
     assert!(Command::new("ip").args(words).status().expect("ip runs").success(), "ip {words:?}");
 }
 
-/// The recipe of the README for many machines: the scheduler and the program on one, an executor on the other.
+/// Tests the instructions of the README for several machines: scheduler and program on one, an
+/// executor on the other.
 #[test]
 #[ignore = "needs root and network namespaces; gate.sh runs it where they can be made"]
 fn with_netns_the_recipe_for_many_machines_answers() {

@@ -1,4 +1,4 @@
-//! The ready commands.
+//! The commands of the program.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use stretch_data::{Channel, Trial};
 
 use crate::support::{asked, bytes, file, fleet, parquet, refused, said, tree, trial};
 
-/// Sensors that drift are found, others are not: four of ten sensors lose a twentieth of their gain.
+/// Sensors that drift are found, and no others. Four of ten sensors lose 5 % of their gain.
 #[test]
 fn drift_names_the_sensors_that_moved() {
     let folder = tempfile::tempdir().unwrap();
@@ -30,7 +30,7 @@ fn drift_names_the_sensors_that_moved() {
     let (rows, _) = parquet(&table);
     let column: &BooleanArray = rows.column_by_name("moved").unwrap().as_boolean();
     assert_eq!((rows.num_rows(), column.true_count()), (10, moved.len()));
-    // a month of three days
+    // The second month has three days.
     let told = said("drift --lake {} --from 2026-01 --to 2026-03", &[&lake]);
     assert!(told.contains("3 days in the second month are too few"), "{told}");
     assert!(
@@ -52,7 +52,7 @@ fn no_answer_is_written_over_what_it_was_made_from() {
         for over in [trial, "lake.json"] {
             let told = refused(line, &[&lake, &lake.join(over)]);
             assert!(told.contains("this command reads"), "{line}, {over}: {told}");
-            // sums that help the next command may be added
+            // Partial fits, which help the next command, may be added.
             let after = tree(&lake);
             assert!(
                 before.iter().all(|(name, bytes)| after.get(name) == Some(bytes)),
@@ -106,7 +106,7 @@ fn answers_come_as_a_table_csv_and_records() {
     assert!(told.contains("the answer has no column record"), "{told}");
     let told = ask(&[], "select nonsense from trials");
     assert!(told.contains("nonsense"), "{told}");
-    // a custom query on the estimates of a record
+    // A custom query on the estimates of a calibration.
     let text = fs::read_to_string(out.join("a.json")).unwrap().replace('\n', "");
     let agreed = format!(
         "select agreement(contraction, strain_estimate('{text}', rate, bridge_v)) as a from trials where sensor = 'a'"
@@ -115,7 +115,7 @@ fn answers_come_as_a_table_csv_and_records() {
     assert!(told.contains("rmse"), "{told}");
 }
 
-/// A gauge that is late by a twentieth of a second, diagnosed as what it is; the second run has nothing left to do.
+/// A gauge with a delay of 50 ms is diagnosed as such. A second run has nothing to do.
 #[test]
 fn a_partition_is_diagnosed_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -152,8 +152,8 @@ fn a_partition_is_diagnosed_once() {
     );
 }
 
-/// Three sensors of four days each: the prior knows each of them, and its error on a new one;
-/// `stretch calibrate` reads it.
+/// Three sensors with four days each. The prior contains the expected errors for a known and for a
+/// new sensor, and `stretch calibrate` reads it.
 #[test]
 fn a_prior_is_learnt_from_every_sensor() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,11 +167,11 @@ fn a_prior_is_learnt_from_every_sensor() {
     assert_eq!(sensors.len(), 3, "{sensors:?}");
     let first = prior.expected.first().unwrap();
     assert!(first.rmse_known.unwrap() < first.rmse_new.unwrap(), "{first:?}");
-    // the same lake gives the same bytes
+    // The same lake gives the same bytes.
     let before = fs::read(&out).unwrap();
     said("prior --lake {} --out {} --json", &[&lake, &out]);
     assert!(fs::read(&out).unwrap() == before);
-    // one session tells nothing of how sessions vary
+    // A single session does not show how sessions vary.
     let whole = fleet("prior --lake {} --out {} --by sensor", &[&lake, &out]);
     assert!(whole.status.success());
     let few = folder.path().join("few");
@@ -211,7 +211,7 @@ fn a_question_only_reads_unless_it_may_write() {
     assert!(is_answered && to.exists(), "{told}");
 }
 
-/// A query may return anything as a sensor name; its record does not leave the folder.
+/// A query may return anything as a sensor name. Its calibration file stays in the folder.
 #[test]
 fn records_stay_in_their_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,19 +231,19 @@ fn records_stay_in_their_folder() {
     }
     let names: Vec<_> = tree(folder.path()).into_keys().collect();
     assert!(names.iter().all(|name| name.starts_with("lake/")), "{names:?}");
-    // nor does a second row take the name of the first
+    // A second row with the same name is refused.
     let twice = format!("({0}) union all ({0})", fit("'00000'"));
     let (is_answered, told) = asked(&lake, &twice, &["--records", &shown]);
     assert!(is_answered && told.contains("1 records, 1 refused"), "{told}");
     assert!(told.contains("another row of the answer has that name"), "{told}");
 }
 
-/// Sums are added in the order of files and rows, whichever thread takes them.
+/// Sums are added in the order of files and rows, whichever thread computes them.
 #[test]
 fn calibrations_have_the_same_bits_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let lake = folder.path().join("lake");
-    // two trials a day: a day's state is of several files as well
+    // With two trials per day, the state of a day is computed from several files.
     said("make --lake {} --sensors 5 --days 40 --rows 400 --rigs 2", &[&lake]);
     said("make --lake {} --sensors 5 --days 40 --rows 400 --rigs 2 --seed 2", &[&lake]);
     let mut first = None;

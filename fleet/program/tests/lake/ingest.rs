@@ -1,4 +1,4 @@
-//! From trials to a lake.
+//! Adding trials to a lake.
 
 use std::{fs, path::Path};
 
@@ -42,12 +42,12 @@ fn a_trial_is_a_file_and_a_second_ingest_changes_nothing() {
     assert!(bytes(&lake) == before, "a second ingest changed something");
 }
 
-/// Rates are those that `calibrate` fits on, bit for bit.
+/// Rates equal those that `calibrate` fits, bit for bit.
 #[test]
 fn rates_are_those_of_a_calibration() {
     let folder = tempfile::tempdir().unwrap();
     let mut one = trial("a.csv", 0.3);
-    // a gap: what warms up anew behind it has no rate
+    // After a gap the rate estimator warms up again, so some rows have no rate.
     for values in
         std::iter::once(&mut one.time_s).chain(one.channels.iter_mut().map(|c| &mut c.values))
     {
@@ -69,7 +69,8 @@ fn rates_are_those_of_a_calibration() {
     assert_eq!(told[300][0].parse::<f64>().unwrap(), 3.2);
 }
 
-/// The record of a fleet is that of `stretch calibrate` without a dead band, up to the order of sums.
+/// A calibration of the fleet equals that of `stretch calibrate` without a dead band, up to the
+/// order of sums.
 #[test]
 fn a_record_is_that_of_a_calibration() {
     let folder = tempfile::tempdir().unwrap();
@@ -99,7 +100,7 @@ fn a_record_is_that_of_a_calibration() {
     );
     assert_eq!(found.spec().provenance.trial_count(), 2);
     assert!(found.spec().dead_band > 0.0);
-    // estimates agree wherever the branch does: the bands are not the same
+    // Estimates are compared where the branches agree, because the dead bands differ.
     let mut found = found.into_spec();
     found.dead_band = 0.0;
     let found = stretch_core::Calibration::new(found).unwrap();
@@ -111,7 +112,8 @@ fn a_record_is_that_of_a_calibration() {
         .zip(&b.readings)
         .filter_map(|(a, b)| a.as_ref().ok().zip(b.as_ref().ok()));
     let worst = both.map(|(a, b)| (a.estimate - b.estimate).abs()).fold(0.0, f64::max);
-    // millimetres; a surface of 600 samples in other units and another order of sums
+    // In millimetres: a surface fitted to 600 samples, in other units and with another order of
+    // sums.
     assert!(worst < 1e-6, "{worst}");
 }
 
@@ -122,7 +124,7 @@ fn a_damaged_trial_is_named_and_the_rest_goes_on() {
     file(&logs, &trial("1_20260101.csv", 0.0));
     file(&logs, &trial("2_20260101.csv", 1.0));
     let text = fs::read_to_string(logs.join("2_20260101.csv")).unwrap();
-    // a third of the rows, more than are left out
+    // A third of the rows, more than may be left out.
     let damaged = text.replace("\n0.", "\nnonsense0.").replace("\n1.", "\nnonsense1.");
     fs::write(logs.join("2_20260101.csv"), damaged).unwrap();
     fs::write(logs.join("notes.txt"), "to do: coffee").unwrap();
@@ -133,7 +135,7 @@ fn a_damaged_trial_is_named_and_the_rest_goes_on() {
     assert!(told.contains("2_20260101.csv") && told.contains("nonsense"), "{told}");
     assert!(told.contains("does not fit the pattern"), "{told}");
     assert_eq!(bytes(&lake.join("refused")).len(), 2);
-    // corrected, it is in the lake, and no longer named
+    // Once corrected, the trial is in the lake, and its error is removed.
     fs::write(logs.join("2_20260101.csv"), text).unwrap();
     assert!(
         warned(line, &[&logs, &lake])
@@ -185,7 +187,7 @@ fn a_byte_identical_copy_under_another_date_is_refused_and_the_original_stays() 
     let of_original = format!("refused: {}:", first.display());
     assert!(told.contains("refused: ") && !told.contains(&of_original), "{told}");
     assert!(tree(&lake.join("trials")) == before);
-    // without the copies nothing is refused, and a file that was named twice counts once
+    // Without the copies nothing is refused, and a file that was named twice counts once.
     fs::remove_dir_all(logs.join("0043")).unwrap();
     for copy in ["0042/20260104_b.csv", "0042/20260103_c.csv"] {
         fs::remove_file(logs.join(copy)).unwrap();
@@ -195,7 +197,7 @@ fn a_byte_identical_copy_under_another_date_is_refused_and_the_original_stays() 
     assert!(told.contains("1 there already, 0 refused"), "{told}");
 }
 
-/// The same samples in another format are the same trial, on whatever day.
+/// The same samples in another format are the same trial, whatever its date.
 #[test]
 fn the_same_samples_under_another_date_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -261,7 +263,8 @@ fn a_device_or_a_pipe_among_the_logs_is_refused() {
     std::os::unix::fs::symlink("/dev/zero", logs.join("2.csv")).unwrap();
     let pipe = std::process::Command::new("mkfifo").arg(logs.join("0.csv")).status().unwrap();
     assert!(pipe.success());
-    // an endless file ends at the limit; a pipe would block forever, and the test with it
+    // An endless file would stop at the memory limit. A pipe would block the command, and therefore
+    // the test, forever.
     let line = "ulimit -v 4000000; exec timeout 120 \"$0\" ingest logs --lake lake --date 2026-01-01 --from-path {sensor}.csv";
     let mut shell = std::process::Command::new("sh");
     let output = shell.args(["-c", line, PROGRAM]).current_dir(folder.path()).output().unwrap();

@@ -1,4 +1,4 @@
-//! Commands that write, and what must exist after a kill and a second run.
+//! Commands that write, and the files that must exist after a kill and a second run.
 
 use std::{
     collections::BTreeMap,
@@ -12,11 +12,11 @@ use std::{
 
 use crate::support::{PROGRAM, file, said, scratch, tree, trial};
 
-/// A killed command: its folder, and the files that it leaves if it is not killed.
+/// A command to be killed: its preparation, and the folders that it writes.
 pub(crate) struct Job {
     line: &'static str,
     prepare: fn(&Path),
-    /// Folders of the answer.
+    /// Folders with the results.
     answer: [&'static str; 2],
 }
 
@@ -28,7 +28,7 @@ pub(crate) const INGEST: Job = Job {
         {
             file(&folder.join("logs"), &trial(name, k as f64));
         }
-        // a trial that is refused, and one that was refused and is corrected
+        // A trial that is refused, and one that was refused and has been corrected.
         fs::create_dir(folder.join("logs/3")).unwrap();
         fs::write(folder.join("logs/3/20260101_a.csv"), "no trial").unwrap();
         file(&folder.join("logs"), &trial("4/20260101_a.csv", 9.0));
@@ -58,7 +58,8 @@ pub(crate) const MAKE: Job = Job {
     answer: ["lake/trials", "lake"],
 };
 
-/// So few rows that the verdict is "too few", because the test is about how it is written.
+/// The data sets have too few rows for a verdict, because the test is only about how verdicts are
+/// written.
 pub(crate) const DIAGNOSE: Job = Job {
     line: "diagnose --lake lake --out out",
     prepare: |folder| {
@@ -67,7 +68,8 @@ pub(crate) const DIAGNOSE: Job = Job {
     answer: ["lake", "out"],
 };
 
-/// Sums of one thread have the same bits in every run. A tab is white space of SQL and none between words of a line.
+/// With one thread, sums have the same bits in every run. Tabs separate words in SQL without
+/// splitting the argument, because the test splits the line at spaces.
 pub(crate) const RECORDS: Job = Job {
     line: "sql --lake lake --threads 1 --records out \
            select\tsensor,poly13_fit(rate,bridge_v,contraction)\tas\tfit\tfrom\ttrials\tgroup\tby\tsensor",
@@ -77,7 +79,7 @@ pub(crate) const RECORDS: Job = Job {
     answer: ["lake", "out"],
 };
 
-/// The example that aborts before one of its calls on the file system, which `cargo test` builds
+/// Returns the command of the example that aborts before a file-system call. `cargo test` builds it
 /// with the tests.
 fn killed_fleet() -> Command {
     let program = Path::new(PROGRAM).with_file_name("examples").join("killed_fleet");
@@ -97,7 +99,7 @@ impl Job {
         self.answer.map(|name| tree(&folder.join(name)))
     }
 
-    /// The files that exist if nothing was killed, and how long that takes.
+    /// Returns the files that exist if nothing is killed, and the run time.
     fn expected(&self) -> ([BTreeMap<String, Vec<u8>>; 2], Duration) {
         let folder = scratch();
         (self.prepare)(folder.path());
@@ -106,7 +108,7 @@ impl Job {
         (self.answer(folder.path()), begun.elapsed())
     }
 
-    /// Runs the command again after a kill: everything is there, and nothing else.
+    /// Runs the command again after a kill. All files must exist, and no others.
     fn assert_mended(&self, folder: &Path, expected: &[BTreeMap<String, Vec<u8>>; 2], case: &str) {
         let names = |answer: &[BTreeMap<String, Vec<u8>>; 2]| {
             answer.each_ref().map(|tree| tree.keys().cloned().collect::<Vec<_>>())
@@ -119,8 +121,8 @@ impl Job {
         assert_eq!(left, None, "{case}: a temporary file is left");
     }
 
-    /// Ends the command before every `step`th of its calls on the file system; returns their
-    /// number.
+    /// Kills the command before every `step`th of its file-system calls. Returns the number of
+    /// calls.
     pub(crate) fn is_killed_before_its_calls(&self, step: usize) -> usize {
         let (expected, _) = self.expected();
         for at in (1..).step_by(step) {
@@ -132,7 +134,7 @@ impl Job {
                 .current_dir(folder.path())
                 .output()
                 .unwrap();
-            // SIGABRT, which has no handler
+            // SIGABRT has no handler.
             let is_killed = output.status.signal() == Some(6);
             let case = format!("{} killed before call {at}: {output:?}", self.line);
             assert!(is_killed || output.status.success(), "{case}");
@@ -144,13 +146,13 @@ impl Job {
         0
     }
 
-    /// Kills the command at moments that are spread over its run time until `hits` kills came before
-    /// its end; returns how many kills that took.
+    /// Kills the command at times distributed over its run time, until `hits` kills came before its
+    /// end. Returns the number of attempts.
     pub(crate) fn is_killed_at_moments(&self, hits: u32) -> u32 {
         let (expected, takes) = self.expected();
         let (mut hit, mut moments) = (0, 0);
         while hit < hits {
-            // multiples of the golden ratio fill the time evenly, however many it takes
+            // Multiples of the golden ratio fill the interval evenly for any number of attempts.
             let share = (f64::from(moments) * 0.618_033_988_75).fract();
             moments += 1;
             assert!(moments < 50 * hits, "{hit} of {moments} kills came before the end");

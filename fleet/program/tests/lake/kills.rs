@@ -14,7 +14,7 @@ use crate::{
     support::{PROGRAM, bytes, file, fleet, only, said, tree, trial},
 };
 
-/// Starts the program, kills it once `is_reached`, and says whether it was still running then.
+/// Starts the program and kills it once `is_reached`. Returns whether it was still running.
 fn killed(words: &[&str], is_reached: impl Fn() -> bool) -> bool {
     let mut child = Command::new(PROGRAM)
         .args(words)
@@ -39,7 +39,7 @@ fn count(folder: &Path) -> usize {
     bytes(folder).iter().filter(|(path, _)| is_parquet(path)).count()
 }
 
-/// Whether two lakes have the same files of trials, to the bit.
+/// Whether two lakes have the same trial files, bit for bit.
 fn same_trials(a: &Path, b: &Path) -> bool {
     let relative = |lake: &Path| -> Vec<_> {
         let all = bytes(&lake.join("trials")).into_iter();
@@ -75,7 +75,7 @@ fn what_an_ingest_wrote_before_it_was_killed_stays() {
     let mut one = trial("", 0.0);
     for k in 0..300 {
         one.name = format!("ulm/r2/{:04}/20260103_a.csv", k);
-        // no two files have the same bytes, because they would be the same trial
+        // All files have different bytes, because files with equal bytes would be the same trial.
         one.channels[1].values[0] = 1.24 + 1e-6 * f64::from(k);
         file(&logs, &one);
     }
@@ -96,7 +96,7 @@ fn what_an_ingest_wrote_before_it_was_killed_stays() {
     assert!(same_trials(&killed_lake, &whole), "a killed lake is another");
 }
 
-/// A kill between a trial's last byte and its rename leaves a complete temporary file.
+/// A kill after a trial was written and before it was renamed leaves a complete temporary file.
 #[test]
 fn a_trial_that_was_killed_before_it_had_its_name_is_ingested() {
     let folder = tempfile::tempdir().unwrap();
@@ -132,11 +132,12 @@ fn calibrations_go_on_where_they_were_killed() {
         "{told}"
     );
     assert!(fs::read(only(&states)).unwrap() == before, "what was done was done again");
-    // the same as without a kill, to the bit: states are merged in the order of their days
+    // The result has the same bits as without a kill, because states are merged in the order of
+    // their days.
     fs::remove_dir_all(&states).unwrap();
     said("calibrate --lake {} --out {} --threads 1", &[&lake, &fresh]);
     assert!(tree(&fresh) == tree(&out), "a killed calibration is another");
-    // a day more makes its month anew, and no other
+    // An additional day causes only its month to be computed again.
     let told = said("make --lake {} --sensors 6 --days 63 --rows 200 --rigs 3", &[&lake]);
     assert!(told.contains("1200 rows written"), "{told}");
     let told = said("calibrate --lake {} --out {}", &[&lake, &out]);
@@ -155,16 +156,16 @@ fn a_calibration_killed_before_any_call_is_mended_by_the_next() {
     assert!(calls > 20, "{calls}");
 }
 
-/// The table of a drift is outside the lake, where no lock of the lake protects what another
-/// command writes.
+/// The table of `drift` is outside the lake, where the lake's lock does not protect it against
+/// other commands.
 #[test]
 fn a_drift_killed_before_any_call_is_mended_by_the_next() {
     let calls = DRIFT.is_killed_before_its_calls(2);
     assert!(calls > 10, "{calls}");
 }
 
-/// Verdicts and records are outside the lake as well; a lake that is being made is killed before it
-/// is complete.
+/// Verdicts and calibration files are outside the lake, too. The lake made by `make` is killed
+/// before it is complete.
 #[test]
 fn what_else_writes_killed_before_any_call_is_mended_by_the_next() {
     for (job, step, least) in [(MAKE, 4, 20), (DIAGNOSE, 3, 15), (RECORDS, 2, 10)] {

@@ -1,4 +1,4 @@
-//! The program `stretch-fleet`, run as it is run.
+//! Tests of the program `stretch-fleet` as a separate process.
 
 mod bad_input;
 mod cluster;

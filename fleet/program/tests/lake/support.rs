@@ -1,4 +1,4 @@
-//! Trials, lakes, and the program.
+//! Trials, lakes, and runs of the program.
 
 use std::{
     collections::BTreeMap,
@@ -29,7 +29,7 @@ pub(crate) fn fleet(line: &str, paths: &[&Path]) -> Output {
     Command::new(PROGRAM).args(words.collect::<Vec<_>>()).output().expect("the program runs")
 }
 
-/// What it says, having succeeded.
+/// Runs the program, which must succeed, and returns its output and messages.
 pub(crate) fn said(line: &str, paths: &[&Path]) -> String {
     let output = fleet(line, paths);
     let told = String::from_utf8_lossy(&output.stderr);
@@ -37,14 +37,15 @@ pub(crate) fn said(line: &str, paths: &[&Path]) -> String {
     format!("{}{told}", String::from_utf8_lossy(&output.stdout))
 }
 
-/// What it says, having failed.
+/// Runs the program, which must fail, and returns its error message.
 pub(crate) fn refused(line: &str, paths: &[&Path]) -> String {
     let output = fleet(line, paths);
     assert!(!output.status.success(), "{line} did not fail");
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Output of a run that did its work and refused some files.
+/// Runs the program, which must end with status 1 because it refuses some files, and returns its
+/// output and messages.
 pub(crate) fn warned(line: &str, paths: &[&Path]) -> String {
     let output = fleet(line, paths);
     let told = String::from_utf8_lossy(&output.stderr);
@@ -52,7 +53,7 @@ pub(crate) fn warned(line: &str, paths: &[&Path]) -> String {
     format!("{}{told}", String::from_utf8_lossy(&output.stdout))
 }
 
-/// Asks a question; returns the answer with messages, and whether it was answered.
+/// Runs a query. Returns whether it succeeded, and its output with messages.
 pub(crate) fn asked(lake: &Path, query: &str, more: &[&str]) -> (bool, String) {
     let output = Command::new(PROGRAM)
         .args(["sql", "--lake", &lake.display().to_string(), query])
@@ -63,21 +64,21 @@ pub(crate) fn asked(lake: &Path, query: &str, more: &[&str]) -> (bool, String) {
     (output.status.success(), said + &told)
 }
 
-/// Every file below a folder with its bytes, by its path there, except the empty lock file.
+/// Returns the bytes of every file below a folder by relative path, except the empty lock file.
 pub(crate) fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let below = |path: PathBuf| path.strip_prefix(folder).unwrap().display().to_string();
     let all = bytes(folder).into_iter().map(|(path, bytes)| (below(path), bytes));
     all.filter(|(name, _)| !name.ends_with(".stretch-lock")).collect()
 }
 
-/// A folder where syncing takes no time, if there is such a place.
+/// Returns a temporary folder, in memory if possible, because syncing takes no time there.
 pub(crate) fn scratch() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
     made.expect("a folder can be made")
 }
 
-/// The answer of a query as CSV, a line a row.
+/// Runs a query and returns its result as rows of CSV fields.
 pub(crate) fn rows(lake: &Path, query: &str) -> Vec<Vec<String>> {
     let output = Command::new(PROGRAM)
         .args(["sql", "--csv", "--lake", &lake.display().to_string(), query])
@@ -89,7 +90,8 @@ pub(crate) fn rows(lake: &Path, query: &str) -> Vec<Vec<String>> {
     text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
-/// A sleeve that goes up and down twice, with millivolts of noise; `phase` makes it another trial.
+/// A trial of a sleeve that is stretched and released, with noise of 1 mV. `phase` makes different
+/// trials.
 pub(crate) fn trial(name: &str, phase: f64) -> Trial {
     let time_s: Vec<f64> = (0..600).map(|n| f64::from(n) * 0.01).collect();
     let shape = |t: f64| 0.08 - 0.06 * (2.1 * t + phase).cos() - 0.015 * (5.3 * t + phase).cos();
@@ -102,7 +104,7 @@ pub(crate) fn trial(name: &str, phase: f64) -> Trial {
     Trial { name: name.into(), time_s, channels }
 }
 
-/// Writes a trial as CSV; its path comes back.
+/// Writes a trial as CSV and returns its path.
 pub(crate) fn file(folder: &Path, trial: &Trial) -> PathBuf {
     let path = folder.join(&trial.name);
     fs::create_dir_all(path.parent().expect("a folder")).expect("a folder can be made");
@@ -110,7 +112,7 @@ pub(crate) fn file(folder: &Path, trial: &Trial) -> PathBuf {
     path
 }
 
-/// Every file below a folder with its bytes.
+/// Returns every file below a folder with its bytes.
 pub(crate) fn bytes(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(folder) = folders.pop() {
@@ -125,7 +127,7 @@ pub(crate) fn bytes(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// The one Parquet file below a folder.
+/// Returns the first Parquet file found below a folder.
 pub(crate) fn only(folder: &Path) -> PathBuf {
     let all = bytes(folder);
     let mut all = all.into_iter().map(|(path, _)| path);
@@ -133,7 +135,7 @@ pub(crate) fn only(folder: &Path) -> PathBuf {
     found.expect("a file of the lake")
 }
 
-/// A Parquet file's rows, and what its footer says.
+/// Reads a Parquet file: its rows, and the metadata in its footer.
 pub(crate) fn parquet(path: &Path) -> (RecordBatch, Vec<KeyValue>) {
     let file = fs::File::open(path).expect("it can be opened");
     let builder = ParquetRecordBatchReaderBuilder::try_new(file).expect("it is Parquet");
@@ -144,7 +146,7 @@ pub(crate) fn parquet(path: &Path) -> (RecordBatch, Vec<KeyValue>) {
     (batches.next().expect("a row").expect("rows"), about)
 }
 
-/// Writes a file of a lake again with a column changed, or left out.
+/// Rewrites a file of a lake with one column changed or removed.
 pub(crate) fn altered(
     path: &Path,
     column: &str,
@@ -169,7 +171,7 @@ pub(crate) fn altered(
     writer.close().expect("a footer");
 }
 
-/// Numbers as a column.
+/// Returns numbers as a column.
 pub(crate) fn numbers(values: impl IntoIterator<Item = f64>) -> ArrayRef {
     Arc::new(values.into_iter().collect::<datafusion::arrow::array::Float64Array>())
 }

@@ -17,8 +17,8 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, Side, PAUSE_S, Prediction, Problem, ProblemSpec,
-    RecordedSession, Source, predict_with,
+    BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, PAUSE_S, Prediction, Problem,
+    ProblemSpec, RecordedSession, Side, Source, predict_with,
     worker::{Workers, WorkersSpec, session_header},
 };
 use stretch_report::{Subject, diagnosis_page};

@@ -1,13 +1,12 @@
-//! Steps that a fit on a computer and a receptor on a board compute with the same bits.
+//! Arithmetic steps that give the same bits in a fit on a computer and in a live estimator on a microcontroller.
 
 use core::ops::{Add, Sub};
 
 use crate::Real;
 
-/// A sample of the lag: `z + share (x - z)`.
+/// Advances a first-order lag by one sample: returns `z + share (x - z)`.
 ///
-/// With `share` from [`lag_share`] it is exact for an input that holds its new
-/// value over the sample.
+/// With `share` from [`lag_share`] the result is exact for an input that holds its new value `x` over the sample.
 ///
 /// ```
 /// use stretch_core::arithmetic::{lag, lag_share};
@@ -21,10 +20,10 @@ pub fn lag<T: Real>(before: T, x: T, share: T) -> T {
     before + share * (x - before)
 }
 
-/// The share of the way that a lag of time constant `tau_s` goes in `step_s`:
-/// `1 - exp(-step_s/tau_s)`. Exact for an input that holds over the step.
+/// Returns the share of the remaining distance that a lag of time constant `tau_s` covers in `step_s`:
+/// `1 - exp(-step_s/tau_s)`. Exact for an input that is constant over the step.
 ///
-/// Computed through `libm`, hence the same bits on a computer and on a board.
+/// It uses `libm`, so a computer and a microcontroller give the same bits.
 ///
 /// ```
 /// assert!((stretch_core::arithmetic::lag_share(1.0, 1.0) - 0.632_120_558_828_557_7).abs() < 1e-15);
@@ -34,15 +33,14 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
     -libm::expm1(-step_s / tau_s)
 }
 
-/// The weights of `z`, of the input before and of the input now that give the new
-/// `z`: exact for an input that is a straight line over the step.
+/// Returns the weights of the lag's state `z`, of the previous input and of the new input that give the new `z`. They
+/// are exact for an input that is a straight line over the step.
 ///
 /// ```text
 /// z_new = w[0] z + w[1] x_before + w[2] x_now,   w[0] = exp(-step_s/tau_s)
 /// ```
 ///
-/// For an input that changes between samples, where [`lag`] would be half a
-/// sample early.
+/// Use them for an input that changes between samples, for which [`lag`] would be half a sample early.
 ///
 /// ```
 /// use stretch_core::arithmetic::lag_weights;
@@ -55,21 +53,21 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
 pub fn lag_weights(step_s: f64, tau_s: f64) -> [f64; 3] {
     let a = step_s / tau_s;
     let gone = lag_share(step_s, tau_s);
-    // mean of the decay over the step; a series where the quotient would cancel
+    // mean of the decay over the step; for small steps a series, because the differences below would cancel
     let mean = if a < 1e-4 { 1.0 - a * (0.5 - a / 6.0) } else { gone / a };
     [1.0 - gone, mean - (1.0 - gone), 1.0 - mean]
 }
 
-/// Backlash of half-width `radius`: the output stays where it was until the input
-/// pushes it, and is then `radius` behind.
+/// Advances a play operator (backlash) of half-width `radius`: the output keeps its value until the input pushes it,
+/// and then follows `radius` behind the input.
 ///
 /// ```text
 /// y = max(x - radius, min(x + radius, y_before))
 /// ```
 ///
-/// Floats and integers alike, by comparisons and one sum or difference, so the
-/// same bits everywhere. The building block of [`HistoryMap`](crate::HistoryMap) and of
-/// [`ObserverMap`](crate::ObserverMap). Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
+/// It works on floats and integers. It uses only comparisons, one sum and one difference, so every platform gives the
+/// same bits. [`HistoryMap`](crate::HistoryMap) and [`ObserverMap`](crate::ObserverMap) are built from it.
+/// Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
 ///
 /// ```
 /// use stretch_core::arithmetic::play;
@@ -93,8 +91,8 @@ where
     }
 }
 
-/// x^n by multiplication, which gives the same bits everywhere: `powi` may differ from platform to platform, and a general power costs a
-/// firmware some kilobytes.
+/// Returns x^n by repeated multiplication, which gives the same bits everywhere: `powi` may differ from platform to
+/// platform, and a general power function costs some kilobytes of firmware.
 ///
 /// ```
 /// use stretch_core::arithmetic::power;

@@ -1,8 +1,8 @@
-//! Which way the target moves.
+//! Direction of the target's movement.
 
 use core::ops::Neg;
 
-/// Which way the target moves, and so which surface describes it.
+/// Direction of the target's movement, which selects the calibration surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,9 +16,9 @@ pub enum Branch {
 }
 
 impl Branch {
-    /// The branch for a rate of the target, given the one before: it changes
-    /// only when the rate leaves the dead band (`|rate| > dead_band`). NaN holds.
-    /// Floats and integers alike.
+    /// Returns the branch for a rate of the target, given the branch before. The branch changes
+    /// only if the rate leaves the dead band (`|rate| > dead_band`). NaN keeps the branch.
+    /// Works on floats and integers.
     ///
     /// ```
     /// use stretch_core::Branch;
@@ -37,7 +37,7 @@ impl Branch {
         }
     }
 
-    /// The other one.
+    /// Returns the other branch.
     ///
     /// ```
     /// use stretch_core::Branch;

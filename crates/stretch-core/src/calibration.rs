@@ -1,4 +1,5 @@
-//! The calibration record: everything a receptor needs, and where it came from.
+//! The contents of a calibration file: everything that a live estimator (crate `stretch-receptor`) needs, and the
+//! origin of the calibration.
 
 use crate::{
     Branch, DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
@@ -6,30 +7,29 @@ use crate::{
     sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
 
-/// The schema of calibration records that this release writes.
+/// The schema (format version) of the calibration files that this release writes.
 ///
-/// 1: without a seal. 2: the same fields under a checksum, which is checked when the bytes are loaded
-/// (`record::load`, or `stretch_calibrate::read_calibration`). Release 0.1.0 also wrote schema 3, in bytes, for calibrations
-/// that held where movements turn; these are records of `stretch-sleeve` now.
+/// Schema 1 has no checksum. Schema 2 has the same fields and a checksum, which is checked when the bytes are loaded
+/// (`record::load`, or `stretch_calibrate::read_calibration`). Release 0.1.0 also wrote schema 3, in binary form only,
+/// for calibrations that stored the turning points of movements. These are now files of the crate `stretch-sleeve`.
 pub const CALIBRATION_SCHEMA: u32 = 2;
 
-/// What is estimated, and how a normalised target becomes a number with a unit.
+/// The estimated quantity (the target), and its relation to the reference, the measured quantity with a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Target {
-    /// The reference is the length L of a muscle; the target is its
-    /// contraction `(L0 - L)/L0`, 0 at rest.
+    /// The reference is the length L of a muscle. The target is its contraction `(L0 - L)/L0`, which is 0 at rest.
     Contraction {
         /// Resting length L0, in the unit of the reference.
         rest_length: f64,
     },
-    /// The reference itself (an angle, a displacement).
+    /// The target is the reference itself, such as an angle or a displacement.
     Direct,
 }
 
 impl Target {
-    /// The target of a reference value: `(L0 - x)/L0`, or `x` itself.
+    /// Converts a reference value to a target: `(L0 - x)/L0`, or `x` itself.
     #[inline]
     pub fn from_reference(self, x: f64) -> f64 {
         match self {
@@ -38,7 +38,7 @@ impl Target {
         }
     }
 
-    /// The reference value of a target: `L0 (1 - t)`, or `t` itself.
+    /// Converts a target to a reference value: `L0 (1 - t)`, or `t` itself.
     #[inline]
     pub fn to_reference(self, target: f64) -> f64 {
         match self {
@@ -47,7 +47,7 @@ impl Target {
         }
     }
 
-    /// Change of the reference per change of the target: `-L0`, or 1.
+    /// Returns the change of the reference per change of the target: `-L0`, or 1.
     #[inline]
     pub fn reference_per_target(self) -> f64 {
         match self {
@@ -56,7 +56,7 @@ impl Target {
         }
     }
 
-    /// What a branch is called: `inflation` and `deflation` where a muscle contracts, `rising` and `falling` for any other reference.
+    /// Returns the name of a branch: `inflation` or `deflation` for a contraction, `rising` or `falling` otherwise.
     ///
     /// ```
     /// use stretch_core::{Branch, Target};
@@ -73,20 +73,20 @@ impl Target {
     }
 }
 
-/// Which rate a surface was fitted on. At use it is always the signal's.
+/// The rate on which the surfaces were fitted. In live use the rate is always that of the signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum RateSource {
-    /// The reference's, as published (paper section 2.5); each normalised by
-    /// its own range.
+    /// The rate of the reference, as published (paper section 2.5). The rates of reference and signal are each
+    /// normalised by their own range.
     Strain,
-    /// The signal's, by the estimator that runs live: matched.
+    /// The rate of the signal, from the same estimator that runs live.
     #[default]
     Voltage,
 }
 
-/// A record's schema number, refused at once when this release does not know it.
+/// The schema number of a calibration file. Deserialisation refuses numbers that this release does not know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u32", into = "u32"))]
@@ -115,44 +115,43 @@ impl From<Schema> for u32 {
     }
 }
 
-/// The parts of a [`Calibration`], all public; [`Calibration::new`] checks them.
+/// The unchecked parts of a [`Calibration`]. [`Calibration::new`] checks them.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct CalibrationSpec {
-    /// First in every record, so that a newer one is refused before the rest is read.
+    /// First field of every file, so that a newer schema is refused before the rest is read.
     pub schema: Schema,
-    /// Column of the signal: `bridge_v`.
+    /// Name of the column with the signal, such as `bridge_v`.
     pub signal: Label,
-    /// Column of the reference: `length_mm`. Its unit is that of the estimate.
+    /// Name of the column with the reference, such as `length_mm`. The estimate has its unit.
     pub reference: Label,
-    /// Samples a second at which the rate estimator was designed.
+    /// Sample rate for which the rate estimator was designed, in hertz.
     pub sample_rate_hz: SampleRate,
-    /// What is estimated.
+    /// The estimated quantity.
     pub target: Target,
-    /// Whether the signal rises with the target.
+    /// Whether the signal rises or falls with the target.
     pub polarity: Polarity,
-    /// Normalises the signal; pooled over all calibration trials and frozen.
+    /// Range that normalises the signal. It covers all calibration trials and does not change in use.
     pub signal_range: Range,
-    /// Normalises the target; pooled over all calibration trials and frozen.
+    /// Range that normalises the target. It covers all calibration trials and does not change in use.
     pub target_range: Range,
-    /// The estimator of the signal's rate, at use.
+    /// The estimator of the signal's rate in live use.
     pub rate_estimator: RateEstimator,
-    /// The rate that the surfaces were fitted on.
+    /// The rate on which the surfaces were fitted.
     pub rate_source: RateSource,
-    /// A signed rate this close to zero keeps the branch, in signal units per second.
+    /// Signed rates of at most this magnitude keep the current branch, in signal units per second.
     pub dead_band: f64,
-    /// From signal and rate to the normalised target.
+    /// The map from signal and rate to the normalised target.
     pub model: Model,
-    /// Where it comes from.
+    /// Date and trials of the calibration.
     pub provenance: Provenance,
 }
 
-/// A checked calibration: every number finite and possible, and so every reading.
+/// A checked calibration. All its numbers are finite and within limits that keep every reading finite.
 ///
-/// Serialised with serde as its [`CalibrationSpec`]: JSON on a computer, `postcard`
-/// on a board, where it loads without an allocator. A record that is not
-/// possible does not deserialise; the error names the field.
+/// It is serialised with serde as its [`CalibrationSpec`]: as JSON on a computer, as `postcard` on a microcontroller,
+/// where it loads without an allocator. Deserialisation applies the same checks as [`Calibration::new`].
 ///
 /// ```
 /// use stretch_core::*;
@@ -191,17 +190,17 @@ pub struct CalibrationSpec {
 pub struct Calibration(CalibrationSpec);
 
 impl Calibration {
-    /// Checks the parts: every number finite, and of a size with which no finite sample can give a
-    /// reading that is not. Numbers with a unit are up to 1e9, those that are divided by from 1e-9,
-    /// rates 1e-3 to 1e7 Hz.
+    /// Checks the parts. Every number must be finite and so limited in size that no finite sample gives a
+    /// non-finite reading: numbers with a unit are at most 1e9, divisors at least 1e-9, sample rates 1e-3 to 1e7
+    /// Hz.
     ///
-    /// The schema says how a record was written, which is no part of what is calibrated: from here on it is
-    /// [`Schema::CURRENT`], whose fields are those of schema 1.
+    /// The result has [`Schema::CURRENT`], because the schema describes only how the file was written. Schema 1 has
+    /// the same fields.
     ///
     /// # Errors
     /// [`DesignError`] that names the field.
     pub fn new(mut spec: CalibrationSpec) -> Result<Self, DesignError> {
-        // in place: a copy of the record is two kilobytes of code on a board
+        // changed in place, because a copy would cost two kilobytes of code on a microcontroller
         spec.schema = Schema::CURRENT;
         if let Target::Contraction { rest_length } = spec.target {
             DesignError::check("target.rest_length", rest_length, rest_length > 0.0)?;
@@ -213,18 +212,18 @@ impl Calibration {
         Ok(Self(spec))
     }
 
-    /// The parts.
+    /// Returns the parts.
     pub fn spec(&self) -> &CalibrationSpec {
         &self.0
     }
 
-    /// The parts, to change and check again.
+    /// Returns the parts by value, so that they can be changed and checked again.
     pub fn into_spec(self) -> CalibrationSpec {
         self.0
     }
 }
 
-/// Every size that is not the model's alone.
+/// Checks the sizes of all numbers that do not belong to the model alone.
 fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     let hz = spec.sample_rate_hz.hz();
     DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;
@@ -233,7 +232,7 @@ fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     }
     range(["signal_range", "span of signal_range"], &spec.signal_range)?;
     range(["target_range", "span of target_range"], &spec.target_range)?;
-    // up to the largest signal in a sample; and a band that can be divided by, or none
+    // at most the largest signal per sample period; zero, or large enough to divide by
     let band = spec.dead_band;
     let fits = band == 0.0 || (LEAST * LEAST..=MOST * RATES_HZ.end()).contains(&band);
     DesignError::check("dead_band", band, fits)?;

@@ -34,13 +34,13 @@ impl Degree {
     /// A line over the voltage: `p00 + p01 volts`.
     pub const LINE: Self = Self { rate: 0, volts: 1 };
 
-    /// The paper's surface: degree 1 in rate, 3 in voltage.
+    /// The surface of the published method ("the paper"): degree 1 in rate, 3 in voltage.
     pub const POLY13: Self = Self { rate: 1, volts: 3 };
 
-    /// Degree `rate` in the rate and `volts` in the voltage.
+    /// Creates the degree `rate` in the rate and `volts` in the voltage.
     ///
     /// # Errors
-    /// [`DesignError::TooLarge`] when either is above [`MAX_DEGREE`].
+    /// [`DesignError::TooLarge`] if either is above [`MAX_DEGREE`].
     pub const fn new(rate: u8, volts: u8) -> Result<Self, DesignError> {
         let asked = if rate > volts { rate } else { volts } as usize;
         if asked > MAX_DEGREE {
@@ -64,13 +64,13 @@ impl Degree {
         if self.rate > self.volts { self.rate } else { self.volts }
     }
 
-    /// The highest power of the voltage in a term with `rate^i`.
+    /// Returns the highest power of the voltage among the terms with `rate^i`.
     pub const fn volts_beside(self, i: u8) -> u8 {
         let left = self.total().saturating_sub(i);
         if left < self.volts { left } else { self.volts }
     }
 
-    /// How many terms the surface has, at most [`MAX_TERMS`].
+    /// Returns the number of terms of the surface, at most [`MAX_TERMS`].
     pub const fn terms(self) -> usize {
         let mut count = 0;
         let mut i = 0;
@@ -81,7 +81,7 @@ impl Degree {
         count
     }
 
-    /// The powers `(of rate, of volts)` of each term, in the order above.
+    /// Returns the powers `(of rate, of volts)` of each term, in the order that the type describes.
     pub fn exponents(self) -> impl Iterator<Item = (u8, u8)> + Clone {
         (0..=self.total()).flat_map(move |total| {
             (0..=total)
@@ -93,7 +93,7 @@ impl Degree {
 }
 
 impl core::fmt::Display for Degree {
-    /// MATLAB's name: `poly13`.
+    /// Writes the name that MATLAB uses, such as `poly13`.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "poly{}{}", self.rate, self.volts)
     }

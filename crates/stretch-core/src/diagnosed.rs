@@ -1,120 +1,125 @@
-//! A gauge described by its named defects, forwards, and a filter that asks which motion explains the signal.
+//! The forward model of a gauge whose defects are named, and the parameters of the filter that inverts it.
+//!
+//! The *drive* is the normalised strain of the gauge: the normalised target after the defects have acted on it. A
+//! *play* is a backlash operator (`arithmetic::play`).
 
 use crate::{
     DesignError, FitSummary, Interval, MAX_KNOTS, RestTracker, Values,
     sizes::{MOST, apart, extent, size},
 };
 
-/// A pressure that strains the gauge: `u + c x (1 + bend (1 - x))`, `x = p/scale`.
+/// Strain of the gauge by a pressure p: `u + c x (1 + bend (1 - x))`, `x = p/scale`, where u is the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Crosstalk {
-    /// Drive at the scale.
+    /// Drive that is added at a pressure of `scale`.
     pub c: f64,
-    /// How it bends in between.
+    /// Curvature of the relation between pressure and added drive.
     pub bend: f64,
-    /// The pressure that counts as one, in its own unit.
+    /// The pressure at which x is 1, in the unit of the pressure.
     pub scale: f64,
 }
 
-/// A bound with a knee: `floor + (d + sqrt(d^2 + 4 (w ln 2)^2))/2`, `d = u - floor`; a ceiling is the same upside down.
+/// A soft bound on the drive: `floor + (d + sqrt(d^2 + 4 (w ln 2)^2))/2`, `d = u - floor`. A ceiling is its mirror
+/// image.
 ///
-/// At the bound it lies `w ln 2` inside, as the soft knee `w ln(1 + exp(d/w))` of the effects does, with no function that a
-/// board would have to carry.
+/// For a drive at the bound the output lies `w ln 2` inside, as for the soft knee `w ln(1 + exp(d/w))` of
+/// `stretch-effects`. This form needs only a square root, whereas `ln` and `exp` would take space on a microcontroller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Knee {
-    /// The drive that is not left.
+    /// The bound, in drive.
     pub at: f64,
-    /// Its width w.
+    /// Width w of the knee, in drive.
     pub width: f64,
 }
 
-/// Three plays: `u - share mean of (u - play(u, r))`; a share of one is a slip.
+/// Hysteresis by three plays: `u - share mean of (u - play(u, r))`. With a share of 1 it describes a slipping sleeve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Plays {
-    /// How much of the drive they take.
+    /// Weight of the plays.
     pub share: f64,
-    /// Their radii, in drive.
+    /// Half-widths of the plays, in drive.
     pub radii: [f64; 3],
 }
 
-/// Memory that fades: `u + share (u - mean of lag(u, tau))`.
+/// Relaxation by three lags: `u + share (u - mean of lag(u, tau))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Fading {
-    /// Above zero it overshoots, below it lags.
+    /// Weight of the lags. If it is positive the gauge overshoots, if it is negative the gauge lags.
     pub share: f64,
     /// Time constants, s.
     pub taus_s: [f64; 3],
 }
 
-/// A response that weakens as it is worked: `(u - zero)(1 - m x/(n + x)) + zero`, x the way that u has gone.
+/// A response that weakens with use: `(u - zero)(1 - m x/(n + x)) + zero`, where x is the total travel of the drive u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Worn {
-    /// What is lost in the end.
+    /// Share of the response that is lost after infinite travel.
     pub m: f64,
-    /// The way by which half of it is lost, in drive.
+    /// Travel after which half of that share is lost, in drive.
     pub n: f64,
     /// The drive at which nothing is lost.
     pub zero: f64,
-    /// Turns smaller than this do not count, in drive.
+    /// Reversals smaller than this do not add to the travel, in drive.
     pub reversal: f64,
-    /// How far it had gone when the calibration ended: where a live stream begins.
+    /// Travel at the end of the calibration, with which a live stream begins.
     pub travelled: f64,
 }
 
-/// The forward model of a gauge whose defects have names, and what a Kalman filter needs to invert it.
+/// The forward model of a gauge whose defects are named, and the parameters of the Kalman filter that inverts it.
 ///
-/// With the normalised target `y` the drive goes through what is named, in this order:
+/// The defects act on the normalised target `y` in this order:
 ///
 /// ```text
 /// u = y -> slack -> slip -> crosstalk -> hysteresis -> relaxation -> worn -> floor, ceiling -> lowpass
 /// v(t + skew_s) = curve(u(t)) + noise
 /// ```
 ///
-/// A bend of the gauge or of its reference is in the curve. The filter carries `y` and its rate `r`, which forgets itself in
-/// `steady_s` and has a random walk of spectral density `agility`, and their covariance; the defects follow the estimated target.
+/// `curve` includes any nonlinearity of the gauge and of the reference. The state of the filter is `y`, its rate `r`
+/// and their covariance. The rate decays with the time constant `steady_s` and is driven by white noise of spectral
+/// density `agility`. The states of the defects follow the estimated target.
 ///
-/// Source: this project; filter as in Kalman 1960, doi:10.1115/1.3662552, with the secant to the drive that the signal suggests in
-/// place of the tangent.
+/// Source: this project. The filter is that of Kalman 1960, doi:10.1115/1.3662552, except that it linearises with a
+/// secant instead of the tangent: the secant to the drive at which `curve` has the measured signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct DiagnosedMap {
-    /// The baseline, where it is followed.
+    /// The tracker of the resting signal, if its drift is followed.
     pub rest: Option<RestTracker>,
-    /// The sleeve goes slack at low targets.
+    /// The sleeve that carries the gauge goes slack at low targets.
     pub slack_low: Option<Knee>,
-    /// The sleeve goes slack at high targets, as where a muscle shortens.
+    /// The sleeve goes slack at high targets, for example when a muscle shortens.
     pub slack_high: Option<Knee>,
     /// The sleeve slips on the muscle.
     pub slip: Option<Plays>,
     /// The pressure strains the gauge.
     pub crosstalk: Option<Crosstalk>,
-    /// The gauge takes another way back.
+    /// The gauge has hysteresis.
     pub hysteresis: Option<Plays>,
     /// The gauge relaxes or overshoots.
     pub relaxation: Option<Fading>,
-    /// The gauge softens.
+    /// The response of the gauge weakens with use.
     pub worn: Option<Worn>,
-    /// The amplifier's lower end.
+    /// The amplifier clips at its lower end.
     pub floor: Option<Knee>,
-    /// Its upper end.
+    /// The amplifier clips at its upper end.
     pub ceiling: Option<Knee>,
-    /// The amplifier is slow: two time constants, s.
+    /// The amplifier is slow: the time constants of two first-order lags in series, s.
     pub lowpass_s: Option<[f64; 2]>,
-    /// The signal shows the target of so many seconds before.
+    /// Delay of the signal behind the target, s.
     pub skew_s: f64,
-    /// The states of plays when a stream begins at the lower and at the upper end of `estimate_domain`, and on a line between: 1 as if the
-    /// target had come up from far below, -1 from far above.
+    /// State of the plays if a stream begins at the lower and at the upper end of `estimate_domain`. Between the
+    /// ends the state is interpolated linearly. 1 means that the target came up from far below, -1 from far above.
     #[cfg_attr(feature = "serde", serde(rename = "wound"))]
     pub initial_hysteresis: [f64; 2],
     /// Signal at evenly spaced drives over `drive_domain`, strictly monotone.
@@ -123,20 +128,20 @@ pub struct DiagnosedMap {
     pub drive_domain: Interval,
     /// Standard deviation of the signal around the model, in the signal's unit.
     pub noise: f64,
-    /// Spectral density of the rate's random walk, in 1/s^3 of normalised target.
+    /// Spectral density of the white noise that drives the rate, in 1/s^3 of normalised target.
     pub agility: f64,
-    /// Time in which a rate forgets itself, s.
+    /// Time constant with which the predicted rate decays, s.
     pub steady_s: f64,
-    /// What the errors of the fit were in standard deviations of the filter: what it says of itself is multiplied by it.
+    /// Factor on the filter's own standard deviation: the RMS of the fit's errors, each divided by that deviation.
     pub spread: f64,
-    /// The normalised targets that the fit saw.
+    /// Range of the normalised targets in the fit.
     pub estimate_domain: Interval,
-    /// How good the fit was: of the estimates, in normalised target.
+    /// Statistics of the estimates' errors in the fit, in normalised target.
     pub fit: FitSummary,
 }
 
 impl DiagnosedMap {
-    /// The longest skew, s.
+    /// The largest allowed magnitude of `skew_s`, s.
     pub const MOST_SKEW_S: f64 = 2.0;
 
     /// Checks every number and length.
@@ -201,7 +206,7 @@ impl DiagnosedMap {
             positive("diagnosed knee's width", width)?;
         }
         for Plays { share, radii } in [self.slip, self.hysteresis].into_iter().flatten() {
-            // A drive that falls while the target rises cannot be inverted.
+            // With a share above 1 the drive could fall while the target rises, and could not be inverted.
             DesignError::check("diagnosed plays' share", share, (0.0..=1.0).contains(&share))?;
             for radius in radii {
                 DesignError::check(

@@ -1,8 +1,8 @@
-//! What can be wrong with a design.
+//! The error of designs: calibrations, filters and their parameters.
 
 use core::fmt;
 
-/// Why a design was refused. Small, `Copy`, and carries the evidence.
+/// The reason why a design was refused, with the offending values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -14,7 +14,7 @@ pub enum DesignError {
         /// The value that was given.
         value: f64,
     },
-    /// A range whose ends coincide: nothing can be divided by it.
+    /// A range that is empty or too small to divide by.
     EmptyRange {
         /// The field.
         field: &'static str,
@@ -23,52 +23,52 @@ pub enum DesignError {
         /// Upper end.
         max: f64,
     },
-    /// A record whose bytes are not those that were sealed.
+    /// A binary calibration file whose bytes do not match its checksum.
     Damaged {
-        /// The seal that the record carries.
+        /// The checksum stored in the file.
         stored: u32,
-        /// The seal of its bytes.
+        /// The checksum computed from its bytes.
         computed: u32,
     },
-    /// Bytes that are no record of the kind that was asked for: too few, too many, or others.
+    /// Bytes that are not exactly one file of the requested kind: too few, too many, or of another format.
     NoRecord,
-    /// A record of a schema that this release does not know.
+    /// A calibration file of a schema (format version) that this release does not know.
     Schema {
-        /// The schema of the record.
+        /// The schema of the file.
         found: u32,
         /// The newest schema that this release reads.
         newest: u32,
     },
-    /// A record of a model that this release does not have any more.
+    /// A calibration with a model that this release no longer supports.
     Removed {
-        /// The model.
+        /// The name of the model.
         model: &'static str,
     },
-    /// A calibration of another kind than what is made of it can use.
+    /// A calibration of a kind that the caller cannot use.
     Mismatch {
-        /// What differs: `model`, `rate estimator`.
+        /// The part that differs, such as `model` or `rate estimator`.
         field: &'static str,
-        /// The kind, or kinds, that can be used.
+        /// The kind or kinds that the caller can use.
         expected: &'static str,
-        /// The kind that came.
+        /// The kind that was given.
         found: &'static str,
     },
     /// A degree, count or length that this release cannot hold.
     TooLarge {
         /// The field.
         field: &'static str,
-        /// What was asked for.
+        /// The requested size.
         asked: usize,
-        /// The most that there is room for.
+        /// The largest size that fits.
         most: usize,
     },
 }
 
 impl DesignError {
-    /// `value` when it is finite and `holds`, else the error that names `field`.
+    /// Returns `value` if it is finite and `holds` is true, otherwise an error that names `field`.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] when the value is not finite or `holds` is false.
+    /// [`DesignError::OutOfRange`] if the value is not finite or `holds` is false.
     pub fn check(field: &'static str, value: f64, holds: bool) -> Result<f64, Self> {
         if value.is_finite() && holds { Ok(value) } else { Err(Self::OutOfRange { field, value }) }
     }
@@ -77,7 +77,7 @@ impl DesignError {
 impl fmt::Display for DesignError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            // hundreds of digits say no more
+            // without an exponent, a large value would be printed with up to 309 digits
             Self::OutOfRange { field, value } if value.abs() >= 1e16 && value.is_finite() => {
                 write!(f, "{field} is {value:e}, which is outside what it may be")
             }

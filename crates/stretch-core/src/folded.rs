@@ -1,4 +1,5 @@
-//! What a receptor makes of a line or a surface, before it does: no product may leave `f32`.
+//! Checks that a line or surface stays within `f32` after folding. A live estimator folds a model when it is created:
+//! it multiplies the scales of normalisation and units into the coefficients.
 
 use crate::{
     BranchSurface, DesignError, Interval, LinearMap, MAX_DEGREE, Range,
@@ -6,23 +7,23 @@ use crate::{
     sizes::{MOST_PRODUCT, MOST_SLOPE, range, size},
 };
 
-/// What a model is scaled with.
+/// The scales that are folded into a model.
 pub(crate) struct Scales {
-    /// Reference per normalised target.
+    /// Change of the reference per normalised target.
     pub(crate) gain: f64,
     /// The reference at a normalised target of 0.
     pub(crate) zero: f64,
-    /// Normalises the signal.
+    /// Range that normalises the signal.
     pub(crate) signal: Range,
 }
 
-/// The furthest that a domain lies from an offset.
+/// Returns the largest distance of a point of the domain from the offset.
 fn reach(domain: Interval, offset: f64) -> f64 {
     (domain.min - offset).abs().max((domain.max - offset).abs())
 }
 
 /// # Errors
-/// A line that is too steep, or leads too far.
+/// `DesignError` for a line whose slope or largest output is too large.
 pub(crate) fn line_holds(scales: &Scales, line: &LinearMap) -> Result<(), DesignError> {
     let Scales { gain, zero, signal } = scales;
     let (gain, zero) = (gain.abs(), zero.abs());
@@ -33,7 +34,8 @@ pub(crate) fn line_holds(scales: &Scales, line: &LinearMap) -> Result<(), Design
     DesignError::check("linear.intercept", line.intercept, furthest <= MOST_PRODUCT).map(|_| ())
 }
 
-/// Horner's rule over the magnitudes of the folded coefficients: no intermediate sum is larger than these.
+/// Checks a surface by Horner's rule over the magnitudes of the folded coefficients. In the actual evaluation every
+/// intermediate sum is at most as large as the sums here.
 pub(crate) fn surface_holds(scales: &Scales, branch: &BranchSurface) -> Result<(), DesignError> {
     const FIELD: &str = "surface.coefficients";
     const RATE: [&str; 2] = ["rate_range", "span of rate_range"];
@@ -51,12 +53,12 @@ pub(crate) fn surface_holds(scales: &Scales, branch: &BranchSurface) -> Result<(
     for i in (0..=MAX_DEGREE as u8).rev() {
         let (mut row, mut rise) = (0.0, 0.0);
         for j in (0..=MAX_DEGREE as u8).rev() {
-            // as they are folded: per signal and per rate, not per range
+            // folded: per unit of signal and of rate, not per range
             let scale = power(signal.span(), j) * power(rate.span(), i);
             let c = gain * branch.surface.coefficient(i, j).abs() / scale;
             rise = rise * v + row;
             row = row * v + c;
-            // a sum that is later multiplied with little is a number, too
+            // each intermediate must fit by itself, even if a small factor follows
             for x in [c, rise, row] {
                 holds(x, MOST_PRODUCT)?;
             }

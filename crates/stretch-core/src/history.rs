@@ -1,24 +1,27 @@
-//! A target read from the signal and from what the signal did before.
+//! A model that computes the target from the signal and its history.
+//!
+//! A *play* is a backlash operator (`arithmetic::play`).
 
 use crate::{
     DesignError, FitSummary, Interval, RestTracker, Values,
     sizes::{extent, size},
 };
 
-/// The most relaxations of a [`HistoryMap`].
+/// Largest number of relaxations in a [`HistoryMap`].
 pub const MAX_RELAXATIONS: usize = 4;
-/// The most plays of a [`HistoryMap`].
+/// Largest number of plays in a [`HistoryMap`].
 pub const MAX_PLAYS: usize = 3;
-/// The most states of a [`HistoryMap`]: the signal, relaxations, plays.
+/// Largest number of states in a [`HistoryMap`]: the signal, the relaxations and the plays.
 pub const MAX_STATES: usize = 1 + MAX_RELAXATIONS + MAX_PLAYS;
-/// The most terms of a [`HistoryMap`].
+/// Largest number of terms in a [`HistoryMap`].
 pub const MAX_HISTORY_TERMS: usize = 128;
 const MAX_HISTORY_DEGREE: u8 = 5;
 
-/// Which products of states a [`HistoryMap`] sums: all whose powers add to at
-/// most `degree`, of which at most `memory_degree` belong to states other than
-/// the signal. poly13 is of this kind, with one memory state (its rate), degree
-/// 3 and memory degree 1.
+/// The set of products of states that a [`HistoryMap`] sums: all products whose powers add up to at
+/// most `degree`, and whose powers of the memory states (all states except the signal) add up to at
+/// most `memory_degree`.
+///
+/// poly13 is an example, with one memory state (the rate), degree 3 and memory degree 1.
 ///
 /// ```
 /// use stretch_core::HistoryShape;
@@ -28,7 +31,7 @@ const MAX_HISTORY_DEGREE: u8 = 5;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HistoryShape {
-    /// How many states, the signal counted.
+    /// Number of states, including the signal.
     pub states: usize,
     /// The greatest sum of powers.
     pub degree: u8,
@@ -37,19 +40,19 @@ pub struct HistoryShape {
 }
 
 impl HistoryShape {
-    /// How many terms, the constant counted; at most one more than
-    /// [`MAX_HISTORY_TERMS`], which means too many.
+    /// Returns the number of terms, including the constant. Counting stops at
+    /// [`MAX_HISTORY_TERMS`] + 1, which means too many.
     pub fn terms(self) -> usize {
         let mut terms = 1;
         self.each_product(|_, _| terms += 1);
         terms
     }
 
-    /// Calls `product(parent, state)` for each term beyond the constant, in the
-    /// order of the coefficients: the term is that of `parent` times `state`.
-    /// Stops after [`MAX_HISTORY_TERMS`] of them.
+    /// Calls `product(parent, state)` for each term except the constant, in the order of the
+    /// coefficients. The term is the term with index `parent` times the state with index
+    /// `state`. Stops after [`MAX_HISTORY_TERMS`] calls.
     pub fn each_product(self, mut product: impl FnMut(usize, usize)) {
-        // of every term so far: its last state, and the sum of its memory powers
+        // the last state of every term so far, and the sum of its memory powers
         let mut made = [(0u8, 0u8); MAX_HISTORY_TERMS + 1];
         let (mut from, mut next) = (0, 1);
         for _ in 0..self.degree {
@@ -74,34 +77,32 @@ impl HistoryShape {
     }
 }
 
-/// A polynomial of the normalised signal and of its history.
+/// A polynomial in the normalised signal and its history.
 ///
-/// With `x` the normalised signal less its baseline, the states are
+/// With `x` the normalised signal minus its baseline, the states are:
 /// - `x`;
-/// - for each time constant `tau` in rising order, what `x` changed over about
-///   that time: `l_before - l`, where `l' = (x - l)/tau` and `l_before` is the
-///   one before it in the list (`x` for the first): the states that invert
-///   linear relaxation, lag and lead;
-/// - for each radius `w`, `x - play(x, w)`: those that invert backlash and
-///   Prandtl-Ishlinskii hysteresis (the inverse of such an operator is a sum of
-///   plays again).
+/// - for each time constant `tau` in rising order, the change of `x` over about that time:
+///   `l_before - l`, where `l' = (x - l)/tau` and `l_before` is the lag with the next shorter time
+///   constant (`x` for the first). These states can invert linear relaxation, lag and lead;
+/// - for each radius `w`, `x - play(x, w)`. These states can invert backlash and Prandtl-Ishlinskii
+///   hysteresis, because the inverse of such an operator is also a sum of plays.
 ///
-/// Each is moved into its domain and scaled to -1..1 over it; the normalised
-/// target is the sum over [`HistoryShape`]'s products, moved into `estimate_domain`.
-/// Linear in its coefficients, so the fit is one least-squares problem.
+/// Each state is clamped to its domain and scaled to -1..1. The normalised target is the sum over
+/// the products of [`HistoryShape`], clamped to `estimate_domain`. The map is linear in its
+/// coefficients, so the fit is one least-squares problem.
 ///
-/// Source: this project; a Volterra series on a Laguerre-like bank, as in Boyd
-/// and Chua 1985, doi:10.1109/TCS.1985.1085649, with plays as in
-/// Kuhnen 2003, doi:10.3166/ejc.9.407-418.
+/// Source: this project. It is a Volterra series on a Laguerre-like filter bank, as in Boyd and
+/// Chua 1985, doi:10.1109/TCS.1985.1085649, with plays as in Kuhnen 2003,
+/// doi:10.3166/ejc.9.407-418.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct HistoryMap {
-    /// The baseline, where it is followed.
+    /// The tracker of the resting signal, if its drift is followed.
     pub rest: Option<RestTracker>,
     /// Time constants, rising, in seconds.
     pub relaxations_s: Values<MAX_RELAXATIONS>,
-    /// Radii of the plays, in normalised signal.
+    /// Half-widths of the plays, in normalised signal.
     pub radii: Values<MAX_PLAYS>,
     /// The greatest sum of powers, 1 to 5.
     pub degree: u8,
@@ -111,16 +112,16 @@ pub struct HistoryMap {
     pub state_min: Values<MAX_STATES>,
     /// Upper end of each state in the fit.
     pub state_max: Values<MAX_STATES>,
-    /// One coefficient a term, in normalised target.
+    /// One coefficient per term, in normalised target.
     pub coefficients: Values<MAX_HISTORY_TERMS>,
-    /// The normalised targets that the fit saw.
+    /// Range of the normalised targets in the fit.
     pub estimate_domain: Interval,
-    /// How good the fit was.
+    /// Statistics of the fit.
     pub fit: FitSummary,
 }
 
 impl HistoryMap {
-    /// Which products it sums.
+    /// Returns the set of products that the map sums.
     pub fn shape(&self) -> HistoryShape {
         HistoryShape {
             states: 1 + self.relaxations_s.len() + self.radii.len(),

@@ -1,4 +1,4 @@
-//! Where inputs are valid.
+//! Intervals of valid inputs.
 
 use crate::DesignError;
 
@@ -14,7 +14,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Whether both ends are finite and in order; the error names `field`.
+    /// Checks that both ends are finite and in order. The error names `field`.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] or [`DesignError::EmptyRange`].

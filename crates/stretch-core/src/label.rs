@@ -1,10 +1,11 @@
-//! Short names held in place, without an allocator.
+//! Short names stored inline, without an allocator.
 
 use core::fmt;
 
 use crate::DesignError;
 
-/// A name of at most [`Label::CAPACITY`] bytes: a column, a trial, a date.
+/// A short text of at most [`Label::CAPACITY`] bytes, such as the name of a column or trial, or a
+/// date.
 ///
 /// ```
 /// use stretch_core::Label;
@@ -23,17 +24,17 @@ impl Label {
     /// The longest label, in bytes of UTF-8.
     pub const CAPACITY: usize = 40;
 
-    /// A label that holds the whole name.
+    /// Creates a label with the whole name.
     ///
     /// # Errors
-    /// [`DesignError::TooLarge`] when the name is longer than [`Label::CAPACITY`].
+    /// [`DesignError::TooLarge`] if the name is longer than [`Label::CAPACITY`].
     pub fn new(name: &str) -> Result<Self, DesignError> {
         let too_large =
             DesignError::TooLarge { field: "label", asked: name.len(), most: Self::CAPACITY };
         heapless::String::try_from(name).map(Self).map_err(|_| too_large)
     }
 
-    /// As much of the name as there is room for, cut between characters.
+    /// Creates a label with as much of the name as fits, cut between characters.
     pub fn truncated(name: &str) -> Self {
         let mut text = heapless::String::new();
         for c in name.chars() {
@@ -49,8 +50,7 @@ impl Label {
         &self.0
     }
 
-    /// The unit that a column's name ends with: `mm` of `length_mm`; empty
-    /// when there is no `_`.
+    /// Returns the unit at the end of a column name, such as `mm` in `length_mm`. Empty if the name has no `_`.
     pub fn unit(&self) -> &str {
         self.0.rsplit_once('_').map_or("", |(_, unit)| unit)
     }

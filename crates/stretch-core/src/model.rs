@@ -1,4 +1,4 @@
-//! What a calibration computes: from signal and rate to the normalised target.
+//! The models of a calibration, which convert signal and rate to the normalised target.
 
 use crate::{
     DesignError, DiagnosedMap, FitSummary, HistoryMap, Interval, ObserverMap, Range, Surface,
@@ -14,30 +14,30 @@ pub struct LinearMap {
     pub slope: f64,
     /// Normalised target at a normalised signal of zero.
     pub intercept: f64,
-    /// The signal that the fit saw, in the signal's unit.
+    /// Range of the signal in the fit, in the signal's unit.
     pub signal_domain: Interval,
-    /// How good the fit was.
+    /// Statistics of the fit.
     pub fit: FitSummary,
 }
 
-/// One branch's surface and where it is valid.
+/// The surface of one branch and its domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct BranchSurface {
-    /// Normalises the signed signal rate, in signal units per second.
+    /// Range that normalises the signed signal rate, in signal units per second.
     pub rate_range: Range,
     /// Normalised target over normalised rate and normalised signal.
     pub surface: Surface,
-    /// The signal that the fit saw, in the signal's unit.
+    /// Range of the signal in the fit, in the signal's unit.
     pub signal_domain: Interval,
-    /// The signed signal rates that the fit saw, in signal units per second.
+    /// Range of the signed signal rates in the fit, in signal units per second.
     pub rate_domain: Interval,
-    /// How good the fit was.
+    /// Statistics of the fit.
     pub fit: FitSummary,
 }
 
-/// How a calibration turns a signal into a target.
+/// The model that converts a signal to a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
@@ -46,31 +46,32 @@ pub struct BranchSurface {
 pub enum Model {
     /// One line for both directions (paper section 3.1).
     Linear(LinearMap),
-    /// A surface a branch (paper section 3.2).
+    /// One surface per branch (paper section 3.2).
     Surfaces {
         /// For a rising target.
         inflation: BranchSurface,
         /// For a falling target.
         deflation: BranchSurface,
     },
-    /// Two surfaces mixed across the dead band, which builds of stretch 0.1.0 before 27 November 2026 ran.
-    /// [`Model::validate`] refuses them. The variant stays because records in bytes number the models.
+    /// Two surfaces mixed across the dead band, as supported by builds of stretch 0.1.0 before 27 November 2026.
+    /// [`Model::validate`] refuses this model. The variant stays because binary calibration files store the
+    /// variant's index.
     Blended {
         /// For a rising target.
         inflation: BranchSurface,
         /// For a falling target.
         deflation: BranchSurface,
     },
-    /// A polynomial of the signal and its history.
+    /// A polynomial in the signal and its history.
     History(HistoryMap),
     /// The gauge's forward model, inverted by a Kalman filter.
     Observer(ObserverMap),
-    /// The gauge's forward model with its defects by name, inverted by a filter.
+    /// The gauge's forward model with named defects, inverted by a Kalman filter.
     Diagnosed(DiagnosedMap),
 }
 
 impl Model {
-    /// The kind, as messages and records call it.
+    /// Returns the name of the model in messages and calibration files.
     ///
     /// ```
     /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
@@ -90,8 +91,8 @@ impl Model {
         }
     }
 
-    /// Whether an estimate needs one value of the signal and nothing else, no rate and no earlier sample: a line, and one
-    /// curve for both branches.
+    /// Returns whether an estimate needs only the current value of the signal, no rate and no earlier sample. This
+    /// holds for a line, and for surfaces that are the same for both branches and do not depend on the rate.
     ///
     /// ```
     /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
@@ -110,8 +111,8 @@ impl Model {
         }
     }
 
-    /// What a caller answers who takes models of kind `expected` only:
-    /// [`DesignError::Mismatch`], with this model's name.
+    /// Returns the error of a caller that accepts only models of kind `expected`: [`DesignError::Mismatch`] with
+    /// this model's name.
     pub fn instead_of(&self, expected: &'static str) -> DesignError {
         DesignError::Mismatch { field: "model", expected, found: self.name() }
     }

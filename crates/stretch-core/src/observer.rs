@@ -1,37 +1,39 @@
-//! A gauge described as it works, forwards, and a filter that asks which
-//! motion explains the signal.
+//! The forward model of a gauge (from motion to signal), and the parameters of the filter that inverts it.
+//!
+//! The *drive* is the normalised strain of the gauge, including its memory. A *play* is a backlash operator
+//! (`arithmetic::play`).
 
 use crate::{
     DesignError, FitSummary, Interval, RestTracker, Values,
     sizes::{apart, extent, size},
 };
 
-/// The most relaxations of an [`ObserverMap`].
+/// Largest number of relaxations in an [`ObserverMap`].
 pub const MAX_OBSERVER_RELAXATIONS: usize = 2;
-/// The most plays of an [`ObserverMap`].
+/// Largest number of plays in an [`ObserverMap`].
 pub const MAX_OBSERVER_PLAYS: usize = 3;
-/// The most knots of an [`ObserverMap`]'s curve.
+/// Largest number of knots in the curve of an [`ObserverMap`].
 pub const MAX_KNOTS: usize = 33;
 
-/// The forward model of a gauge, and what a Kalman filter needs to invert it.
+/// The forward model of a gauge, and the parameters of the Kalman filter that inverts it.
 ///
 /// With `y` the normalised target and `r` its rate:
 /// - drive `u = y + lead_s r + sum a_i (y - l_i) + sum b_j (y - play(y, w_j))`;
-/// - signal `v = curve(u) + noise`, a rising (or falling) line between knots.
+/// - signal `v = curve(u) + noise`, where the monotone curve is linear between knots.
 ///
-/// The filter carries `y`, `r` and every `l_i`; `r` is a random walk of spectral density `agility`. Its
-/// gain follows the slope of the curve: where the signal hardly answers the
-/// target it trusts the motion, elsewhere the signal. `y` never leaves
-/// `estimate_domain`.
+/// Here `l_i` is the lag `l_i' = (y - l_i)/tau_i`, with the amplitude `a_i`. The play of half-width `w_j` has the
+/// weight `b_j`. The state of the filter is `y`, `r` and every `l_i`. `r` is a random walk of spectral density
+/// `agility`. The gain depends on the slope of the curve: where the signal hardly depends on the target, the filter
+/// relies on the predicted motion, elsewhere on the signal. `y` is clamped to `estimate_domain`.
 ///
-/// Every number is a property of the gauge or of the motion, with a unit.
-/// Source: this project; filter as in Kalman 1960, doi:10.1115/1.3662552,
-/// extended, with the secant in place of the tangent wherever it is steeper.
+/// Every number is a property of the gauge or of the motion, with a unit. Source: this project. The filter is an
+/// extended form of that of Kalman 1960, doi:10.1115/1.3662552, with the secant instead of the tangent wherever the
+/// secant is steeper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ObserverMap {
-    /// The baseline, where it is followed.
+    /// The tracker of the resting signal, if its drift is followed.
     pub rest: Option<RestTracker>,
     /// Signal at evenly spaced drives over `drive_domain`, strictly monotone.
     pub curve: Values<MAX_KNOTS>,
@@ -39,22 +41,22 @@ pub struct ObserverMap {
     pub drive_domain: Interval,
     /// Time constants of the relaxations, in seconds.
     pub relaxations_s: Values<MAX_OBSERVER_RELAXATIONS>,
-    /// Their amplitudes: with `l' = (y - l)/tau`, `amplitude (y - l)` is added to the
-    /// drive; positive overshoots, negative lags.
+    /// Amplitudes of the relaxations. With `l' = (y - l)/tau`, `amplitude (y - l)` is added to the drive. A
+    /// positive amplitude makes the gauge overshoot, a negative one makes it lag.
     pub amplitudes: Values<MAX_OBSERVER_RELAXATIONS>,
-    /// Seconds by which the signal leads the target; below zero it is late.
+    /// Seconds by which the signal leads the target; negative if the signal lags.
     pub lead_s: f64,
-    /// Radii of the plays, in normalised target.
+    /// Half-widths of the plays, in normalised target.
     pub radii: Values<MAX_OBSERVER_PLAYS>,
-    /// Their weights; below zero is the usual hysteresis.
+    /// Weights of the plays. A negative weight gives the usual hysteresis, in which the signal lags.
     pub play_weights: Values<MAX_OBSERVER_PLAYS>,
     /// Standard deviation of the signal around the model, in the signal's unit.
     pub noise: f64,
     /// Spectral density of the rate's random walk, in 1/s^3 of normalised target.
     pub agility: f64,
-    /// The normalised targets that the fit saw.
+    /// Range of the normalised targets in the fit.
     pub estimate_domain: Interval,
-    /// How good the fit was: of the estimates, in normalised target.
+    /// Statistics of the estimates' errors in the fit, in normalised target.
     pub fit: FitSummary,
 }
 

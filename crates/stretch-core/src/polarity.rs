@@ -1,4 +1,4 @@
-//! How signal and target move together.
+//! Sign of the relation between signal and target.
 
 /// Whether the signal rises or falls as the target rises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -13,8 +13,7 @@ pub enum Polarity {
 }
 
 impl Polarity {
-    /// 1 or -1: what the signal's rate is multiplied by, so that a positive
-    /// signed rate means a rising target.
+    /// Returns 1 or -1, the factor that makes the signal's rate positive when the target rises.
     pub fn sign(self) -> f64 {
         match self {
             Self::Rising => 1.0,

@@ -1,10 +1,10 @@
-//! Where a calibration comes from.
+//! Origin of a calibration: date, trials, quality of the fit.
 
 use crate::Label;
 
-/// What a calibration was made of, for those who read the record in a year.
+/// The date of a calibration and the trials from which it was made.
 ///
-/// The date is the caller's: this crate has no clock.
+/// The caller supplies the date, because this crate has no clock.
 ///
 /// ```
 /// use stretch_core::Provenance;
@@ -20,26 +20,27 @@ pub struct Provenance {
     checksums: Named<u32>,
 }
 
-/// One for each of the trials that are named.
+/// One item for each named trial.
 type Named<T> = heapless::Vec<T, { Provenance::NAMED_TRIALS }>;
 
 impl Provenance {
-    /// How many trials are named; those beyond are only counted.
+    /// Largest number of trials whose names are stored. Further trials are only counted.
     pub const NAMED_TRIALS: usize = 16;
 
-    /// A record of a date (free text, may be empty) and the trials in order.
+    /// Creates the provenance from a date (free text, may be empty) and the names of the trials in order.
     pub fn new<'a>(date: &str, trials: impl IntoIterator<Item = &'a str>) -> Self {
         let mut record = Self { date: Label::truncated(date), ..Self::default() };
         for name in trials {
             record.trial_count = record.trial_count.saturating_add(1);
-            // a full list is no error: the count goes on
+            // a full list is no error, because further trials are only counted
             let _ = record.trials.push(Label::truncated(name));
         }
         record
     }
 
-    /// The same with CRC-32C of the samples of each of the first [`Provenance::NAMED_TRIALS`], which tell a trial under another
-    /// name. Only JSON holds them, because a board has no trials to compare.
+    /// Adds the CRC-32C of the samples of each of the first [`Provenance::NAMED_TRIALS`] trials. These checksums
+    /// identify a trial even if its file was renamed. Only JSON stores them, because a microcontroller has no
+    /// trials to compare.
     ///
     /// ```
     /// use stretch_core::Provenance;
@@ -51,28 +52,29 @@ impl Provenance {
         Self { checksums, ..self }
     }
 
-    /// CRC-32C of the samples of the named trials; none in a record that was made without, or comes from a board.
+    /// Returns the CRC-32C of the samples of the named trials. Empty if none were added or if the calibration was
+    /// read from binary form.
     pub fn checksums(&self) -> &[u32] {
         &self.checksums
     }
 
-    /// The date as the caller gave it.
+    /// Returns the date as given by the caller, cut to `Label::CAPACITY` bytes.
     pub fn date(&self) -> &str {
         self.date.as_str()
     }
 
-    /// How many trials were used.
+    /// Returns the number of trials.
     pub fn trial_count(&self) -> u32 {
         self.trial_count
     }
 
-    /// The names of the first [`Provenance::NAMED_TRIALS`].
+    /// Returns the names of the first [`Provenance::NAMED_TRIALS`] trials.
     pub fn trials(&self) -> impl Iterator<Item = &str> {
         self.trials.iter().map(Label::as_str)
     }
 }
 
-/// How well a fit described the samples it was made from.
+/// Statistics of a fit on its own samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -85,7 +87,7 @@ pub struct FitSummary {
     pub rmse: f64,
 }
 
-/// The two forms in which it is written.
+/// The binary and the text form of a `Provenance`.
 #[cfg(feature = "serde")]
 mod forms {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -93,7 +95,8 @@ mod forms {
     use super::{Named, Provenance};
     use crate::Label;
 
-    /// As bytes, field behind field: nothing may be optional there, and earlier records are read by the same code.
+    /// The binary form. It has no optional fields, because fields are stored one after another without names, and
+    /// files of earlier releases are read by the same code.
     #[derive(Serialize, Deserialize)]
     struct Bytes {
         date: Label,
@@ -101,7 +104,7 @@ mod forms {
         trials: Named<Label>,
     }
 
-    /// As text, where a field may be missing.
+    /// The text form, in which a field may be missing.
     #[derive(Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Text {

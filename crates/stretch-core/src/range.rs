@@ -1,21 +1,22 @@
-//! Normalisation by a channel's range, in the two ways that the field uses.
+//! Normalisation by a channel's range, in two common forms.
 
 use crate::{DesignError, Real};
 
-/// How a channel is brought to the order of one.
+/// The formula that scales a channel to the order of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Normalisation {
-    /// `(x - zero)/(max - min)`: divided by the total range, the minimum left
-    /// where it is. What the paper's published coefficients imply (section 2.5).
+    /// `(x - zero)/(max - min)`: divided by the total range, so that `zero`, not the minimum,
+    /// becomes 0. The coefficients of the published method ("the paper", section 2.5) imply
+    /// this form.
     #[default]
     Range,
-    /// `(x - min)/(max - min)`: the calibrated span becomes 0..1.
+    /// `(x - min)/(max - min)`: the calibrated range becomes 0..1.
     MinMax,
 }
 
-/// The range of a channel, frozen at calibration.
+/// The range of a channel, fixed at calibration.
 ///
 /// `normalise(x) = (x - offset)/(max - min)`, with the offset that
 /// [`Normalisation`] names. The inverse is [`denormalise`](Range::denormalise).
@@ -49,14 +50,14 @@ pub struct Range<T = f64> {
     span: T,
 }
 
-/// What a [`Range`] is made of.
+/// The unchecked parts of a [`Range`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RangeSpec<T = f64> {
-    /// Which offset is subtracted.
+    /// The formula, which determines the offset.
     pub mode: Normalisation,
-    /// The channel's own zero (a bridge's reference voltage), subtracted in
+    /// The channel's own zero, such as the reference voltage of a bridge. It is subtracted in
     /// [`Normalisation::Range`].
     pub zero: T,
     /// Least value seen at calibration.
@@ -66,11 +67,11 @@ pub struct RangeSpec<T = f64> {
 }
 
 impl<T: Real> Range<T> {
-    /// A range from its parts.
+    /// Creates a range from its parts.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] for a number that is not finite,
-    /// [`DesignError::EmptyRange`] unless `min < max` by a usable amount.
+    /// [`DesignError::OutOfRange`] for a number that is not finite, [`DesignError::EmptyRange`]
+    /// unless `max - min` is positive and both it and its reciprocal are finite.
     pub fn new(spec: RangeSpec<T>) -> Result<Self, DesignError> {
         DesignError::check("range.zero", spec.zero.as_f64(), true)?;
         DesignError::check("range.min", spec.min.as_f64(), true)?;
@@ -87,25 +88,25 @@ impl<T: Real> Range<T> {
         Ok(Self { spec, offset, span })
     }
 
-    /// `(x - offset)/span`, dimensionless.
+    /// Returns `(x - offset)/span`, dimensionless.
     #[inline]
     pub fn normalise(&self, x: T) -> T {
         (x - self.offset) / self.span
     }
 
-    /// `offset + n span`, in the channel's unit: the inverse of [`normalise`](Self::normalise).
+    /// Returns `offset + n span`, in the channel's unit: the inverse of [`normalise`](Self::normalise).
     #[inline]
     pub fn denormalise(&self, n: T) -> T {
         self.offset + n * self.span
     }
 
-    /// Whether `min <= x <= max`; false for NaN.
+    /// Returns whether `min <= x <= max`; false for NaN.
     #[inline]
     pub fn contains(&self, x: T) -> bool {
         x >= self.spec.min && x <= self.spec.max
     }
 
-    /// The nearest value inside the range.
+    /// Returns the nearest value inside the range.
     #[inline]
     pub fn clamp(&self, x: T) -> T {
         if x < self.spec.min {
@@ -117,7 +118,7 @@ impl<T: Real> Range<T> {
         }
     }
 
-    /// What is subtracted before the division, in the channel's unit.
+    /// Returns the offset that is subtracted before the division, in the channel's unit.
     pub fn offset(&self) -> T {
         self.offset
     }
@@ -137,7 +138,7 @@ impl<T: Real> Range<T> {
         self.spec.max
     }
 
-    /// The mode.
+    /// Returns the normalisation formula.
     pub fn mode(&self) -> Normalisation {
         self.spec.mode
     }

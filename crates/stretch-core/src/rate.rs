@@ -1,27 +1,28 @@
-//! Which estimator turns a voltage into its rate.
+//! Parameters of the estimator that computes the rate of a voltage.
 
 use crate::DesignError;
 
-/// The estimator of the signal's rate, as a calibration records it.
+/// Kind and parameters of the estimator of the signal's rate, as stored in a calibration.
 ///
-/// A surface fitted on one estimator's rates is only right with that estimator:
-/// the choice is part of the calibration. `stretch-filter` builds what is named here.
+/// The estimator is part of the calibration, because a surface that was fitted to the rates of one
+/// estimator is valid only with that estimator. The crate `stretch-filter` implements the
+/// estimators.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum RateEstimator {
-    /// Central difference of a log, as the paper's; looks one sample ahead, so
-    /// it cannot run live.
+    /// Central difference over a log, as in the published method ("the paper"). It needs the
+    /// next sample, so it cannot run live.
     CentralDifference,
-    /// Savitzky-Golay: slope of the polynomial of `degree` that fits the
-    /// newest `window` samples best, taken `delay` samples before the newest.
+    /// Savitzky-Golay: slope of the least-squares polynomial of `degree` through the newest
+    /// `window` samples, evaluated `delay` samples before the newest.
     SavitzkyGolay {
         /// Samples in the window.
         window: u16,
         /// Degree of the local polynomial.
         degree: u8,
-        /// How many samples before the newest the slope is taken.
+        /// Number of samples before the newest at which the slope is evaluated.
         delay: u16,
     },
     /// Band-limited differentiator: a second-order Butterworth low-pass in
@@ -32,20 +33,20 @@ pub enum RateEstimator {
     },
     /// Steady-state Kalman (alpha-beta) tracker.
     Tracker {
-        /// Standard deviation of the acceleration times the squared period,
-        /// over the standard deviation of the noise; dimensionless.
+        /// Standard deviation of the acceleration times the squared sample period, divided by the
+        /// standard deviation of the noise; dimensionless.
         tracking_index: f64,
     },
 }
 
 impl RateEstimator {
-    /// The longest Savitzky-Golay window that a record may name, in samples.
+    /// The longest Savitzky-Golay window, in samples.
     pub const MAX_WINDOW: u16 = 64;
 
-    /// Eleven points, degree 2, at the newest sample: causal, 0.1 s at 100 Hz.
+    /// Savitzky-Golay with eleven points and degree 2, evaluated at the newest sample: 0.1 s at 100 Hz.
     pub const SAVGOL_11_2: Self = Self::SavitzkyGolay { window: 11, degree: 2, delay: 0 };
 
-    /// The kind, as messages call it.
+    /// Returns the name of the kind for messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::CentralDifference => "a central difference",
@@ -55,7 +56,7 @@ impl RateEstimator {
         }
     }
 
-    /// Checks every number of the record.
+    /// Checks every parameter.
     ///
     /// # Errors
     /// [`DesignError`] that names the field.

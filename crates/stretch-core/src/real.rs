@@ -1,4 +1,4 @@
-//! The two floating-point types that a pipeline may run in.
+//! The two floating-point types in which a pipeline can run.
 
 use num_traits::float::FloatCore;
 
@@ -10,10 +10,10 @@ mod sealed {
 
 /// A floating-point sample type: `f32` or `f64`.
 ///
-/// It extends [`FloatCore`] and adds only the square root, which IEEE 754
-/// rounds correctly: a live step can therefore not call a function whose last
-/// bit differs between a computer and a board. Designs are computed in `f64` and
-/// rounded with [`Real::from_f64`].
+/// It extends [`FloatCore`] and adds only conversions and the square root, which IEEE 754 requires
+/// to be correctly rounded. A live step therefore cannot call a function whose last bit differs
+/// between a computer and a microcontroller. Designs are computed in `f64` and rounded with
+/// [`Real::from_f64`].
 ///
 /// ```
 /// use stretch_core::Real;
@@ -23,11 +23,11 @@ mod sealed {
 pub trait Real:
     FloatCore + Default + core::fmt::Debug + core::fmt::Display + Send + Sync + 'static + sealed::Sealed
 {
-    /// The nearest value of this type.
+    /// Returns the nearest value of this type.
     fn from_f64(x: f64) -> Self;
-    /// This value, exactly.
+    /// Returns this value exactly as `f64`.
     fn as_f64(self) -> f64;
-    /// The square root, correctly rounded; NaN below zero.
+    /// Returns the correctly rounded square root; NaN below zero.
     fn sqrt(self) -> Self;
 }
 

@@ -1,31 +1,30 @@
-//! Records as bytes under a seal: what a board carries in flash.
+//! Binary files with a checksum, such as the calibration in the flash of a microcontroller.
 //!
 //! ```text
 //! record = postcard(value), then CRC-32C of those bytes, least byte first
 //! ```
 //!
-//! The first field of every record is its schema. Schema 1 had no seal: such a record is still
-//! read, and refused like any other where bytes are left over. The checksum is Castagnoli's
-//! (Koopman, DSN 2002): it finds every error of up to three bits, in records below 655 bytes of
-//! up to five, every burst of up to 32 bits, and lets one other damage in 2^32 through.
+//! A `record` is such a file in memory. Its first field is its schema (format version). Schema 1 had no checksum and
+//! can still be read. The checksum is Castagnoli's CRC (Koopman, DSN 2002). It detects every error of up to three bits
+//! (up to five bits in records below 655 bytes), every burst of up to 32 bits, and all but one in 2^32 of other errors.
 //!
-//! A seal says that the bytes are those that were written, not that their author meant well.
+//! The checksum detects damage. It does not protect against deliberate changes.
 
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
 use crate::DesignError;
 
-/// The schema of the records that this release writes, of all kinds.
+/// The schema of all kinds of records that this release writes.
 pub const SCHEMA: u32 = crate::CALIBRATION_SCHEMA;
 
-/// Without a table: a kilobyte of flash for a few thousand instructions when the board starts.
+/// Without a lookup table: this saves a kilobyte of flash and costs a few thousand instructions at start-up.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
-/// Bytes of a seal.
+/// Bytes of the checksum.
 const SEAL: usize = 4;
 
-/// CRC-32C of bytes.
+/// Returns the CRC-32C of bytes.
 ///
 /// ```
 /// // the check value of the catalogue of CRC algorithms
@@ -35,10 +34,10 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
-/// Writes a value and its seal to the beginning of `buffer`; gives what was written.
+/// Writes a value and its checksum to the beginning of `buffer`, and returns the written bytes.
 ///
 /// # Errors
-/// [`DesignError::TooLarge`] where the buffer is too small.
+/// [`DesignError::TooLarge`] if the buffer is too small.
 pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u8], DesignError> {
     let most = buffer.len();
     let full = DesignError::TooLarge { field: "record in bytes", asked: most + 1, most };
@@ -49,11 +48,11 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
     Ok(&buffer[..length + SEAL])
 }
 
-/// A value from the bytes of its record, all of them.
+/// Reads a value from the bytes of its record. No byte may be left over.
 ///
 /// # Errors
-/// [`DesignError::Damaged`] where the seal is not that of the bytes, [`DesignError::Schema`] for
-/// a newer record, [`DesignError::NoRecord`] for bytes that are no record of a `T` or more than one.
+/// [`DesignError::Damaged`] if the checksum does not match the bytes, [`DesignError::Schema`] for a newer schema,
+/// [`DesignError::NoRecord`] if the bytes are not exactly one record of a `T`.
 ///
 /// ```
 /// use stretch_core::{DesignError, record};
@@ -73,16 +72,16 @@ pub fn load<'r, T: Deserialize<'r>>(bytes: &'r [u8]) -> Result<T, DesignError> {
     if rest.is_empty() { Ok(value) } else { Err(DesignError::NoRecord) }
 }
 
-/// The seal at the end of a record, once it was found to be that of its bytes; none for schema 1.
+/// Checks the checksum at the end of a record and returns it; `None` for schema 1.
 ///
 /// # Errors
-/// As [`load`].
+/// Those of [`load`], except that the bytes of the value are not checked.
 pub fn seal(bytes: &[u8]) -> Result<Option<u32>, DesignError> {
     let body = body(bytes)?;
     Ok((body.len() < bytes.len()).then(|| checksum(body)))
 }
 
-/// The bytes before the seal.
+/// Checks the checksum and the schema, and returns the bytes before the checksum.
 fn body(bytes: &[u8]) -> Result<&[u8], DesignError> {
     let (found, _) = postcard::take_from_bytes::<u32>(bytes).map_err(|_| DesignError::NoRecord)?;
     if found == 1 {

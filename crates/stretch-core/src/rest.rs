@@ -1,44 +1,42 @@
-//! The value of the signal at rest, followed as it drifts.
+//! Parameters for tracking the drift of the resting signal.
 
 use crate::{
     DesignError,
     sizes::{MOST, extent, size},
 };
 
-/// A baseline that follows the resting signal.
+/// Parameters of a baseline that follows the resting signal.
 ///
-/// A muscle is never longer than at rest and a joint never straighter than
-/// straight: whenever the signal falls below its frozen resting level (or rises
-/// above it, for a signal that falls with the target), that is drift, and the
-/// baseline gives way. With `s` the signal times the sign of the polarity, `b` the
-/// baseline and `e` the mean of `s - b - level` over about [`RestTracker::AVERAGE_S`],
-/// so that noise is no drift, a sample:
-/// - `e < 0`: `b += e dt/catch_up_s`;
-/// - else `b += leak dt`, so that drift the other way is found at the next rest.
+/// A muscle is never longer than at rest, and a joint cannot be straighter than straight. Therefore a signal below its
+/// calibrated resting level has drifted (or above it, for a signal that falls with the target), and the baseline
+/// follows it. Let `s` be the signal times the sign of the polarity, `b` the baseline, and `e` the running average of
+/// `s - b - level` over about [`RestTracker::AVERAGE_S`], which suppresses noise. For each sample:
+/// - if `e < 0`: `b += e dt/catch_up_s`;
+/// - otherwise `b += leak dt`, so that drift in the other direction is found at the next rest.
 ///
-/// The model sees `s - b`. A model that knows how memory moves a resting signal
-/// moves `level` with it. [`RestLevel`](crate::RestLevel) is this, stepped. Source: this project; it is the one-sided zero
-/// update of strapdown navigation.
+/// The input of the model is `s - b`. If a model predicts how its memory shifts the resting signal, `level` is shifted
+/// by the same amount. [`RestLevel`](crate::RestLevel) implements this per sample. Source: this project. It is a
+/// one-sided form of the zero update of strapdown navigation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RestTracker {
-    /// The resting signal at calibration, in the signal's unit.
+    /// Resting signal at calibration, in the signal's unit.
     pub level: f64,
-    /// How fast a signal beyond the level pulls the baseline, in seconds.
+    /// Time constant with which the baseline follows a signal beyond the level, in seconds.
     pub catch_up_s: f64,
-    /// How fast the baseline rises otherwise, in signal units per second.
+    /// Rate at which the baseline rises otherwise, in signal units per second.
     pub leak: f64,
 }
 
 impl RestTracker {
-    /// Time constant of the excess's running average, in seconds.
+    /// Time constant of the running average `e`, in seconds.
     pub const AVERAGE_S: f64 = 0.05;
-    /// The furthest that a baseline goes, as a share of the signal's range: what is
-    /// beyond is no drift but another gauge.
+    /// Largest magnitude of the baseline, as a share of the signal's range. A larger offset means a different
+    /// gauge, not drift.
     pub const FURTHEST: f64 = 0.2;
-    /// What a sample beyond the level counts for at most, as a share of the signal's
-    /// range: drift is slow, a spike is not drift.
+    /// Largest magnitude with which a single sample enters the average `e`, as a share of the signal's range. It
+    /// limits the effect of spikes, because drift is slow.
     pub const MOST_EXCESS: f64 = 0.1;
 
     /// Checks every number.

@@ -1,11 +1,11 @@
-//! The resting baseline, stepped sample by sample.
+//! Tracking of the resting signal, sample by sample.
 
 use crate::{
     Design, Polarity, Range, Real, RestTracker, SampleRate,
     arithmetic::{lag, lag_share},
 };
 
-/// [`RestTracker`] with its rates folded to one sample.
+/// A [`RestTracker`] whose rates are converted to steps per sample.
 ///
 /// ```
 /// use stretch_core::*;
@@ -21,21 +21,22 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestLevel<T> {
-    /// The resting signal, times the sign of its polarity.
+    /// Resting signal times the sign of the polarity.
     pub level: T,
-    /// Share of the excess that is taken up in a sample; zero: nothing is followed.
+    /// Share of the excess (signal minus baseline minus level) by which the baseline moves in one sample. Zero
+    /// means that no drift is followed.
     pub pull: T,
-    /// What the baseline rises by in a sample without excess.
+    /// Rise of the baseline in one sample while the average excess is not negative.
     pub leak: T,
-    /// Share of a sample in the running average of the excess.
+    /// Weight of one sample in the running average of the excess.
     pub average: T,
-    /// The furthest that the baseline goes.
+    /// Largest magnitude of the baseline.
     pub furthest: T,
-    /// The most that an excess counts for.
+    /// Largest magnitude with which the excess of one sample enters the average.
     pub most: T,
 }
 
-/// Where the baseline is, and how far the signal has been above rest of late.
+/// The state of a `RestLevel`: the baseline and the running average of the excess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Baseline<T> {
     at: T,
@@ -43,7 +44,7 @@ pub struct Baseline<T> {
 }
 
 impl<T: Real> RestLevel<T> {
-    /// The tracker of a calibration with these parts; without one, a signal passes as it is.
+    /// Creates the tracker from these parts of a calibration. If `rest` is `None`, the signal passes unchanged.
     pub fn new(
         rest: Option<RestTracker>,
         polarity: Polarity,
@@ -66,14 +67,14 @@ impl<T: Real> RestLevel<T> {
         }
     }
 
-    /// Whether a baseline is followed at all.
+    /// Returns whether drift is followed at all.
     #[inline(always)]
     pub fn follows(&self) -> bool {
         self.pull != T::zero()
     }
 
-    /// Moves the baseline for a signal times the sign of its polarity, where memory
-    /// moves the resting level by `shift`; the signal above the baseline.
+    /// Updates the baseline with a sample and returns the sample minus the baseline. `signal` is the signal times
+    /// the sign of the polarity. `shift` is the amount by which the model's memory shifts the resting level.
     #[inline(always)]
     pub fn step(&self, baseline: &mut Baseline<T>, signal: T, shift: T) -> T {
         if !self.follows() {
@@ -86,7 +87,7 @@ impl<T: Real> RestLevel<T> {
             if baseline.excess < T::zero() { self.pull * baseline.excess } else { self.leak };
         let before = baseline.at;
         baseline.at = (before + wanted).max(-self.furthest).min(self.furthest);
-        // the average is of what lies above the baseline as it is now
+        // the average refers to the baseline, so it changes when the baseline moves
         baseline.excess = baseline.excess - (baseline.at - before);
         signal - baseline.at
     }

@@ -1,24 +1,24 @@
-//! What sizes the numbers of a record may have, so that no finite sample gives a reading that is none.
+//! Limits on the numbers of a calibration, which ensure that no finite sample gives a non-finite reading.
 //!
-//! A board computes in `f32`, which ends at 3.4e38, and an estimator takes samples up to 1e18 at up
-//! to 1e7 a second: a rate of 2e25. What is multiplied with that must stay below 1e11 to leave a
-//! hundred over; what is not, below 1e30. Numbers with a unit may be up to 1e9 and what is divided
-//! by down to 1e-9: a record in nanometres and microvolts fits.
+//! A microcontroller computes in `f32`, whose largest value is 3.4e38. Samples are at most 1e18 at up to 1e7 Hz, so a
+//! rate is at most 2e25. Factors of a rate must stay below 1e11, which leaves a margin of 100. Other products must stay
+//! below 1e30. Numbers with a unit are at most 1e9 and divisors at least 1e-9. Calibrations in nanometres and
+//! microvolts are within these limits.
 
 use crate::{DesignError, Range};
 
-/// The largest number with a unit, and the largest that has none.
+/// Largest magnitude of a number, with or without a unit.
 pub const MOST: f64 = 1e9;
-/// The least that is divided by.
+/// Smallest divisor.
 pub const LEAST: f64 = 1e-9;
-/// The largest product on the way to an estimate.
+/// Largest intermediate product of an estimate.
 pub(crate) const MOST_PRODUCT: f64 = 1e30;
-/// The largest change of the reference per change of the signal.
+/// Largest change of the reference per change of the signal.
 pub const MOST_SLOPE: f64 = 1e11;
-/// The least and the most samples a second.
+/// Range of sample rates, in hertz.
 pub const RATES_HZ: core::ops::RangeInclusive<f64> = 1e-3..=1e7;
 
-/// A number of a size that can be computed with.
+/// Checks that the magnitude of a number is at most `MOST`.
 ///
 /// # Errors
 /// [`DesignError`] that names the field.
@@ -26,7 +26,7 @@ pub fn size(field: &'static str, x: f64) -> Result<f64, DesignError> {
     DesignError::check(field, x, x.abs() <= MOST)
 }
 
-/// A number above zero that can be divided by.
+/// Checks that a number is positive and can be a divisor: from `LEAST` to `MOST`.
 ///
 /// # Errors
 /// [`DesignError`] that names the field.
@@ -34,13 +34,13 @@ pub fn extent(field: &'static str, x: f64) -> Result<f64, DesignError> {
     DesignError::check(field, x, (LEAST..=MOST).contains(&x))
 }
 
-/// Checks that neighbours on a curve differ in `f32`, because their difference is a divisor.
+/// Checks that two neighbouring knots of a curve differ in `f32`, because their difference is a divisor.
 pub(crate) fn apart(field: &'static str, pair: &[f64]) -> Result<f64, DesignError> {
     let step = pair[1] - pair[0];
     DesignError::check(field, step, step.abs() >= LEAST && pair[1] as f32 != pair[0] as f32)
 }
 
-/// A range with a unit, whose two names are its own and its span's.
+/// Checks the sizes of a range. `fields` are the names of the range and of its span in errors.
 pub(crate) fn range(fields: [&'static str; 2], range: &Range) -> Result<(), DesignError> {
     for x in [range.min(), range.max(), range.offset()] {
         size(fields[0], x)?;

@@ -1,26 +1,26 @@
-//! A design apart from its memory, and the step that joins them.
+//! Stream-processing stages that separate the immutable design from the memory.
 
 /// An immutable description of a computation on a stream of samples.
 ///
-/// The design holds coefficients and never changes while it runs; what does
-/// change lives in its [`Memory`](Design::Memory). One design can therefore
-/// serve many channels, and a reset is a fresh memory.
+/// The design holds coefficients and never changes while it runs. The state that changes is in its
+/// [`Memory`](Design::Memory). One design can therefore serve many channels, and a reset is a fresh
+/// memory.
 pub trait Design {
-    /// What the computation remembers between two samples.
+    /// The state of the computation between two samples.
     type Memory;
-    /// A memory that has seen no sample.
+    /// Returns a memory that has seen no sample.
     fn memory(&self) -> Self::Memory;
 }
 
 /// A [`Design`] that turns one sample of type `In` into one output.
 pub trait Stage<In>: Design {
-    /// What comes out for one sample.
+    /// The output for one sample.
     type Out;
-    /// Takes the next sample. Never panics.
+    /// Processes the next sample. Never panics.
     fn step(&self, memory: &mut Self::Memory, sample: In) -> Self::Out;
 }
 
-/// A design together with its memory, for callers who want one object.
+/// A design together with its memory.
 ///
 /// ```
 /// use stretch_core::{Design, Runner, Stage};
@@ -48,13 +48,13 @@ pub struct Runner<D: Design> {
 }
 
 impl<D: Design> Runner<D> {
-    /// A runner whose memory has seen no sample.
+    /// Creates a runner whose memory has seen no sample.
     pub fn new(design: D) -> Self {
         let memory = design.memory();
         Self { design, memory }
     }
 
-    /// Takes the next sample.
+    /// Processes the next sample.
     #[inline]
     pub fn step<In>(&mut self, sample: In) -> D::Out
     where
@@ -68,12 +68,12 @@ impl<D: Design> Runner<D> {
         self.memory = self.design.memory();
     }
 
-    /// The design that runs.
+    /// Returns the design.
     pub fn design(&self) -> &D {
         &self.design
     }
 
-    /// Runs another design from now on, with a fresh memory.
+    /// Replaces the design, with a fresh memory.
     pub fn replace(&mut self, design: D) {
         *self = Self::new(design);
     }

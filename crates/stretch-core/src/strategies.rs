@@ -22,12 +22,12 @@ use crate::{
     RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Values, Worn,
 };
 
-/// Either way of normalising.
+/// Both normalisation formulas.
 pub fn normalisation() -> impl Strategy<Value = Normalisation> {
     prop_oneof![Just(Normalisation::Range), Just(Normalisation::MinMax)]
 }
 
-/// Ranges of any mode, offset -100..100 and span 1e-3..1e3.
+/// Ranges of any mode, with zero and minimum in -100..100 and a span of 1e-3..1e3.
 pub fn range() -> impl Strategy<Value = Range> {
     (normalisation(), -100.0..100.0, -100.0..100.0, -3.0..3.0).prop_map(
         |(mode, zero, min, log_span)| {
@@ -95,8 +95,7 @@ fn values<const N: usize>(items: &[f64]) -> Values<N> {
     Values::new("generated", items).expect("finite, and few enough")
 }
 
-/// Ways of following a baseline, and none, for a signal in `range` that rises
-/// (`sign` 1) or falls (-1) with the target.
+/// Rest trackers or `None`, for a signal in `range` that rises (`sign` 1) or falls (-1) with the target.
 fn rest(range: Range, sign: f64) -> impl Strategy<Value = Option<RestTracker>> {
     let tracker = (0.0..0.1, 0.02..2.0, 0.0..0.003).prop_map(move |(share, catch_up_s, leak)| {
         let end = if sign > 0.0 { range.min() } else { range.max() };
@@ -132,9 +131,8 @@ pub fn history_map(range: Range, sign: f64) -> impl Strategy<Value = HistoryMap>
     )
 }
 
-/// Observer maps of up to two relaxations and two plays behind a curve whose
-/// slope varies by a factor of ten, for a signal in `range` that rises
-/// (`sign` 1) or falls (-1) with the target.
+/// Observer maps of up to two relaxations and two plays with a curve whose slope varies by a factor of up to ten, for a
+/// signal in `range` that rises (`sign` 1) or falls (-1) with the target.
 pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMap> {
     let amplitudes = collection::vec((0.03..3.0f64, -0.3..0.6f64), 0..=2);
     let plays = collection::vec(-0.2..0.1f64, 0..=2);
@@ -167,7 +165,7 @@ pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMa
     )
 }
 
-/// Maps of named defects, any of them or none, behind a curve as an observer's.
+/// Diagnosed maps with any subset of the defects and a curve from `observer_map`.
 pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = DiagnosedMap> {
     let knee = || option::of((-0.1..0.3f64, 1e-3..0.05f64));
     let plays = |share| option::of((share, 0.001..0.2f64, 0.1..0.9f64));
@@ -225,8 +223,8 @@ pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = Diagnosed
     )
 }
 
-/// Calibrations of every model, estimator, normalisation and polarity, for a
-/// signal of 1..2 V or so.
+/// Calibrations of every supported model, live rate estimator, normalisation and polarity, for a signal of about 1..2
+/// V.
 pub fn calibration() -> impl Strategy<Value = Calibration> {
     prop_oneof![
         2 => paper_calibration(),
@@ -236,7 +234,7 @@ pub fn calibration() -> impl Strategy<Value = Calibration> {
     ]
 }
 
-/// Calibrations of the paper's two models, a line and two surfaces.
+/// Calibrations of the two models of the published method: a line, and two surfaces.
 pub fn paper_calibration() -> impl Strategy<Value = Calibration> {
     frame().prop_flat_map(|frame| {
         let domain = frame.domain();
@@ -258,7 +256,7 @@ pub fn history_calibration() -> impl Strategy<Value = Calibration> {
     })
 }
 
-/// Calibrations of [`Model::Observer`], for a signal of 1..2 V or so.
+/// Calibrations of [`Model::Observer`], for a signal of about 1..2 V.
 pub fn observer_calibration() -> impl Strategy<Value = Calibration> {
     frame().prop_flat_map(|frame| {
         observer_map(frame.signal_range, frame.polarity.sign())
@@ -266,7 +264,7 @@ pub fn observer_calibration() -> impl Strategy<Value = Calibration> {
     })
 }
 
-/// Calibrations of [`Model::Diagnosed`], for a signal of 1..2 V or so.
+/// Calibrations of [`Model::Diagnosed`], for a signal of about 1..2 V.
 pub fn diagnosed_calibration() -> impl Strategy<Value = Calibration> {
     frame().prop_flat_map(|frame| {
         diagnosed_map(frame.signal_range, frame.polarity.sign())
@@ -274,7 +272,7 @@ pub fn diagnosed_calibration() -> impl Strategy<Value = Calibration> {
     })
 }
 
-/// A calibration but for its model.
+/// The parts of a calibration other than its model.
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     signal_range: Range,

@@ -6,9 +6,9 @@ const ROWS: usize = crate::MAX_DEGREE + 1;
 
 /// A polynomial surface of any [`Degree`], `sum p_ij rate^i volts^j`.
 ///
-/// The degree is a run-time value, so that a calibration record can hold any
-/// surface; [`Poly13`] is the paper's, with the degree known to the compiler.
-/// Evaluated by Horner's rule in the voltage inside Horner's rule in the rate.
+/// The degree is a run-time value, so that a calibration file can hold any surface. [`Poly13`] is the surface of the
+/// published method ("the paper"), with a degree known at compile time. The surface is evaluated by Horner's rule in
+/// the voltage inside Horner's rule in the rate.
 ///
 /// ```
 /// use stretch_core::{Degree, Surface};
@@ -22,16 +22,16 @@ const ROWS: usize = crate::MAX_DEGREE + 1;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface<T = f64> {
     degree: Degree,
-    /// `rows[i][j]` multiplies `rate^i volts^j`; zero outside the term set.
+    /// `rows[i][j]` is the coefficient of `rate^i volts^j`; zero outside the term set.
     rows: [[T; ROWS]; ROWS],
 }
 
 impl<T: Real> Surface<T> {
-    /// A surface from its coefficients in the order of [`Degree::exponents`].
+    /// Creates a surface from its coefficients in the order of [`Degree::exponents`].
     ///
     /// # Errors
-    /// [`DesignError::TooLarge`] unless there is one coefficient a term,
-    /// [`DesignError::OutOfRange`] for one that is not finite.
+    /// [`DesignError::TooLarge`] unless there is one coefficient per term, [`DesignError::OutOfRange`] if a
+    /// coefficient is not finite.
     pub fn new(degree: Degree, coefficients: &[T]) -> Result<Self, DesignError> {
         if coefficients.len() != degree.terms() {
             return Err(DesignError::TooLarge {
@@ -48,19 +48,19 @@ impl<T: Real> Surface<T> {
         Ok(Self { degree, rows })
     }
 
-    /// The degree in rate and voltage.
+    /// Returns the degree in rate and voltage.
     pub fn degree(&self) -> Degree {
         self.degree
     }
 
-    /// The coefficient of `rate^i volts^j`; zero for a term the degree lacks.
+    /// Returns the coefficient of `rate^i volts^j`; zero for a term that is not in the term set.
     pub fn coefficient(&self, i: u8, j: u8) -> T {
         let row = self.rows.get(usize::from(i));
         row.and_then(|row| row.get(usize::from(j))).copied().unwrap_or(T::zero())
     }
 
-    /// The coefficients in the order of [`Degree::exponents`], in the first
-    /// [`Degree::terms`] places; zero behind them.
+    /// Returns the coefficients in the order of [`Degree::exponents`], followed by zeros after the first
+    /// [`Degree::terms`] places.
     pub fn coefficients(&self) -> [T; MAX_TERMS] {
         let mut all = [T::zero(); MAX_TERMS];
         for (place, (i, j)) in all.iter_mut().zip(self.degree.exponents()) {
@@ -69,13 +69,13 @@ impl<T: Real> Surface<T> {
         all
     }
 
-    /// The surface at a rate and a voltage, both normalised.
+    /// Evaluates the surface at a rate and a voltage, both normalised.
     #[inline]
     pub fn eval(&self, rate: T, volts: T) -> T {
         self.horner(rate, |i| self.row(i, volts))
     }
 
-    /// The partial derivative by the rate.
+    /// Returns the partial derivative with respect to the rate.
     pub fn d_rate(&self, rate: T, volts: T) -> T {
         let mut sum = T::zero();
         for i in (1..=self.degree.rate()).rev() {
@@ -84,7 +84,7 @@ impl<T: Real> Surface<T> {
         sum
     }
 
-    /// The partial derivative by the voltage.
+    /// Returns the partial derivative with respect to the voltage.
     pub fn d_volts(&self, rate: T, volts: T) -> T {
         self.horner(rate, |i| {
             let mut sum = T::zero();
@@ -118,7 +118,7 @@ impl<T: Real> Surface<T> {
 
 /// The paper's surface, degree 1 in rate `r` and 3 in voltage `v`:
 /// `p00 + p10 r + p01 v + p11 r v + p02 v^2 + p12 r v^2 + p03 v^3`
-/// (paper section 3.2; names as in MATLAB). Any finite numbers make one.
+/// (paper section 3.2; names as in MATLAB).
 ///
 /// ```
 /// use stretch_core::Poly13;
@@ -141,20 +141,20 @@ pub struct Poly13<T = f64> {
 }
 
 impl<T: Real> Poly13<T> {
-    /// The surface at a rate and a voltage: six multiplications, six additions.
+    /// Evaluates the surface at a rate and a voltage with six multiplications and six additions.
     #[inline]
     pub fn eval(&self, rate: T, volts: T) -> T {
         let at_rest = ((self.p03 * volts + self.p02) * volts + self.p01) * volts + self.p00;
         at_rest + rate * self.d_rate(volts)
     }
 
-    /// The partial derivative by the rate; it does not depend on the rate.
+    /// Returns the partial derivative with respect to the rate, which does not depend on the rate.
     #[inline]
     pub fn d_rate(&self, volts: T) -> T {
         (self.p12 * volts + self.p11) * volts + self.p10
     }
 
-    /// The partial derivative by the voltage.
+    /// Returns the partial derivative with respect to the voltage.
     pub fn d_volts(&self, rate: T, volts: T) -> T {
         let (two, three) = (T::from_f64(2.0), T::from_f64(3.0));
         (three * self.p03 * volts + two * (self.p02 + self.p12 * rate)) * volts
@@ -173,7 +173,7 @@ impl<T: Real> From<Poly13<T>> for Surface<T> {
 }
 
 impl<T: Real> Surface<T> {
-    /// This surface as a [`Poly13`], if it has no term beyond.
+    /// Converts the surface to a [`Poly13`], if the term set of its degree is within that of poly13.
     pub fn as_poly13(&self) -> Option<Poly13<T>> {
         let fits = self.degree.exponents().all(|(i, j)| i <= 1 && i + j <= 3);
         fits.then(|| Poly13 {
@@ -190,7 +190,7 @@ impl<T: Real> Surface<T> {
 
 #[cfg(feature = "serde")]
 mod record {
-    //! A surface is written as its degree and one coefficient a term.
+    //! Serialised form of a surface: its degree and one coefficient per term.
     use super::{Degree, MAX_TERMS, Real, Surface};
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 

@@ -1,7 +1,6 @@
-//! Newtypes of units for the public functions, so that arguments cannot be swapped.
+//! Newtypes for quantities with units, so that arguments of public functions cannot be swapped.
 //!
-//! They carry a number across a public boundary and no arithmetic; inside,
-//! the bare number (field `0`) is used.
+//! They have no arithmetic. Internal code uses the bare number (field `0`).
 
 use crate::{DesignError, Real};
 
@@ -36,7 +35,7 @@ unit! {
     Strain, "(strain)";
 }
 
-/// How many samples a second a stream has: finite and above zero.
+/// Sample rate of a stream, in samples per second: finite and above zero.
 ///
 /// It is a separate type, so that a cutoff frequency cannot be passed instead.
 ///
@@ -53,7 +52,7 @@ unit! {
 pub struct SampleRate(f64);
 
 impl SampleRate {
-    /// A rate of `hz` samples a second.
+    /// Creates a rate of `hz` samples per second.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] unless `hz` is finite and above zero.
@@ -61,12 +60,12 @@ impl SampleRate {
         DesignError::check("sample_rate_hz", hz, hz > 0.0).map(Self)
     }
 
-    /// Samples a second.
+    /// Returns the samples per second.
     pub fn hz(self) -> f64 {
         self.0
     }
 
-    /// Seconds from one sample to the next.
+    /// Returns the sample period in seconds.
     pub fn period_s(self) -> f64 {
         1.0 / self.0
     }
@@ -86,7 +85,7 @@ impl From<SampleRate> for f64 {
 }
 
 impl<T: Real> Millimetres<T> {
-    /// The same length in metres, the SI unit.
+    /// Returns the length in metres.
     pub fn metres(self) -> T {
         self.0 / T::from_f64(1000.0)
     }

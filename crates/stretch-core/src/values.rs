@@ -1,12 +1,12 @@
-//! A list of numbers held in place, without an allocator.
+//! A list of numbers stored inline, without an allocator.
 
 use core::fmt;
 
 use crate::DesignError;
 
-/// At most `N` finite numbers: knots, time constants, coefficients.
+/// A list of at most `N` finite numbers, such as knots, time constants or coefficients.
 ///
-/// It is `Copy`, needs no allocator, and is written as a plain list.
+/// It is `Copy`, needs no allocator, and is serialised as a plain list.
 ///
 /// ```
 /// use stretch_core::Values;
@@ -23,14 +23,14 @@ pub struct Values<const N: usize> {
 }
 
 impl<const N: usize> Values<N> {
-    /// A list with nothing in it.
+    /// The empty list.
     pub const EMPTY: Self = Self { used: 0, items: [0.0; N] };
 
-    /// The numbers of a slice; an error names `field`.
+    /// Copies the numbers of a slice. Errors name `field`.
     ///
     /// # Errors
-    /// [`DesignError::TooLarge`] for more than `N`, [`DesignError::OutOfRange`]
-    /// for one that is not finite.
+    /// [`DesignError::TooLarge`] for more than `N` numbers, [`DesignError::OutOfRange`] for a
+    /// number that is not finite.
     pub fn new(field: &'static str, values: &[f64]) -> Result<Self, DesignError> {
         let mut items = [0.0; N];
         let room = items.get_mut(..values.len());

@@ -1,9 +1,10 @@
-//! Which characters can be seen.
+//! Detection of invisible characters.
 
-/// Whether a character is not shown as itself: it controls a terminal or ends a line, turns the text around it, or hides.
+/// Returns whether a character is not shown as itself: it controls the terminal, ends a line, changes the text
+/// direction, or is invisible.
 ///
-/// Names of columns and units come from files of unknown origin. Code that writes them into a program, a page or a terminal leaves such
-/// characters out or writes an escape, so that readers see what is there.
+/// Names of columns and units come from files of unknown origin. Code that writes them into a program, a page or a
+/// terminal omits or escapes such characters, so that readers see the real contents.
 ///
 /// ```
 /// use stretch_core::is_hidden;

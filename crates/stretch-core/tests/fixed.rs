@@ -1,4 +1,4 @@
-//! Fixed point against real numbers, at every corner and in between.
+//! Tests of fixed point against real numbers, at extreme and random inputs.
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ use stretch_core::{
 };
 use testkit::tolerance as tol;
 
-/// The inputs at which 32-bit arithmetic goes wrong, if it does.
+/// Extreme inputs, at which errors of 32-bit arithmetic are most likely.
 const CORNERS: [i32; 11] = [
     i32::MIN,
     i32::MIN + 1,
@@ -28,7 +28,7 @@ fn half(n: i32) -> f64 {
     f64::from(n) / 2f64.powi(32)
 }
 
-/// The largest factor on `shape` that still makes a fixed surface, to a part in 2^40.
+/// Returns the surface with the largest multiple of `shape` that fits fixed point, to one part in 2^40.
 fn largest(shape: [f64; 7]) -> FixedPoly13 {
     let scaled = |k: f64| {
         let [p00, p10, p01, p11, p02, p12, p03] = shape.map(|c| c * k);
@@ -43,7 +43,7 @@ fn largest(shape: [f64; 7]) -> FixedPoly13 {
 }
 
 fn close(surface: &FixedPoly13, rate: i32, volts: i32) -> Result<(), String> {
-    // the coefficients are already rounded: the products' share of the error is left
+    // compared with the rounded coefficients, so only the rounding of the products remains
     let exact = surface.coefficients().eval(half(rate), half(volts));
     let found = f64::from(surface.eval(rate, volts));
     if abs_diff_eq!(found, exact, epsilon = FixedPoly13::ROUNDING) {
@@ -55,7 +55,7 @@ fn close(surface: &FixedPoly13, rate: i32, volts: i32) -> Result<(), String> {
 
 #[test]
 fn the_largest_surface_of_every_sign_holds_at_every_corner() {
-    // 3^7 sign patterns, each blown up until it just fits
+    // 3^7 sign patterns, each scaled up until it just fits
     for pattern in 0..3u32.pow(7) {
         let mut rest = pattern;
         let shape = [(); 7].map(|()| {
@@ -132,7 +132,7 @@ proptest! {
             let channel = zero + step * (f64::from(moved) + whole);
             let exact = saturate((range.normalise(channel) * 2f64.powi(27)).round() as i64);
             let found = f64::from(fixed.normalise(x));
-            // 31 bits of gain over a full-scale input, and the last rounding
+            // rounding of the 30-bit gain over a full-scale input, and the last rounding
             let bound = 2.0 + f64::from(exact).abs() * 2f64.powi(-29);
             let near = abs_diff_eq!(found, f64::from(exact), epsilon = bound);
             prop_assert!(near, "{x}: {found} for {exact}");
@@ -149,10 +149,10 @@ proptest! {
 
     #[test]
     fn a_range_brings_codes_back(range in strategies::range(), code in 0..65_536i32) {
-        // a 16-bit converter that spans the range and as much on either side
+        // a 16-bit converter whose input span is three times the range, with the range in the middle
         let step = 3.0 * range.span() / 65_535.0;
         let units = RangeUnits { zero: range.min() - range.span(), step };
-        // refused when the offset lies too far outside the range for 32 bits
+        // refused if the offset is too far outside the range for 32 bits
         let Ok(fixed) = FixedRange::new(&range, units) else { return Ok(()) };
         let n = fixed.normalise(code);
         if n < i32::MAX && n > i32::MIN {

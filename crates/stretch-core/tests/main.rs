@@ -1,4 +1,5 @@
-//! The tests of stretch-core from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-core, in one program because linking takes longer than most of
+//! the tests.
 
 mod fixed;
 mod properties;

@@ -1,4 +1,4 @@
-//! Identities that hold for every range, surface and calibration.
+//! Property tests of identities that hold for every range, surface and calibration.
 
 use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use stretch_core::{
 };
 use testkit::tolerance as tol;
 
-/// The sum of terms, one power at a time: what Horner's rule must equal.
+/// Evaluates a surface term by term, for comparison with Horner's rule.
 fn naive(surface: &Surface, rate: f64, volts: f64) -> f64 {
     let terms = surface.degree().exponents();
     terms.map(|(i, j)| surface.coefficient(i, j) * rate.powi(i.into()) * volts.powi(j.into())).sum()
@@ -135,7 +135,7 @@ proptest! {
         prop_assert!(postcard::from_bytes::<Calibration>(&bytes[..cut % length]).is_err());
         bytes[at % length] = byte;
         if let Ok(calibration) = postcard::from_bytes::<Calibration>(bytes) {
-            // whatever still loads is a calibration that passes its own checks
+            // damaged bytes that still load must give a calibration that passes its own checks
             prop_assert!(Calibration::new(CalibrationSpec::from(calibration)).is_ok());
         }
     }

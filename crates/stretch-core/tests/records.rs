@@ -1,10 +1,10 @@
-//! Records that must be refused, and what the refusal says.
+//! Tests of calibration files that must be refused, and of the error messages.
 
 use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
 use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface, strategies};
 
-/// A calibration with surfaces, as JSON to spoil.
+/// Returns a valid calibration with surfaces as JSON, which tests then change.
 fn record() -> Value {
     let mut runner = TestRunner::deterministic();
     loop {
@@ -73,7 +73,7 @@ fn a_newer_schema_says_so_before_anything_else() {
     refused("/schema", json!(0), "schema is 0");
 }
 
-/// Records in bytes number the models: those that are left keep their numbers.
+/// Binary files store the index of the model, so the remaining models must keep their indices.
 #[test]
 fn a_removed_model_is_refused_by_name_in_text_and_in_bytes() {
     let mut record = record();
@@ -113,7 +113,7 @@ fn an_unknown_or_missing_field_is_named() {
     assert!(error.contains("signal_range"), "{error}");
 }
 
-/// A record that an earlier release wrote.
+/// Reads a binary file that an earlier release wrote.
 #[test]
 fn an_earlier_record_loads_and_is_written_as_it_was() {
     let bytes = include_bytes!("../../../firmware/data/poly13.postcard");

@@ -1,7 +1,8 @@
-//! Which estimator of the rate? A stretch sensor is pulled and let go at a
-//! constant speed, with 1 % of noise, as in the paper: every estimator has to
-//! say how fast and, above all, in which direction. The direction chooses the
-//! calibration surface, so that a wrong sign is a wrong length.
+//! Comparison of rate estimators on a noisy triangle wave.
+//!
+//! A stretch sensor is pulled and released at constant speed, with 1 % noise. Each estimator
+//! estimates the speed and its sign. The sign matters most, because it selects the calibration
+//! surface: a wrong sign gives a wrong length.
 //!
 //! ```text
 //! cargo run --release -p stretch-filter --example rate_on_a_noisy_ramp
@@ -13,29 +14,29 @@ use stretch_core::{RateEstimator, Runner, SampleRate};
 use stretch_filter::{RateFilter, SgFilter, SgShape, log::central_difference};
 
 const HZ: f64 = 100.0;
-/// Full scale a second: up in two seconds, down in two.
+/// Speed in full scale per second: two seconds up, two seconds down.
 const SPEED: f64 = 0.5;
 const LEG: usize = 200;
 const LEGS: usize = 100;
-/// Standard deviation of the noise, of full scale.
+/// Standard deviation of the noise, as a share of full scale.
 const NOISE: f64 = 0.01;
 
-/// What an estimator achieved.
+/// Results of one estimator.
 struct Score {
     name: String,
     delay_s: f64,
     noise_gain: f64,
-    /// On the straight legs, 0.5 s and more after a reversal.
+    /// RMS error of the rate at least 0.5 s after a reversal.
     rmse_straight: f64,
-    /// All samples.
+    /// RMS error of the rate over all samples.
     rmse: f64,
     /// Share of all samples with the wrong sign.
     wrong: f64,
-    /// The same on the straight legs.
+    /// Share of samples with the wrong sign at least 0.5 s after a reversal.
     wrong_straight: f64,
 }
 
-/// Triangle from 0 to 1 and its rate.
+/// Returns the triangle wave from 0 to 1 and its rate.
 fn truth(n: usize) -> (f64, f64) {
     let (leg, within) = (n / LEG, (n % LEG) as f64 / HZ);
     if leg.is_multiple_of(2) { (SPEED * within, SPEED) } else { (1.0 - SPEED * within, -SPEED) }
@@ -43,7 +44,7 @@ fn truth(n: usize) -> (f64, f64) {
 
 fn score(name: String, delay_s: f64, noise_gain: f64, rates: &[Option<f64>]) -> Score {
     let (mut all, mut straight) = (Tally::default(), Tally::default());
-    // The first leg warms every estimator up.
+    // The first leg is skipped, because the estimators warm up during it.
     for (n, rate) in rates.iter().enumerate().skip(LEG) {
         let Some(rate) = *rate else { continue };
         all.add(rate, truth(n).1);
@@ -96,7 +97,7 @@ fn live(name: &str, estimator: RateEstimator, log: &[f64]) -> Score {
 fn main() {
     let sample_rate = SampleRate::new(HZ).expect("above zero");
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    // Twelve uniform numbers: near enough to a normal one, and the same on every machine.
+    // The sum of twelve uniform numbers is nearly normal, and the same on every machine.
     let mut noise = || NOISE * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
     let log: Vec<f64> = (0..LEG * LEGS).map(|n| truth(n).0 + noise()).collect();
 
@@ -147,7 +148,7 @@ fn main() {
         );
     }
 
-    // The noise gain tells beforehand what the noise does on a straight leg ...
+    // The noise gain predicts the error on a straight leg ...
     for s in &scores {
         let predicted = NOISE * s.noise_gain;
         let ratio = s.rmse_straight / predicted;
@@ -156,11 +157,11 @@ fn main() {
     let find = |name: &str| scores.iter().find(|s| s.name.starts_with(name)).expect("a row");
     let (central, newest, line) = (find("central"), find("SG 11,2"), find("SG 11,1"));
     let (long, slow) = (find("SG 31,1"), find("differentiator 2"));
-    // ... a central difference does not know the direction, ...
+    // ... a central difference often has the wrong sign, ...
     assert!(central.wrong_straight > 0.15);
-    // ... the newest end of a parabola pays for having no delay, ...
+    // ... a parabola at its newest sample has no delay, but more noise, ...
     assert!(newest.noise_gain > 3.0 * line.noise_gain && newest.wrong_straight > 0.05);
-    // ... a straight line through the same samples nearly always knows it, ...
+    // ... a straight line through the same samples nearly always has the right sign, ...
     assert!(line.wrong_straight < 0.001 && line.wrong < 0.05);
     // ... and more smoothing only moves the errors to the reversals.
     assert!(long.rmse_straight < line.rmse_straight && long.wrong > line.wrong);

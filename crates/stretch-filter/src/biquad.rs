@@ -1,4 +1,4 @@
-//! One second-order section.
+//! A second-order filter section (biquad).
 
 use crate::{Cost, sample};
 use stretch_core::{Design, DesignError, Real, Stage};
@@ -27,9 +27,9 @@ pub struct BiquadSpec {
 /// y = b0 x + s1;   s1 = s2 + b1 x - a1 y;   s2 = b2 x - a2 y
 /// ```
 ///
-/// The coefficients never change; what does change is the [`BiquadMemory`]. A
-/// sample that is NaN or beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE)
-/// leaves the memory as it was and gives NaN for that one step.
+/// The coefficients never change. The state is in the [`BiquadMemory`]. A sample that is NaN or
+/// beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE) leaves the memory unchanged and gives NaN for
+/// that one step.
 ///
 /// ```
 /// use stretch_core::{Runner, Stage};
@@ -53,7 +53,7 @@ pub struct Biquad<T> {
     a2: T,
 }
 
-/// What a [`Biquad`] remembers: two numbers.
+/// State of a [`Biquad`]: two numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BiquadMemory<T> {
     s1: T,
@@ -64,7 +64,7 @@ impl<T: Real> Biquad<T> {
     /// Arithmetic and memory of one step.
     pub const COST: Cost = Cost::new(5, 4, 2);
 
-    /// The section with these coefficients.
+    /// Creates a section with these coefficients.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] naming the coefficient: not finite, above
@@ -82,30 +82,30 @@ impl<T: Real> Biquad<T> {
         Ok(Self { b0, b1, b2, a1, a2 })
     }
 
-    /// The coefficients as they run, that is, rounded to `T`.
+    /// Returns the coefficients in use, rounded to `T`.
     pub fn spec(&self) -> BiquadSpec {
         let [b0, b1, b2, a1, a2] =
             [self.b0, self.b1, self.b2, self.a1, self.a2].map(|c| c.as_f64());
         BiquadSpec { b0, b1, b2, a1, a2 }
     }
 
-    /// Gain for a constant input: H(1).
+    /// Returns the gain for a constant input: H(1).
     pub fn dc_gain(&self) -> f64 {
         let c = self.spec();
         (c.b0 + c.b1 + c.b2) / (1.0 + c.a1 + c.a2)
     }
 
-    /// Group delay at frequency zero, in samples: by how much a slow signal is late.
+    /// Returns the group delay at frequency zero, in samples: the delay of a slow signal.
     ///
-    /// Infinite or NaN for a section that does not pass a constant.
+    /// Infinite or NaN for a section whose gain at frequency zero is 0.
     pub fn delay_samples(&self) -> f64 {
         let c = self.spec();
         (c.b1 + 2.0 * c.b2) / (c.b0 + c.b1 + c.b2) - (c.a1 + 2.0 * c.a2) / (1.0 + c.a1 + c.a2)
     }
 
-    /// Standard deviation out for white noise of standard deviation one in.
+    /// Returns the standard deviation of the output for white input noise of standard deviation 1.
     ///
-    /// The root of the energy of the impulse response, in closed form (Astrom,
+    /// It is the square root of the energy of the impulse response, in closed form (Astrom,
     /// Introduction to Stochastic Control Theory, 1970, chapter 5).
     pub fn noise_gain(&self) -> f64 {
         let BiquadSpec { b0, b1, b2, a1, a2 } = self.spec();
@@ -115,9 +115,11 @@ impl<T: Real> Biquad<T> {
         libm::sqrt(numerator / ((1.0 - a2) * (e - a1) * (e + a1)))
     }
 
-    /// A memory that has seen `x` forever: a constant input gives no transient.
+    /// Returns the steady state for the constant input `x`, from which this input gives no
+    /// transient.
     ///
-    /// A value that is not usable as a sample gives the empty memory.
+    /// If `x` is NaN or beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE), the result is the empty
+    /// memory.
     pub fn settled_at(&self, x: T) -> BiquadMemory<T> {
         if !sample::usable(x) {
             return self.memory();
@@ -126,11 +128,11 @@ impl<T: Real> Biquad<T> {
         BiquadMemory { s1: y - self.b0 * x, s2: self.b2 * x - self.a2 * y }
     }
 
-    /// One step for a sample that is known to be usable.
+    /// Processes one sample, which the caller has checked.
     #[inline(always)]
     pub(crate) fn pass(&self, memory: &mut BiquadMemory<T>, x: T) -> T {
         let y = self.b0 * x + memory.s1;
-        // What does not wait for y is added first: the chain from y to y stays short.
+        // The terms without y are added first, which keeps the dependency chain from y to y short.
         memory.s1 = (memory.s2 + self.b1 * x) - self.a1 * y;
         memory.s2 = self.b2 * x - self.a2 * y;
         y

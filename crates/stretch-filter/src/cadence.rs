@@ -1,13 +1,12 @@
-//! Whether the samples of a live stream come when they should.
+//! Checks of the time stamps of a live stream.
 
 use crate::sample;
 use stretch_core::{Design, DesignError, SampleRate, Seconds, Stage};
 
-/// Judges the time stamps of a live stream against its sample rate.
+/// Classifies the time stamps of a live stream by its sample rate.
 ///
-/// Every estimator of this crate assumes one sample a period. Step the cadence
-/// with each time stamp and start the estimator afresh after an
-/// [`Arrival::Gap`] or an [`Arrival::Backwards`].
+/// Every estimator of this crate assumes one sample per period. Step the cadence with each time
+/// stamp and reset the estimator after an [`Arrival::Gap`] or an [`Arrival::Backwards`].
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate, Seconds};
@@ -27,48 +26,48 @@ pub struct Cadence {
     tolerance: f64,
 }
 
-/// What a [`Cadence`] remembers: the last finite time stamp.
+/// State of a [`Cadence`]: the last finite time stamp.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CadenceMemory {
     last_s: Option<f64>,
 }
 
-/// How one time stamp follows the one before it.
+/// Relation of a time stamp to the one before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Arrival {
-    /// The first stamp: there is nothing to compare it with.
+    /// The first time stamp.
     First,
-    /// One period later, within the tolerance.
+    /// The stamp is one period later, within the tolerance.
     OnTime,
-    /// One sample, early or late by more than the tolerance, none missing.
+    /// The stamp is early or late by more than the tolerance, but no sample is missing.
     Jitter {
-        /// How late, in seconds; negative when early.
+        /// Lateness in seconds; negative if early.
         late_s: f64,
     },
     /// Samples are missing: the interval is nearest to `missing + 1` periods.
     Gap {
-        /// How many are missing, saturating.
+        /// Number of missing samples, saturating.
         missing: u32,
     },
     /// The stamp repeats the one before it or is earlier.
     Backwards {
-        /// How far back, in seconds; zero for a repeated stamp.
+        /// Step back in seconds; zero for a repeated stamp.
         by_s: f64,
     },
-    /// The stamp is NaN or infinite; it was not remembered.
+    /// The stamp is NaN or infinite. It is ignored.
     NotFinite,
 }
 
 impl Arrival {
-    /// Whether an estimator may go on: one period has passed, on time or not.
+    /// Returns whether an estimator may continue, because no sample is missing.
     pub fn is_continuous(self) -> bool {
         matches!(self, Self::First | Self::OnTime | Self::Jitter { .. })
     }
 }
 
 impl Cadence {
-    /// A cadence that calls an interval on time when it is off by no more than
+    /// Creates a cadence. An interval is on time if it deviates from one period by at most
     /// `tolerance` periods, from 0 to 0.5.
     ///
     /// # Errors
@@ -79,7 +78,7 @@ impl Cadence {
         Ok(Self { sample_rate, tolerance })
     }
 
-    /// The sample rate that is expected.
+    /// Returns the expected sample rate.
     pub fn sample_rate(&self) -> SampleRate {
         self.sample_rate
     }

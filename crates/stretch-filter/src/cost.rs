@@ -1,16 +1,15 @@
-//! What a live step costs.
+//! Cost of a live step.
 
-/// Arithmetic of one live step and the numbers kept between two steps.
+/// Number of operations in one live step, and of values kept between two steps.
 ///
-/// On a core without a floating-point unit multiply each by the price of a
-/// soft-float operation (about 50 instructions a product and 80 a sum on a
-/// Cortex-M3) to see the budget that a design needs.
+/// On a core without a floating-point unit, multiply these by the cost of a soft-float operation to
+/// get the cost of a step. On a Cortex-M3 a product takes about 50 instructions, a sum about 80.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Cost {
-    /// Products a sample.
+    /// Products per sample.
     pub multiplications: usize,
-    /// Sums and differences a sample.
+    /// Sums and differences per sample.
     pub additions: usize,
     /// Floating-point numbers in the memory.
     pub state: usize,

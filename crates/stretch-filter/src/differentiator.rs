@@ -5,21 +5,21 @@ use crate::{Biquad, BiquadMemory, Cost, LowPassSpec, sample};
 use core::f64::consts::SQRT_2;
 use stretch_core::{Design, DesignError, Real, Stage};
 
-/// Rate of a signal by a difference in series with a second-order Butterworth
+/// Estimator of a signal's rate: a first difference in series with a second-order Butterworth
 /// low-pass filter.
 ///
 /// ```text
 /// rate[n] = fs (H(z) (x[n] - x[n-1])),   H: Butterworth, order 2, at the cutoff
 /// ```
 ///
-/// The difference comes first: it is exact or nearly so for a slow signal, and
-/// a constant offset leaves no rounding behind. Output in the sample's unit
-/// per second; exact on a ramp once settled, late by [`delay_s`](Self::delay_s)
-/// on a bend.
+/// The difference comes first because it is exact or nearly exact for a slow signal, and because it
+/// removes a constant offset before any rounding. The output is in the sample's unit per second. On
+/// a ramp it is exact after settling. If the signal curves, it is late by
+/// [`delay_s`](Self::delay_s).
 ///
-/// `None` until the filter has settled to 1 %: [`warm_up`](Self::warm_up)
-/// samples. A sample that is not usable gives `None` and leaves the memory as
-/// it was; the stream then lacks a sample, so treat it as a gap.
+/// The output is `None` for the first [`warm_up`](Self::warm_up) samples, until the filter has
+/// settled to 1 %. A sample that is NaN or beyond `LARGEST_SAMPLE` gives `None` and leaves the
+/// memory unchanged. The stream then lacks a sample, so treat it as a gap.
 ///
 /// ```
 /// use stretch_core::{Hertz, Runner, SampleRate};
@@ -37,7 +37,7 @@ pub struct Differentiator<T> {
     warm_up: u32,
 }
 
-/// What a [`Differentiator`] remembers.
+/// State of a [`Differentiator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DifferentiatorMemory<T> {
     low_pass: BiquadMemory<T>,
@@ -47,7 +47,7 @@ pub struct DifferentiatorMemory<T> {
 }
 
 impl<T> DifferentiatorMemory<T> {
-    /// How many further samples give `None` before the filter has settled.
+    /// Returns the number of further samples that give `None` before the filter has settled.
     pub fn remaining(&self) -> usize {
         self.remaining as usize
     }
@@ -57,7 +57,7 @@ impl<T: Real> Differentiator<T> {
     /// Arithmetic and memory of one step.
     pub const COST: Cost = Cost::new(5, 5, 3);
 
-    /// The differentiator whose low-pass filter `spec` describes.
+    /// Creates the differentiator with the low-pass filter of `spec`.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] naming `cutoff_hz` or `sample_rate_hz`.
@@ -71,23 +71,23 @@ impl<T: Real> Differentiator<T> {
         Ok(Self { low_pass: Biquad::new(c)?, spec, warm_up })
     }
 
-    /// What the low-pass filter was asked to do.
+    /// Returns the specification of the low-pass filter.
     pub fn spec(&self) -> LowPassSpec {
         self.spec
     }
 
-    /// How many samples give `None` at the start.
+    /// Returns the number of samples that give `None` at the start.
     pub fn warm_up(&self) -> usize {
         self.warm_up as usize
     }
 
-    /// By how many seconds the rate is late while the signal changes slowly:
-    /// the low-pass filter's group delay and half a sample for the difference.
+    /// Returns the delay of the rate for slow signals, in seconds: the low-pass filter's group
+    /// delay plus half a sample for the difference.
     pub fn delay_s(&self) -> f64 {
         (self.low_pass.delay_samples() + 0.5) * self.spec.sample_rate.period_s()
     }
 
-    /// Standard deviation of the rate for white noise of standard deviation one, in 1/s.
+    /// Returns the standard deviation of the rate for white noise of standard deviation 1, in 1/s.
     pub fn noise_gain(&self) -> f64 {
         // |1 - z^-1|^2 = 4 sin^2(pi f/fs)
         let power = noise_power(self.spec.warped(), 2, |u| 4.0 * u * u / (1.0 + u * u));

@@ -1,17 +1,17 @@
-//! What can be wrong with a filter or with the log that it is given.
+//! Errors of filter designs and of functions on logs.
 
 use core::fmt;
 use stretch_core::DesignError;
 
-/// Why a filter was refused, or a log could not be worked on.
+/// The reason why a filter design was refused, or a log could not be processed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum FilterError {
     /// A number of the design is out of range.
     Design(DesignError),
-    /// The estimator needs samples that a live stream does not have yet.
+    /// The estimator needs future samples, so it cannot run live.
     LooksAhead {
-        /// How many samples it looks ahead.
+        /// Number of future samples needed.
         samples: usize,
     },
     /// Two slices that belong together have different lengths.
@@ -42,7 +42,7 @@ pub enum FilterError {
         /// The stamp itself, in seconds.
         time_s: f64,
     },
-    /// A grid point before the first or after the last sample: nothing is extrapolated.
+    /// A grid point is before the first or after the last sample. Functions never extrapolate.
     OutsideLog {
         /// The grid point, in seconds.
         time_s: f64,

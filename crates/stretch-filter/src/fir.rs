@@ -1,12 +1,13 @@
-//! The transposed finite impulse response filter that every Savitzky-Golay shape runs on.
+//! The transposed finite impulse response filter on which all Savitzky-Golay filters run.
 
 use stretch_core::Real;
 
-/// One step: the output for `x`, `taps` newest first.
+/// Processes the sample `x` and returns the output. `taps` are ordered from the newest sample to
+/// the oldest.
 ///
-/// `state[j]` holds what the samples so far add to the output j + 1 steps
-/// from now; its last element stays zero. Every partial sum leaves after
-/// `taps.len()` steps, so that no rounding accumulates.
+/// `state[j]` holds the contribution of the samples so far to the output j + 1 steps from now. Its
+/// last element stays zero. Every partial sum leaves the state after `taps.len()` steps, so that no
+/// rounding accumulates.
 #[inline(always)]
 pub(crate) fn step<T: Real>(taps: &[T], state: &mut [T], x: T) -> T {
     let n = taps.len().min(state.len());
@@ -18,7 +19,7 @@ pub(crate) fn step<T: Real>(taps: &[T], state: &mut [T], x: T) -> T {
     sum + first * x
 }
 
-/// The state after `x` was seen forever.
+/// Sets the state to the steady state for the constant input `x`.
 pub(crate) fn settle<T: Real>(taps: &[T], state: &mut [T], x: T) {
     let mut sum = T::zero();
     for (slot, &tap) in state.iter_mut().zip(taps).rev() {
@@ -27,15 +28,15 @@ pub(crate) fn settle<T: Real>(taps: &[T], state: &mut [T], x: T) {
     }
 }
 
-/// Standard deviation out for white noise of standard deviation one in.
+/// Returns the standard deviation of the output for white input noise of standard deviation 1.
 pub(crate) fn noise_gain<T: Real>(taps: &[T]) -> f64 {
     libm::sqrt(taps.iter().map(|h| h.as_f64() * h.as_f64()).sum())
 }
 
-/// By how many samples the `order`-th derivative is late, for a signal that
-/// changes slowly: minus the output for x(t) = t^(order+1)/(order+1)! at t = 0.
+/// Returns the delay of the `order`-th derivative for slow signals, in samples: minus the output
+/// for x(t) = t^(order+1)/(order+1)! at t = 0.
 ///
-/// `unit` undoes the scale of the taps.
+/// `unit` is the factor that removes the scale of the taps.
 pub(crate) fn delay_samples<T: Real>(taps: &[T], order: usize, unit: f64) -> f64 {
     let mut sum = 0.0;
     for (lag, tap) in taps.iter().enumerate() {

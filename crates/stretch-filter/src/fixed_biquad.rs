@@ -1,4 +1,4 @@
-//! One second-order section in fixed point.
+//! A second-order filter section (biquad) in fixed point.
 
 use crate::{BiquadSpec, sample};
 use stretch_core::{
@@ -13,14 +13,14 @@ use stretch_core::{
 /// y = saturate(sum >> bits);  rest = what the shift left behind
 /// ```
 ///
-/// Five 32 x 32 -> 64 multiply-accumulates. The rest of every shift enters the
-/// next sum (first-order error feedback), so that a constant comes out with
-/// [`dc_gain`](Self::dc_gain) on average, to less than one bit. A design is
-/// refused when its coefficients could take the sum out of 64 bits: no `i32`
-/// stream overflows, and a result outside 32 bits becomes the nearest end.
+/// A step takes five 32 x 32 -> 64 multiply-accumulates. The remainder of every shift is added to
+/// the next sum (first-order error feedback). The average output for a constant input therefore has
+/// the gain [`dc_gain`](Self::dc_gain), to less than one bit. A design is refused if its
+/// coefficients could make the sum exceed 64 bits, so no `i32` stream overflows. A result outside
+/// 32 bits becomes the nearest `i32`.
 ///
-/// The unit of the samples is free: scale them so that the largest leaves head
-/// room for the overshoot of the section.
+/// Samples may have any unit. Scale them so that the largest leaves headroom for the overshoot of
+/// the section.
 ///
 /// ```
 /// use stretch_core::{Hertz, Runner, SampleRate};
@@ -43,7 +43,8 @@ pub struct FixedBiquad {
     bits: u32,
 }
 
-/// What a [`FixedBiquad`] remembers: two samples in, two out, and the rest.
+/// State of a [`FixedBiquad`]: the last two inputs and outputs, and the remainder of the last
+/// shift.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FixedBiquadMemory {
     x1: i32,
@@ -54,17 +55,18 @@ pub struct FixedBiquadMemory {
 }
 
 impl FixedBiquad {
-    /// The most bits behind the binary point of a coefficient.
+    /// Largest number of fractional bits of a coefficient.
     const MOST_BITS: u32 = 30;
-    /// With fewer than this a low-pass would not keep its cutoff.
+    /// Smallest number of fractional bits of a coefficient. With fewer, rounding would move the
+    /// cutoff of a low-pass.
     const LEAST_BITS: u32 = 16;
 
-    /// The section with these coefficients, rounded to as many bits as fit.
+    /// Creates a section with these coefficients, rounded to as many bits as fit.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] naming the coefficient: not finite, too large
-    /// for 16 bits behind the binary point, or poles on or outside the unit
-    /// circle once rounded (|a2| < 1 and |a1| < 1 + a2 must hold).
+    /// [`DesignError::OutOfRange`] naming the coefficient that is not finite or exceeds 1e18, or
+    /// that puts a pole on or outside the unit circle after rounding (|a2| < 1 and |a1| < 1 + a2
+    /// must hold). It names `b0` if the coefficients are too large for 16 fractional bits.
     pub fn new(spec: BiquadSpec) -> Result<Self, DesignError> {
         let BiquadSpec { b0, b1, b2, a1, a2 } = spec;
         for (field, c) in [("b0", b0), ("b1", b1), ("b2", b2), ("a1", a1), ("a2", a2)] {
@@ -73,7 +75,8 @@ impl FixedBiquad {
         let sum: f64 = [b0, b1, b2, a1, a2].map(f64::abs).iter().sum();
         let fits = |bits: u32| {
             let one = f64::from(1u32 << bits);
-            // rounded magnitudes sum to less than 2^32: with the rest, below 2^63
+            // rounded magnitudes sum to less than 2^32, so the sum of a step with the remainder is
+            // below 2^63
             let each = [b0, b1, b2, a1, a2].iter().all(|c| (c * one).abs() < 2147483647.0);
             each && sum * one < 4294967290.0
         };
@@ -95,20 +98,21 @@ impl FixedBiquad {
         Ok(Self { taps, bits })
     }
 
-    /// The coefficients as they run, that is, rounded.
+    /// Returns the coefficients in use, rounded.
     pub fn spec(&self) -> BiquadSpec {
         let one = f64::from(1u32 << self.bits);
         let [b0, b1, b2, a1, a2] = self.taps.map(|c| f64::from(c) / one);
         BiquadSpec { b0, b1, b2, a1: -a1, a2: -a2 }
     }
 
-    /// Gain for a constant input: H(1).
+    /// Returns the gain for a constant input: H(1).
     pub fn dc_gain(&self) -> f64 {
         let c = self.spec();
         (c.b0 + c.b1 + c.b2) / (1.0 + c.a1 + c.a2)
     }
 
-    /// A memory that has seen `x` forever: a constant input gives no transient.
+    /// Returns the steady state for the constant input `x`, from which this input gives no
+    /// transient.
     pub fn settled_at(&self, x: i32) -> FixedBiquadMemory {
         let y = saturate(libm::round(self.dc_gain() * f64::from(x)) as i64);
         FixedBiquadMemory { x1: x, x2: x, y1: y, y2: y, rest: 1 << (self.bits - 1) }

@@ -1,21 +1,21 @@
-//! A Savitzky-Golay rate for `f32` samples on a core without a floating-point unit.
+//! A Savitzky-Golay rate estimator for `f32` samples on a core without a floating-point unit.
 
 use crate::{FixedSgMemory, FixedSgRate, LARGEST_SAMPLE, sample};
 use stretch_core::{Design, DesignError, SampleRate, Stage};
 
-/// Rate of an `f32` signal, summed in integers: [`FixedSgRate`] between two conversions.
+/// Estimator of the rate of an `f32` signal with integer sums: a [`FixedSgRate`] with conversions
+/// before and after it.
 ///
-/// The same rate as [`SgRate`](crate::SgRate), for cores that have no
-/// floating-point unit: eleven soft-float products and ten sums (about 1,400
-/// instructions on a Cortex-M3) become one conversion to an integer, an exact
-/// sliding sum, and one product. On a core *with* a floating-point unit `SgRate`
-/// is the smaller and faster one.
+/// It gives the same rate as [`SgRate`](crate::SgRate), for cores without a floating-point unit.
+/// With a window of eleven samples, `SgRate` needs eleven soft-float products and ten sums (about
+/// 1,400 instructions on a Cortex-M3). This type needs one conversion to an integer, an exact
+/// sliding sum, and one product. On a core *with* a floating-point unit `SgRate` is smaller and
+/// faster.
 ///
-/// **Samples** are taken as integer multiples of `2^(e-31)`, where `2^e` is the
-/// first power of two at or above the `largest` magnitude that the design was
-/// made for: exact for every `f32` of at least `2^(e-8)`, rounded to that step
-/// below. A sample beyond `2^e` counts as `2^e`. One that is NaN or beyond
-/// [`LARGEST_SAMPLE`] gives `None` and leaves the memory as it was.
+/// **Samples** are rounded to integer multiples of `2^(e-31)`, where `2^e` is the smallest power of
+/// two that is at least the parameter `largest` of `new`. The conversion is exact for every `f32`
+/// of magnitude `2^(e-8)` or more. A sample beyond `2^e` is clamped to `2^e`. A sample that is NaN
+/// or beyond [`LARGEST_SAMPLE`] gives `None` and leaves the memory unchanged.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate};
@@ -31,9 +31,9 @@ use stretch_core::{Design, DesignError, SampleRate, Stage};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerSgRate<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> {
     sums: FixedSgRate<i32, WINDOW, DEGREE, DELAY>,
-    /// Bits behind the binary point of a quantised sample.
+    /// Fractional bits of a quantised sample.
     fraction_bits: i32,
-    /// From the sums' output to the sample's unit per second.
+    /// Factor from the output of `sums` to the sample's unit per second.
     per_second: f32,
     sample_rate: SampleRate,
 }
@@ -41,16 +41,17 @@ pub struct IntegerSgRate<const WINDOW: usize, const DEGREE: usize, const DELAY: 
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     IntegerSgRate<WINDOW, DEGREE, DELAY>
 {
-    /// The design for samples of at most `largest` in magnitude at `sample_rate`.
+    /// Creates the design for samples of at most `largest` in magnitude at `sample_rate`.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] for a sample rate that no design is computed
-    /// for, or a `largest` outside 1e-6 ..= 1e18.
+    /// [`DesignError::OutOfRange`] for a sample rate outside 1e-9 ..= 1e9 Hz, or a `largest`
+    /// outside 1e-6 ..= 1e18.
     pub fn new(sample_rate: SampleRate, largest: f64) -> Result<Self, DesignError> {
         let sample_rate = sample::checked_rate(sample_rate)?;
         DesignError::check("largest", largest, (1e-6..=LARGEST_SAMPLE).contains(&largest))?;
         let (mantissa, exponent) = libm::frexp(largest);
-        // frexp gives 0.5 <= mantissa < 1: a power of two itself needs one less
+        // frexp gives 0.5 <= mantissa < 1, so the exponent is one too large if `largest` is a power
+        // of two
         let exponent = if mantissa == 0.5 { exponent - 1 } else { exponent };
         let fraction_bits = 31 - exponent;
         let per_sample = FixedSgRate::<i32, WINDOW, DEGREE, DELAY>::PER_SAMPLE;
@@ -63,12 +64,12 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
         })
     }
 
-    /// The sample rate of the design.
+    /// Returns the sample rate of the design.
     pub fn sample_rate(&self) -> SampleRate {
         self.sample_rate
     }
 
-    /// `x 2^fraction_bits`, rounded and saturated, without a floating-point operation.
+    /// Returns `x 2^fraction_bits`, rounded and saturated, without a floating-point operation.
     #[inline(always)]
     fn quantise(&self, x: f32) -> Option<i32> {
         const LARGEST_BITS: u32 = (LARGEST_SAMPLE as f32).to_bits();
@@ -78,8 +79,8 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
             return None; // NaN has the largest bits of all
         }
         let mantissa = (magnitude & 0x007f_ffff) | 0x0080_0000;
-        // a mantissa of 24 bits ends 150 below the biased exponent; a subnormal
-        // number is far below half a step and becomes zero
+        // x is the 24-bit mantissa times 2^(biased exponent - 150); a subnormal number is far below
+        // half a step and becomes zero
         let shift = (magnitude >> 23) as i32 - 150 + self.fraction_bits;
         let size = if shift >= 8 {
             i32::MAX

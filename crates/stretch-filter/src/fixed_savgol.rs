@@ -1,4 +1,4 @@
-//! Causal Savitzky-Golay rate in integers, at a cost that the window does not change.
+//! Causal Savitzky-Golay rate estimator in integers, whose cost does not depend on the window.
 
 use core::marker::PhantomData;
 
@@ -8,13 +8,13 @@ use stretch_core::{Design, Stage};
 mod sealed {
     pub trait Sample: Copy + Default + core::fmt::Debug + PartialEq {
         type Sum: Copy + Default + core::fmt::Debug + PartialEq;
-        /// The largest magnitude, and what a constant offset of the samples adds to it.
+        /// Largest magnitude of a sample.
         const LARGEST: i128;
         const LARGEST_SUM: i128;
         fn widen(self) -> Self::Sum;
-        /// `sum + other - choose old`, wrapping.
+        /// Returns `sum + other - choose old`, wrapping.
         fn slide(sum: Self::Sum, other: Self::Sum, choose: i32, old: Self) -> Self::Sum;
-        /// `total + weight sum`, wrapping.
+        /// Returns `total + weight sum`, wrapping.
         fn weigh(total: i64, weight: i32, sum: Self::Sum) -> i64;
     }
 
@@ -55,31 +55,31 @@ mod sealed {
     }
 }
 
-/// An integer sample: `u16` (a converter's code, sums in 32 bits) or `i32`
-/// (sums in 64 bits).
+/// An integer sample: `u16` (such as the code of an analogue-to-digital converter, with sums in 32
+/// bits) or `i32` (with sums in 64 bits).
 pub trait FixedSample: sealed::Sample {}
 impl FixedSample for u16 {}
 impl FixedSample for i32 {}
 
-/// Rate of an integer signal by a causal Savitzky-Golay fit of `DEGREE` 1 to 3
+/// Estimator of the rate of an integer signal by a causal Savitzky-Golay fit of `DEGREE` 1 to 3
 /// through the newest `WINDOW` samples, evaluated `DELAY` samples before the newest.
 ///
-/// The same filter as [`SgRate`](crate::SgRate), with two differences: its taps
-/// are exact fractions of integers, so that nothing is rounded where the result
-/// fits 32 bits; and the window is not summed anew for each sample. Its
-/// moments are moved on,
+/// It is the same filter as [`SgRate`](crate::SgRate), with two differences. Its taps are exact
+/// fractions of integers, so that nothing is rounded if the result fits 32 bits. And it does not
+/// sum the whole window for each sample, but updates moments of the window:
 ///
 /// ```text
 /// B_0 <- B_0 + x[now] - x[now-n],    B_k <- B_k + B_(k-1) - C(n, k) x[now-n]
 /// y = (T_0 B_0 + ... + T_d B_d) >> SHIFT
 /// ```
 ///
-/// which costs the same for any window. In integers that is safe: a sliding sum
-/// of floats collects rounding errors, a sum of integers has none.
+/// Here n is the window, C(n, k) are binomial coefficients, T_k are integer weights, and d is the
+/// degree. The cost is the same for any window. A sliding sum of floats would accumulate rounding
+/// errors, but a sum of integers is exact.
 ///
-/// The output is an integer of which [`PER_SAMPLE`](Self::PER_SAMPLE) makes a
-/// change a sample; it fits 32 bits for every possible input, which is checked
-/// when the shape is compiled. It is `None` until the window is full.
+/// The output is an integer. Multiply it by [`PER_SAMPLE`](Self::PER_SAMPLE) to get the change of
+/// the signal per sample. It fits 32 bits for every possible input, which is checked at compile
+/// time. The output is `None` until the window is full.
 ///
 /// ```
 /// use stretch_core::Runner;
@@ -99,15 +99,15 @@ impl FixedSample for i32 {}
 /// let _ = Runner::new(FixedSgRate::<u16, 64, 3>::new()); // moments of 16 bits leave 32
 /// ```
 ///
-/// Source: Savitzky and Golay 1964, doi:10.1021/ac60214a047; moments instead of
-/// taps: Hogenauer's integrators and combs, doi:10.1109/TASSP.1981.1163535.
+/// Source: Savitzky and Golay 1964, doi:10.1021/ac60214a047. The moments are computed as in
+/// Hogenauer's integrators and combs, doi:10.1109/TASSP.1981.1163535.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0>(
     PhantomData<S>,
 );
 
-/// The integers that a [`FixedSgRate`] computes with, without its const parameters. Use them to
-/// write the step in another language. The letters are those of [`FixedSgRate`].
+/// The integer constants of a [`FixedSgRate`], for implementing its step in another language. The
+/// letters are those of the equations of [`FixedSgRate`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FixedSgIntegers {
     /// Samples in the window.
@@ -118,19 +118,19 @@ pub struct FixedSgIntegers {
     pub weights: [i32; MOMENTS],
     /// C(n, k), in the first `degree + 1` places.
     pub choose: [i32; MOMENTS],
-    /// SHIFT.
+    /// SHIFT, the right shift of the weighted sum.
     pub shift: u32,
     /// The factor f of [`FixedSgRate::change`]: `(((output f) >> (s - 9)) samples + 256) >> 9`.
     pub change_factor: i64,
-    /// Its shift s.
+    /// The shift s of the same expression.
     pub change_shift: u32,
 }
 
-/// What a [`FixedSgRate`] remembers: the window and its moments.
+/// State of a [`FixedSgRate`]: the window and its moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
     sums: [S::Sum; MOMENTS],
-    /// Where the oldest sample lies, or one past the end.
+    /// Index of the oldest sample, or one past the end.
     oldest: u32,
     /// Samples until the window is full.
     remaining: u32,
@@ -138,13 +138,13 @@ pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
 }
 
 impl<S: FixedSample, const WINDOW: usize> FixedSgMemory<S, WINDOW> {
-    /// How many further samples give `None` before the window is full.
+    /// Returns the number of further samples that give `None` before the window is full.
     #[inline]
     pub fn remaining(&self) -> usize {
         self.remaining.saturating_sub(1) as usize
     }
 
-    /// The newest sample; zero before the first.
+    /// Returns the newest sample; zero before the first.
     pub fn newest(&self) -> S {
         let at = (self.oldest as usize).checked_sub(1).unwrap_or(WINDOW - 1);
         self.ring.get(at).copied().unwrap_or_default()
@@ -168,8 +168,8 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         taps
     };
 
-    /// How many low bits of the weighted sum are rounded away: none for the
-    /// shapes in common use on 16-bit samples.
+    /// Number of low bits of the weighted sum that are rounded away: 0 for the shapes in common use
+    /// on 16-bit samples.
     pub const SHIFT: u32 = {
         let mut shift = 0;
         while (Self::TAPS.total * S::LARGEST) >> shift >= i32::MAX as i128 {
@@ -178,20 +178,20 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         shift
     };
 
-    /// Change of the signal a sample, per unit of the output.
+    /// Change of the signal per sample and per unit of the output.
     pub const PER_SAMPLE: f64 = (1i64 << Self::SHIFT) as f64 / Self::TAPS.denominator as f64;
 
-    /// The largest magnitude that the output can have, whatever the samples are.
+    /// Bound on the magnitude of the output for any samples.
     pub const LARGEST: i32 = ((Self::TAPS.total * S::LARGEST) >> Self::SHIFT) as i32 + 1;
 
-    /// The filter; all its numbers belong to its type.
+    /// Creates the filter. All its constants belong to its type.
     #[must_use]
     pub const fn new() -> Self {
         let _ = Self::TAPS; // the shape is checked here at the latest
         Self(PhantomData)
     }
 
-    /// A memory that has seen `x` forever: no warm-up and no transient.
+    /// Returns the steady state for the constant input `x`: no warm-up and no transient.
     #[must_use]
     pub fn settled_at(&self, x: S) -> FixedSgMemory<S, WINDOW> {
         let mut memory = self.memory();
@@ -201,7 +201,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         memory
     }
 
-    /// The output for the current window.
+    /// Returns the output for the current window.
     #[inline(always)]
     fn output(memory: &FixedSgMemory<S, WINDOW>) -> i32 {
         let half = if Self::SHIFT == 0 { 0 } else { 1 << (Self::SHIFT.max(1) - 1) };
@@ -212,8 +212,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         (total >> Self::SHIFT) as i32
     }
 
-    /// What [`change`](Self::change) multiplies by, and how far it shifts: 29
-    /// bits of `PER_SAMPLE`.
+    /// Factor and shift of [`change`](Self::change): 29 bits of `PER_SAMPLE`.
     const CHANGE: (i64, u32) = {
         let (denominator, mut shift) = (Self::TAPS.denominator as i128, Self::SHIFT);
         while (1i128 << shift) / denominator < 1 << 28 {
@@ -227,7 +226,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         (factor as i64, shift - Self::SHIFT)
     };
 
-    /// The integers that a step computes with.
+    /// The integer constants of a step.
     ///
     /// ```
     /// type Rate = stretch_filter::FixedSgRate<u16, 11, 2>;
@@ -246,7 +245,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         change_shift: Self::CHANGE.1,
     };
 
-    /// The change of the signal over `samples` samples that an output means, rounded.
+    /// Converts an output to the change of the signal over `samples` samples, rounded.
     ///
     /// ```
     /// type Rate = stretch_filter::FixedSgRate<u16, 11, 2>;
@@ -256,12 +255,12 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     #[must_use]
     pub fn change(&self, output: i32, samples: u8) -> i64 {
         let (factor, shift) = Self::CHANGE;
-        // 31 + 30 bits; nine bits behind the point are kept for the product
+        // the product has at most 31 + 30 bits; nine fractional bits are kept for the next product
         let per_sample = (i64::from(output) * factor) >> (shift - 9);
         (per_sample * i64::from(samples) + 256) >> 9
     }
 
-    /// The output of the last step, without a new sample; `None` in the warm-up.
+    /// Returns the output of the last step again; `None` during the warm-up.
     #[inline]
     pub fn last(&self, memory: &FixedSgMemory<S, WINDOW>) -> Option<i32> {
         (memory.remaining == 0).then(|| Self::output(memory))
@@ -298,7 +297,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
 
     #[inline(always)]
     fn step(&self, memory: &mut FixedSgMemory<S, WINDOW>, x: S) -> Option<i32> {
-        // also what shows the compiler that the index is inside
+        // wraps the index, and shows the compiler that it is in bounds
         let at = memory.oldest as usize;
         let at = if at < WINDOW { at } else { 0 };
         let old = core::mem::replace(&mut memory.ring[at], x);
@@ -318,7 +317,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     }
 }
 
-/// C(n, k) for every moment; wraps where no admitted shape reads it.
+/// Returns C(n, k) for every moment. A value may wrap, but no valid shape uses such a value.
 const fn binomials(n: usize) -> [i32; MOMENTS] {
     let (mut all, mut k) = ([0; MOMENTS], 0);
     while k < MOMENTS {

@@ -1,4 +1,4 @@
-//! Savitzky-Golay rates as exact integers.
+//! Taps of Savitzky-Golay rate estimators as exact integers.
 //!
 //! A tap of a Savitzky-Golay filter of degree `d` is a polynomial of degree `d`
 //! in the lag j, so the output is a sum of `d + 1` *moments* of the window,
@@ -8,21 +8,20 @@
 //! y   = (T_0 B_0 + ... + T_d B_d) / D
 //! ```
 //!
-//! with integers T and D. Least squares gives them without rounding: with
-//! A_kl = sum of C(j, k) C(j, l) and d_k = C'(delay, k) it is T/D = -A^-1 d,
-//! solved here in integers while the program is compiled.
+//! with integers T and D. With A_kl = sum of C(j, k) C(j, l) and d_k = C'(delay, k), least squares
+//! gives T/D = -A^-1 d. This is solved exactly, in integers, at compile time.
 
 /// The highest degree of a fixed-point Savitzky-Golay filter.
 pub const MAX_FIXED_SG_DEGREE: usize = 3;
 
 pub(crate) const MOMENTS: usize = MAX_FIXED_SG_DEGREE + 1;
 
-/// The integers of one shape.
+/// The integer constants of one filter shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FixedTaps {
     /// T_k.
     pub weights: [i32; MOMENTS],
-    /// D: what the weighted sum is divided by to give a change a sample.
+    /// D: the weighted sum divided by D is the change per sample.
     pub denominator: i64,
     /// Sum of the magnitudes of the taps, times D.
     pub total: i128,
@@ -49,7 +48,7 @@ const fn gcd(a: i128, b: i128) -> i128 {
     a
 }
 
-/// 6 C'(x, k), a whole number for every k up to 3.
+/// Returns 6 C'(x, k), which is an integer for every k up to 3.
 const fn slope_of_choose(x: i128, k: usize) -> i128 {
     match k {
         0 => 0,
@@ -60,8 +59,8 @@ const fn slope_of_choose(x: i128, k: usize) -> i128 {
 }
 
 impl FixedTaps {
-    /// Needs `1 <= degree <= 3`, `degree < window` and `delay < window`; does not
-    /// compile where an integer would not fit.
+    /// Computes the constants of a shape. Needs `1 <= degree <= 3`, `degree < window` and
+    /// `delay < window`. Compilation fails if an integer does not fit.
     pub(crate) const fn of(window: usize, degree: usize, delay: usize) -> Self {
         let terms = degree + 1;
         // the normal equations, right-hand side in the last column
@@ -110,7 +109,7 @@ impl FixedTaps {
     }
 }
 
-/// The tap at lag `j`, times the denominator.
+/// Returns the tap at lag `j`, times the denominator.
 const fn tap(weights: &[i128; MOMENTS], j: usize) -> i128 {
     let (mut sum, mut k) = (0, 0);
     while k < MOMENTS {
@@ -120,7 +119,7 @@ const fn tap(weights: &[i128; MOMENTS], j: usize) -> i128 {
     sum
 }
 
-/// Gauss-Jordan without fractions; every row is divided by its common factor.
+/// Performs Gauss-Jordan elimination without fractions. Every row is divided by its common factor.
 const fn eliminate(
     mut rows: [[i128; MOMENTS + 1]; MOMENTS],
     terms: usize,

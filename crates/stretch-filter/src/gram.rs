@@ -1,4 +1,4 @@
-//! Discrete orthogonal (Gram) polynomials, and the taps that they give.
+//! Discrete orthogonal (Gram) polynomials and the Savitzky-Golay taps that they give.
 //!
 //! On the `n` equidistant points x = -(n-1)/2 .. (n-1)/2 the orthonormal
 //! polynomials obey, with b(k) = k^2 (n^2 - k^2) / (4 (4 k^2 - 1)),
@@ -7,25 +7,25 @@
 //! q(0) = 1/sqrt(n),   sqrt(b(k+1)) q(k+1) = x q(k) - sqrt(b(k)) q(k-1)
 //! ```
 //!
-//! and their derivatives obey the same recurrence plus `s q^(s-1)(k)`. A least
-//! squares fit is then a sum of products: no matrix is formed or solved.
-//! Source: Gorry 1990, doi:10.1021/ac00205a007.
+//! and their s-th derivatives obey the same recurrence plus `s q^(s-1)(k)`. A least-squares fit is
+//! then a sum of products, without forming or solving a matrix. Source: Gorry 1990,
+//! doi:10.1021/ac00205a007.
 
 /// The highest degree of a local polynomial.
 ///
-/// A fit of higher degree follows the noise: what it gains in bias it loses
-/// many times over in noise gain.
+/// A fit of higher degree follows the noise. Its bias is smaller, but its noise gain is many times
+/// larger.
 pub const MAX_SG_DEGREE: usize = 10;
 
 pub(crate) type Basis = [f64; MAX_SG_DEGREE + 1];
 
-/// Root of the recurrence coefficient b(k) of `window` points.
+/// Returns the square root of the recurrence coefficient b(k) of `window` points.
 fn root_b(window: usize, k: usize) -> f64 {
     let (n, k) = (window as f64, k as f64);
     libm::sqrt(k * k * (n - k) * (n + k) / (4.0 * (4.0 * k * k - 1.0)))
 }
 
-/// The `order`-th derivatives at `x` (from the middle, in samples) of the
+/// Returns the `order`-th derivatives at `x` (in samples from the middle) of the
 /// orthonormal polynomials of degree 0 ..= `degree`.
 ///
 /// Needs `degree < window`, `degree <= MAX_SG_DEGREE` and `order <= MAX_SG_DEGREE`.
@@ -53,9 +53,9 @@ pub(crate) fn basis(window: usize, degree: usize, order: usize, x: f64) -> Basis
     values
 }
 
-/// Writes one tap per sample, newest first: the `order`-th derivative (per
-/// sample^order) of the least squares polynomial, `delay` samples before the
-/// newest, multiplied by `scale`.
+/// Calls `write(lag, tap)` for each sample of the window, newest first. The taps give the
+/// `order`-th derivative (per sample^order) of the least-squares polynomial, `delay` samples before
+/// the newest, multiplied by `scale`.
 pub(crate) fn taps_into(
     window: usize,
     degree: usize,

@@ -1,4 +1,4 @@
-//! Butterworth low-pass filters by cutoff.
+//! Butterworth low-pass filters.
 
 use crate::{Biquad, BiquadMemory, BiquadSpec, Cost, sample};
 use core::f64::consts::PI;
@@ -7,31 +7,31 @@ use stretch_core::{Design, DesignError, Hertz, Real, SampleRate, Stage};
 /// The highest order of a [`LowPass`].
 pub const MAX_ORDER: usize = 8;
 
-/// What a low-pass filter is asked to do.
+/// Specification of a low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPassSpec {
-    /// Where the gain is 1/sqrt(2) (-3 dB): above zero and below half the sample rate.
+    /// Frequency at which the gain is 1/sqrt(2) (-3 dB): above zero and below half the sample rate.
     pub cutoff: Hertz,
     /// The sample rate of the stream.
     pub sample_rate: SampleRate,
 }
 
 impl LowPassSpec {
-    /// The Butterworth low-pass filter of `ORDER` with this cutoff.
+    /// Designs the Butterworth low-pass filter of `ORDER` with this cutoff.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] naming `cutoff_hz` or `sample_rate_hz`; see
-    /// [`LowPass`] for how low a cutoff each sample type can run.
+    /// [`DesignError::OutOfRange`] naming `cutoff_hz` or `sample_rate_hz`. See [`LowPass`] for the
+    /// lowest cutoff of each sample type.
     pub fn design<T: Real, const ORDER: usize>(self) -> Result<LowPass<T, ORDER>, DesignError> {
         LowPass::new(self)
     }
 
-    /// tan(pi fc / fs): the cutoff on the prewarped axis.
+    /// Returns tan(pi fc / fs), the prewarped cutoff.
     pub(crate) fn warped(&self) -> f64 {
         libm::tan(PI * self.cutoff.0 * self.sample_rate.period_s())
     }
 
-    /// The spec, when its numbers allow a design.
+    /// Returns the specification if its numbers allow a design.
     pub(crate) fn checked(self) -> Result<Self, DesignError> {
         sample::checked_rate(self.sample_rate)?;
         let cutoff = self.cutoff.0;
@@ -40,7 +40,7 @@ impl LowPassSpec {
         Ok(self)
     }
 
-    /// A second-order section with unit gain at frequency zero, whose
+    /// Designs a second-order section with unit gain at frequency zero, whose analogue
     /// prototype is 1 / (s^2 + `inverse_q` s + 1).
     pub(crate) fn section<T: Real>(&self, inverse_q: f64) -> Result<Biquad<T>, DesignError> {
         let k = self.warped();
@@ -50,14 +50,14 @@ impl LowPassSpec {
         self.with_poles::<T>(a1, a2, 4.0 * k * k * norm, 2)
     }
 
-    /// The first-order section 1 / (s + 1).
+    /// Designs the first-order section whose analogue prototype is 1 / (s + 1).
     fn first_order<T: Real>(&self) -> Result<Biquad<T>, DesignError> {
         let k = self.warped();
         self.with_poles::<T>((k - 1.0) / (k + 1.0), 0.0, 2.0 * k / (k + 1.0), 1)
     }
 
-    /// Rounds the poles to `T` first and derives the zeros' gain from what
-    /// became of them, so that a constant passes with gain one.
+    /// Creates a section from pole coefficients. They are rounded to `T` first, and the numerator
+    /// is computed from the rounded values, so that a constant passes with gain 1.
     fn with_poles<T: Real>(
         &self,
         a1: f64,
@@ -67,8 +67,8 @@ impl LowPassSpec {
     ) -> Result<Biquad<T>, DesignError> {
         let [ra1, ra2] = [a1, a2].map(|a| T::from_f64(a).as_f64());
         let sum = 1.0 + ra1 + ra2;
-        // 1 + a1 + a2 goes with the cutoff^order: what rounding did to it is
-        // what rounding did to the cutoff.
+        // 1 + a1 + a2 is nearly proportional to cutoff^order, so its relative change by rounding
+        // bounds that of the cutoff.
         let kept = (sum / exact_sum - 1.0).abs() <= 0.01;
         DesignError::check("cutoff_hz", self.cutoff.0, kept)?;
         let (b0, b1, b2) = if order == 2 {
@@ -87,14 +87,14 @@ impl LowPassSpec {
 /// |H(f)|^2 = 1 / (1 + (tan(pi f/fs) / tan(pi fc/fs))^(2 ORDER))
 /// ```
 ///
-/// The bilinear transform with prewarping, so that the gain at the cutoff is
-/// exactly 1/sqrt(2); a constant passes with gain one. The first usable sample
-/// settles the memory: there is no start-up transient from zero. A sample that
-/// is not usable gives NaN and leaves the memory as it was.
+/// It is designed by the bilinear transform with prewarping, so that the gain at the cutoff is
+/// exactly 1/sqrt(2). A constant passes with gain 1. The filter starts in the steady state for the
+/// first valid sample, so there is no start-up transient from zero. A sample that is NaN or beyond
+/// `LARGEST_SAMPLE` gives NaN and leaves the memory unchanged.
 ///
-/// **Limits.** Rounding the poles to `T` moves the cutoff; a design that it
-/// would move by more than about 1 % is refused. In `f32` that is a cutoff
-/// below roughly fs/1500, in `f64` below fs/3e7.
+/// **Limits.** Rounding the poles to `T` moves the cutoff. A design whose cutoff would move by more
+/// than about 1 % is refused. This excludes cutoffs below roughly fs/1500 in `f32`, and below
+/// fs/3e7 in `f64`.
 ///
 /// ```
 /// use stretch_core::{Hertz, Runner, SampleRate};
@@ -117,7 +117,7 @@ pub struct LowPass<T, const ORDER: usize> {
     spec: LowPassSpec,
 }
 
-/// What a [`LowPass`] remembers.
+/// State of a [`LowPass`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LowPassMemory<T> {
     sections: [BiquadMemory<T>; MAX_ORDER / 2],
@@ -131,7 +131,7 @@ impl<T: Real, const ORDER: usize> LowPass<T, ORDER> {
     /// Arithmetic and memory of one step.
     pub const COST: Cost = Cost::new(5 * Self::SECTIONS, 4 * Self::SECTIONS, 2 * Self::SECTIONS);
 
-    /// The filter that `spec` asks for; the same as [`LowPassSpec::design`].
+    /// Designs the filter for `spec`, like [`LowPassSpec::design`].
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] naming `cutoff_hz` or `sample_rate_hz`.
@@ -144,7 +144,7 @@ impl<T: Real, const ORDER: usize> LowPass<T, ORDER> {
         if odd == 1 {
             sections[0] = spec.first_order()?;
         }
-        // The most damped pair first: the least overshoot inside the cascade.
+        // The most damped pair comes first, which gives the least overshoot inside the cascade.
         for (i, section) in sections[odd..Self::SECTIONS].iter_mut().enumerate() {
             let pair = ORDER / 2 - 1 - i;
             let angle = PI * (2 * pair + 1) as f64 / (2 * ORDER) as f64;
@@ -153,30 +153,31 @@ impl<T: Real, const ORDER: usize> LowPass<T, ORDER> {
         Ok(Self { sections, spec })
     }
 
-    /// The sections in the order in which they run.
+    /// Returns the sections in the order in which they run.
     pub fn sections(&self) -> &[Biquad<T>] {
         &self.sections[..Self::SECTIONS]
     }
 
-    /// What the filter was asked to do.
+    /// Returns the specification of the filter.
     pub fn spec(&self) -> LowPassSpec {
         self.spec
     }
 
-    /// By how many seconds a slow signal is late: the group delay at frequency zero.
+    /// Returns the delay of slow signals in seconds: the group delay at frequency zero.
     pub fn delay_s(&self) -> f64 {
         let samples: f64 = self.sections().iter().map(Biquad::delay_samples).sum();
         samples * self.spec.sample_rate.period_s()
     }
 
-    /// Standard deviation out for white noise of standard deviation one in.
+    /// Returns the standard deviation of the output for white input noise of standard deviation 1.
     pub fn noise_gain(&self) -> f64 {
         libm::sqrt(noise_power(self.spec.warped(), ORDER, |_| 1.0))
     }
 
-    /// A memory that has seen `x` forever: a constant input gives no transient.
+    /// Returns the steady state for the constant input `x`, from which this input gives no
+    /// transient.
     ///
-    /// A value that is not usable as a sample counts as no sample.
+    /// If `x` is NaN or beyond `LARGEST_SAMPLE`, the result is a memory that has seen no sample.
     pub fn settled_at(&self, x: T) -> LowPassMemory<T> {
         let mut memory = LowPassMemory::default();
         if sample::usable(x) {
@@ -189,19 +190,19 @@ impl<T: Real, const ORDER: usize> LowPass<T, ORDER> {
     }
 }
 
-/// Mean of `extra(u) |H|^2` over all frequencies up to half the sample rate,
+/// Returns the mean of `extra(u) |H|^2` over all frequencies up to half the sample rate,
 /// where H is the Butterworth filter with prewarped cutoff `k` and u = tan(pi f/fs).
 ///
 /// ```text
 /// (2/pi) integral over u = 0 .. inf of extra(u) / ((1 + u^2) (1 + (u/k)^(2 order))) du
 /// ```
 ///
-/// With u = k e^s the trapezoidal rule converges geometrically, because the
-/// integrand is analytic in a strip about the real axis.
+/// With the substitution u = k e^s the trapezoidal rule converges geometrically, because the
+/// integrand is analytic in a strip around the real axis.
 pub(crate) fn noise_power(k: f64, order: usize, extra: impl Fn(f64) -> f64) -> f64 {
     const STEP: f64 = 1.0 / 32.0;
     let mut sum = 0.0;
-    // e^s falls below 1e-18 at the low end; at the high end the filter does.
+    // At the low end of the sum e^s is below 1e-18, at the high end |H|^2 is.
     for i in -1344..=1344 {
         let u = k * libm::exp(f64::from(i) * STEP);
         let filter = 1.0 / (1.0 + libm::exp(2.0 * order as f64 * f64::from(i) * STEP));

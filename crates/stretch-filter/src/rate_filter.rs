@@ -1,4 +1,4 @@
-//! The live rate estimator that a calibration record names.
+//! The live rate estimator that a calibration file specifies.
 
 use crate::{
     Cost, Differentiator, DifferentiatorMemory, FilterError, LowPassSpec, SgFilter, SgMemory,
@@ -6,12 +6,11 @@ use crate::{
 };
 use stretch_core::{Design, Hertz, RateEstimator, Real, SampleRate, Stage};
 
-/// A live rate estimator chosen at run time by a [`RateEstimator`] record, with
-/// room for a Savitzky-Golay window of `CAP` samples.
+/// A live rate estimator that is chosen at run time by a [`RateEstimator`], with room for a
+/// Savitzky-Golay window of `CAP` samples.
 ///
-/// The step gives the rate in the sample's unit per second, or `None` while
-/// the estimator warms up and for a sample that is not usable, which also
-/// leaves the memory as it was.
+/// A step gives the rate in the sample's unit per second, or `None` while the estimator warms up. A
+/// sample that is NaN or beyond `LARGEST_SAMPLE` also gives `None` and leaves the memory unchanged.
 ///
 /// ```
 /// use stretch_core::{RateEstimator, Runner, SampleRate};
@@ -41,9 +40,9 @@ enum Kind<T, const CAP: usize> {
     Tracker(Tracker<T>),
 }
 
-/// What a [`RateFilter`] remembers.
+/// State of a [`RateFilter`].
 ///
-/// A memory of another estimator is replaced by a fresh one at the next step.
+/// If a step gets the memory of another kind of estimator, it replaces the memory by a fresh one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateMemory<T, const CAP: usize = 64>(Inner<T, CAP>);
 
@@ -56,7 +55,7 @@ enum Inner<T, const CAP: usize> {
 }
 
 impl<T, const CAP: usize> RateMemory<T, CAP> {
-    /// How many further samples give `None` before the estimator has warmed up.
+    /// Returns the number of further samples that give `None` before the estimator has warmed up.
     pub fn remaining(&self) -> usize {
         match &self.0 {
             Inner::SavitzkyGolay(memory) => memory.remaining(),
@@ -67,12 +66,11 @@ impl<T, const CAP: usize> RateMemory<T, CAP> {
 }
 
 impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
-    /// The estimator that the record names, for samples that come at `sample_rate`.
+    /// Creates the estimator for samples at `sample_rate`.
     ///
     /// # Errors
     /// [`FilterError::LooksAhead`] for an estimator that only works on a log;
-    /// [`FilterError::Design`], naming the field, for numbers that no design
-    /// can be computed from or a window above `CAP`.
+    /// [`FilterError::Design`], naming the field, for invalid parameters or a window above `CAP`.
     pub fn new(estimator: RateEstimator, sample_rate: SampleRate) -> Result<Self, FilterError> {
         let estimator = estimator.validate()?;
         let kind = match estimator {
@@ -92,23 +90,23 @@ impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
             RateEstimator::Tracker { tracking_index } => {
                 Kind::Tracker(Tracker::new(TrackerSpec { tracking_index, sample_rate })?)
             }
-            // The central difference, and whatever a later record may name.
+            // The central difference, and estimators that a later version may add.
             _ => return Err(FilterError::LooksAhead { samples: 1 }),
         };
         Ok(Self { kind, estimator })
     }
 
-    /// The record that the design was built from.
+    /// Returns the parameters from which the design was built.
     pub fn estimator(&self) -> RateEstimator {
         self.estimator
     }
 
-    /// How many samples give `None` at the start.
+    /// Returns the number of samples that give `None` at the start.
     pub fn warm_up(&self) -> usize {
         self.memory().remaining()
     }
 
-    /// By how many seconds the rate is late while the signal changes slowly.
+    /// Returns the delay of the rate for slow signals, in seconds.
     pub fn delay_s(&self) -> f64 {
         match &self.kind {
             Kind::SavitzkyGolay(design) => design.delay_s(),
@@ -117,7 +115,7 @@ impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
         }
     }
 
-    /// Standard deviation of the rate for white noise of standard deviation one, in 1/s.
+    /// Returns the standard deviation of the rate for white noise of standard deviation 1, in 1/s.
     pub fn noise_gain(&self) -> f64 {
         match &self.kind {
             Kind::SavitzkyGolay(design) => design.noise_gain(),
@@ -126,7 +124,7 @@ impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
         }
     }
 
-    /// Arithmetic and memory of one step.
+    /// Returns the arithmetic and memory of one step.
     pub fn cost(&self) -> Cost {
         match &self.kind {
             Kind::SavitzkyGolay(design) => design.cost(),

@@ -1,11 +1,11 @@
-//! Causal Savitzky-Golay designs whose shape is part of the type.
+//! Causal Savitzky-Golay filters whose shape is part of the type.
 
 use crate::{Cost, MAX_SG_DEGREE, fir, gram, sample};
 use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 
-/// Causal Savitzky-Golay filter: the `ORDER`-th derivative of the least squares
-/// polynomial of degree `DEGREE` through the newest `WINDOW` samples, evaluated
-/// `DELAY` samples before the newest.
+/// Causal Savitzky-Golay filter: the `ORDER`-th derivative of the least-squares polynomial of
+/// degree `DEGREE` through the newest `WINDOW` samples, evaluated `DELAY` samples before the
+/// newest.
 ///
 /// ```text
 /// y[n] = sum over j = 0 .. WINDOW-1 of taps[j] x[n-j]
@@ -14,19 +14,16 @@ use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 /// Use it through [`SgRate`] (`ORDER` 1) and [`SgSmooth`] (`ORDER` 0). The
 /// output is in the sample's unit per second^`ORDER`.
 ///
-/// **Choosing.** A longer `WINDOW` lowers [`noise_gain`](Self::noise_gain), but
-/// answers later when the signal bends. A higher `DEGREE` follows bends and
-/// raises the noise gain. `DELAY` trades freshness for noise: in the middle of
-/// the window the noise gain is lowest.
+/// **Choosing.** A longer `WINDOW` lowers [`noise_gain`](Self::noise_gain), but reacts later when
+/// the signal curves. A higher `DEGREE` follows curved signals, but raises the noise gain. A larger
+/// `DELAY`, up to the middle of the window, lowers the noise gain.
 ///
-/// **Samples** that are NaN or beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE)
-/// give `None` and leave the memory as it was. The window then lacks a sample:
-/// treat it as a gap, that is, take a fresh memory or step the last good sample
-/// once more.
+/// **Samples** that are NaN or beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE) give `None` and
+/// leave the memory unchanged. The window then lacks a sample. Treat this as a gap: take a fresh
+/// memory, or step the last good sample once more.
 ///
-/// **A shape that cannot work does not compile**: `WINDOW` must exceed
-/// `DEGREE`, `ORDER` must not, `DELAY` must lie inside the window and `DEGREE`
-/// must not exceed [`MAX_SG_DEGREE`].
+/// **An invalid shape does not compile**: `WINDOW` must exceed `DEGREE`, `ORDER` must not exceed
+/// `DEGREE`, `DELAY` must be less than `WINDOW`, and `DEGREE` must not exceed [`MAX_SG_DEGREE`].
 ///
 /// ```compile_fail
 /// use stretch_core::SampleRate;
@@ -61,7 +58,7 @@ pub struct SavitzkyGolay<
     sample_rate: SampleRate,
 }
 
-/// Rate of a signal, causal: a [`SavitzkyGolay`] of derivative order one.
+/// Causal estimator of the rate of a signal: a [`SavitzkyGolay`] of derivative order 1.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate};
@@ -81,7 +78,7 @@ pub struct SavitzkyGolay<
 pub type SgRate<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     SavitzkyGolay<T, 1, WINDOW, DEGREE, DELAY>;
 
-/// Smoothed value of a signal, causal: a [`SavitzkyGolay`] of derivative order zero.
+/// Causal estimator of the smoothed value of a signal: a [`SavitzkyGolay`] of derivative order 0.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate};
@@ -96,7 +93,7 @@ pub type SgRate<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize 
 pub type SgSmooth<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     SavitzkyGolay<T, 0, WINDOW, DEGREE, DELAY>;
 
-/// What a [`SavitzkyGolay`] of `WINDOW` taps remembers.
+/// State of a [`SavitzkyGolay`] of `WINDOW` taps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SgMemory<T, const WINDOW: usize> {
     state: [T; WINDOW],
@@ -104,7 +101,7 @@ pub struct SgMemory<T, const WINDOW: usize> {
 }
 
 impl<T, const WINDOW: usize> SgMemory<T, WINDOW> {
-    /// How many further samples give `None` before the window is full.
+    /// Returns the number of further samples that give `None` before the window is full.
     #[inline]
     pub fn remaining(&self) -> usize {
         self.remaining
@@ -143,7 +140,7 @@ impl<T: Real, const ORDER: usize, const WINDOW: usize, const DEGREE: usize, cons
     /// Arithmetic and memory of one step.
     pub const COST: Cost = Cost::new(WINDOW, WINDOW - 1, WINDOW);
 
-    /// The design for samples that come at `sample_rate`.
+    /// Computes the design for samples at `sample_rate`.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] for a sample rate outside
@@ -160,35 +157,36 @@ impl<T: Real, const ORDER: usize, const WINDOW: usize, const DEGREE: usize, cons
         Ok(Self { taps, sample_rate })
     }
 
-    /// The taps, newest sample first, in 1/s^`ORDER`.
+    /// Returns the taps, newest sample first, in 1/s^`ORDER`.
     pub fn taps(&self) -> &[T; WINDOW] {
         &self.taps
     }
 
-    /// The sample rate of the design.
+    /// Returns the sample rate of the design.
     pub fn sample_rate(&self) -> SampleRate {
         self.sample_rate
     }
 
-    /// Standard deviation of the output for white noise of standard deviation
-    /// one: the root of the sum of the squared taps, in 1/s^`ORDER`.
+    /// Returns the standard deviation of the output for white noise of standard deviation 1, in
+    /// 1/s^`ORDER`. It is the square root of the sum of the squared taps.
     pub fn noise_gain(&self) -> f64 {
         fir::noise_gain(&self.taps)
     }
 
-    /// By how many seconds the output is late while the signal changes slowly.
+    /// Returns the delay of the output for slow signals, in seconds.
     ///
-    /// It is `DELAY` samples when `DEGREE` exceeds `ORDER`. At `DEGREE` equal
-    /// to `ORDER` the fit cannot tell where in the window it is, and the delay
-    /// is half the window whatever `DELAY` is.
+    /// It is `DELAY` samples if `DEGREE` exceeds `ORDER`. If `DEGREE` equals `ORDER`, the
+    /// derivative of the fit is the same everywhere in the window, and the delay is half the window
+    /// for any `DELAY`.
     pub fn delay_s(&self) -> f64 {
         let unit: f64 = (0..ORDER).map(|_| self.sample_rate.period_s()).product();
         fir::delay_samples(&self.taps, ORDER, unit) * self.sample_rate.period_s()
     }
 
-    /// A memory that has seen `x` forever: no warm-up and no transient.
+    /// Returns the steady state for the constant input `x`: no warm-up and no transient.
     ///
-    /// A value that is not usable as a sample counts as no sample.
+    /// If `x` is NaN or beyond [`LARGEST_SAMPLE`](crate::LARGEST_SAMPLE), the result is a memory
+    /// that has seen no sample.
     pub fn settled_at(&self, x: T) -> SgMemory<T, WINDOW> {
         let mut memory = self.memory();
         if sample::usable(x) {

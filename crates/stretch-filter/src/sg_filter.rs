@@ -3,31 +3,33 @@
 use crate::{Cost, FilterError, MAX_SG_DEGREE, SgMemory, fir, gram, sample};
 use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 
-/// Outputs that [`SgFilter::over_log`] works on at once: they stay in the first cache.
+/// Number of outputs in one block of [`SgFilter::over_log`], chosen so that a block stays in the L1
+/// cache.
 const BLOCK: usize = 256;
 
 /// The shape of a [`SgFilter`], all in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SgShape {
-    /// Samples that the polynomial is fitted to.
+    /// Samples in the fit of the polynomial.
     pub window: usize,
     /// Degree of the polynomial, below `window` and at most [`MAX_SG_DEGREE`].
     pub degree: usize,
     /// Derivative: 0 smooths, 1 gives the rate.
     pub order: usize,
-    /// Where the polynomial is evaluated: samples before the newest.
+    /// Number of samples before the newest at which the polynomial is evaluated.
     pub delay: usize,
 }
 
 impl SgShape {
-    /// The rate at the newest sample.
+    /// Creates the shape for the rate at the newest sample.
     pub fn rate(window: usize, degree: usize) -> Self {
         Self { window, degree, order: 1, delay: 0 }
     }
 
-    /// The rate in the middle of the window; for a log, or live with that delay.
+    /// Creates the shape for the rate in the middle of the window, for a log or for live use with
+    /// that delay.
     ///
-    /// For an even window it is the sample just after the middle.
+    /// For an even window the rate is evaluated at the sample just after the middle.
     pub fn centred_rate(window: usize, degree: usize) -> Self {
         Self { delay: window.saturating_sub(1) / 2, ..Self::rate(window, degree) }
     }
@@ -51,11 +53,11 @@ impl SgShape {
     }
 }
 
-/// A [`SavitzkyGolay`](crate::SavitzkyGolay) whose shape is chosen at run time,
-/// up to `CAP` samples of window: for programs that take the shape from a user.
+/// A [`SavitzkyGolay`](crate::SavitzkyGolay) whose shape is chosen at run time, with a window of up
+/// to `CAP` samples.
 ///
-/// The same arithmetic, in the same order, as the type with a fixed shape, and
-/// the same bits out. It also works on whole logs: [`SgFilter::over_log`].
+/// It uses the same arithmetic in the same order as the type with a fixed shape, and gives the same
+/// bits. It also works on whole logs: [`SgFilter::over_log`].
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate};
@@ -79,13 +81,13 @@ pub struct SgFilter<T, const CAP: usize = 64> {
 }
 
 impl<T: Real, const CAP: usize> SgFilter<T, CAP> {
-    /// The design for samples that come at `sample_rate`.
+    /// Computes the design for samples at `sample_rate`.
     ///
     /// # Errors
-    /// [`DesignError::TooLarge`] for a window above `CAP` or a degree above
-    /// [`MAX_SG_DEGREE`]; [`DesignError::OutOfRange`], which names the field, for a
-    /// window that does not exceed the degree, an order above the degree, a
-    /// delay outside the window, or a sample rate that no design is computed for.
+    /// [`DesignError::TooLarge`] for a window above `CAP` or a degree above [`MAX_SG_DEGREE`];
+    /// [`DesignError::OutOfRange`], which names the field, for a window that does not exceed the
+    /// degree, an order above the degree, a delay outside the window, or a sample rate outside 1e-9
+    /// ..= 1e9 Hz.
     pub fn new(shape: SgShape, sample_rate: SampleRate) -> Result<Self, DesignError> {
         let shape = shape.checked(CAP)?;
         let sample_rate = sample::checked_rate(sample_rate)?;
@@ -98,44 +100,45 @@ impl<T: Real, const CAP: usize> SgFilter<T, CAP> {
         Ok(Self { taps, shape, sample_rate })
     }
 
-    /// The taps, newest sample first, in 1/s^order.
+    /// Returns the taps, newest sample first, in 1/s^order.
     pub fn taps(&self) -> &[T] {
         &self.taps[..self.shape.window]
     }
 
-    /// The shape.
+    /// Returns the shape.
     pub fn shape(&self) -> SgShape {
         self.shape
     }
 
-    /// Standard deviation out for white noise of standard deviation one in, in 1/s^order.
+    /// Returns the standard deviation of the output for white input noise of standard deviation 1,
+    /// in 1/s^order.
     pub fn noise_gain(&self) -> f64 {
         fir::noise_gain(self.taps())
     }
 
-    /// By how many seconds the live output is late while the signal changes slowly.
+    /// Returns the delay of the live output for slow signals, in seconds.
     pub fn delay_s(&self) -> f64 {
         let period_s = self.sample_rate.period_s();
         let unit: f64 = (0..self.shape.order).map(|_| period_s).product();
         fir::delay_samples(self.taps(), self.shape.order, unit) * period_s
     }
 
-    /// Arithmetic and memory of one live step.
+    /// Returns the arithmetic and memory of one live step.
     pub fn cost(&self) -> Cost {
         Cost::new(self.shape.window, self.shape.window - 1, self.shape.window)
     }
 
     /// Applies the filter to a whole log, aligned: `out[i]` belongs to sample i.
     ///
-    /// Inside the log `out[i]` looks `delay` samples ahead of i. Near the ends,
-    /// where the window does not fit, the polynomial of the first (or last)
-    /// whole window is evaluated off its usual place, as `sgolayfilt` and
-    /// SciPy's `mode="interp"` do: no sample is invented.
+    /// Inside the log `out[i]` uses samples up to i + `delay`. Near the ends, where the window does
+    /// not fit, the polynomial of the first (or last) whole window is evaluated at the other
+    /// samples of that window, as in `sgolayfilt` and SciPy's `mode="interp"`. The log is not
+    /// padded.
     ///
     /// # Errors
-    /// [`FilterError::LengthsDiffer`]; [`FilterError::TooShort`] for a log
-    /// shorter than the window; [`FilterError::NotFinite`] for a sample that is
-    /// not usable. `out` is then unchanged.
+    /// [`FilterError::LengthsDiffer`]; [`FilterError::TooShort`] for a log shorter than the window;
+    /// [`FilterError::NotFinite`] for a sample that is NaN or beyond `LARGEST_SAMPLE`. `out` is
+    /// then unchanged.
     pub fn over_log(&self, log: &[T], out: &mut [T]) -> Result<(), FilterError> {
         let SgShape { window, delay, .. } = self.shape;
         if log.len() != out.len() {
@@ -149,8 +152,8 @@ impl<T: Real, const CAP: usize> SgFilter<T, CAP> {
         }
         let taps = self.taps();
         let before = window - 1 - delay;
-        // Tap by tap over a block of outputs, which runs several outputs at a
-        // time; oldest first, as the live step sums: the same bits.
+        // The loop goes tap by tap over a block of outputs, so that it can be vectorised. The
+        // oldest tap comes first, as in the live step, which gives the same bits.
         let inside = &mut out[before..log.len() - delay];
         for (index, block) in inside.chunks_mut(BLOCK).enumerate() {
             let start = index * BLOCK;

@@ -111,8 +111,8 @@ pub fn sines(highest_hz: f64) -> impl Strategy<Value = Signal> {
         .prop_map(|(offset, parts)| Signal::Sines { offset, parts })
 }
 
-/// Streams of up to `longest` samples in which anything a converter or a link
-/// can deliver occurs: values in -10..10, NaN, infinities, huge and tiny numbers.
+/// Streams of up to `longest` samples with faults as from a converter or a link: mostly values in
+/// -10..10, but also NaN, infinities, huge and tiny numbers.
 pub fn faulty_stream(longest: usize) -> impl Strategy<Value = Vec<f64>> {
     let sample = prop_oneof![
         8 => -10.0..10.0,
@@ -122,7 +122,7 @@ pub fn faulty_stream(longest: usize) -> impl Strategy<Value = Vec<f64>> {
     collection::vec(sample, 0..=longest)
 }
 
-/// Increasing times from zero, steps between a half and one and a half of `period_s`.
+/// Increasing times from zero, with intervals between 0.5 and 1.5 times `period_s`.
 pub fn uneven_times(count: usize, period_s: f64) -> impl Strategy<Value = Vec<f64>> {
     collection::vec(0.5..1.5, count).prop_map(move |steps| {
         let mut time_s = 0.0;

@@ -1,33 +1,34 @@
-//! The steady-state Kalman tracker of a value and its rate.
+//! A steady-state Kalman filter (alpha-beta tracker) for a value and its rate.
 
 use crate::{Cost, sample};
 use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 
-/// What a tracker expects of the signal and of its noise.
+/// Specification of a tracker: the signal's acceleration relative to the noise, and the sample
+/// rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackerSpec {
-    /// lambda = sigma_acceleration T^2 / sigma_measurement, from 1e-6 to 1e6,
-    /// without a unit: how far the signal's acceleration moves it in a sample,
-    /// measured by the noise. Small is smooth and late, large is nervous and fresh.
+    /// lambda = sigma_acceleration T^2 / sigma_measurement, from 1e-6 to 1e6, dimensionless, where
+    /// T is the sample period. It compares the motion due to the acceleration in one sample with
+    /// the noise. A small index gives smooth but delayed estimates, a large index gives fast but
+    /// noisy ones.
     pub tracking_index: f64,
     /// The sample rate of the stream.
     pub sample_rate: SampleRate,
 }
 
-/// Value and rate by an alpha-beta filter with the gains of the steady-state
-/// Kalman filter for a signal whose acceleration is white noise.
+/// An alpha-beta filter for value and rate, with the gains of the steady-state Kalman filter for a
+/// signal whose acceleration is white noise.
 ///
 /// ```text
 /// predicted = value + T rate;   surprise = x - predicted
 /// value = predicted + alpha surprise;   rate = rate + beta/T surprise
 /// ```
 ///
-/// With s = 2 lambda/(lambda + sqrt(lambda^2 + 8 lambda)) the gains are
-/// alpha = s (2 - s) and beta = 2 s^2 (Kalata 1984,
-/// doi:10.1109/TAES.1984.310438, written without cancellation). Unbiased on a
-/// ramp. It starts from its first two samples and gives `None` until what they
-/// left has shrunk to 1 %. A sample that is not usable gives `None` and leaves
-/// the memory as it was; the stream then lacks a sample, so treat it as a gap.
+/// With s = 2 lambda/(lambda + sqrt(lambda^2 + 8 lambda)) the gains are alpha = s (2 - s) and beta
+/// = 2 s^2 (Kalata 1984, doi:10.1109/TAES.1984.310438, rewritten to avoid cancellation). The
+/// estimates are unbiased on a ramp. The filter starts from its first two samples and gives `None`
+/// until their effect has decayed to 1 %. A sample that is NaN or beyond `LARGEST_SAMPLE` gives
+/// `None` and leaves the memory unchanged. The stream then lacks a sample, so treat it as a gap.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate};
@@ -49,7 +50,7 @@ pub struct Tracker<T> {
     warm_up: u32,
 }
 
-/// What a [`Tracker`] knows after a sample.
+/// Output of a [`Tracker`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track<T> {
     /// The value, in the sample's unit.
@@ -58,18 +59,18 @@ pub struct Track<T> {
     pub rate: T,
 }
 
-/// What a [`Tracker`] remembers.
+/// State of a [`Tracker`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackerMemory<T> {
     value: T,
-    /// Change a sample.
+    /// Change per sample.
     change: T,
     seen: u8,
     remaining: u32,
 }
 
 impl<T> TrackerMemory<T> {
-    /// How many further samples give `None` before the tracker has settled.
+    /// Returns the number of further samples that give `None` before the tracker has settled.
     pub fn remaining(&self) -> usize {
         self.remaining as usize
     }
@@ -79,7 +80,7 @@ impl<T: Real> Tracker<T> {
     /// Arithmetic and memory of one step.
     pub const COST: Cost = Cost::new(3, 4, 2);
 
-    /// The tracker that `spec` describes.
+    /// Designs the tracker for `spec`.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] naming `tracking_index` or `sample_rate_hz`.
@@ -98,41 +99,41 @@ impl<T: Real> Tracker<T> {
         })
     }
 
-    /// What the tracker was designed for.
+    /// Returns the specification of the tracker.
     pub fn spec(&self) -> TrackerSpec {
         self.spec
     }
 
-    /// The gain of the value as it runs, that is, rounded to `T`.
+    /// Returns the gain of the value, rounded to `T`.
     pub fn alpha(&self) -> T {
         self.alpha
     }
 
-    /// The gain of the change a sample, likewise.
+    /// Returns the gain of the change per sample, rounded to `T`.
     pub fn beta(&self) -> T {
         self.beta
     }
 
-    /// How many samples give `None` at the start.
+    /// Returns the number of samples that give `None` at the start.
     pub fn warm_up(&self) -> usize {
         self.warm_up as usize
     }
 
-    /// By how many seconds the rate is late while the signal bends slowly:
-    /// T (2 alpha - beta)/(2 beta). The value itself is not late on a ramp.
+    /// Returns the delay of the rate for slowly curving signals, in seconds: T (2 alpha - beta)/(2
+    /// beta). The value has no delay on a ramp.
     pub fn delay_s(&self) -> f64 {
         let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
         (2.0 * alpha - beta) / (2.0 * beta) * self.spec.sample_rate.period_s()
     }
 
-    /// Standard deviation of the rate for white noise of standard deviation one, in 1/s.
+    /// Returns the standard deviation of the rate for white noise of standard deviation 1, in 1/s.
     pub fn noise_gain(&self) -> f64 {
         let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
         let power = 2.0 * beta * beta / (alpha * (4.0 - 2.0 * alpha - beta));
         libm::sqrt(power) * self.spec.sample_rate.hz()
     }
 
-    /// Standard deviation of the value for white noise of standard deviation one.
+    /// Returns the standard deviation of the value for white noise of standard deviation 1.
     pub fn value_noise_gain(&self) -> f64 {
         let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
         let power = 2.0 * alpha * alpha + beta * (2.0 - 3.0 * alpha);
@@ -140,7 +141,7 @@ impl<T: Real> Tracker<T> {
     }
 }
 
-/// The larger magnitude of the roots of z^2 - (2 - alpha - beta) z + 1 - alpha.
+/// Returns the larger magnitude of the roots of z^2 - (2 - alpha - beta) z + 1 - alpha.
 fn pole_radius(alpha: f64, beta: f64) -> f64 {
     let half = (2.0 - alpha - beta) / 2.0;
     let square = half * half - (1.0 - alpha);

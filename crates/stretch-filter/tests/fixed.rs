@@ -1,4 +1,4 @@
-//! The integer filters against exact integer arithmetic and against the float ones.
+//! Tests of the integer filters against exact integer arithmetic and against the float filters.
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::{collection::vec, prelude::*};
@@ -7,7 +7,7 @@ use stretch_filter::{
     BiquadSpec, FixedBiquad, FixedSample, FixedSgRate, IntegerSgRate, LowPassSpec, SgRate,
 };
 
-/// Samples with the extremes that break sums: ends, halves, long constant runs.
+/// Streams with inputs that could overflow sums: extreme values and long constant runs.
 fn stream_16() -> impl Strategy<Value = Vec<u16>> {
     let piece = prop_oneof![
         vec(any::<u16>(), 1..40),
@@ -24,7 +24,7 @@ fn stream_32() -> impl Strategy<Value = Vec<i32>> {
     vec(piece, 1..12).prop_map(|pieces| pieces.concat())
 }
 
-/// The taps that the shape answers single samples with: impulse by impulse.
+/// Returns the taps of a shape, measured as its impulse response.
 fn taps<S: FixedSample + From<u8>, const W: usize, const D: usize, const L: usize>() -> [i128; W] {
     let design = FixedSgRate::<S, W, D, L>::new();
     core::array::from_fn(|lag| {
@@ -37,7 +37,7 @@ fn taps<S: FixedSample + From<u8>, const W: usize, const D: usize, const L: usiz
     })
 }
 
-/// After any stream the sliding sums hold exactly the convolution, in `i128`.
+/// Checks that after every sample the output equals the convolution, computed exactly in `i128`.
 fn is_the_convolution<S, const W: usize, const D: usize, const L: usize>(
     stream: &[S],
     exact: [i128; W],
@@ -60,7 +60,7 @@ where
     Ok(())
 }
 
-/// The taps of the `u16` shape without its shift, from the float design.
+/// Returns the integer taps of a shape, before its shift, computed from the float design.
 fn float_taps<S: FixedSample, const W: usize, const D: usize, const L: usize>() -> [i128; W] {
     let unit = FixedSgRate::<S, W, D, L>::PER_SAMPLE;
     let full = (1i128 << FixedSgRate::<S, W, D, L>::SHIFT) as f64;
@@ -111,7 +111,7 @@ proptest! {
             prop_assert!(a1.abs() >= 1.0 + a2 - 1e-9, "refused {spec:?}");
             return Ok(());
         };
-        // the same recursion in 128 bits, with the coefficients as they run
+        // the same recursion in 128 bits, with the rounded coefficients
         let bits = (16..=30).rev().find(|&bits| {
             let one = 2f64.powi(bits);
             [spec.b0, spec.b1, spec.b2, spec.a1, spec.a2].iter().map(|c| c.abs()).sum::<f64>() * one
@@ -142,8 +142,8 @@ proptest! {
         for step in steps {
             x = (x + step).clamp(-8.0, 8.0);
             let (Some(rate), exact) = (integer.step(x), float.step(x.into())) else { continue };
-            // half a step of 2^-28 at each tap (their magnitudes sum to about one), and
-            // of the output, which holds 16 times the sum; then two roundings of f32
+            // half a step of 2^-28 at each tap (their magnitudes sum to about 1), and of the
+            // output, which is 16 times the sum; then two roundings in f32
             let bound = hz * 16.0 * 2f64.powi(-28) + exact.unwrap().abs() * 2f64.powi(-22);
             assert_abs_diff_eq!(f64::from(rate), exact.unwrap(), epsilon = bound);
         }
@@ -174,11 +174,11 @@ fn a_constant_passes_a_low_pass_unchanged() {
             let exact = design.dc_gain() * f64::from(x);
             let errors: Vec<f64> =
                 (0..4000).map(|_| f64::from(design.step(&mut memory, x)) - exact).collect();
-            // the rest of a shift, below one bit, comes back through (1 - 1/z)/A(z),
-            // whose magnitudes sum to at most 4 for these sections
+            // the remainder of a shift, below one bit, is filtered by (1 - 1/z)/A(z), whose impulse
+            // response has magnitudes that sum to at most 4 for these sections
             assert!(errors.iter().all(|error| error.abs() < 4.0), "{cutoff} Hz, {x}");
             let mean = errors.iter().sum::<f64>() / 4000.0;
-            // a settled memory starts on the nearest integer, half a bit away at most
+            // the steady state starts at the nearest integer, at most half a bit away
             assert!(abs_diff_eq!(mean, 0.0, epsilon = 0.55), "{cutoff} Hz, {x}: {mean}");
         }
     }

@@ -1,4 +1,4 @@
-//! What must hold for every signal.
+//! Property tests that must hold for every signal.
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
@@ -54,7 +54,7 @@ proptest! {
     fn savitzky_golay_is_exact_on_polynomials(
         shape in shape(), coefficients in prop::collection::vec(-10.0..10.0, 6),
     ) {
-        // In units of the window: the same problem at every length.
+        // Time is in units of the window, so that the problem is equally hard for every length.
         let span_s = shape.window as f64 / HZ;
         let signal = Signal::Polynomial(coefficients[..=shape.degree].to_vec());
         let derivative = |u: f64| match (&signal, shape.order) {
@@ -76,7 +76,7 @@ proptest! {
 
         let mut whole = vec![0.0; log.len()];
         filter.over_log(&log, &mut whole).unwrap();
-        // At the ends the fit is evaluated where its taps may be larger.
+        // At the ends the fit is evaluated off centre, where its taps may be larger.
         let end = SgShape { delay: 0, ..shape };
         let end = SgFilter::<f64, 40>::new(end, hundred()).unwrap();
         let end_taps: f64 = end.taps().iter().map(|t| t.abs()).sum();
@@ -101,7 +101,7 @@ proptest! {
     fn the_delay_is_that_of_a_bending_signal(estimator in live_estimator(), bend in 0.1..5.0_f64) {
         let design = RateFilter::<f64>::new(estimator, hundred()).unwrap();
         let mut runner = Runner::new(design);
-        // x = bend t^2 / 2, so that the rate is bend t: late by d, it reads bend (t - d).
+        // x = bend t^2 / 2, so the rate is bend t. An estimate with a delay d gives bend (t - d).
         let settled = 4 * design.warm_up() + 50;
         let mut last = None;
         for n in 0..=settled {
@@ -189,7 +189,7 @@ proptest! {
             Runner::new(spec(5.0).design::<f64, 4>().unwrap()),
             Runner::new(spec(5.0).design::<f32, 4>().unwrap()),
         );
-        // Rounding of the samples is amplified by the taps whatever the rate is.
+        // The taps amplify the rounding of the samples, independent of the rate.
         let scale = largest(&x) * 50.0;
         for &x in &x {
             if let (Some(a), Some(b)) = (sg.step(x), sg32.step(x as f32)) {
@@ -208,7 +208,7 @@ proptest! {
         let biquad = low_pass.sections()[1];
         let mut memories =
             (low_pass.settled_at(x), smooth.settled_at(x), rate.settled_at(x), biquad.settled_at(x));
-        // A design forgets at the pole's pace: rounding may add up over 1/cutoff.
+        // Errors decay at the rate of the slowest pole, so rounding may accumulate over 1/cutoff.
         let bound = tolerance::RECURSIVE_OUTPUT * x.abs().max(1.0);
         for _ in 0..200 {
             assert_abs_diff_eq!(low_pass.step(&mut memories.0, x), x, epsilon = bound);
@@ -248,7 +248,7 @@ proptest! {
     }
 }
 
-/// Amplitude of the response to a sine, by projection on a whole number of periods.
+/// Returns the amplitude of the response to a sine, by projection over a whole number of periods.
 fn measured_gain<const N: usize>(filter: &LowPass<f64, N>, frequency_hz: f64) -> f64 {
     let mut memory = filter.settled_at(0.0);
     let w = std::f64::consts::TAU * frequency_hz / HZ;
@@ -286,7 +286,7 @@ fn the_gain_at_the_cutoff_is_minus_3_db() {
     cutoff_is_minus_3_db::<8>();
 }
 
-/// White noise of standard deviation one: sums of twelve uniform numbers.
+/// Returns white noise of standard deviation 1, as sums of twelve uniform numbers.
 fn noise(count: usize) -> Vec<f64> {
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     let mut uniform = move || {

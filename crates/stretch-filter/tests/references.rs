@@ -1,4 +1,4 @@
-//! Values from exact arithmetic and from SciPy (`reference/filter/generate.py`).
+//! Tests against values from exact arithmetic and from SciPy (`reference/filter/generate.py`).
 
 use approx::abs_diff_eq;
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ fn hundred() -> SampleRate {
     SampleRate::new(100.0).unwrap()
 }
 
-/// Row numbers in which the named columns have these values.
+/// Returns the row numbers in which the named columns have these values.
 fn rows(table: &Columns, key: &[(&str, f64)]) -> Vec<usize> {
     let count = table.values().next().unwrap().len();
     (0..count).filter(|&i| key.iter().all(|(name, v)| table[*name][i] == *v)).collect()
@@ -49,7 +49,7 @@ fn taps_equal_exact_arithmetic() {
         let ours = SgFilter::<f64, 64>::new(shape, hundred()).unwrap();
         let range = start..start + window;
         assert_close(ours.taps(), &table["exact"][range.clone()], tolerance::TAPS);
-        // SciPy's taps lose what the condition of its Vandermonde system costs.
+        // SciPy's taps lose accuracy with the condition number of its Vandermonde system.
         let lost = f64::EPSILON * table["condition"][start];
         assert_close(&table["scipy"][range], ours.taps(), tolerance::TAPS + lost);
     }
@@ -94,7 +94,7 @@ fn live_rates_equal_scipy() {
     live::<31, 3, 0>();
 }
 
-/// Response at `frequency_hz` from the sections' coefficients.
+/// Returns the complex response at `frequency_hz`, computed from the sections' coefficients.
 fn response<const N: usize>(filter: &LowPass<f64, N>, frequency_hz: f64) -> (f64, f64) {
     let w = std::f64::consts::TAU * frequency_hz / filter.spec().sample_rate.hz();
     let at = |c0: f64, c1: f64, c2: f64| {

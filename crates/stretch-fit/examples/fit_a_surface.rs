@@ -1,17 +1,16 @@
-//! Fits the paper's surface to noisy samples, with bounds, and asks which
-//! order satisfies the acceptance criterion: `cargo run --release -p stretch-fit --example fit_a_surface`.
+//! Fits the surface of the published method ("the paper") to noisy samples, prints confidence bounds, and finds the
+//! lowest order that satisfies the acceptance criterion: `cargo run --release -p stretch-fit --example fit_a_surface`.
 
 use stretch_core::{Degree, Poly13};
 use stretch_fit::{Factor, FitError, OrderTable, Sample, SurfaceAccumulator};
 
-/// The paper's inflation surface; rate and volts normalised.
+/// The paper's inflation surface, over normalised rate and volts.
 const TRUTH: Poly13 =
     Poly13 { p00: 0.058, p10: 0.001, p01: 0.774, p11: -0.121, p02: 2.30, p12: 0.094, p03: -2.26 };
 const NOISE: f64 = 0.01;
 
-/// One trial of 1000 samples, seeded by its number, folded into a triangle.
-/// Accumulating poly24 lets the table judge every neighbour of poly13 from
-/// this one pass.
+/// Generates a trial of 1000 samples, seeded by its number, and returns its triangular factor. It accumulates poly24,
+/// so that the order table can compare all neighbours of poly13 after this one pass.
 fn trial(number: u64) -> Result<Factor<f64>, FitError> {
     let mut state = number;
     let mut uniform = || {

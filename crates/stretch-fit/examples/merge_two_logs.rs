@@ -1,15 +1,15 @@
-//! Two halves of a log, fitted apart and merged, equal one pass:
-//! `cargo run -p stretch-fit --example merge_two_logs`.
+//! Accumulates two parts of a log separately, merges them, and compares the fit with that of one
+//! pass: `cargo run -p stretch-fit --example merge_two_logs`.
 //!
-//! The halves could come from two days, two threads or two boards; what is
-//! kept of each is one triangle of a few hundred bytes.
+//! The parts could come from two days, two threads or two microcontrollers. For each part only a
+//! triangular matrix of a few hundred bytes is kept.
 
 use stretch_core::Degree;
 use stretch_fit::{FitError, Sample, SurfaceAccumulator};
 
 type Log = SurfaceAccumulator<f64, { Degree::POLY13.terms() }>;
 
-/// Sample `k` of a log; its value is a strain.
+/// Returns sample `k` of a log, whose value is a strain.
 fn sample(k: u32) -> Sample<f64> {
     let (rate, volts) = ((f64::from(k) * 0.05).cos(), 0.5 + 0.5 * (f64::from(k) * 0.0519).sin());
     let noise = 0.004 * (f64::from(k * k % 17) / 8.0 - 1.0);

@@ -1,4 +1,4 @@
-//! Takes samples one by one and keeps only their triangular factor.
+//! Accumulation of samples into a triangular factor.
 
 use stretch_core::{Degree, MAX_TERMS, Real};
 
@@ -7,22 +7,19 @@ use crate::{
     basis::{Basis, entry_exponent, power_of_two},
 };
 
-/// Least squares of a polynomial surface over a stream of samples.
+/// Least-squares accumulator of a polynomial surface for a stream of samples.
 ///
-/// Samples collect in a block of `ROWS`; a full block is folded into the
-/// triangular [`Factor`] by Householder reflections. Memory is
-/// `TERMS^2 + (TERMS + 4) ROWS` numbers whatever the length of the log.
+/// Samples collect in a block of `ROWS`. A full block is folded into the triangular [`Factor`] by Householder
+/// reflections. Memory is `TERMS^2 + (TERMS + 4) ROWS` numbers for a log of any length.
 ///
-/// - `TERMS`: room for terms, enough for any degree unless memory is scarce:
-///   `{ Degree::POLY13.terms() }` then.
-/// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a
-///   board. It changes speed and memory, and results only by rounding, which
-///   grows with the number of blocks: below 8 rows, logs of more than 1e5
-///   samples lose a digit or two and dependent terms may go unseen.
+/// - `TERMS`: largest number of terms. The default is enough for any degree. If memory is scarce, use the number of
+///   the degree, such as `{ Degree::POLY13.terms() }`.
+/// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a microcontroller. It affects speed and
+///   memory. It affects results only by rounding, which grows with the number of blocks: below 8 rows, logs of more
+///   than 1e5 samples lose a digit or two, and dependent terms may not be detected.
 ///
-/// Rate, voltage and value carry whatever units the caller's normalisation
-/// gives them. In `f32` keep them near 1: powers of large or tiny numbers
-/// leave its range, which is refused.
+/// Rate, voltage and value may have any units. In `f32` keep them near 1. Large samples, whose powers would overflow,
+/// are refused. Powers of tiny numbers underflow, and the fit is refused.
 ///
 /// ```
 /// use stretch_core::Degree;
@@ -54,10 +51,10 @@ pub struct SurfaceAccumulator<T, const TERMS: usize = MAX_TERMS, const ROWS: usi
 impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS, ROWS> {
     const SHAPE: () = assert!(ROWS > 0 && TERMS > 0, "a block needs a row and a term");
 
-    /// An accumulator that has seen no sample, for a surface of `degree`.
+    /// Creates an accumulator without samples, for a surface of `degree`.
     ///
     /// # Errors
-    /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms.
+    /// [`FitError::TooManyTerms`] if the degree has more than `TERMS` terms.
     pub fn new(degree: Degree) -> Result<Self, FitError> {
         let () = Self::SHAPE;
         let basis = Basis::new(degree)?;
@@ -89,9 +86,8 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         }
     }
 
-    /// Adds a sample whose squared residual counts `weight` times. A sample of
-    /// weight zero is not counted. Weights do not change the degrees of
-    /// freedom, which are samples less terms.
+    /// Adds a sample whose squared residual is multiplied by `weight`. A sample of weight zero is ignored. Weights do
+    /// not change the degrees of freedom, which are samples minus terms.
     ///
     /// # Errors
     /// As for [`push`](Self::push); also for a weight below zero, or so large
@@ -105,7 +101,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         let power = (0..self.factor.degree().total()).fold(T::one(), |power, _| power * largest);
         let most = self.most_value / power.max(value.abs());
         let root_weight = weight.sqrt();
-        // A NaN weight, or the root of one below zero, fails this too.
+        // This also refuses NaN weights and negative weights, whose root is NaN.
         if !within(root_weight, most) {
             let most = most.as_f64() * most.as_f64();
             return Err(FitError::OutOfRange { field: "weight", value: weight.as_f64(), most });
@@ -149,7 +145,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         FitError::OutOfRange { field: "value", value: value.as_f64(), most }
     }
 
-    /// Adds many samples, up to the first refused one.
+    /// Adds samples up to the first one that is refused.
     ///
     /// # Errors
     /// As for [`push`](Self::push).
@@ -157,11 +153,11 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         samples.into_iter().try_for_each(|sample| self.push(sample))
     }
 
-    /// Adds many samples that are given as columns, as many as the shortest has: all of them, or none. The same as pushing each, bit
-    /// for bit, in less time.
+    /// Adds samples that are given as columns, up to the length of the shortest column. If a sample is refused, none is
+    /// added. The result has the same bits as with [`push`](Self::push), but this is faster.
     ///
     /// # Errors
-    /// As for [`push`](Self::push), of the first sample that is refused.
+    /// As for [`push`](Self::push), for the first sample that is refused.
     ///
     /// ```
     /// use stretch_core::Degree;
@@ -178,7 +174,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         let rows = rates.iter().zip(volts).zip(values);
         let samples =
             || rows.clone().map(|((&rate, &volts), &value)| Sample { rate, volts, value });
-        // without a way out of the loop it is done side by side
+        // a fold without early exit, so that the compiler vectorises it
         if !samples().fold(true, |sound, sample| sound & self.takes(sample)) {
             let refused = samples().find(|&sample| !self.takes(sample));
             return refused.map_or(Ok(()), |sample| Err(self.refusal(sample)));
@@ -199,7 +195,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         Ok(())
     }
 
-    /// Folds what the block holds; rows not yet filled weigh nothing.
+    /// Folds the samples in the block into the factor. Unfilled rows get weight zero.
     #[inline(never)]
     fn fold(&mut self) {
         for row in self.filled..ROWS {
@@ -217,31 +213,31 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         self.filled = 0;
     }
 
-    /// Samples so far, without those of weight zero.
+    /// Returns the number of samples so far, without those of weight zero.
     pub fn samples(&self) -> u64 {
         self.factor.samples().saturating_add(self.filled as u64)
     }
 
-    /// The degree that the samples are accumulated for.
+    /// Returns the degree of the accumulated surface.
     pub fn degree(&self) -> Degree {
         self.factor.degree()
     }
 
-    /// Adds all samples of another accumulator, as if they had been pushed
-    /// here: equal to one pass up to rounding, in any order.
+    /// Adds all samples of another accumulator. The result equals one pass over all samples, up to rounding, in any
+    /// order of merging.
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when the degrees differ.
+    /// [`FitError::MissingTerm`] if the degrees differ.
     pub fn merge(&mut self, other: &Self) -> Result<(), FitError> {
         self.fold();
         self.factor.merge(&other.factor())
     }
 
-    /// Goes on with the samples of another factor, and gives that of all samples so far: one
-    /// block serves many logs, of which each keeps its factor alone.
+    /// Replaces the factor by another one, and returns the factor of all samples so far. One block can thus serve many
+    /// logs, for each of which only the factor is kept.
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.
+    /// [`FitError::MissingTerm`] if the degrees differ; nothing changes then.
     ///
     /// ```
     /// use stretch_core::Degree;
@@ -263,8 +259,8 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         Ok(core::mem::replace(&mut self.factor, other))
     }
 
-    /// The triangular factor of all samples so far: what merges, what gives
-    /// fits of this and lower degrees, and all there is to keep of a log.
+    /// Returns the triangular factor of all samples so far. It can be merged, gives fits of this and lower degrees, and
+    /// contains all that is needed of a log.
     pub fn factor(&self) -> Factor<T, TERMS> {
         if self.filled == 0 {
             return self.factor;
@@ -274,7 +270,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         copy.factor
     }
 
-    /// The least-squares surface of the accumulated degree.
+    /// Fits the least-squares surface of the accumulated degree.
     ///
     /// # Errors
     /// [`FitError::TooFewSamples`], [`FitError::RankDeficient`] with the first
@@ -284,7 +280,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     }
 }
 
-/// Whether a number's size is at most `most`; false for one that is not finite.
+/// Returns whether the magnitude of a number is at most `most`; false for NaN and infinity.
 #[inline(always)]
 fn within<T: Real>(x: T, most: T) -> bool {
     x.abs() <= most

@@ -1,10 +1,11 @@
-//! The terms of a degree as columns and rows of the design matrix.
+//! Columns and rows of the design matrix for the terms of a degree.
 
 use stretch_core::{Degree, Real};
 
 use crate::FitError;
 
-/// The powers of each term in an array, which is walked faster than they are found.
+/// Returns the powers of each term as an array, because iterating over an array is faster than
+/// computing the powers.
 pub(crate) fn exponents<const TERMS: usize>(degree: Degree) -> [(u8, u8); TERMS] {
     let mut terms = [(0, 0); TERMS];
     for (place, term) in terms.iter_mut().zip(degree.exponents()) {
@@ -13,16 +14,17 @@ pub(crate) fn exponents<const TERMS: usize>(degree: Degree) -> [(u8, u8); TERMS]
     terms
 }
 
-/// The place of a term in the order of `Degree::exponents`.
+/// Returns the index of a term in the order of `Degree::exponents`.
 pub(crate) fn position(degree: Degree, term: (u8, u8)) -> Option<usize> {
     degree.exponents().position(|t| t == term)
 }
 
-/// The recipe that builds every column from an earlier one.
+/// A table that gives, for every column, the earlier column and the factor of which it is the
+/// product.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Basis<const TERMS: usize> {
     degree: Degree,
-    /// `(index of the earlier term, times the voltage)`; the first is unused.
+    /// `(index of the earlier term, whether the factor is the voltage)`; the first entry is unused.
     steps: [(u8, bool); TERMS],
 }
 
@@ -53,8 +55,8 @@ impl<const TERMS: usize> Basis<TERMS> {
         self.degree.terms().min(TERMS)
     }
 
-    /// Columns for many samples; the constant term's is `one` (the square
-    /// roots of the weights).
+    /// Writes the columns for many samples to `block`. The column of the constant term is `one`
+    /// (the square roots of the weights).
     #[inline(always)]
     pub(crate) fn columns<T: Real, const ROWS: usize>(
         &self,
@@ -78,7 +80,7 @@ impl<const TERMS: usize> Basis<TERMS> {
         }
     }
 
-    /// The row of one sample, in the first `terms` places.
+    /// Returns the row of one sample, in the first `terms` places.
     pub(crate) fn row<T: Real>(&self, rate: T, volts: T) -> [T; TERMS] {
         let mut row = [T::zero(); TERMS];
         if TERMS > 0 {
@@ -91,22 +93,23 @@ impl<const TERMS: usize> Basis<TERMS> {
         row
     }
 
-    /// The largest rate or voltage whose powers cannot overflow when squared
-    /// and summed: a power of two.
+    /// Returns the largest allowed rate or voltage, a power of two. Up to it, sums of squared
+    /// powers cannot overflow.
     pub(crate) fn most<T: Real>(&self) -> T {
         let exponent = entry_exponent::<T>() / i32::from(self.degree.total().max(1));
         power_of_two(exponent)
     }
 }
 
-/// Entries of a row up to two to this power keep sums of squares finite for
-/// ten million rows (`f32`) or any number (`f64`), centred or not.
+/// Returns the exponent of the largest allowed entry of a row, as a power of 2. Up to it, sums of
+/// squares stay finite for ten million rows (`f32`) or any number of rows (`f64`), with or without
+/// centring.
 pub(crate) fn entry_exponent<T: Real>() -> i32 {
-    // f32: 2^128 overflows, f64: 2^1024.
+    // f32 overflows at 2^128, f64 at 2^1024.
     if T::max_value().as_f64() < 1e100 { 45 } else { 480 }
 }
 
-/// `2^n`, exactly.
+/// Returns `2^n`, exactly.
 pub(crate) fn power_of_two<T: Real>(n: i32) -> T {
     let mut x = T::one();
     let two = T::one() + T::one();

@@ -1,4 +1,4 @@
-//! Bounds at a confidence level.
+//! Confidence bounds of a fit.
 
 use stretch_core::{MAX_TERMS, Real};
 use stretch_metrics::student_t::critical;
@@ -10,19 +10,19 @@ use crate::{Fit, FitError, quantile::fisher};
 pub struct Bounds<T> {
     /// Lower bound.
     pub lower: T,
-    /// What was estimated, midway.
+    /// Estimate, in the middle of the bounds.
     pub estimate: T,
     /// Upper bound.
     pub upper: T,
 }
 
-/// Bounds of a fit at one confidence level, as MATLAB's `confint` and
-/// `predint` give them, for errors that are normal, independent and of one
-/// variance. Samples of a log are seldom independent: true bounds are then
-/// wider, and [`cross_validate`](crate::cross_validate) is the honest check.
+/// Bounds of a fit at one confidence level, as in MATLAB's `confint` and `predint`. They assume
+/// errors that are normal, independent and of equal variance. Samples of a log are seldom
+/// independent. True bounds are then wider, and [`cross_validate`](crate::cross_validate) is the
+/// better check.
 ///
-/// With `t` the two-sided quantile of Student's t for `n - p` degrees of
-/// freedom, `s` the fit's sigma and `h` the leverage of a point:
+/// With `t` the two-sided quantile of Student's t for `n - p` degrees of freedom, `se` the standard
+/// error of a coefficient, `s` the fit's sigma and `h` the leverage of a point:
 ///
 /// | bounds of | half width |
 /// | --- | --- |
@@ -60,12 +60,11 @@ pub struct Confidence<'a, T, const TERMS: usize = MAX_TERMS> {
 }
 
 impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
-    /// Bounds at a level such as 0.95: of coefficients, of the surface, of new
-    /// observations.
+    /// Returns the bounds of coefficients, surface and new observations at a level such as 0.95.
     ///
     /// # Errors
     /// [`FitError::Level`] unless the level is above 0 and below 1,
-    /// [`FitError::TooFewSamples`] when no degree of freedom is left.
+    /// [`FitError::TooFewSamples`] if no degree of freedom is left.
     pub fn confidence(&self, level: f64) -> Result<Confidence<'_, T, TERMS>, FitError> {
         Confidence::new(self, level)
     }
@@ -86,7 +85,7 @@ impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
         Ok(Self { fit, level, t, sigma })
     }
 
-    /// Bounds of a coefficient by its place in the order of
+    /// Returns the bounds of a coefficient by its index in the order of
     /// `Degree::exponents`; `None` beyond the last.
     pub fn coefficient(&self, place: usize) -> Option<Bounds<T>> {
         let estimate = *self.fit.coefficients().get(place)?;
@@ -94,24 +93,24 @@ impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
         Some(around(estimate, self.t * standard_error))
     }
 
-    /// Bounds of the surface at one point (MATLAB's `functional`, `off`).
+    /// Returns the bounds of the surface at one point (MATLAB's `functional`, `off`).
     pub fn surface(&self, rate: T, volts: T) -> Bounds<T> {
         self.at(rate, volts, self.t, T::zero())
     }
 
-    /// Bounds of one new observation at a point (`observation`, `off`).
+    /// Returns the bounds of one new observation at a point (MATLAB's `observation`, `off`).
     pub fn observation(&self, rate: T, volts: T) -> Bounds<T> {
         self.at(rate, volts, self.t, T::one())
     }
 
-    /// Bounds that hold for the surface at all points at once (`functional`,
-    /// `on`). Finds a quantile of F at every call.
+    /// Returns bounds that hold for the surface at all points at once (MATLAB's `functional`,
+    /// `on`). Every call computes a quantile of F.
     pub fn surface_everywhere(&self, rate: T, volts: T) -> Bounds<T> {
         self.at(rate, volts, self.scheffe(), T::zero())
     }
 
-    /// Bounds that hold for observations at all points at once
-    /// (`observation`, `on`). Finds a quantile of F at every call.
+    /// Returns bounds that hold for observations at all points at once (MATLAB's `observation`,
+    /// `on`). Every call computes a quantile of F.
     pub fn observation_everywhere(&self, rate: T, volts: T) -> Bounds<T> {
         self.at(rate, volts, self.scheffe(), T::one())
     }

@@ -1,4 +1,4 @@
-//! Leave one trial out, without a second look at its samples.
+//! Leave-one-trial-out cross-validation from triangular factors, without reading the samples again.
 
 use core::ops::Range;
 
@@ -6,22 +6,22 @@ use stretch_core::{Degree, Real};
 
 use crate::{Factor, FitError};
 
-/// How a surface fitted on all other trials does on one that it has not seen.
+/// The errors on one trial of the surface that was fitted on all other trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOut<T> {
-    /// The trial's place in the slice that was given.
+    /// Index of the trial in the slice.
     pub trial: usize,
     /// Samples in the trial.
     pub samples: u64,
-    /// The trial's weighted sum of squared prediction errors.
+    /// Weighted sum of the squared prediction errors on the trial.
     pub sse: T,
-    /// The sum of the trial's weights (its samples, when none were given).
+    /// Sum of the trial's weights (its number of samples if no weights were given).
     pub weight: T,
 }
 
 impl<T: Real> HeldOut<T> {
-    /// The root mean square error on the trial, in units of the value. No
-    /// degrees of freedom are taken off: nothing was fitted on this trial.
+    /// Returns the root mean square error on the trial, in units of the value. No degrees of freedom are subtracted,
+    /// because nothing was fitted on this trial.
     pub fn rmse(&self) -> T {
         self.mean_square().sqrt()
     }
@@ -31,21 +31,19 @@ impl<T: Real> HeldOut<T> {
     }
 }
 
-/// Fits each trial's surface on all the others and asks it about that trial.
+/// Evaluates, on each trial, the surface that is fitted on all other trials, and calls `visit` with the result.
 ///
-/// A trial enters as its [`Factor`]; the others' factors are merged, and the
-/// error on the one left out follows from its own factor as
-/// `|R c - q|^2 + rest`, so no sample is read again. `k` trials cost
-/// `k log k` merges. Samples within a trial are neighbours in time and resemble each
-/// other; leaving out samples would flatter, leaving out trials does not.
+/// Each trial is given by its [`Factor`]. The factors of the other trials are merged. The error on the trial left out
+/// follows from its factor as `|R c - q|^2` plus its residual sum of squares, so no sample is read again. `k` trials
+/// take `k log k` merges. Whole trials are left out because neighbouring samples of a trial are correlated, so leaving
+/// out single samples would give errors that are too small.
 ///
-/// `degree` may be any degree within the accumulated one. Trials without a
-/// sample are passed over.
+/// `degree` may be any degree within the accumulated one. Trials without samples are skipped.
 ///
 /// # Errors
-/// [`FitError::MissingTerm`] when factors differ in degree. Each item:
-/// [`FitError::MissingTerm`] when `degree` is not within it, and as for [`Factor::fit`] when the others cannot
-/// determine the surface (there must be at least two trials).
+/// [`FitError::MissingTerm`] if the factors differ in degree. For a single trial: [`FitError::MissingTerm`] if `degree`
+/// is not within the accumulated degree, and as for [`Factor::fit`] if the other trials cannot determine the surface
+/// (there must be at least two trials).
 pub fn held_out<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     degree: Degree,
@@ -54,7 +52,7 @@ pub fn held_out<T: Real, const TERMS: usize>(
     leave_out(trials, &mut |trial, others| visit(judge(trials, trial, others, degree)))
 }
 
-/// The error on one trial of the surface that the others determine.
+/// Returns the error on one trial of the surface that is fitted on the others.
 pub(crate) fn judge<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     trial: usize,
@@ -79,9 +77,10 @@ pub(crate) fn leave_out<T: Real, const TERMS: usize>(
     leave_out_within(trials, 0..trials.len(), &first.without_samples(), visit)
 }
 
-/// Does so for the trials of a range, outside of which the trials are merged already.
+/// Does the same as `leave_out` for the trials of a range. `outside` is the merged factor of all trials outside it.
 ///
-/// Each half is merged into what the other half lacks: no list of prefixes and suffixes is needed, for which there is no allocator here.
+/// It recurses into each half of the range after merging the other half into `outside`. Without an allocator there is
+/// no room for lists of merged prefixes and suffixes.
 fn leave_out_within<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     Range { start, end }: Range<usize>,
@@ -106,17 +105,17 @@ fn leave_out_within<T: Real, const TERMS: usize>(
 /// The errors of [`held_out`] pooled over all trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CrossValidation<T> {
-    /// Trials that were left out in turn.
+    /// Number of trials that were left out in turn.
     pub trials: usize,
-    /// Samples in them.
+    /// Number of samples in these trials.
     pub samples: u64,
-    /// Root of the mean squared error over all samples of all trials.
+    /// Square root of the mean squared error over all samples of all trials.
     pub rmse: T,
     /// The trial with the largest error.
     pub worst: HeldOut<T>,
 }
 
-/// Leave-one-trial-out cross-validation, pooled. For the single trials use
+/// Performs leave-one-trial-out cross-validation and pools the errors. For the errors of single trials use
 /// [`held_out`].
 ///
 /// ```
@@ -151,7 +150,7 @@ pub fn cross_validate<T: Real, const TERMS: usize>(
 
 /// The errors on the trials that have been left out so far.
 pub(crate) struct Pooled<T> {
-    /// The sums of squared errors and weights, and the worst trial; or the first failure.
+    /// Sums over the trials and the worst trial, or the first error.
     sums: Result<Option<Sums<T>>, FitError>,
 }
 

@@ -1,45 +1,46 @@
-//! Why a fit was refused.
+//! The error of fits.
 
 use core::fmt;
 
-/// Why samples or a fit were refused. Small, `Copy`, and carries the evidence.
+/// The reason why a sample or a fit was refused, with the offending values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum FitError {
     /// A sample that is NaN, infinite, or so large that its powers would
     /// overflow the number type. It was not added.
     OutOfRange {
-        /// Which of `rate`, `volts`, `value` or `weight`.
+        /// Name of the number: `rate`, `volts`, `value` or `weight`.
         field: &'static str,
         /// The number that was given.
         value: f64,
-        /// The largest magnitude that is taken.
+        /// The largest allowed magnitude.
         most: f64,
     },
     /// Fewer samples than the result needs.
     TooFewSamples {
-        /// How many are needed.
+        /// Number of samples needed.
         needed: u64,
-        /// How many were given.
+        /// Number of samples given.
         got: u64,
     },
-    /// The data cannot tell this term from those before it in the order of
-    /// `Degree::exponents` (a rate that never changes cannot determine p10),
-    /// or only if the voltage is counted from within the samples.
+    /// The data cannot determine this term, because it depends linearly on the terms before it in
+    /// the order of `Degree::exponents`. For example, a constant rate cannot determine p10. In some
+    /// cases the fit succeeds if the voltage is measured from an origin within the samples
+    /// (`Factor::counted_from`).
     RankDeficient {
         /// Power of the rate in the term.
         rate_power: u8,
         /// Power of the voltage in the term.
         volts_power: u8,
     },
-    /// The degree has more terms than the type has room for.
+    /// The degree has more terms than the type can hold.
     TooManyTerms {
         /// Terms of the degree.
         terms: usize,
-        /// Room for terms.
+        /// Largest number of terms of the type.
         room: usize,
     },
-    /// The degree asks for a term that the accumulated one lacks.
+    /// The requested degree has a term that the accumulated degree lacks.
     MissingTerm {
         /// Power of the rate in the term.
         rate_power: u8,
@@ -51,18 +52,18 @@ pub enum FitError {
         /// The level that was given.
         level: f64,
     },
-    /// The memory that the caller lent is too short.
+    /// The buffer given by the caller is too short.
     ShortMemory {
-        /// Numbers needed.
+        /// Needed length.
         needed: u64,
-        /// Numbers lent.
+        /// Given length.
         got: u64,
     },
     /// The result is not finite: the samples span too many powers of ten.
     NotFinite,
 }
 
-/// A term's name as MATLAB writes it, and as a product.
+/// Writes the name of a term as in MATLAB, and the term as a product.
 pub(crate) fn write_term(f: &mut fmt::Formatter<'_>, i: u8, j: u8) -> fmt::Result {
     write!(f, "p{i}{j}")?;
     match (i, j) {

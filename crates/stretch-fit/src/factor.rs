@@ -1,6 +1,6 @@
-//! What is kept of the samples: one triangle.
+//! The triangular factor of the samples, from which fits are computed.
 
-// Triangles are walked by index, as in the textbooks.
+// Loops over triangles use indices, as in textbooks.
 #![allow(clippy::needless_range_loop)]
 
 use stretch_core::{Degree, MAX_TERMS, Real, Surface};
@@ -12,54 +12,53 @@ use crate::{
     shift::{apply, product, shift},
 };
 
-/// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and
-/// the residual sum of squares: everything that least squares needs to know of
-/// the samples, in `TERMS^2` numbers.
+/// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and the residual sum of squares. These are
+/// all that least squares needs of the samples, in about `TERMS^2` numbers.
 ///
-/// Factors [`merge`](Self::merge), and one of a high degree answers for every
-/// degree within it ([`fit_degree`](Self::fit_degree)), so a log is read once.
-/// Get one from [`SurfaceAccumulator::factor`](crate::SurfaceAccumulator::factor).
+/// Factors can be merged ([`merge`](Self::merge)). A factor of a high degree gives the fits of every degree within it
+/// ([`fit_degree`](Self::fit_degree)), so a log is read only once.
+/// [`SurfaceAccumulator::factor`](crate::SurfaceAccumulator::factor) returns the factor of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factor<T, const TERMS: usize = MAX_TERMS> {
     basis: Basis<TERMS>,
-    /// Terms are powers of `volts - centre`; the first sample's voltage.
+    /// The first sample's voltage. Terms are powers of `volts - centre`.
     centre: T,
     r: [[T; TERMS]; TERMS],
     q: [T; TERMS],
-    /// Residual sum of squares, and what its last addition rounded off.
+    /// Residual sum of squares, and the rounding error of its last addition.
     residual: (T, T),
     samples: u64,
-    /// Blocks and triangles folded in: each adds its rounding.
+    /// Number of blocks and triangles folded in, each of which adds rounding errors.
     folds: u64,
 }
 
-/// The numbers of a [`Factor`], to be stored or sent; [`Factor::new`] checks them.
+/// The unchecked numbers of a [`Factor`], for storage or transmission. [`Factor::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FactorSpec<T, const TERMS: usize = MAX_TERMS> {
     /// The degree that the samples were accumulated for.
     pub degree: Degree,
-    /// The voltage that powers are taken about.
+    /// The voltage that is subtracted before powers are taken.
     pub centre: T,
-    /// The triangle, by row; nothing is read below its diagonal or beyond the degree's terms.
+    /// The triangle, by row. Entries below the diagonal or beyond the terms of the degree are ignored.
     pub r: [[T; TERMS]; TERMS],
-    /// `Q^T z`, a number a term.
+    /// `Q^T z`, one number per term.
     pub q: [T; TERMS],
     /// Residual sum of squares.
     pub residual: T,
-    /// What the last addition to the residual rounded off.
+    /// Rounding error of the last addition to the residual.
     pub residual_rounding: T,
-    /// Samples of a weight above zero.
+    /// Number of samples with a weight above zero.
     pub samples: u64,
-    /// Blocks and triangles folded in.
+    /// Number of blocks and triangles folded in.
     pub folds: u64,
 }
 
 impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
-    /// A factor from its numbers, as [`spec`](Self::spec) gave them, bit for bit.
+    /// Creates a factor from the numbers that [`spec`](Self::spec) returned, bit for bit.
     ///
     /// # Errors
-    /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms,
-    /// [`FitError::NotFinite`] for a number that is not finite.
+    /// [`FitError::TooManyTerms`] if the degree has more than `TERMS` terms, [`FitError::NotFinite`] for a number that
+    /// is not finite.
     ///
     /// ```
     /// use stretch_core::Degree;
@@ -92,7 +91,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         if sound { Ok(factor) } else { Err(FitError::NotFinite) }
     }
 
-    /// The numbers of which it consists.
+    /// Returns the numbers of the factor.
     pub fn spec(&self) -> FactorSpec<T, TERMS> {
         FactorSpec {
             degree: self.degree(),
@@ -106,10 +105,10 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         }
     }
 
-    /// The same samples with voltages counted from `origin`: what was `volts` is `volts - origin`.
+    /// Returns the factor of the same samples with `volts - origin` in place of `volts`.
     ///
-    /// Coefficients of raw volts that vary little cancel; those about an origin within the samples
-    /// do not, and no digit is lost on the way.
+    /// If raw volts vary little, the terms of a surface over raw volts nearly cancel. With an origin within the samples
+    /// they do not, and the conversion itself loses no digits.
     #[must_use]
     pub fn counted_from(self, origin: T) -> Self {
         Self { centre: self.centre - origin, ..self }
@@ -127,7 +126,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         }
     }
 
-    /// A factor of the same degree without a sample.
+    /// Returns a factor of the same degree without samples.
     pub(crate) fn without_samples(&self) -> Self {
         Self::empty(self.basis)
     }
@@ -137,18 +136,18 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         self.basis.degree()
     }
 
-    /// How many samples of a weight above zero went in.
+    /// Returns the number of samples with a weight above zero.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// The sum of all weights: the sample count when none was given.
+    /// Returns the sum of all weights, or the number of samples if no weights were given.
     pub fn weight(&self) -> T {
         self.r[0][0] * self.r[0][0]
     }
 
-    /// Adds to the residual sum of squares (Kahan summation: a long log adds
-    /// many small blocks to a large sum).
+    /// Adds to the residual sum of squares by Kahan summation, because a long log adds many small blocks to a large
+    /// sum.
     fn add_residual(&mut self, squares: T) {
         let (sum, lost) = self.residual;
         let exact = squares - lost;
@@ -179,11 +178,11 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         self.folds = self.folds.saturating_add(1);
     }
 
-    /// Adds the samples of another factor: equal to one pass over both logs up
-    /// to rounding, in any order. Costs about `TERMS^3` multiplications.
+    /// Adds the samples of another factor. The result equals one pass over both logs, up to rounding, in any order of
+    /// merging. It takes about `TERMS^3` multiplications.
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.
+    /// [`FitError::MissingTerm`] if the degrees differ; nothing changes then.
     pub fn merge(&mut self, other: &Self) -> Result<(), FitError> {
         self.same_degree(other.degree())?;
         if other.samples == 0 {
@@ -193,8 +192,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
             *self = *other;
             return Ok(());
         }
-        // The other triangle about this centre; its rows are a block of TERMS
-        // rows, by column.
+        // The other triangle is converted to this centre. Its rows then form a block of TERMS rows, stored by column.
         let terms = self.basis.terms();
         let by = other.centre - self.centre;
         let triangle = product(terms, &other.r, &shift(self.degree(), by));
@@ -208,7 +206,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         let squares = fold(terms, &mut self.r, &mut self.q, &mut block, &mut values);
         self.add_residual(squares);
         self.add_residual(other.residual_sum());
-        // what was stored may have been damaged: counts stay counts
+        // saturating, because the counts of a stored factor may be damaged
         self.samples = self.samples.saturating_add(other.samples);
         self.folds = self.folds.saturating_add(other.folds).saturating_add(1);
         Ok(())
@@ -235,11 +233,11 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         (self.residual.0 - self.residual.1).max(T::zero())
     }
 
-    /// The factor of a lower degree over the same samples: columns that the
-    /// degree lacks are dropped and the rest made triangular again.
+    /// Returns the factor of a lower degree over the same samples. Columns that the degree lacks are dropped, and the
+    /// rest is made triangular again.
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when `degree` has a term that this one lacks.
+    /// [`FitError::MissingTerm`] if `degree` has a term that this factor lacks.
     pub fn restrict(&self, degree: Degree) -> Result<Self, FitError> {
         if degree == self.degree() {
             return Ok(*self);
@@ -264,15 +262,14 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         Ok(lower)
     }
 
-    /// The weighted sum of squared residuals of *any* surface on these
-    /// samples, `|R c - q|^2 + rest`, from its coefficients in the order of
-    /// `Degree::exponents`; those beyond the end count as zero.
+    /// Returns the weighted sum of squared residuals of *any* surface on these samples: `|R c - q|^2` plus the residual
+    /// sum of squares. `coefficients` are in the order of `Degree::exponents`; missing ones count as zero.
     pub fn residual_of(&self, coefficients: &[T]) -> T {
         let missed = self.missed(coefficients);
         missed.iter().fold(T::zero(), |sum, &x| sum + x * x) + self.residual_sum()
     }
 
-    /// `q - R c`.
+    /// Returns `q - R c`.
     fn missed(&self, coefficients: &[T]) -> [T; TERMS] {
         let terms = self.basis.terms();
         let mut raw = [T::zero(); TERMS];
@@ -288,7 +285,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         missed
     }
 
-    /// The same of a surface of this very degree.
+    /// Returns `q - R c` for a surface of the same degree as the factor.
     pub(crate) fn missed_by(
         &self,
         degree: Degree,
@@ -306,23 +303,21 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         &self.r
     }
 
-    /// The weighted sum of squares of the values about their weighted mean.
+    /// Returns the weighted sum of squares of the values about their weighted mean.
     pub fn total_sum(&self) -> T {
         let terms = self.basis.terms();
         let explained = self.q[..terms].iter().skip(1).fold(T::zero(), |sum, &q| sum + q * q);
         explained + self.residual_sum()
     }
 
-    /// The least-squares surface of the accumulated degree, by back
-    /// substitution.
+    /// Fits the least-squares surface of the accumulated degree, by back substitution.
     ///
     /// # Errors
-    /// [`FitError::TooFewSamples`] unless there is a sample a term,
-    /// [`FitError::RankDeficient`] with the first term (in the order of
-    /// `Degree::exponents`) that depends on those before it, or with the
-    /// highest power of the voltage where the surface can be fitted but not
-    /// evaluated ([`counted_from`](Self::counted_from) an origin within the
-    /// samples it can), [`FitError::NotFinite`].
+    /// [`FitError::TooFewSamples`] unless there is at least one sample per term, [`FitError::RankDeficient`] with the
+    /// first term (in the order of `Degree::exponents`) that depends on those before it. It names the highest power of
+    /// the voltage if the surface can be fitted but, because of cancellation, not evaluated over raw volts; then use
+    /// [`counted_from`](Self::counted_from) with an origin within the samples. [`FitError::NotFinite`] if the result is
+    /// not finite.
     pub fn fit(&self) -> Result<Fit<T, TERMS>, FitError> {
         let terms = self.basis.terms();
         if self.samples < terms as u64 {
@@ -356,7 +351,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         let rounding = self.rounding_of(&coefficients);
         let (residual, total) = (self.residual_sum(), self.total_sum());
         let values = total + self.q[0] * self.q[0];
-        // half of the values' digits are lost, and what is left of the fit is rounding
+        // refused if half of the values' digits are lost and rounding exceeds the residuals of the fit
         if rounding > residual && rounding > T::epsilon() * values {
             let (rate_power, volts_power) = (0, self.degree().volts());
             return Err(FitError::RankDeficient { rate_power, volts_power });
@@ -376,10 +371,9 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         if fit.is_finite() { Ok(fit) } else { Err(FitError::NotFinite) }
     }
 
-    /// What rounding adds to the residual sum of squares where the surface of
-    /// these coefficients is evaluated: each product of a coefficient and its
-    /// term has an error of about its last digit, and terms of raw volts that
-    /// vary little are large and cancel.
+    /// Estimates the contribution of rounding to the residual sum of squares when the surface of these coefficients is
+    /// evaluated. Each product of a coefficient and its term has an error of about its last digit. If raw volts vary
+    /// little, these products are large and nearly cancel.
     fn rounding_of(&self, coefficients: &[T; TERMS]) -> T {
         let terms = self.basis.terms();
         let raw = product(terms, &self.r, &shift(self.degree(), self.centre));
@@ -390,7 +384,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         T::epsilon() * T::epsilon() * squares
     }
 
-    /// [`fit`](Self::fit) for a degree within the accumulated one.
+    /// Fits a surface of a degree within the accumulated one, like [`fit`](Self::fit).
     ///
     /// # Errors
     /// As for [`restrict`](Self::restrict) and [`fit`](Self::fit).
@@ -398,12 +392,12 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         self.restrict(degree)?.fit()
     }
 
-    /// What a column adds to those before it is on the diagonal; it must
-    /// exceed rounding: of the reflections, whose errors walk at random from
-    /// fold to fold (a tenth of what is allowed, measured over 1e6 samples in
-    /// blocks of 8 and more), and, for powers of the voltage, of the samples'
-    /// own last digit, which the centre magnifies against the spread that is
-    /// left.
+    /// Checks that every column is independent of those before it. The diagonal entry is the part of a column that is
+    /// independent, and it must exceed two kinds of rounding error:
+    /// - that of the reflections, which grows as a random walk with the number of folds. The measured error was a tenth
+    ///   of the allowed one, over 1e6 samples in blocks of 8 and more;
+    /// - for powers of the voltage, that of the samples' last digit, which is larger relative to the spread of the
+    ///   volts if the centre is large.
     fn check_rank(&self) -> Result<(), FitError> {
         let walked = libm::sqrt(self.folds as f64) + self.basis.terms() as f64;
         let rounding = T::epsilon() * T::from_f64(8.0 * walked);
@@ -420,13 +414,14 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     }
 }
 
-/// The length of a column of the design matrix, kept by the reflections: that of its column in the triangle.
+/// Returns the norm of a column of the design matrix. Reflections preserve it, so it is the norm of the triangle's
+/// column.
 fn column_norm<T: Real, const TERMS: usize>(triangle: &[[T; TERMS]; TERMS], k: usize) -> T {
     let largest = (0..=k).fold(T::zero(), |most, m| most.max(triangle[m][k].abs()));
     if largest == T::zero() {
         return largest;
     }
-    // Divided by the largest first, so that no square can underflow.
+    // Entries are divided by the largest first, so that the sum of squares cannot underflow.
     let square = (0..=k).fold(T::zero(), |sum, m| {
         let part = triangle[m][k] / largest;
         sum + part * part

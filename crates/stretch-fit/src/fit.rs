@@ -1,6 +1,6 @@
-//! A fitted surface and how well it fits.
+//! A fitted surface and the statistics of its fit.
 
-// Triangles are walked by index, as in the textbooks.
+// Loops over triangles use indices, as in textbooks.
 #![allow(clippy::needless_range_loop)]
 
 use stretch_core::{Degree, MAX_TERMS, Real, Surface};
@@ -12,10 +12,10 @@ use crate::{
 
 /// A least-squares surface with the statistics of its fit.
 ///
-/// With `n` samples, `p` terms, weights `w` (1 unless given) and residuals
-/// `e = z - surface`: `SSE = sum w e^2`, `SST = sum w (z - mean)^2` about the
-/// weighted mean, `dof = n - p`. A quantity that the samples leave undefined
-/// (no degree of freedom, values all equal) is `None`.
+/// With `n` samples, `p` terms, weights `w` (1 unless given) and residuals `e = z - surface`:
+/// `SSE = sum w e^2`, `SST = sum w (z - mean)^2` about the weighted mean, `dof = n - p`. A quantity
+/// that is undefined for the samples (because no degree of freedom is left or all values are equal)
+/// is `None`.
 ///
 /// ```
 /// use stretch_core::Degree;
@@ -39,12 +39,13 @@ pub struct Fit<T, const TERMS: usize = MAX_TERMS> {
     /// `r` is the triangle of powers of `volts - centre`.
     pub(crate) centre: T,
     pub(crate) r: [[T; TERMS]; TERMS],
-    /// What turns unit errors into errors of the coefficients in raw volts.
+    /// Inverse of the triangle, converted to raw volts: it maps unit errors to errors of the
+    /// coefficients.
     pub(crate) inverse: [[T; TERMS]; TERMS],
     pub(crate) sse: T,
     pub(crate) sst: T,
     pub(crate) samples: u64,
-    /// Error variance from elsewhere (a robust scale), in place of SSE / dof.
+    /// Error variance of a robust fit, which replaces SSE / dof.
     pub(crate) sigma_squared: Option<T>,
 }
 
@@ -56,49 +57,49 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
             && self.sst.is_finite()
     }
 
-    /// The surface. It can be evaluated, differentiated and recorded.
+    /// Returns the surface, which can be evaluated, differentiated and stored.
     pub fn surface(&self) -> Surface<T> {
         self.surface
     }
 
-    /// The degree of the surface.
+    /// Returns the degree of the surface.
     pub fn degree(&self) -> Degree {
         self.basis.degree()
     }
 
-    /// The coefficients, one a term, in the order of `Degree::exponents`.
+    /// Returns the coefficients, one per term, in the order of `Degree::exponents`.
     pub fn coefficients(&self) -> &[T] {
         &self.coefficients[..self.terms()]
     }
 
-    /// How many terms the surface has (`p`).
+    /// Returns the number of terms of the surface (`p`).
     pub fn terms(&self) -> usize {
         self.basis.terms()
     }
 
-    /// How many samples were fitted (`n`).
+    /// Returns the number of samples in the fit (`n`).
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Degrees of freedom, `n - p`.
+    /// Returns the degrees of freedom, `n - p`.
     pub fn dof(&self) -> u64 {
         self.samples.saturating_sub(self.terms() as u64)
     }
 
-    /// The sum of squared residuals, in squared units of the value, of the
-    /// surface as it is evaluated: rounding counts where terms cancel.
+    /// Returns the sum of squared residuals, in squared units of the value. It includes an estimate
+    /// of the rounding error when the surface is evaluated, which matters if terms nearly cancel.
     pub fn sse(&self) -> T {
         self.sse
     }
 
-    /// `R^2 = 1 - SSE/SST`, the share of the values' variation that the surface
-    /// explains. `None` when all values are equal.
+    /// Returns `R^2 = 1 - SSE/SST`, the share of the values' variation that the surface
+    /// explains. `None` if all values are equal.
     pub fn r_squared(&self) -> Option<T> {
         (self.sst > T::zero()).then(|| T::one() - self.sse / self.sst)
     }
 
-    /// `1 - (SSE/dof)/(SST/(n - 1))`: R^2 with a price on terms. `None` when
+    /// Returns `1 - (SSE/dof)/(SST/(n - 1))`, the R^2 adjusted for the number of terms. `None` if
     /// all values are equal or no degree of freedom is left.
     pub fn adjusted_r_squared(&self) -> Option<T> {
         let dof = self.dof();
@@ -108,15 +109,15 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         })
     }
 
-    /// `sqrt(SSE/(n - p))`, the standard error of the regression, in units of
-    /// the value. `None` when no degree of freedom is left.
+    /// Returns `sqrt(SSE/(n - p))`, the standard error of the regression, in units of the value.
+    /// `None` if no degree of freedom is left.
     pub fn rmse(&self) -> Option<T> {
         let dof = self.dof();
         (dof > 0).then(|| (self.sse / T::from_f64(dof as f64)).sqrt())
     }
 
-    /// The standard deviation of one value about the surface: the RMSE, or for
-    /// a robust fit the robust scale.
+    /// Returns the standard deviation of one value about the surface: the RMSE, or for a robust fit
+    /// the robust scale.
     pub fn sigma(&self) -> Option<T> {
         match self.sigma_squared {
             Some(square) => (self.dof() > 0).then(|| square.sqrt()),
@@ -124,9 +125,8 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         }
     }
 
-    /// The standard error of each coefficient, `sigma sqrt(((A^T W A)^-1)_kk)`,
-    /// in the order of the coefficients. `None` when no degree of freedom is
-    /// left.
+    /// Returns the standard error of each coefficient, `sigma sqrt(((A^T W A)^-1)_kk)`, in the
+    /// order of the coefficients. `None` if no degree of freedom is left.
     pub fn standard_errors(&self) -> Option<impl Iterator<Item = T> + '_> {
         let sigma = self.sigma()?;
         Some(self.inverse[..self.terms()].iter().map(move |row| {
@@ -135,9 +135,9 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         }))
     }
 
-    /// `h = a^T (A^T W A)^-1 a` for the row `a` of a rate and a voltage: the
-    /// variance of the surface there in units of `sigma^2`. On a sample of
-    /// weight 1 it is the leverage, and these sum to the number of terms.
+    /// Returns `h = a^T (A^T W A)^-1 a` for the row `a` of a rate and a voltage: the variance of
+    /// the surface at this point in units of `sigma^2`. For a sample of weight 1 it is the
+    /// leverage. If all weights are 1, the leverages of all samples sum to the number of terms.
     pub fn leverage(&self, rate: T, volts: T) -> T {
         let row = self.basis.row(rate, volts - self.centre);
         let terms = self.terms();
@@ -155,10 +155,9 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         sum
     }
 
-    /// The condition number of the weighted design matrix (2-norm), found by
-    /// power iteration on `R^T R` and on its inverse, in
-    /// raw volts: within a few per cent,
-    /// from below. A coefficient can lose as many digits as this has.
+    /// Estimates the condition number (2-norm) of the weighted design matrix in raw volts, by power
+    /// iteration on `R^T R` and on its inverse. The estimate is too small by up to a few per cent.
+    /// A coefficient can lose as many decimal digits as the condition number has.
     pub fn condition(&self) -> T {
         let terms = self.terms();
         let raw = product(terms, &self.r, &shift(self.degree(), self.centre));
@@ -185,11 +184,11 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     }
 }
 
-/// Power iterations: each multiplies the error by a squared ratio of
+/// Number of power iterations. Each one multiplies the error by the squared ratio of
 /// neighbouring singular values.
 const STEPS: usize = 12;
 
-/// Scales a vector to length 1 and gives the length it had.
+/// Scales a vector to length 1 and returns its previous length.
 fn rescale<T: Real>(x: &mut [T]) -> T {
     let norm = x.iter().fold(T::zero(), |sum, &e| sum + e * e).sqrt();
     if norm > T::zero() {

@@ -6,24 +6,25 @@
 //! Demmel et al., doi:10.1137/080731992). No product `A^T A` is ever formed,
 //! so the error grows with the condition number and not with its square.
 //!
-//! Blocks are stored by column, so every inner loop runs along the rows, whose
-//! number is a constant: the compiler vectorises it.
+//! Blocks are stored by column. Every inner loop therefore runs along the rows, whose number is a compile-time
+//! constant, and the compiler vectorises it.
 
-// Lanes are walked by index: the form that the compiler vectorises.
+// Loops over lanes use indices, because the compiler vectorises this form.
 #![allow(clippy::needless_range_loop)]
 
 use stretch_core::Real;
 
-/// Numbers that one pass of an inner loop handles side by side.
+/// Number of SIMD lanes: numbers that one pass of an inner loop processes in parallel.
 const LANES: usize = 4;
 
-/// All lanes: halves first, as they lie in registers, or the compiler shuffles in the loops before.
+/// Returns the sum over the lanes. Lanes two apart are added first, as they lie in registers. With another order the
+/// compiler adds shuffles to the preceding loops.
 #[inline(always)]
 fn total<T: Real>(sums: [T; LANES]) -> T {
     (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
-/// `v . a`, in lanes.
+/// Returns the dot product of `v` and `a`, summed in lanes.
 #[inline(always)]
 fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
     let mut sums = [T::zero(); LANES];
@@ -40,8 +41,8 @@ fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
     total(sums) + tail
 }
 
-/// `a - s v` into each `a`, and `next . a` of the result: several columns at
-/// once share the loads of `v` and `next`.
+/// Replaces each `a` by `a - s v`, and returns the dot product of `next` and each result. Processing several columns at
+/// once shares the loads of `v` and `next`.
 #[inline(always)]
 fn reflect_then_dot<T: Real, const COLUMNS: usize, const ROWS: usize>(
     a: [&mut [T; ROWS]; COLUMNS],
@@ -76,7 +77,7 @@ fn reflect_then_dot<T: Real, const COLUMNS: usize, const ROWS: usize>(
     dots
 }
 
-/// `a - s v` into `a`, and the sum of squares of the result.
+/// Replaces `a` by `a - s v`, and returns the sum of squares of the result.
 #[inline(always)]
 fn reflect_then_square<T: Real, const ROWS: usize>(a: &mut [T; ROWS], s: T, v: &[T; ROWS]) -> T {
     let mut sums = [T::zero(); LANES];
@@ -97,17 +98,15 @@ fn reflect_then_square<T: Real, const ROWS: usize>(a: &mut [T; ROWS], s: T, v: &
     total(sums) + tail
 }
 
-/// One reflection `I - beta w w^T` with `w = (head, v)`: what it takes to
-/// apply it, once the sum of squares below the diagonal is known.
+/// A reflection `I - beta w w^T` with `w = (head, v)`, where `v` is the column below the diagonal.
 struct Reflection<T> {
     head: T,
     beta: T,
 }
 
 impl<T: Real> Reflection<T> {
-    /// The reflection that zeroes a column of sum of squares `below` under the
-    /// diagonal entry `d`, which it replaces. A column too small to be squared
-    /// without underflow is left alone: it is zero to this number type.
+    /// Returns the reflection that zeroes a column below the diagonal entry `d`, and updates `d`. `below` is the
+    /// column's sum of squares. If the squares of a column underflow, it counts as zero and is left unchanged.
     #[inline(always)]
     fn zeroing(d: &mut T, below: T) -> Self {
         let square = *d * *d + below;
@@ -116,14 +115,15 @@ impl<T: Real> Reflection<T> {
             return Self { head: T::zero(), beta: T::zero() };
         }
         let norm = square.sqrt();
-        // a choice of a number, not of a way: the sign changes from fold to fold, and a wrong guess costs more than the arithmetic
+        // branch-free selection: the sign changes from fold to fold, and a mispredicted branch costs more than the
+        // arithmetic
         let signed = if *d > T::zero() { norm } else { -norm };
         let (head, beta) = (*d + signed, T::one() / (norm * (norm + d.abs())));
         *d = -signed;
         Self { head, beta }
     }
 
-    /// What to subtract from a column, per unit of `w`; updates its top entry.
+    /// Returns the factor s with which `s v` must be subtracted from a column, and updates the column's top entry.
     #[inline(always)]
     fn apply(&self, top: &mut T, dot: T) -> T {
         let s = (self.head * *top + dot) * self.beta;
@@ -132,12 +132,11 @@ impl<T: Real> Reflection<T> {
     }
 }
 
-/// Folds `block` (one array a term) and `values` into `r` and `q`, so that
-/// `[R q]` becomes the triangular factor of all rows together. Both are
-/// overwritten. Returns the sum of squares that no coefficient can explain,
-/// to be added to the residual sum of squares.
+/// Folds `block` (one array per term) and `values` into `r` and `q`, so that `[R q]` becomes the triangular factor of
+/// all rows together. `block` and `values` are overwritten. Returns the sum of squares that no coefficients can
+/// explain, which the caller adds to the residual sum of squares.
 ///
-/// Entries at or below the diagonal beyond `terms` are not touched.
+/// Entries of `r` below the diagonal or beyond `terms` are not changed.
 #[inline]
 pub(crate) fn fold<T: Real, const TERMS: usize, const ROWS: usize>(
     terms: usize,
@@ -147,8 +146,8 @@ pub(crate) fn fold<T: Real, const TERMS: usize, const ROWS: usize>(
     values: &mut [T; ROWS],
 ) -> T {
     let terms = terms.min(TERMS);
-    // `dots[j]` holds v_k . column j, known one step ahead: the pass that
-    // applies reflection k - 1 to column j also multiplies it by column k.
+    // `dots[j]` is the dot product of v_k and column j. It is computed one step ahead: the pass that applies reflection
+    // k - 1 to column j also computes its dot product with column k.
     let mut dots = [T::zero(); TERMS];
     let mut value_dot = T::zero();
     let mut below = T::zero();

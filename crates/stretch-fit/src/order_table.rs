@@ -1,4 +1,4 @@
-//! The acceptance criterion for the order of a surface.
+//! Choice of the order (degree) of a surface by an acceptance criterion.
 
 use stretch_core::{Degree, MAX_DEGREE, Real};
 
@@ -7,26 +7,24 @@ use crate::{
     cross_validation::{Pooled, judge, leave_out},
 };
 
-/// The most orders that one table compares.
+/// Largest number of orders in a table.
 const MOST: usize = 5;
 
-/// One order's fit on all trials, and its error on trials left out.
+/// The fit of one order on all trials, and its error on trials left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrderRow<T> {
     /// The order.
     pub degree: Degree,
-    /// Its terms.
+    /// Number of terms.
     pub terms: usize,
-    /// R^2 over all trials; `None` when all values are equal.
+    /// R^2 over all trials; `None` if all values are equal.
     pub r_squared: Option<T>,
-    /// RMSE over all trials with `n - p` degrees of freedom; `None` when none
-    /// is left.
+    /// RMSE over all trials with `n - p` degrees of freedom; `None` if none is left.
     pub rmse: Option<T>,
-    /// Leave-one-trial-out cross-validation; `Err` when there is one trial, or
-    /// some trial is needed to determine a term.
+    /// Leave-one-trial-out cross-validation; `Err` if there is only one trial, or if a term cannot be determined
+    /// without some trial.
     pub cross_validation: Result<CrossValidation<T>, FitError>,
-    /// How much larger the cross-validated mean squared error is than that of
-    /// the best order; `None` without cross-validation.
+    /// Excess of the cross-validated mean squared error over that of the best order; `None` without cross-validation.
     pub excess: Option<Excess<T>>,
 }
 
@@ -39,18 +37,16 @@ pub struct Excess<T> {
     pub standard_error: T,
 }
 
-/// An order with its row, or with the reason why it cannot be fitted.
+/// An order with its row, or with the error of its fit.
 pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 
-/// A chosen order with its neighbours: next lower, chosen, next higher.
+/// A comparison of a chosen order with its next lower and next higher orders, or of several curves.
 ///
-/// The lowest order that satisfies the acceptance criterion is the one with the fewest terms whose excess
-/// over the best order's cross-validated mean squared error is within one
-/// standard error of zero, the excess taken trial by trial: an order that
-/// beats another on every trial by a little is accepted, one that wins on
-/// some trials and loses on others is not (the one-standard-error rule of
-/// Breiman et al., *Classification and Regression Trees*, 1984, section 3.4.3,
-/// on paired differences).
+/// An order satisfies the acceptance criterion if its cross-validated mean squared error exceeds that of the best order
+/// by at most one standard error. The excess and its standard error are computed from the differences on single trials.
+/// A higher order is therefore recommended even for a small improvement if it improves every trial, but not if it
+/// improves some trials and worsens others. This is the one-standard-error rule of Breiman et al., *Classification and
+/// Regression Trees*, 1984, section 3.4.3, on paired differences.
 ///
 /// ```
 /// use stretch_core::Degree;
@@ -80,9 +76,8 @@ pub struct OrderTable<T> {
 }
 
 impl<T: Real> OrderTable<T> {
-    /// The orders next to `chosen`: one less and one more in the voltage, one
-    /// less and one more in the rate, and `chosen` itself, by rising number of
-    /// terms. For poly13: poly03, poly12, poly13, poly14, poly23.
+    /// Returns `chosen` and its neighbours, by rising number of terms. The neighbours have one degree less or more in
+    /// the voltage or in the rate. For poly13: poly03, poly12, poly13, poly14, poly23.
     pub fn neighbours(chosen: Degree) -> impl Iterator<Item = Degree> {
         let mut all = [
             Some(chosen),
@@ -95,19 +90,18 @@ impl<T: Real> OrderTable<T> {
         all.into_iter().flatten()
     }
 
-    /// The smallest degree to accumulate so that one pass over the samples
-    /// serves the whole table: poly24 for poly13.
+    /// Returns the smallest degree that contains all orders of the table, so that one pass over the samples is enough:
+    /// poly24 for poly13.
     pub fn covering(chosen: Degree) -> Degree {
         let up = |power: u8| (power + 1).min(MAX_DEGREE as u8);
         Degree::new(up(chosen.rate()), up(chosen.volts())).unwrap_or(chosen)
     }
 
-    /// Compares `chosen` and its [`neighbours`](Self::neighbours) as far as
-    /// the factors, one a trial, were accumulated for them.
+    /// Compares `chosen` and its [`neighbours`](Self::neighbours), given one factor per trial. An order that
+    /// the factors were not accumulated for gets an error instead of a row.
     ///
     /// # Errors
-    /// [`FitError::TooFewSamples`] without any factor,
-    /// [`FitError::MissingTerm`] when their degrees differ.
+    /// [`FitError::TooFewSamples`] without any factor, [`FitError::MissingTerm`] if the degrees of the factors differ.
     pub fn new<const TERMS: usize>(
         trials: &[Factor<T, TERMS>],
         chosen: Degree,
@@ -115,8 +109,8 @@ impl<T: Real> OrderTable<T> {
         Self::comparing(trials, chosen, Self::neighbours(chosen))
     }
 
-    /// Compares the curves of the signal alone, of the first degree to the fifth, as far as the factors, one a trial,
-    /// were accumulated for them.
+    /// Compares curves over the voltage alone, of degree 1 to 5, given one factor per trial. A degree that the factors
+    /// were not accumulated for gets an error instead of a row.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -187,13 +181,12 @@ impl<T: Real> OrderTable<T> {
         Ok(table)
     }
 
-    /// The order that was asked about.
+    /// Returns the chosen order, to which the others are compared.
     pub fn chosen(&self) -> Degree {
         self.chosen
     }
 
-    /// Each order with its row, or with the reason why it cannot be fitted on
-    /// these samples, by rising number of terms.
+    /// Returns each order with its row, or with the error of its fit, by rising number of terms.
     pub fn rows(&self) -> impl Iterator<Item = &OrderEntry<T>> {
         self.rows.iter().flatten()
     }
@@ -202,7 +195,7 @@ impl<T: Real> OrderTable<T> {
         self.rows().filter_map(|(_, row)| row.as_ref().ok())
     }
 
-    /// The order of the lowest cross-validated error, whatever its terms.
+    /// Returns the order with the lowest cross-validated error, regardless of its number of terms.
     pub fn best(&self) -> Option<&OrderRow<T>> {
         let error = |row: &OrderRow<T>| row.cross_validation.map(|cv| cv.rmse).ok();
         self.fitted()
@@ -210,9 +203,9 @@ impl<T: Real> OrderTable<T> {
             .reduce(|best, row| if error(row) < error(best) { row } else { best })
     }
 
-    /// The lowest order that satisfies the acceptance criterion above. `None` when there are
-    /// not enough trials to leave one out: no statistic of a single trial can
-    /// say how the surface does on the next.
+    /// Returns the order with the fewest terms that satisfies the acceptance criterion (see `OrderTable`). `None` if
+    /// there are not enough trials to leave one out, because a single trial gives no estimate of the error on other
+    /// trials.
     pub fn recommended(&self) -> Option<Degree> {
         self.fitted()
             .find(|row| row.excess.is_some_and(|excess| excess.mean <= excess.standard_error))
@@ -242,8 +235,8 @@ fn row<T: Real, const TERMS: usize>(
     })
 }
 
-/// The difference of two orders in held-out mean squared error, over the trials so far: their number, the mean, and the sum of squares
-/// about it (Welford 1962, doi:10.1080/00401706.1962.10490022).
+/// Running statistics of the difference of two orders in held-out mean squared error: number of trials, mean, and sum
+/// of squares about the mean (Welford 1962, doi:10.1080/00401706.1962.10490022).
 #[derive(Clone, Copy)]
 struct Difference<T> {
     count: T,

@@ -1,15 +1,16 @@
-//! Quantiles of Fisher's F, for bounds.
+//! Quantiles of Fisher's F, for confidence bounds.
 //!
-//! The distribution function is statrs' incomplete beta; its inverse is not
-//! used, being wrong by some per cent at few degrees of freedom (0.19.1). The
-//! function is monotone, so bisection finds the quantile to the last bits.
+//! The distribution function uses the incomplete beta function of statrs. Its inverse in statrs
+//! (0.19.1) is not used, because it is wrong by some per cent at few degrees of freedom. The
+//! distribution function is monotone, so bisection finds the quantile to the last bits.
 
 use statrs::function::beta::checked_beta_reg;
 
-/// Halvings: enough to bring any starting interval down to one rounding.
+/// Largest number of bisection steps, enough to reduce any starting interval to neighbouring
+/// floats.
 const HALVINGS: u32 = 1100;
 
-/// The quantile at `level` of Fisher's F of `terms` and `dof`.
+/// Returns the quantile at `level` of Fisher's F with `terms` and `dof` degrees of freedom.
 pub(crate) fn fisher(level: f64, terms: u64, dof: u64) -> f64 {
     let (p, n) = (terms as f64, dof as f64);
     root_of(1.0 - level, |f| beta(0.5 * n, 0.5 * p, n / (n + p * f)))
@@ -19,7 +20,8 @@ fn beta(a: f64, b: f64, x: f64) -> f64 {
     checked_beta_reg(a, b, x).unwrap_or(f64::NAN)
 }
 
-/// The `x >= 0` at which a falling `tail` is `wanted`; NaN if there is none.
+/// Returns the `x >= 0` at which a falling function `tail` has the value `wanted`; NaN if `tail` is
+/// NaN.
 fn root_of(wanted: f64, tail: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while tail(high) > wanted && high < f64::MAX / 4.0 {

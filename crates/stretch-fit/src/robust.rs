@@ -1,33 +1,35 @@
-//! Fits that outliers cannot pull.
+//! Robust fits, which limit the effect of outliers.
 
 use stretch_core::{Degree, MAX_TERMS, Real};
 
 use crate::{Fit, FitError, Sample, SurfaceAccumulator};
 
-/// What a residual costs.
+/// Loss function of a robust fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Loss {
-    /// Tukey's bisquare with tuning constant 4.685: near least squares for
-    /// small residuals (95 % of its efficiency on normal errors), and blind
-    /// to residuals beyond 4.685 robust standard deviations.
+    /// Tukey's bisquare with tuning constant 4.685. It is close to least squares for small
+    /// residuals (95 % efficiency on normal errors), and ignores residuals beyond 4.685 robust
+    /// standard deviations.
     #[default]
     Bisquare,
-    /// The sum of absolute residuals: no scale to tune, half the samples may
-    /// be wrong in value; 64 % efficient on normal errors.
+    /// The sum of absolute residuals. It needs no tuning constant, tolerates wrong values in up to
+    /// half of the samples, and has 64 % efficiency on normal errors.
     LeastAbsolute,
 }
 
-/// Bisquare residuals beyond this many robust standard deviations weigh 0.
+/// Tuning constant of the bisquare: residuals beyond this many robust standard deviations have
+/// weight 0.
 const TUNING: f64 = 4.685;
 /// Median absolute deviation of a standard normal variable.
 const NORMAL_MAD: f64 = 0.6745;
-/// Leverage is taken as at most this, so that a residual can be studentised.
+/// Upper limit on the leverage, so that residuals can be divided by `sqrt(1 - h)`.
 const MOST_LEVERAGE: f64 = 0.9999;
-/// Rows of the accumulators within.
+/// Rows of the internal accumulators.
 const ROWS: usize = 32;
 
 impl Loss {
-    /// Re-weighted fits at most. Least absolute residuals converge linearly.
+    /// Returns the largest number of re-weighted fits. Least absolute residuals need more, because
+    /// they converge only linearly.
     fn most_steps(self) -> u32 {
         match self {
             Self::Bisquare => 50,
@@ -36,41 +38,40 @@ impl Loss {
     }
 }
 
-/// A robust surface, its scale and how the iteration went.
+/// A robust fit with its scale and the outcome of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
-    /// The surface. SSE, R^2 and RMSE count every sample alike, outliers
-    /// included; `sigma`, standard errors and bounds use the robust scale.
+    /// The fit. SSE, R^2 and RMSE weigh all samples equally, including outliers. `sigma`, standard
+    /// errors and bounds use the robust scale.
     pub fit: Fit<T, TERMS>,
-    /// Re-weighted fits that were made.
+    /// Number of re-weighted fits.
     pub steps: u32,
-    /// Whether the coefficients came to rest before the limit of steps.
+    /// Whether the coefficients converged within the limit of steps.
     pub converged: bool,
-    /// Samples that the bisquare rejected altogether (weight 0).
+    /// Number of samples to which the bisquare gives weight 0; always 0 for least absolute
+    /// residuals.
     pub rejected: u64,
 }
 
 /// Fits a surface by iteratively re-weighted least squares.
 ///
-/// `samples` is called once a pass and must give the same
-/// samples each time; `memory` is lent, one number a sample,
-/// for the median of the residuals. Nothing else grows with the log.
+/// `samples` is called several times and must give the same samples each time. `memory` is a buffer
+/// with one number per sample, for the median of the residuals. No other memory grows with the log.
 ///
-/// **Bisquare**, as MATLAB's `fit(..., 'Robust', 'Bisquare')` documents it:
-/// residuals are divided by `sqrt(1 - h)` with `h` the leverage in the plain
-/// fit; `s` is the median of the largest `n - p + 1` absolute adjusted
-/// residuals over 0.6745; with `u = e/(4.685 s)` a sample weighs
-/// `(1 - u^2)^2`, or 0 from `|u| = 1` on. Sigma is the robust one of DuMouchel
-/// and O'Brien (1989), never below its mix with the plain RMSE weighed
-/// `n : p^2`.
+/// **Bisquare**, as documented for MATLAB's `fit(..., 'Robust', 'Bisquare')`: residuals are divided
+/// by `sqrt(1 - h)`, with `h` the leverage in the plain least-squares fit. `s` is the median of the
+/// largest `n - p + 1` absolute adjusted residuals divided by 0.6745. With `u = e/(4.685 s)` a
+/// sample has the weight `(1 - u^2)^2`, or 0 if `|u| >= 1`. Sigma is the robust sigma of DuMouchel
+/// and O'Brien (1989), but at least its quadratic mean with the plain RMSE, in which they have the
+/// weights `n` and `p^2`.
 ///
-/// **Least absolute residuals**: a sample weighs `1/max(|e|, d)` with `d` a
-/// millionth of the robust scale so far. Sigma is the distribution-free
-/// `sqrt(n - p) (e_hi - e_lo)/(2 * 1.96)` between the order statistics that bound
-/// the median at 95 % (McKean and Schrader 1987), over the `n - p` residuals that
-/// the surface does not pass through.
+/// **Least absolute residuals**: the weight of a sample is proportional to `1/max(|e|, d)`, with
+/// `d` a millionth of the current robust scale. Sigma is the distribution-free
+/// `sqrt(n - p) (e_hi - e_lo)/(2 * 1.96)`, where `e_lo` and `e_hi` are the order statistics that
+/// bound the median at 95 % (McKean and Schrader 1987). They are taken from `n - p` residuals,
+/// without the `p` smallest, because the surface passes through `p` samples.
 ///
-/// Steps end when no coefficient moves by more than `sqrt(epsilon)` of its size.
+/// The iteration ends when no coefficient changes by more than `sqrt(epsilon)` of its magnitude.
 ///
 /// ```
 /// use stretch_core::Degree;
@@ -93,11 +94,10 @@ pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
 /// ```
 ///
 /// # Errors
-/// As for [`SurfaceAccumulator::push`] and [`SurfaceAccumulator::fit`];
-/// [`FitError::ShortMemory`] when `memory` has fewer places than there are
-/// samples; [`FitError::TooFewSamples`] when no degree of freedom is left;
-/// [`FitError::RankDeficient`] also when the samples that still weigh anything
-/// cannot determine a term.
+/// As for [`SurfaceAccumulator::push`] and [`SurfaceAccumulator::fit`]; [`FitError::ShortMemory`]
+/// if `memory` is shorter than the number of samples; [`FitError::TooFewSamples`] if no degree of
+/// freedom is left; [`FitError::RankDeficient`] also if the samples with non-zero weight cannot
+/// determine a term.
 pub fn robust_fit<T: Real, const TERMS: usize, I>(
     degree: Degree,
     loss: Loss,
@@ -126,7 +126,8 @@ where
         }
         Loss::LeastAbsolute => T::one(),
     };
-    // A perfect fit has no scale: a millionth of the spread of the values.
+    // Lower limit on the scale, because a perfect fit has none: a millionth of the values' standard
+    // deviation.
     let spread = (ols.sst / T::from_f64((n - 1) as f64)).sqrt();
     let tiny = T::from_f64(1e-6) * if spread > T::zero() { spread } else { T::one() };
     let scale_of = |fit: &Fit<T, TERMS>, residuals: &mut [T]| {
@@ -137,7 +138,7 @@ where
         median_of_largest(residuals, fit.terms()) / T::from_f64(NORMAL_MAD)
     };
 
-    // Absolute residuals below this are rounding of the values.
+    // Absolute residuals below this are rounding errors of the values.
     let largest =
         samples().into_iter().fold(T::zero(), |most, sample| most.max(sample.value.abs()));
     let rounding = T::from_f64(8.0) * T::epsilon() * largest.max(T::min_positive_value());
@@ -192,7 +193,7 @@ where
             median_spread(residuals, ols.terms())
         }
     };
-    // Statistics over all samples alike, from the plain triangle.
+    // Statistics weigh all samples equally, so they come from the unweighted triangle.
     let fit = Fit {
         coefficients: found.coefficients,
         surface: found.surface,
@@ -213,8 +214,8 @@ fn bisquare_weight<T: Real>(u: T) -> T {
     if root > T::zero() { root * root } else { T::zero() }
 }
 
-/// The median of all but the `terms - 1` smallest of some absolute values:
-/// a fit through `terms` samples makes that many residuals nearly zero.
+/// Returns the median of absolute values without the `terms - 1` smallest ones, because a fit can
+/// make about that many residuals nearly zero.
 fn median_of_largest<T: Real>(values: &mut [T], terms: usize) -> T {
     let skipped = terms.saturating_sub(1).min(values.len().saturating_sub(1));
     let left = values.len() - skipped;
@@ -222,12 +223,12 @@ fn median_of_largest<T: Real>(values: &mut [T], terms: usize) -> T {
     if left % 2 == 1 {
         return upper;
     }
-    // The lower middle is the largest of those before the upper one.
+    // The lower middle value is the largest of the values before the upper one.
     let lower = values[..skipped + left / 2].iter().fold(T::zero(), |most, &v| most.max(v));
     (lower + upper) / T::from_f64(2.0)
 }
 
-/// The value that would be at `place` if sorted; those before it are moved
+/// Returns the value that would be at `place` after sorting, and moves the smaller values
 /// before it.
 fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
     if values.is_empty() {
@@ -237,8 +238,8 @@ fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
     *values.select_nth_unstable_by(place, order).1
 }
 
-/// Robust sigma from `psi(u) = u (1 - u^2)^2` and its derivative, with the
-/// small-sample factor `1 + (p/n)(1 - m)/m`.
+/// Computes the robust sigma from `psi(u) = u (1 - u^2)^2` and its derivative, with the
+/// small-sample factor `1 + (p/n)(1 - m)/m`, where m is the mean of the derivative.
 fn bisquare_sigma<T: Real, const TERMS: usize>(
     studentised: impl Iterator<Item = (T, T)>,
     reach: T,
@@ -262,10 +263,10 @@ fn bisquare_sigma<T: Real, const TERMS: usize>(
     robust.max(mixed)
 }
 
-/// Half the width of the 95 % interval of the median of residuals, as the
-/// standard deviation that a mean would need to be that uncertain. The surface
-/// passes through `terms` samples; their residuals of zero are no evidence of
-/// the errors' density at the median and are left out.
+/// Computes sigma from the 95 % interval of the residuals' median: the standard deviation for which
+/// the mean of as many samples would have an interval of the same width. The `terms` smallest
+/// residuals are left out: the surface passes through these samples, so their residuals carry no
+/// information about the density of the errors at the median.
 fn median_spread<T: Real>(residuals: &mut [T], terms: usize) -> T {
     const NORMAL_95: f64 = 1.959_963_984_540_054;
     let by_size = |a: &T, b: &T| order(&a.abs(), &b.abs());
@@ -279,7 +280,7 @@ fn median_spread<T: Real>(residuals: &mut [T], terms: usize) -> T {
     (high - low) * T::from_f64(root / (2.0 * NORMAL_95))
 }
 
-/// By size; finite numbers only, so that any two compare.
+/// Compares two numbers, which must be finite.
 fn order<T: Real>(a: &T, b: &T) -> core::cmp::Ordering {
     a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal)
 }

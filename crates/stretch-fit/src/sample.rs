@@ -1,14 +1,14 @@
 //! One row of a log.
 
-/// At this rate and voltage the surface should be `value`.
+/// One observation of the surface: `value` at a rate and a voltage.
 ///
-/// The numbers carry whatever units the caller's normalisation gives them.
+/// The numbers may have any units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<T> {
-    /// Rate of the signal; without effect on a surface of degree 0 in the rate.
+    /// Rate of the signal; has no effect on a surface of degree 0 in the rate.
     pub rate: T,
     /// The signal.
     pub volts: T,
-    /// What was measured there.
+    /// The measured value.
     pub value: T,
 }

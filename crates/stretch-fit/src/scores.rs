@@ -1,6 +1,6 @@
-//! What each part of a log says of a fit to the whole.
+//! Scores and information of parts of a log with respect to a fit of the whole log.
 
-// Triangles are walked by index, as in the textbooks.
+// Loops over triangles use indices, as in textbooks.
 #![allow(clippy::needless_range_loop)]
 
 use stretch_core::Real;
@@ -11,15 +11,17 @@ use crate::{
 };
 
 impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
-    /// The score of a part of the samples at this fit, in units in which the information of the whole is one:
-    /// `u = (X^T X)^(-1/2) X_d^T (z_d - X_d c)`, with `X^T X = R^T R` and `R` for its root.
+    /// Returns the score of a part of the samples at this fit, in units in which the information of the whole is the
+    /// identity matrix: `u = (X^T X)^(-1/2) X_d^T (z_d - X_d c)`, with `X^T X = R^T R` and `R` as its root. The index d
+    /// denotes the part.
     ///
-    /// Scores of all parts sum to zero. Were errors white with variance `s^2`, the outer products `u u^T` of all parts would sum
-    /// to `s^2 I` on average; by how much they exceed that is the design effect of parts whose errors belong together (a day, a
-    /// trial): the middle of the sandwich of Liang and Zeger (doi 10.1093/biomet/73.1.13).
+    /// The scores of all parts sum to zero. If errors were white with variance `s^2`, the outer products `u u^T` of all
+    /// parts would sum to `s^2 I` on average. Their excess over it is the design effect of parts with correlated errors
+    /// (such as a day or a trial). Their sum is the middle factor of the sandwich estimator of Liang and Zeger
+    /// (doi 10.1093/biomet/73.1.13).
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when the degrees differ.
+    /// [`FitError::MissingTerm`] if the degrees differ.
     ///
     /// ```
     /// use stretch_core::Degree;
@@ -54,11 +56,12 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         Ok(scores)
     }
 
-    /// The information of a part of the samples in the units of [`scores`](Self::scores), `R^(-T) X_d^T X_d R^(-1)`: that of all
-    /// parts sums to one. Rows and columns beyond the terms are zero.
+    /// Returns the information of a part of the samples in the units of [`scores`](Self::scores),
+    /// `R^(-T) X_d^T X_d R^(-1)`. The information of all parts sums to the identity matrix. Rows and columns beyond the
+    /// terms are zero.
     ///
     /// # Errors
-    /// [`FitError::MissingTerm`] when the degrees differ.
+    /// [`FitError::MissingTerm`] if the degrees differ.
     pub fn information(&self, part: &Factor<T, TERMS>) -> Result<[[T; TERMS]; TERMS], FitError> {
         part.missed_by(self.degree(), &self.coefficients)?;
         let root = self.root_of(part);
@@ -72,7 +75,7 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         Ok(information)
     }
 
-    /// `R_d R^(-1)`, the part's triangle about this fit's centre as where two are merged: triangular, too.
+    /// Returns the triangular matrix `R_d R^(-1)`, where `R_d` is the part's triangle converted to this fit's centre.
     fn root_of(&self, part: &Factor<T, TERMS>) -> [[T; TERMS]; TERMS] {
         let terms = self.terms();
         let by = part.centre() - self.centre;

@@ -1,13 +1,12 @@
-//! Moving the voltage's origin.
+//! Conversion of polynomials to another origin of the voltage.
 //!
-//! Powers of raw volts that vary little compared with their mean are nearly parallel
-//! (1.23 to 1.25 V: condition 1e8). Powers of `volts - centre` are not, and
-//! with a centre near the data the subtraction is exact. Terms that share a
-//! power of the rate turn into each other by the binomial theorem; in the
-//! order of `Degree::exponents` that is a product with an upper triangle, so a
-//! triangular factor stays triangular whatever its centre.
+//! If raw volts vary little compared with their mean, their powers are nearly linearly dependent
+//! (1.23 to 1.25 V: condition 1e8). Powers of `volts - centre` are not, and with a centre near the
+//! data the subtraction is exact. The conversion follows from the binomial theorem, for terms with
+//! the same power of the rate. In the order of `Degree::exponents` it is a product with an upper
+//! triangular matrix, so a triangular factor stays triangular for any centre.
 
-// Triangles are walked by index, as in the textbooks.
+// Loops over triangles use indices, as in textbooks.
 #![allow(clippy::needless_range_loop)]
 
 use stretch_core::{Degree, MAX_DEGREE, Real};
@@ -32,10 +31,9 @@ const BINOMIALS: [[f64; POWERS]; POWERS] = {
     c
 };
 
-/// The upper triangle `S` with `(columns in v + by) = (columns in v) S`.
+/// Returns the upper triangular matrix `S` with `(columns in v + by) = (columns in v) S`.
 ///
-/// For coefficients of one surface: those in `v` are `S` times those in
-/// `v + by`.
+/// For the coefficients of a surface: those in `v` are `S` times those in `v + by`.
 pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; TERMS]; TERMS] {
     let terms = exponents::<TERMS>(degree);
     let mut powers = [T::one(); POWERS];
@@ -56,7 +54,7 @@ pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; 
     s
 }
 
-/// The product of two upper triangles.
+/// Returns the product of two upper triangular matrices.
 pub(crate) fn product<T: Real, const TERMS: usize>(
     terms: usize,
     a: &[[T; TERMS]; TERMS],
@@ -75,7 +73,7 @@ pub(crate) fn product<T: Real, const TERMS: usize>(
     c
 }
 
-/// An upper triangle times a vector.
+/// Returns the product of an upper triangular matrix and a vector.
 pub(crate) fn apply<T: Real, const TERMS: usize>(
     terms: usize,
     a: &[[T; TERMS]; TERMS],

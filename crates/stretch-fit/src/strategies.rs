@@ -26,7 +26,7 @@ use crate::Sample;
 /// Samples of a known surface.
 #[derive(Debug, Clone)]
 pub struct Observations {
-    /// The truth.
+    /// The true surface.
     pub surface: Surface<f64>,
     /// Rate in -1 to 1, volts in 0 to 1.
     pub samples: Vec<Sample<f64>>,
@@ -44,9 +44,9 @@ pub fn surfaces(degree: Degree) -> impl Strategy<Value = Surface<f64>> {
         .prop_filter_map("a surface", move |c| Surface::new(degree, &c).ok())
 }
 
-/// Samples of a random surface of `degree`, spread over the whole rectangle by
-/// stratified sampling so that every term is determined once there are a few
-/// times more samples than terms, with uniform noise up to `noise`.
+/// Samples of a random surface of `degree` with uniform noise up to `noise`. They are spread over
+/// the whole rectangle by stratified sampling, so that every term is determined if there are a few
+/// times more samples than terms.
 pub fn observations(
     degree: Degree,
     noise: f64,
@@ -56,7 +56,7 @@ pub fn observations(
     (surfaces(degree), vec(jitter, samples)).prop_map(move |(surface, jitters)| {
         let cells = jitters.len() as f64;
         let samples = jitters.iter().enumerate().map(|(k, &(across, along, error))| {
-            // Cell k along the voltage; the golden ratio spreads the rates.
+            // The voltage is in cell k; the golden ratio spreads the rates.
             let volts = (k as f64 + along) / cells;
             let rate = 2.0 * (k as f64 * 0.618_033_988_749_894_9 + 0.3 * across).fract() - 1.0;
             Sample { rate, volts, value: surface.eval(rate, volts) + noise * error }

@@ -1,4 +1,4 @@
-//! Accuracy where it is hard: narrow raw volts, `f32`, long logs, outliers.
+//! Tests of accuracy in hard cases: narrow raw volts, `f32`, long logs, outliers.
 
 use stretch_core::{Degree, Real};
 use stretch_fit::{FitError, Loss, Sample, SurfaceAccumulator, robust_fit};
@@ -11,7 +11,7 @@ fn surface(r: f64, v: f64) -> f64 {
     p00 + p01 * v + p02 * v * v + p03 * v * v * v + r * (p10 + p11 * v + p12 * v * v)
 }
 
-/// Fills the rectangle evenly: rate in -1 to 1, volts around `centre`.
+/// Returns points that fill a rectangle evenly: rate in -1 to 1, volts around `centre`.
 fn points(samples: u32, centre: f64, width: f64) -> impl Iterator<Item = (f64, f64)> {
     (0..samples).map(move |k| {
         let (a, b) =
@@ -24,7 +24,7 @@ fn error<T: Real, const ROWS: usize>(samples: u32, centre: f64, width: f64) -> (
     let mut sums = SurfaceAccumulator::<T, 7, ROWS>::new(Degree::POLY13).unwrap();
     for (rate, volts) in points(samples, centre, width) {
         let (rate, volts) = (T::from_f64(rate), T::from_f64(volts));
-        // The value belongs to the voltage as this type holds it.
+        // The value is computed from the inputs after rounding to the type.
         let value = T::from_f64(surface(rate.as_f64(), volts.as_f64()));
         sums.push(Sample { rate, volts, value }).unwrap();
     }
@@ -52,7 +52,7 @@ fn f32_holds_on_a_board() {
     let (off, worst) = error::<f32, 8>(20_000, 0.35, 1.0);
     assert!(off < tol::FIT_F32, "normalised: off by {off:e}");
     assert!(worst < tol::FIT_F32, "normalised: surface off by {worst:e}");
-    // Condition 4e4: normal equations in f32 lose every digit here.
+    // The condition is 4e4, at which normal equations in f32 lose every digit.
     let (off, worst) = error::<f32, 8>(20_000, 1.1, 0.25);
     assert!(off < tol::FIT_F32, "narrow: off by {off:e}");
     assert!(worst < tol::FIT_F32, "narrow: surface off by {worst:e}");
@@ -64,8 +64,8 @@ fn a_long_f32_log_does_not_stall() {
     assert!(off < tol::FIT_F32, "off by {off:e}");
 }
 
-/// Bounds at 95 % hold the truth in 95 of 100 repetitions, for normal errors:
-/// least squares, bisquare and least absolute residuals alike.
+/// Checks that bounds at 95 % contain the truth in 95 % of the repetitions, for normal errors, with least squares,
+/// bisquare and least absolute residuals.
 #[test]
 fn bounds_hold_the_truth_as_often_as_they_say() {
     let mut state = 7_u64;
@@ -99,15 +99,16 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
             }
         }
     }
-    // Of 7 * 200 bounds, correlated within a run; three standard errors of a
-    // single coefficient's 200 are 4.6 %.
+    // The share is that of 7 * 200 bounds, which are correlated within a run. The tolerance of 4.6 % is three standard
+    // errors for the 200 bounds of a single coefficient.
     for (fit, held) in ["plain", "bisquare", "least absolute"].iter().zip(held) {
         let share = held.iter().sum::<usize>() as f64 / (7 * RUNS) as f64;
         assert!((0.95 - 0.046..=0.95 + 0.046).contains(&share), "{fit}: {share}");
     }
 }
 
-/// Raw counts about an offset: the root mean square errors of a fit, if there is one, as stated and as found from its surface.
+/// Fits a curve to raw counts around an offset. Returns the RMS error that the fit states and the one computed from its
+/// surface, or `None` if the fit is refused.
 fn stated_and_found(offset: f64, half: f64, cubic: Degree) -> Option<(f64, f64)> {
     let sample = |k: u32| {
         let x = f64::from(k % 201) / 100.0 - 1.0;
@@ -132,7 +133,7 @@ fn stated_and_found(offset: f64, half: f64, cubic: Degree) -> Option<(f64, f64)>
 #[test]
 fn the_error_that_a_fit_states_is_that_of_its_surface() {
     let cubic = Degree::new(0, 3).unwrap();
-    // 24-bit counts of a load cell: the terms of raw counts cancel 13 digits
+    // 24-bit counts of a load cell, for which the terms over raw counts cancel to 13 digits
     assert_eq!(stated_and_found(8.3e6, 100.0, cubic), None);
     for (offset, half) in
         [(0.0, 1.0), (3.0, 1.0), (30.0, 1.0), (100.0, 1.0), (2.5, 0.004), (1000.0, 1.0)]
@@ -144,7 +145,7 @@ fn the_error_that_a_fit_states_is_that_of_its_surface() {
         );
     }
     assert!(stated_and_found(100.0, 1.0, cubic).is_some());
-    // about the middle nothing is lost
+    // with the origin in the middle, no digits are lost
     let line = |k: u32| Sample { rate: 0.0, volts: 8.3e6 + f64::from(k), value: f64::from(k * k) };
     let mut sums = SurfaceAccumulator::<f64>::new(cubic).unwrap();
     sums.extend((0..200).map(line)).unwrap();

@@ -1,4 +1,5 @@
-//! The tests of stretch-fit from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-fit, in one program because linking takes longer than most of
+//! the tests.
 
 mod accuracy;
 mod nalgebra;

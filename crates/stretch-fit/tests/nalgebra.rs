@@ -1,4 +1,4 @@
-//! The fold against nalgebra's Householder factors of all rows at once.
+//! Tests of the block-wise factor against nalgebra's Householder factor of all rows at once.
 
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
@@ -17,7 +17,8 @@ fn folded<const ROWS: usize>(degree: Degree, samples: &[Sample]) -> Factor<f64, 
     sums.factor()
 }
 
-/// The design matrix in raw rate and volts, one root of a weight a row, and the values.
+/// Returns the design matrix in raw rate and volts and the values, both multiplied by the square
+/// roots of the weights.
 fn problem(degree: Degree, samples: &[Sample], weights: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let exponents: Vec<_> = degree.exponents().collect();
     let design = DMatrix::from_fn(samples.len(), exponents.len(), |row, term| {
@@ -28,10 +29,11 @@ fn problem(degree: Degree, samples: &[Sample], weights: &[f64]) -> (DMatrix<f64>
     (design, DVector::from_iterator(samples.len(), values))
 }
 
-/// Coefficients and fitted values are nalgebra's up to what both may round off.
+/// Checks that coefficients and fitted values equal those of nalgebra within the rounding errors of
+/// both.
 ///
-/// With residual `r`, condition `k` and rounding `u`, least squares by reflections
-/// errs by `u (|A| |c| + k |r|)` in the fitted values and by `u k (|c| + k |r| / |A|)`
+/// With residual `r`, condition `k` and unit rounding error `u`, least squares by reflections
+/// has an error of `u (|A| |c| + k |r|)` in the fitted values and of `u k (|c| + k |r| / |A|)`
 /// in the coefficients (Golub and Van Loan, 4th ed., section 5.3.7; Wedin 1973).
 fn agrees(
     fit: &Fit<f64, 21>,
@@ -51,7 +53,7 @@ fn agrees(
     let off = off.norm();
     prop_assert!(off <= allowed, "condition {condition:e}: off by {off:e}, allowed {allowed:e}");
 
-    // the residual itself is no larger than the least one, but for that rounding
+    // the residual equals the smallest possible one, up to that rounding
     let allowed = tol::FIT_STATISTICS * residual + tol::FIT_BACKWARD * norm * expected.norm();
     let off = (fit.sse().sqrt() - residual).abs();
     prop_assert!(off <= allowed, "residual {residual:e} off by {off:e}");
@@ -65,7 +67,7 @@ fn narrowed(samples: &[Sample], centre: f64, width: f64) -> Vec<Sample> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
 
-    /// From poly00 to poly55, of condition 1 to 1e5.
+    /// Tests poly00 to poly55, with conditions of 1 to 1e5.
     #[test]
     fn surfaces_of_every_degree(
         log in degrees().prop_flat_map(|degree| observations(degree, 0.5, 60..300)),
@@ -75,8 +77,8 @@ proptest! {
         agrees(&fit, problem(degree, &log.samples, &vec![1.0; log.samples.len()]))?;
     }
 
-    /// Raw volts within a few millivolts of each other: condition 1e2 to 1e12. In raw
-    /// volts nalgebra loses what the condition costs; the bound is for both.
+    /// Tests raw volts in a range of 3 mV to 1 V, with conditions of 1e2 to 1e12. nalgebra works in
+    /// raw volts and loses accuracy with the condition; the bound allows for this.
     #[test]
     fn narrow_ranges(
         log in observations(Degree::POLY13, 0.5, 60..300),
@@ -124,7 +126,7 @@ proptest! {
         agrees(&sums.fit().unwrap(), problem(Degree::POLY13, &log.samples, &weights))?;
     }
 
-    /// Lower degrees from one triangle are those of their own columns.
+    /// Tests that fits of lower degrees from one triangle equal fits of their own design matrices.
     #[test]
     fn degrees_within_a_triangle(
         log in observations(Degree::new(4, 5).unwrap(), 0.5, 100..200),

@@ -1,4 +1,4 @@
-//! What must hold for any data.
+//! Property tests that must hold for any data.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use proptest::prelude::*;
@@ -25,7 +25,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied()).max(1.0)
 }
 
-/// Rounding grows with the condition, some hundred for poly13 and 1e5 for poly55.
+/// Returns the allowed error. Rounding grows with the condition, which is some hundred for poly13
+/// and 1e5 for poly55.
 fn allowed(condition: f64) -> f64 {
     tol::FIT_WELL * (condition / 1e3).max(1.0)
 }
@@ -61,7 +62,7 @@ proptest! {
         }
         let one_by_one = accumulate::<16>(Degree::POLY13, &log.samples);
         prop_assert_eq!(columns.factor(), one_by_one.factor());
-        // one that cannot be taken leaves all of its column out
+        // if one sample is refused, no sample of its columns is added
         let refused = columns.push_columns(&[1.0, f64::INFINITY], &[0.0; 2], &[0.0; 2]);
         let is_refused = matches!(refused, Err(FitError::OutOfRange { field: "rate", .. }));
         prop_assert!(is_refused, "{refused:?}");
@@ -114,8 +115,8 @@ proptest! {
         }
     }
 
-    /// Other units of rate and value scale the coefficients; powers of two do
-    /// so without rounding. Volts scale p_ij by s^-j.
+    /// Changed units of rate, volts and value scale the coefficients, without rounding if the
+    /// factors are powers of 2. A factor s on the volts scales p_ij by s^-j.
     #[test]
     fn units_scale_the_coefficients(
         log in observations(Degree::POLY13, 0.5, 30..150),
@@ -132,7 +133,7 @@ proptest! {
         }
     }
 
-    /// Other zeros of voltage and value describe the same surface.
+    /// Offsets of voltage and value shift the surface without changing its shape.
     #[test]
     fn a_shift_moves_the_surface(
         log in observations(Degree::POLY13, 0.5, 60..150),
@@ -145,7 +146,7 @@ proptest! {
         for &Sample { rate, volts, .. } in &log.samples {
             let (a, b) = (fit.surface(), moved.surface());
             let (a, b) = (a.eval(rate, volts) + by_value, b.eval(rate, volts + by_volts));
-            // Horner in raw volts adds terms up to 10 * 6^3 that cancel.
+            // Horner's rule in raw volts adds terms up to 10 * 6^3 that cancel.
             assert_abs_diff_eq!(a, b, epsilon = 1e4 * tol::FIT_WELL);
             let (h, g) = (fit.leverage(rate, volts), moved.leverage(rate, volts + by_volts));
             assert_abs_diff_eq!(h, g, epsilon = 1e2 * tol::FIT_WELL);
@@ -193,7 +194,7 @@ proptest! {
         (rate, volts) in (0..=4_u8, 0..=5_u8),
     ) {
         let degree = Degree::new(rate, volts).unwrap();
-        // poly45 has every term up to total degree 5 but rate^5.
+        // poly45 has every term up to total degree 5 except rate^5.
         let all = accumulate::<16>(Degree::new(4, 5).unwrap(), &log.samples).factor();
         let own = accumulate::<16>(degree, &log.samples).fit().unwrap();
         let fit = all.fit_degree(degree).unwrap();
@@ -280,11 +281,12 @@ proptest! {
         degree in degrees(),
     ) {
         finite_or_refused::<f64>(degree, &samples, 10.0_f64.powi(exponent))?;
-        // f32 sees the same bits, most of them out of its range, and its own span of scales.
+        // f32 gets the same numbers, most of which are out of its range, and a smaller span of
+        // scales.
         finite_or_refused::<f32>(degree, &samples, 10.0_f64.powi(exponent / 8))?;
     }
 
-    /// Up to a fifth of the samples may be anything at all.
+    /// Up to a fifth of the samples may have arbitrary values.
     #[test]
     fn robust_fits_ignore_gross_errors(
         log in observations(Degree::POLY13, 0.01, 80..150),
@@ -306,7 +308,7 @@ proptest! {
         }
     }
 
-    /// Samples without error leave a robust fit nothing to reject.
+    /// On samples without errors, a robust fit is exact and rejects nothing.
     #[test]
     fn robust_fits_of_exact_samples_are_exact(log in observations(Degree::POLY13, 0.0, 30..90)) {
         let mut memory = vec![0.0; log.samples.len()];
@@ -320,7 +322,8 @@ proptest! {
     }
 }
 
-/// Any bits whatever, and samples all of one scale: an `Err` or finite numbers.
+/// Checks that fits of arbitrary numbers, and of samples with a common scale, give an `Err` or
+/// finite results.
 fn finite_or_refused<T: Real>(
     degree: Degree,
     samples: &[(f64, f64, f64, f64)],
@@ -358,7 +361,7 @@ fn finite_or_refused<T: Real>(
     Ok(())
 }
 
-/// A trial with its own noise; `k` numbers it.
+/// Returns the factor of trial number `k`, which has its own noise.
 fn trial(k: u32, degree: Degree, truth: impl Fn(f64, f64) -> f64) -> Factor<f64, 21> {
     let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(degree).unwrap();
     let mut state = u64::from(k) * 2_654_435_761 + 1;

@@ -1,4 +1,4 @@
-//! Against 60-digit least squares, SciPy and statsmodels (`reference/fit/surfaces.py`).
+//! Tests against 60-digit least squares, SciPy and statsmodels (`reference/fit/surfaces.py`).
 
 use approx::{assert_relative_eq, relative_eq};
 use std::collections::HashMap;
@@ -31,7 +31,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
 }
 
-/// Rows of `table` where each named column has the given value.
+/// Returns the rows of `table` in which each named column has the given value.
 fn rows(table: &Columns, keys: &[(&str, f64)]) -> Vec<usize> {
     let count = table[keys[0].0].len();
     (0..count).filter(|&row| keys.iter().all(|&(name, x)| table[name][row] == x)).collect()
@@ -54,7 +54,7 @@ fn coefficients_errors_and_statistics() {
         let of = |column: &str| -> Vec<f64> {
             rows(&coefficients, &keys).iter().map(|&k| coefficients[column][k]).collect()
         };
-        // One digit lost for each power of ten of the condition beyond 1.3e8.
+        // One digit is lost for each power of ten of the condition beyond 2e8.
         let allowed = if condition < 1e3 { tol::FIT_WELL } else { tol::FIT_ILL };
         let allowed = allowed * (condition / 2e8).max(1.0);
         let off = distance(fit.coefficients(), &of("coefficient"));
@@ -124,7 +124,8 @@ fn prediction_bounds() {
             ("observation_everywhere", bounds.observation_everywhere(rate, volts)),
         ] {
             assert!(near(bounds.estimate, at("estimate"), tol::FIT_STATISTICS), "{what}");
-            // Estimate less bound: half widths of 1e-6 at estimates of 1.
+            // The subtraction loses digits, because half widths are about 1e-6 at estimates of
+            // about 1.
             let allowed = tol::FIT_STATISTICS + tol::F64_ROUNDING / at(what);
             for half in [bounds.estimate - bounds.lower, bounds.upper - bounds.estimate] {
                 assert!(near(half, at(what), allowed), "{what}, row {row}: {half} wide");

@@ -1,4 +1,4 @@
-//! What is refused, and what the refusal says.
+//! Tests of inputs that must be refused, and of the errors.
 
 use approx::assert_abs_diff_eq;
 use stretch_core::{Degree, Real};
@@ -7,7 +7,7 @@ use stretch_fit::{
 };
 use testkit::tolerance::F64_ROUNDING;
 
-/// A line through values over the volts 0, 1, 2 ...
+/// Accumulates values at the volts 0, 1, 2 ... for a line.
 fn line(values: impl IntoIterator<Item = f64>) -> SurfaceAccumulator<f64, 2> {
     let mut sums = SurfaceAccumulator::new(Degree::LINE).unwrap();
     let sample = |(k, value): (u32, f64)| Sample { rate: 0.0, volts: f64::from(k), value };
@@ -21,7 +21,7 @@ fn poly13() -> SurfaceAccumulator<f64, 7, 16> {
 
 #[test]
 fn the_term_that_the_data_cannot_determine_is_named() {
-    // (rate and volts of sample k) and the first term that depends on those before.
+    // Rate and volts of sample k, and the first term that depends on those before it.
     type Point = fn(u32) -> (f64, f64);
     let cases: [(Point, (u8, u8), &str); 6] = [
         (|k| (0.7, f64::from(k) / 50.0), (1, 0), "p10 (rate)"),
@@ -47,7 +47,8 @@ fn the_term_that_the_data_cannot_determine_is_named() {
     }
 }
 
-/// Rates in proportion to the volts: p01 follows from p10.
+/// Returns the error of a fit to volts that are a linear function of the rate, so that p01 depends
+/// on p00 and p10.
 fn dependent<T: Real, const ROWS: usize>(samples: u32, offset: f64) -> FitError {
     let mut sums = SurfaceAccumulator::<T, 7, ROWS>::new(Degree::POLY13).unwrap();
     for k in 0..samples {
@@ -196,7 +197,7 @@ fn counts_that_were_damaged_where_they_were_stored_never_panic() {
         for degree in [Degree::POLY13, Degree::new(1, 2).unwrap(), Degree::LINE] {
             let lower = both.restrict(degree).unwrap();
             assert_eq!(lower.samples(), both.samples());
-            // so many roundings may hide every term, which is said
+            // with so many folds the allowed rounding may hide every term, which gives an error
             let Ok(fit) = lower.fit() else { continue };
             assert!(fit.coefficients().iter().all(|c| c.is_finite()));
             assert!(fit.adjusted_r_squared().is_none_or(f64::is_finite));

@@ -1,4 +1,4 @@
-//! How well an estimate follows the truth, in the units of both and in percent.
+//! Agreement of an estimate with the truth, in the unit of both and in percent.
 
 use stretch_core::{Interval, Real};
 
@@ -7,17 +7,17 @@ use crate::{
     sum::{Moments, Sum, largest, real},
 };
 
-/// What an error is a percentage of.
+/// The range by which an error is divided to give a percentage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Delta {
-    /// The range of the estimate: delta of the paper's equation 1, as printed.
+    /// The range of the estimate: delta in equation 1 of the published method ("the paper").
     Estimate,
-    /// The range of the truth: the stroke. The fairer one, as an estimate that swings too
-    /// wide does not shrink its own error.
+    /// The range of the truth: the stroke. This is fairer, because an estimate with too large a
+    /// range does not reduce its own error.
     Truth,
 }
 
-/// [`ErrorStats`] and what is needed to relate them to the signals: ranges, R^2, correlation.
+/// Streaming [`ErrorStats`] with the ranges of both signals, R^2 and correlation.
 ///
 /// The paper's measures (its section 2, with d_p the truth and d_s the estimate):
 ///
@@ -47,21 +47,23 @@ pub struct Agreement<T> {
     products: Sum<T>,
 }
 
-/// The numbers of an [`Agreement`], to be stored or sent; [`Agreement::from_spec`] takes them back.
+/// The numbers of an [`Agreement`], for storage or transmission. [`Agreement::from_spec`] converts
+/// them back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AgreementSpec<T> {
-    /// Pairs taken.
+    /// Number of accepted pairs.
     pub count: u64,
-    /// Pairs not taken.
+    /// Number of refused pairs.
     pub skipped: u64,
-    /// Of the error: mean and squared deviations, magnitudes, each with what rounding lost, and the
-    /// largest magnitude.
+    /// Of the error: mean, sum of squared deviations, and sum of magnitudes, each followed by its
+    /// rounding error; then the largest magnitude.
     pub errors: [T; 7],
-    /// Of the truth: mean and squared deviations, each with what rounding lost; least and greatest.
+    /// Of the truth: mean and sum of squared deviations, each followed by its rounding error; then
+    /// minimum and maximum.
     pub truth: [T; 6],
-    /// The same of the estimate.
+    /// The same for the estimate.
     pub estimate: [T; 6],
-    /// Products of the deviations of both, and what rounding lost.
+    /// Sum of the products of both deviations, and its rounding error.
     pub products: [T; 2],
 }
 
@@ -114,7 +116,7 @@ impl<T: Real> Default for Agreement<T> {
 }
 
 impl<T: Real> Agreement<T> {
-    /// Without a sample.
+    /// Creates an agreement without samples.
     pub fn new() -> Self {
         Self {
             errors: ErrorStats::new(),
@@ -124,8 +126,8 @@ impl<T: Real> Agreement<T> {
         }
     }
 
-    /// Takes a pair; whether it was taken. One that is not finite, or too large to be
-    /// squared (see [`ErrorStats`]), is not.
+    /// Adds a pair and returns whether it was accepted. A pair that is not finite, or too large to
+    /// be squared (see [`ErrorStats`]), is refused.
     #[inline]
     pub fn push(&mut self, truth: T, estimate: T) -> bool {
         let limit = largest::<T>();
@@ -141,7 +143,7 @@ impl<T: Real> Agreement<T> {
         taken
     }
 
-    /// Takes all samples of another stream, such as another trial.
+    /// Adds all samples of another stream, such as another trial.
     pub fn merge(&mut self, other: &Self) {
         let (own, others) = (self.errors.count(), other.errors.count());
         if own > 0 && others > 0 {
@@ -156,7 +158,7 @@ impl<T: Real> Agreement<T> {
         self.estimate.merge(&other.estimate);
     }
 
-    /// The numbers of which it consists.
+    /// Returns the numbers of the agreement.
     pub fn spec(&self) -> AgreementSpec<T> {
         AgreementSpec {
             count: self.count(),
@@ -168,8 +170,8 @@ impl<T: Real> Agreement<T> {
         }
     }
 
-    /// From the numbers that [`spec`](Self::spec) gave, bit for bit; `None` when one of them is not
-    /// finite.
+    /// Creates an agreement from the numbers that [`spec`](Self::spec) returned, bit for bit.
+    /// `None` if one of them is not finite.
     ///
     /// ```
     /// use stretch_metrics::Agreement;
@@ -188,53 +190,53 @@ impl<T: Real> Agreement<T> {
         })
     }
 
-    /// Bias, MAE, RMSE and the rest, in the unit of the signals.
+    /// Returns bias, MAE, RMSE and the other error statistics, in the unit of the signals.
     pub fn errors(&self) -> &ErrorStats<T> {
         &self.errors
     }
 
-    /// Pairs taken.
+    /// Returns the number of accepted pairs.
     pub fn count(&self) -> u64 {
         self.errors.count()
     }
 
-    /// Pairs not taken.
+    /// Returns the number of refused pairs.
     pub fn skipped(&self) -> u64 {
         self.errors.skipped()
     }
 
-    /// Least and greatest value of the truth. `None` when empty.
+    /// Returns the minimum and maximum of the truth. `None` if there are no samples.
     pub fn truth_range(&self) -> Option<Interval> {
         self.truth.interval()
     }
 
-    /// Least and greatest value of the estimate. `None` when empty.
+    /// Returns the minimum and maximum of the estimate. `None` if there are no samples.
     pub fn estimate_range(&self) -> Option<Interval> {
         self.estimate.interval()
     }
 
-    /// The paper's average error: 100 mean(|d_p - d_s|) / delta. `None` when empty or when
-    /// delta is 0 or too small to divide by.
+    /// Returns the paper's average error: 100 mean(|d_p - d_s|) / delta. `None` if there are no
+    /// samples, or if delta is 0 or too small to divide by.
     pub fn average_error_percent(&self, delta: Delta) -> Option<T> {
         self.percent(self.errors.mae()?, delta)
     }
 
-    /// 100 mean(d_p - d_s) / delta, with the sign that the paper's equation has: positive
-    /// where the estimate is too *small*, the opposite of [`ErrorStats::bias`]. `None` as
+    /// Returns 100 mean(d_p - d_s) / delta, with the sign of the paper's equation: positive
+    /// if the estimate is too *small*, the opposite of [`ErrorStats::bias`]. `None` as for
     /// [`average_error_percent`](Self::average_error_percent).
     pub fn signed_error_percent(&self, delta: Delta) -> Option<T> {
         self.percent(-self.errors.bias()?, delta)
     }
 
-    /// 100 RMSE / delta; with [`Delta::Truth`] it is percent of the stroke. `None` as
-    /// [`average_error_percent`](Self::average_error_percent).
+    /// Returns 100 RMSE / delta. With [`Delta::Truth`] it is in percent of the stroke. `None` as
+    /// for [`average_error_percent`](Self::average_error_percent).
     pub fn rmse_percent(&self, delta: Delta) -> Option<T> {
         self.percent(self.errors.rmse()?, delta)
     }
 
-    /// R^2 = 1 - SSE / SST of the estimate without refitting: 1 is perfect, 0 is as good as the
-    /// mean of the truth, below 0 is worse. `None` if there are no samples or the truth is constant
-    /// (or so nearly constant that R^2 overflows).
+    /// Returns R^2 = 1 - SSE / SST of the estimate without refitting: 1 is perfect, 0 is as good as
+    /// the mean of the truth, below 0 is worse. `None` if there are no samples or the truth is
+    /// constant (or so nearly constant that R^2 overflows).
     pub fn r_squared(&self) -> Option<T> {
         let total = self.truth.moments.squares();
         if total <= T::zero() {
@@ -243,8 +245,8 @@ impl<T: Real> Agreement<T> {
         Some(T::one() - self.errors.sum_of_squares() / total).filter(|r| r.is_finite())
     }
 
-    /// Pearson's correlation of truth and estimate, -1..1: blind to bias and scale. `None`
-    /// when either is constant.
+    /// Returns Pearson's correlation of truth and estimate, -1..1, which does not depend on bias
+    /// and scale. `None` if either is constant.
     pub fn correlation(&self) -> Option<T> {
         let scale = self.truth.moments.squares().sqrt() * self.estimate.moments.squares().sqrt();
         let one = T::one();

@@ -1,4 +1,4 @@
-//! Means over blocks: samples of a recording made nearly independent.
+//! Block means, which make the samples of a recording nearly independent.
 
 use stretch_core::Real;
 
@@ -7,10 +7,9 @@ use crate::{
     sum::{Sum, real},
 };
 
-/// Means over blocks of a fixed number of samples, streaming.
+/// Streaming means over blocks of a fixed number of samples.
 ///
-/// The design is the length; a block that is not complete gives no mean. The mean is
-/// summed with compensation.
+/// An incomplete block gives no mean. The mean is computed with compensated summation.
 ///
 /// ```
 /// use stretch_metrics::BlockMeans;
@@ -27,7 +26,8 @@ pub struct BlockMeans<T> {
 }
 
 impl<T: Real> BlockMeans<T> {
-    /// Blocks of `length` samples: 50 for the half second that the reports use at 100 Hz.
+    /// Creates block means over `length` samples. The reports use half a second, which is 50
+    /// samples at 100 Hz.
     ///
     /// # Errors
     /// [`MetricsError::EmptyBlock`] for a length of 0.
@@ -38,7 +38,7 @@ impl<T: Real> BlockMeans<T> {
         Ok(Self { length, filled: 0, sum: Sum::new() })
     }
 
-    /// Takes a sample; the block's mean when that completes a block.
+    /// Adds a sample, and returns the mean of the block if this completes it.
     #[inline]
     pub fn push(&mut self, x: T) -> Option<T> {
         self.sum.add(x);
@@ -51,19 +51,19 @@ impl<T: Real> BlockMeans<T> {
         Some(mean)
     }
 
-    /// Drops the block that is not complete: the next sample is of another recording.
+    /// Discards the incomplete block, because the next sample belongs to another recording.
     pub fn end_recording(&mut self) {
         self.filled = 0;
         self.sum = Sum::new();
     }
 
-    /// Samples in the block that is not complete.
+    /// Returns the number of samples in the incomplete block.
     pub fn pending(&self) -> u64 {
         self.filled
     }
 }
 
-/// [`PairedT`] on means over blocks of samples.
+/// A [`PairedT`] test on the means over blocks of samples.
 ///
 /// ```
 /// use stretch_metrics::PairedBlocks;
@@ -83,7 +83,7 @@ pub struct PairedBlocks<T> {
 }
 
 impl<T: Real> PairedBlocks<T> {
-    /// Blocks of `length` pairs.
+    /// Creates a test over blocks of `length` pairs.
     ///
     /// # Errors
     /// [`MetricsError::EmptyBlock`] for a length of 0.
@@ -91,7 +91,8 @@ impl<T: Real> PairedBlocks<T> {
         Ok(Self { blocks: BlockMeans::new(length)?, test: PairedT::new(), skipped: 0 })
     }
 
-    /// Takes a pair; whether it was taken. One that [`PairedT`] would not take ends the block.
+    /// Adds a pair and returns whether it was accepted. A pair that [`PairedT`] would refuse also
+    /// discards the incomplete block.
     #[inline]
     pub fn push(&mut self, first: T, second: T) -> bool {
         let difference = first - second;
@@ -105,31 +106,31 @@ impl<T: Real> PairedBlocks<T> {
         taken
     }
 
-    /// Drops the block that is not complete: the next pair is of another recording.
+    /// Discards the incomplete block, because the next pair belongs to another recording.
     pub fn end_recording(&mut self) {
         self.blocks.end_recording();
     }
 
-    /// Takes all complete blocks of another recording; the lengths of the blocks should agree.
+    /// Adds all complete blocks of another recording, which should have the same block length.
     pub fn merge(&mut self, other: &Self) {
         self.test.merge(&other.test);
         self.skipped += other.skipped;
     }
 
-    /// Pairs not taken.
+    /// Returns the number of refused pairs.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
 
-    /// Complete blocks.
+    /// Returns the number of complete blocks.
     pub fn count(&self) -> u64 {
         self.test.count()
     }
 
-    /// The test of "the mean difference is 0" on the block means.
+    /// Tests the hypothesis that the mean difference is 0 on the block means.
     ///
     /// # Errors
-    /// As [`PairedT::test`], with blocks for pairs.
+    /// As for [`PairedT::test`], with blocks in place of pairs.
     pub fn test(&self) -> Result<TTest, MetricsError> {
         self.test.test()
     }

@@ -1,16 +1,16 @@
-//! Why a figure cannot be given.
+//! The error of metrics.
 
 use core::fmt;
 
-/// Why a figure cannot be given. Small, `Copy`, and carries the evidence.
+/// The reason why a metric cannot be computed, with the offending values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum MetricsError {
-    /// Fewer samples (or blocks) than the figure needs.
+    /// Fewer samples (or blocks) than the metric needs.
     TooFew {
-        /// What it needs.
+        /// Number needed.
         needed: u64,
-        /// What there is.
+        /// Number given.
         got: u64,
     },
     /// Two signals of different length.
@@ -25,12 +25,12 @@ pub enum MetricsError {
         /// Its index.
         index: usize,
     },
-    /// A signal without spread: nothing can be divided by it.
+    /// A constant signal, by whose spread nothing can be divided.
     Constant {
-        /// Which one: `truth`, `estimate`, `difference`.
+        /// Name of the signal: `truth`, `estimate` or `difference`.
         signal: &'static str,
     },
-    /// A block of no sample.
+    /// A block length of 0.
     EmptyBlock,
 }
 

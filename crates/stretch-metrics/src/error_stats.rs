@@ -1,17 +1,19 @@
-//! Errors of an estimate, streaming.
+//! Streaming error statistics of an estimate.
 
 use stretch_core::Real;
 
 use crate::sum::{Moments, Sum, largest, real};
 
-/// Errors of an estimate against the truth: count, bias, MAE, RMSE, spread, largest.
+/// Error statistics of an estimate against the truth: count, bias, MAE, RMSE, standard deviation,
+/// largest error.
 ///
-/// The error is e = estimate - truth, in the unit of both. Moments are Welford's with
-/// compensated sums: an `f32` stream of ten million samples loses no digit to the length.
-/// [`merge`](Self::merge) gives, to rounding, what one stream of both would have given.
+/// The error is e = estimate - truth, in the unit of both. Moments are computed by Welford's method
+/// with compensated sums, so an `f32` stream of ten million samples loses no digits because of its
+/// length. [`merge`](Self::merge) gives the same result, up to rounding, as one stream of all
+/// samples.
 ///
-/// A pair that is not finite, or whose error could not be squared (magnitude above about
-/// 1e15 in `f32`, 1e150 in `f64`), is not taken and counted in [`skipped`](Self::skipped).
+/// A pair that is not finite, or whose squared errors could overflow in a sum (magnitude above
+/// about 1e15 in `f32`, 1e150 in `f64`), is refused and counted in [`skipped`](Self::skipped).
 ///
 /// ```
 /// use stretch_metrics::ErrorStats;
@@ -40,17 +42,17 @@ impl<T: Real> Default for ErrorStats<T> {
 }
 
 impl<T: Real> ErrorStats<T> {
-    /// Without a sample.
+    /// Creates statistics without samples.
     pub fn new() -> Self {
         Self { moments: Moments::new(), absolute: Sum::new(), largest: T::zero(), skipped: 0 }
     }
 
-    /// Takes a pair; whether it was taken.
+    /// Adds a pair and returns whether it was accepted.
     #[inline]
     pub fn push(&mut self, truth: T, estimate: T) -> bool {
         let error = estimate - truth;
         let size = error.abs();
-        // False for NaN, too.
+        // Also false for NaN.
         let taken = size <= largest();
         if taken {
             self.moments.push(error);
@@ -62,12 +64,12 @@ impl<T: Real> ErrorStats<T> {
         taken
     }
 
-    /// Counts a pair that was not taken.
+    /// Counts a refused pair.
     pub(crate) fn skip(&mut self) {
         self.skipped += 1;
     }
 
-    /// Takes all samples of another stream.
+    /// Adds all samples of another stream.
     pub fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
         self.absolute.merge(&other.absolute);
@@ -75,37 +77,40 @@ impl<T: Real> ErrorStats<T> {
         self.skipped = self.skipped.saturating_add(other.skipped);
     }
 
-    /// Pairs taken.
+    /// Returns the number of accepted pairs.
     pub fn count(&self) -> u64 {
         self.moments.count()
     }
 
-    /// Pairs not taken.
+    /// Returns the number of refused pairs.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
 
-    /// Mean of the error; positive where the estimate is too large. `None` when empty.
+    /// Returns the mean error, which is positive if the estimate is too large. `None` if there are
+    /// no samples.
     pub fn bias(&self) -> Option<T> {
         (self.count() > 0).then(|| self.moments.mean())
     }
 
-    /// Mean of the error's magnitude. `None` when empty.
+    /// Returns the mean magnitude of the error. `None` if there are no samples.
     pub fn mae(&self) -> Option<T> {
         (self.count() > 0).then(|| self.absolute.value() / real(self.count()))
     }
 
-    /// Root of the mean squared error (divided by n). `None` when empty.
+    /// Returns the square root of the mean squared error (divided by n). `None` if there are no
+    /// samples.
     pub fn rmse(&self) -> Option<T> {
         (self.count() > 0).then(|| (self.sum_of_squares() / real(self.count())).sqrt())
     }
 
-    /// Standard deviation of the error about its mean (divided by n - 1). `None` below two.
+    /// Returns the standard deviation of the error about its mean (divided by n - 1). `None` for
+    /// fewer than two samples.
     pub fn std_dev(&self) -> Option<T> {
         self.moments.std_dev()
     }
 
-    /// The largest magnitude of the error. `None` when empty.
+    /// Returns the largest magnitude of the error. `None` if there are no samples.
     pub fn max_abs(&self) -> Option<T> {
         (self.count() > 0).then_some(self.largest)
     }
@@ -120,7 +125,7 @@ impl<T: Real> ErrorStats<T> {
         Self { moments, absolute, largest, skipped }
     }
 
-    /// Sum of the squared errors.
+    /// Returns the sum of the squared errors.
     pub(crate) fn sum_of_squares(&self) -> T {
         let mean = self.moments.mean();
         self.moments.squares() + mean * mean * real(self.count())

@@ -1,36 +1,38 @@
-//! How far an estimate runs behind the truth.
+//! Delay of an estimate behind the truth.
 
 use stretch_core::Real;
 
 use crate::MetricsError;
 
-/// Where the correlation of truth and estimate is greatest.
+/// The lag at which the correlation of truth and estimate is greatest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lag {
-    /// Samples by which the estimate lags the truth, between samples by a parabola; negative
-    /// where it leads. Times the sampling interval it is seconds.
+    /// Number of samples by which the estimate lags the truth, interpolated by a parabola; negative
+    /// if it leads. Multiply by the sampling interval to get seconds.
     pub samples: f64,
     /// Pearson's correlation at the best whole lag.
     pub correlation: f64,
-    /// Pearson's correlation at lag 0. Little below `correlation`: the lag costs little, or
-    /// the signals hardly determine it (a single ramp correlates with itself at any lag).
+    /// Pearson's correlation at lag 0. If it is only a little below `correlation`, the lag has
+    /// little effect, or the signals hardly determine it (a single ramp correlates with itself at
+    /// any lag).
     pub correlation_at_zero: f64,
-    /// Whether the best lag is the largest that was tried: the true one may be beyond it.
+    /// Whether the best lag is the largest that was tried, so that the true lag may be larger.
     pub at_limit: bool,
 }
 
-/// The lag of `estimate` behind `truth`, by normalised cross-correlation.
+/// Estimates the lag of `estimate` behind `truth`, by normalised cross-correlation.
 ///
-/// For each whole lag k from `-max_lag` to `max_lag`, r(k) is Pearson's correlation of
-/// `truth[i]` with `estimate[i + k]` over the samples that overlap; each overlap has its own
-/// means and scales, so neither offset nor gain nor the length of the overlap draws the
-/// answer. The greatest r(k) wins, the smaller |k| on a tie, and a parabola through it and its
-/// neighbours places the peak between samples. Both signals must be sampled uniformly, at
-/// the same instants. Cost: `n (2 max_lag + 1)` steps of five multiply-adds; no memory.
+/// For each whole lag k from `-max_lag` to `max_lag`, r(k) is Pearson's correlation of `truth[i]`
+/// with `estimate[i + k]` over the overlapping samples. Means and scales are computed for each
+/// overlap, so offset, gain and the length of the overlap do not bias the result. The function
+/// takes the greatest r(k), on a tie that with the smaller |k|. A parabola through it and its
+/// neighbours gives the position of the peak between samples. Both signals must be sampled
+/// uniformly, at the same times. The cost is `n (2 max_lag + 1)` steps of five multiply-adds,
+/// without extra memory.
 ///
 /// # Errors
-/// [`MetricsError`] when the lengths differ, a sample is not finite, either signal is
-/// constant, or fewer than `2 max_lag + 3` samples are given (every overlap must keep more
+/// [`MetricsError`] if the lengths differ, a sample is not finite, either signal is
+/// constant, or fewer than `2 max_lag + 3` samples are given (every overlap must contain more
 /// than half of them).
 ///
 /// ```
@@ -63,7 +65,7 @@ pub fn lag<T: Real>(truth: &[T], estimate: &[T], max_lag: usize) -> Result<Lag, 
         }
     }
     let at_limit = max_lag > 0 && best.unsigned_abs() == max_lag;
-    // One step beyond the limit still overlaps by more than half.
+    // One step beyond the limit, the overlap is still more than half of the samples.
     let (before, after) = (at(best - 1), at(best + 1));
     let bend = before - 2.0 * peak + after;
     let within = before <= peak && after <= peak && bend < 0.0;
@@ -72,7 +74,8 @@ pub fn lag<T: Real>(truth: &[T], estimate: &[T], max_lag: usize) -> Result<Lag, 
     Ok(Lag { samples, correlation: peak, correlation_at_zero: zero, at_limit })
 }
 
-/// A signal with what brings it near 0 and 1, so that products neither cancel nor overflow.
+/// A signal with a centre and scale that bring it to -1..1, so that products neither cancel nor
+/// overflow.
 struct Signal<'a, T> {
     samples: &'a [T],
     centre: f64,
@@ -102,8 +105,8 @@ impl<'a, T: Real> Signal<'a, T> {
     }
 }
 
-/// Pearson's correlation of `truth[i]` and `estimate[i + k]` over the overlap; 0 where either is
-/// constant there.
+/// Returns Pearson's correlation of `truth[i]` and `estimate[i + k]` over the overlap; 0 if either
+/// is constant in the overlap.
 fn correlation<T: Real>(truth: &Signal<'_, T>, estimate: &Signal<'_, T>, k: isize) -> f64 {
     let n = truth.samples.len();
     let size = k.unsigned_abs().min(n);
@@ -119,7 +122,7 @@ fn correlation<T: Real>(truth: &Signal<'_, T>, estimate: &Signal<'_, T>, k: isiz
     }
     let count = (n - size) as f64;
     let (sx, sy) = (xx - x * x / count, yy - y * y / count);
-    // Below this the spread is rounding of the sums.
+    // A spread below this is rounding error of the sums.
     let least = 1e-12 * count;
     if !(sx > least && sy > least) {
         return 0.0;

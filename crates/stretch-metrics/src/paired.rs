@@ -1,4 +1,4 @@
-//! The paired t test, streaming.
+//! A streaming paired t test.
 
 use stretch_core::{Interval, Real};
 
@@ -10,10 +10,10 @@ use crate::{
 
 /// Accumulates paired samples for Student's paired t test.
 ///
-/// The difference is d = first - second; t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of
-/// freedom. It takes the pairs as independent. Samples of one recording are not: neighbours
-/// resemble each other, and P comes out far too small. [`PairedBlocks`](crate::PairedBlocks)
-/// tests means over blocks, which is nearer to the truth; print both.
+/// The difference is d = first - second, and t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of
+/// freedom. The test assumes independent pairs. Neighbouring samples of a recording are correlated,
+/// so P is far too small. [`PairedBlocks`](crate::PairedBlocks) tests means over blocks, whose P is
+/// more realistic. Report both.
 ///
 /// ```
 /// use stretch_metrics::PairedT;
@@ -34,10 +34,10 @@ pub struct PairedT<T> {
     skipped: u64,
 }
 
-/// What a paired t test says.
+/// Result of a paired t test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TTest {
-    /// Pairs, or blocks.
+    /// Number of pairs or blocks.
     pub count: u64,
     /// Mean of first - second, in their unit.
     pub mean_difference: f64,
@@ -47,16 +47,16 @@ pub struct TTest {
     pub t: f64,
     /// Degrees of freedom: `count - 1`.
     pub dof: u64,
-    /// Two-tailed P; 0 where it is below the least `f64`, for which see `ln_p`.
+    /// Two-tailed P; 0 if it is below the smallest `f64` (then see `ln_p`).
     pub p: f64,
-    /// Natural logarithm of the two-tailed P, finite however small P is.
+    /// Natural logarithm of the two-tailed P, which is finite even if P underflows.
     pub ln_p: f64,
     /// Ends of the 95 % interval of the mean difference.
     pub interval_95: Interval,
 }
 
 impl TTest {
-    /// The two-sided confidence interval of the mean difference at `level`, such as 0.99.
+    /// Returns the two-sided confidence interval of the mean difference at `level`, such as 0.99.
     pub fn interval(&self, level: f64) -> Interval {
         let half = critical(1.0 - level, self.dof as f64) * self.standard_error;
         Interval { min: self.mean_difference - half, max: self.mean_difference + half }
@@ -70,13 +70,13 @@ impl<T: Real> Default for PairedT<T> {
 }
 
 impl<T: Real> PairedT<T> {
-    /// Without a pair.
+    /// Creates a test without pairs.
     pub fn new() -> Self {
         Self { moments: Moments::new(), skipped: 0 }
     }
 
-    /// Takes a pair; whether it was taken. One that is not finite, or whose difference could
-    /// not be squared (see [`ErrorStats`](crate::ErrorStats)), is not.
+    /// Adds a pair and returns whether it was accepted. A pair that is not finite, or whose
+    /// difference is too large to be squared (see [`ErrorStats`](crate::ErrorStats)), is refused.
     #[inline]
     pub fn push(&mut self, first: T, second: T) -> bool {
         let difference = first - second;
@@ -89,27 +89,27 @@ impl<T: Real> PairedT<T> {
         taken
     }
 
-    /// Takes all pairs of another stream.
+    /// Adds all pairs of another stream.
     pub fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
         self.skipped += other.skipped;
     }
 
-    /// Pairs taken.
+    /// Returns the number of accepted pairs.
     pub fn count(&self) -> u64 {
         self.moments.count()
     }
 
-    /// Pairs not taken.
+    /// Returns the number of refused pairs.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
 
-    /// The test of "the mean difference is 0".
+    /// Tests the hypothesis that the mean difference is 0.
     ///
     /// # Errors
-    /// [`MetricsError::TooFew`] below two pairs; [`MetricsError::Constant`] when all
-    /// differences are equal, as t would be x / 0.
+    /// [`MetricsError::TooFew`] for fewer than two pairs; [`MetricsError::Constant`] if all
+    /// differences are equal, because t would be x / 0.
     pub fn test(&self) -> Result<TTest, MetricsError> {
         let count = self.count();
         let std_dev =
@@ -117,7 +117,7 @@ impl<T: Real> PairedT<T> {
         let standard_error = std_dev.as_f64() / libm::sqrt(count as f64);
         let mean_difference = self.moments.mean().as_f64();
         let t = mean_difference / standard_error;
-        // 0 / 0, x / 0, and what is as good as that.
+        // t is not finite for 0 / 0, x / 0, or a quotient that overflows.
         if !t.is_finite() {
             return Err(MetricsError::Constant { signal: "difference" });
         }

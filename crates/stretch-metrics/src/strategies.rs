@@ -17,8 +17,8 @@ extern crate std;
 use proptest::{collection::vec, prelude::*};
 use std::{ops::Range, vec::Vec};
 
-/// Lengths of a muscle in mm and estimates of them: any truth in 100..200, an error with a bias
-/// of up to 5 and a spread of up to 10.
+/// Lengths of a muscle in mm and estimates of them, with the truth in 100..200 and an error with a
+/// bias of up to 5 and a spread of up to 10.
 pub fn pairs(count: Range<usize>) -> impl Strategy<Value = Vec<(f64, f64)>> {
     (-5.0..5.0, 0.01..10.0, vec((100.0..200.0, -1.0..1.0), count)).prop_map(
         |(bias, spread, raw)| {
@@ -29,13 +29,13 @@ pub fn pairs(count: Range<usize>) -> impl Strategy<Value = Vec<(f64, f64)>> {
     )
 }
 
-/// Pairs of any bit pattern: NaN, infinities, the largest and the smallest numbers.
+/// Pairs of arbitrary `f64` values, including very large and very small numbers.
 pub fn faulty_pairs(count: Range<usize>) -> impl Strategy<Value = Vec<(f64, f64)>> {
     vec((any::<f64>(), any::<f64>()), count)
 }
 
-/// A smooth truth and an estimate that lags it by so many samples, in -8..8, with gain and
-/// offset: two sines whose periods have no common multiple nearby.
+/// A lag in -8..8 samples, a smooth truth, and an estimate with this lag, a gain and an offset. The
+/// truth is the sum of two sines whose periods have no small common multiple.
 pub fn lagged(count: usize) -> impl Strategy<Value = (f64, Vec<f64>, Vec<f64>)> {
     (-8.0..8.0, 0.0..6.0, 0.5..2.0, -10.0..10.0).prop_map(
         move |(lag, phase, gain, offset): (f64, f64, f64, f64)| {

@@ -1,18 +1,17 @@
-//! Student's t distribution: two-tailed probabilities, however small, and critical values.
+//! Student's t distribution: two-tailed probabilities of any size, and critical values.
 //!
-//! P(|T| >= t) = I_x(v/2, 1/2) with x = v / (v + t^2), the regularised incomplete beta
-//! function, by a continued fraction (Didonato and Morris, doi:10.1145/131766.131776) with
-//! Lentz's method: one whose terms take 1 - x as it is, so that a million degrees of freedom
-//! cost no digit. The factor before the fraction is formed as a logarithm from log1p(t^2 / v), which keeps its digits for any
-//! t, and from a ratio of gamma functions that is never a difference of two large
-//! logarithms. So [`ln_two_tailed`] is right where P itself is below the least `f64`.
+//! P(|T| >= t) = I_x(v/2, 1/2) with x = v / (v + t^2), the regularised incomplete beta function. It is evaluated as a
+//! continued fraction (Didonato and Morris, doi:10.1145/131766.131776) with Lentz's method. The fraction takes 1 - x as
+//! a separate input, so that no digits are lost with a million degrees of freedom. The factor before the fraction is
+//! computed as a logarithm, from log1p(t^2 / v) and from a ratio of gamma functions that is never a difference of two
+//! large logarithms. Therefore [`ln_two_tailed`] is accurate even if P underflows.
 
 use core::f64::consts::PI;
 
-/// P(|T| >= |t|) for `dof` degrees of freedom, 0..=1; NaN for a NaN `t` or `dof` not above 0.
+/// Returns P(|T| >= |t|) for `dof` degrees of freedom, 0..=1; NaN if `t` is NaN or `dof` is not above 0.
 ///
-/// Relative error about 1e-13. Below about 1e-308 it is a subnormal number or 0, as in any
-/// `f64`: [`ln_two_tailed`] has no such limit.
+/// The relative error is about 1e-13. A result below about 1e-308 is a subnormal number or 0. [`ln_two_tailed`] has no
+/// such limit.
 ///
 /// ```
 /// use stretch_metrics::student_t::two_tailed;
@@ -26,7 +25,7 @@ pub fn two_tailed(t: f64, dof: f64) -> f64 {
     }
 }
 
-/// The natural logarithm of [`two_tailed`], accurate where P itself underflows.
+/// Returns the natural logarithm of [`two_tailed`], accurate even if P underflows.
 ///
 /// ```
 /// use stretch_metrics::student_t::ln_two_tailed;
@@ -41,8 +40,8 @@ pub fn ln_two_tailed(t: f64, dof: f64) -> f64 {
     }
 }
 
-/// The t that P(|T| >= t) = `p` has; infinite for 0, NaN for `p` outside 0..=1 or `dof` not
-/// above 0. Half of a two-sided confidence interval of level 1 - p, in standard errors.
+/// Returns the t for which P(|T| >= t) = `p`: half the width of a two-sided confidence interval of level 1 - p, in
+/// standard errors. Infinite if `p` is 0; NaN if `p` is outside 0..=1 or `dof` is not above 0.
 ///
 /// ```
 /// use stretch_metrics::student_t::critical;
@@ -63,7 +62,7 @@ pub fn critical(p: f64, dof: f64) -> f64 {
             return high;
         }
     }
-    // Halving: at most 60 rounds, and no derivative to go wrong.
+    // Bisection needs no derivative. It takes about 60 rounds, and more if t is close to 0.
     loop {
         let middle = low + (high - low) / 2.0;
         if middle <= low || middle >= high {
@@ -77,11 +76,11 @@ pub fn critical(p: f64, dof: f64) -> f64 {
     }
 }
 
-/// P(|T| >= t), in the form that has digits.
+/// P(|T| >= t), in the form that is accurate.
 enum Tail {
-    /// Its logarithm.
+    /// ln P.
     Ln(f64),
-    /// What it lacks of 1.
+    /// 1 - P.
     Rest(f64),
 }
 
@@ -97,11 +96,11 @@ fn tail(t: f64, dof: f64) -> Tail {
         return normal_tail(t);
     }
     let (a, b) = (dof / 2.0, 0.5);
-    // u = t^2 / v, kept finite; x = 1 / (1 + u), y = 1 - x without a difference.
+    // u = t^2 / v, x = 1 / (1 + u), and y = 1 - x computed without a subtraction.
     let root = t / libm::sqrt(dof);
     let u = root * root;
     if u.is_infinite() {
-        // x^a / (a B(a, 1/2)) to far more digits than an f64 has.
+        // P equals x^a / (a B(a, 1/2)) to far more digits than an f64 has.
         return Tail::Ln(-2.0 * a * libm::log(root) - libm::log(a) - ln_beta_half(a));
     }
     let (x, y) = (1.0 / (1.0 + u), u / (1.0 + u));
@@ -118,21 +117,21 @@ fn tail(t: f64, dof: f64) -> Tail {
     }
 }
 
-/// The limit of infinitely many degrees of freedom: erfc(t / sqrt 2).
+/// Returns the limit for infinitely many degrees of freedom: erfc(t / sqrt 2).
 fn normal_tail(t: f64) -> Tail {
     if t < 20.0 {
         return Tail::Ln(libm::log(libm::erfc(t / core::f64::consts::SQRT_2)));
     }
-    // Mills' ratio, asymptotic: at t = 20 the first term left out is 1e-15.
+    // Asymptotic series of Mills' ratio. At t = 20 the first omitted term is 8e-14.
     let w = 1.0 / (t * t);
     let series = 1.0 - w * (1.0 - w * (3.0 - w * (15.0 - w * (105.0 - w * (945.0 - w * 10395.0)))));
     Tail::Ln(-t * t / 2.0 - libm::log(t) + 0.5 * libm::log(2.0 / PI) + libm::log(series))
 }
 
-/// ln B(a, 1/2) = ln(sqrt(pi) gamma(a) / gamma(a + 1/2)).
+/// Returns ln B(a, 1/2) = ln(sqrt(pi) gamma(a) / gamma(a + 1/2)).
 fn ln_beta_half(a: f64) -> f64 {
-    // gamma(a + 1/2) / gamma(a) is asymptotic from 30 on (DLMF 5.11.13, as a logarithm);
-    // below it is brought there by its recurrence.
+    // From a = 30 on, gamma(a + 1/2) / gamma(a) is computed by its asymptotic series (DLMF 5.11.13, as a logarithm).
+    // Smaller a are first raised to 30 by the recurrence.
     let (mut a, mut ratio) = (a, 1.0);
     while a < 30.0 {
         ratio *= a / (a + 0.5);
@@ -143,13 +142,13 @@ fn ln_beta_half(a: f64) -> f64 {
     0.5 * libm::log(PI / a) - series - libm::log(ratio)
 }
 
-/// The continued fraction of I_x(a, b) after the factor x^a y^b / B(a, b), y = 1 - x.
+/// Returns the continued fraction by which the factor x^a y^b / B(a, b) of I_x(a, b) is multiplied, with y = 1 - x.
 fn fraction(a: f64, b: f64, x: f64, y: f64) -> f64 {
     const TINY: f64 = 1e-300;
-    // It takes some tens in practice.
+    // In practice some tens of rounds are enough.
     const ROUNDS: u32 = 20_000;
     let away = |x: f64| if x.abs() < TINY { TINY } else { x };
-    // a - (a + b) x + 1, from whichever of x and y is small and so loses no digit.
+    // a - (a + b) x + 1, computed from the smaller of x and y so that no digits are lost.
     let lead = 1.0 + if x < y { a - (a + b) * x } else { (a + b) * y - b };
     let mut h = away(a * lead / (a + 1.0));
     let (mut c, mut d) = (h, 0.0);

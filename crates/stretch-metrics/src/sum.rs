@@ -17,7 +17,7 @@ impl<T: Real> Sum<T> {
 
     #[inline]
     pub(crate) fn add(&mut self, x: T) {
-        // Knuth's two-sum: exact without asking which is larger.
+        // Knuth's two-sum, which is exact without comparing the magnitudes.
         let high = self.high + x;
         let part = high - self.high;
         self.low = self.low + ((self.high - (high - part)) + (x - part));
@@ -43,8 +43,8 @@ impl<T: Real> Sum<T> {
     }
 }
 
-/// Count, mean and sum of squared deviations (Welford, doi:10.1080/00401706.1962.10490022),
-/// the mean and the squares as compensated sums.
+/// Count, mean and sum of squared deviations (Welford, doi:10.1080/00401706.1962.10490022).
+/// Mean and sum of squares are compensated sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Moments<T> {
     count: u64,
@@ -57,7 +57,7 @@ impl<T: Real> Moments<T> {
         Self { count: 0, mean: Sum::new(), squares: Sum::new() }
     }
 
-    /// Takes a sample; gives how far it was from the mean before and after.
+    /// Adds a sample, and returns its deviations from the mean before and after the update.
     #[inline]
     pub(crate) fn push(&mut self, x: T) -> (T, T) {
         self.count += 1;
@@ -68,7 +68,7 @@ impl<T: Real> Moments<T> {
         (before, after)
     }
 
-    /// As if the other's samples had come, too (Chan, Golub and LeVeque 1979).
+    /// Adds the samples of another stream (Chan, Golub and LeVeque 1979).
     pub(crate) fn merge(&mut self, other: &Self) {
         if other.count == 0 {
             return;
@@ -103,24 +103,24 @@ impl<T: Real> Moments<T> {
         self.mean.value()
     }
 
-    /// Sum of squared deviations from the mean, at least 0.
+    /// Returns the sum of squared deviations from the mean, at least 0.
     pub(crate) fn squares(&self) -> T {
         self.squares.value().max(T::zero())
     }
 
-    /// Standard deviation with n - 1; `None` below two samples.
+    /// Returns the standard deviation with n - 1; `None` for fewer than two samples.
     pub(crate) fn std_dev(&self) -> Option<T> {
         (self.count > 1).then(|| (self.squares() / real(self.count - 1)).sqrt())
     }
 }
 
-/// A count as a number.
+/// Converts a count to the sample type.
 #[inline]
 pub(crate) fn real<T: Real>(count: u64) -> T {
     T::from_f64(count as f64)
 }
 
-/// The largest magnitude that is taken: its square summed 2^28 times is still finite.
+/// Returns the largest accepted magnitude: a sum of 2^28 squares of it is still finite.
 #[inline]
 pub(crate) fn largest<T: Real>() -> T {
     T::max_value().sqrt() / T::from_f64(16384.0)

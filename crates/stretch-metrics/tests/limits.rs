@@ -1,4 +1,4 @@
-//! Long streams, short ones, and those that say nothing.
+//! Tests of long streams, short streams, and inputs for which a metric is undefined.
 
 use approx::relative_eq;
 use stretch_metrics::{Agreement, Delta, ErrorStats, MetricsError, PairedBlocks, PairedT, lag};

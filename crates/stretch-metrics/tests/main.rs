@@ -1,4 +1,5 @@
-//! The tests of stretch-metrics from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-metrics, in one program because linking takes longer than most
+//! of the tests.
 
 mod limits;
 mod properties;

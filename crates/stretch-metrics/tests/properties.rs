@@ -1,4 +1,4 @@
-//! What must hold for any signals.
+//! Property tests that must hold for any signals.
 
 use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
@@ -16,7 +16,7 @@ fn agreement(pairs: &[(f64, f64)]) -> Agreement<f64> {
     all
 }
 
-/// Every figure of an agreement, by a fixed order.
+/// Returns all metrics of an agreement in a fixed order.
 fn figures(a: &Agreement<f64>) -> Vec<Option<f64>> {
     let e = a.errors();
     let mut all = vec![e.bias(), e.mae(), e.rmse(), e.std_dev(), e.max_abs()];
@@ -85,10 +85,11 @@ proptest! {
             pairs.iter().map(|&(t, e)| (scale * t + shift, scale * e + shift)).collect();
         let after = agreement(&moved);
         let (before, after) = (figures(&before), figures(&after));
-        // The first five carry the unit, the others are pure numbers.
+        // The first five have the unit of the signals, the others are dimensionless.
         let scaled: Vec<_> = before[..5].iter().map(|x| x.map(|x| scale * x)).collect();
         same(&after[..5], &scaled, tolerance::METRICS_SHIFT)?;
-        // Ranges and SST below the shift's rounding have no digits left to compare.
+        // If range and SST are small compared with the rounding of the shift, no digits are left to
+        // compare.
         let spread = pairs.iter().map(|p| p.0).fold(f64::MIN, f64::max)
             - pairs.iter().map(|p| p.0).fold(f64::MAX, f64::min);
         if spread > 1.0 {
@@ -136,7 +137,7 @@ proptest! {
         prop_assert_eq!((one.t, one.p, one.dof), (-other.t, other.p, other.dof));
         let turned = Interval { min: -other.interval_95.max, max: -other.interval_95.min };
         prop_assert_eq!(one.interval_95, turned);
-        // The 95 % interval leaves 0 out exactly where P is below 0.05.
+        // The 95 % interval excludes 0 if and only if P is below 0.05.
         let outside = one.interval_95.min > 0.0 || one.interval_95.max < 0.0;
         prop_assert_eq!(outside, one.p < 0.05);
     }

@@ -1,4 +1,4 @@
-//! Against SciPy, NumPy and mpmath: `reference/metrics/make.py`.
+//! Tests against values from SciPy, NumPy and mpmath (`reference/metrics/make.py`).
 
 use approx::relative_eq;
 use stretch_metrics::{
@@ -63,7 +63,7 @@ fn paired_tests_on_samples_and_blocks() {
         close("mean", test.mean_difference, expected["mean"][row], tolerance::METRICS_SUMS);
         close("low", test.interval_95.min, expected["low"][row], tolerance::METRICS_SUMS);
         close("high", test.interval_95.max, expected["high"][row], tolerance::METRICS_SUMS);
-        // P of 1e-240 magnifies the last digits of t by t^2 or so.
+        // At P = 1e-240 a relative error of t is magnified by a factor of about t^2.
         close("p", test.p, expected["p"][row], tolerance::METRICS_TINY_P);
         assert_eq!(test.dof as f64, expected["dof"][row]);
     }

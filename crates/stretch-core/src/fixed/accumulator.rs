@@ -1,33 +1,35 @@
 //! A running sum of products.
 
-/// A value in least bits and the fraction that its last product left, 32 bits each.
+/// A 32-bit integer value in the upper word and the fraction of its last product in the lower word.
 ///
-/// The fraction of one product is carried into the next instead of a half: that
-/// costs no instruction and rounds by less than one least bit either way.
+/// Instead of rounding each product by adding a half, the fraction of one product is carried into
+/// the next. This costs no instruction, and the error stays below one least bit in either
+/// direction.
 #[derive(Clone, Copy)]
 pub(super) struct Accumulator(pub(super) u64);
 
 impl Accumulator {
-    /// `c` and a half, less 2^-32: a whole half would be taken for a rounding
-    /// product (SMMLAR) on cores that have it, which drops the fraction.
+    /// Starts at `c` plus a half minus 2^-32. With a whole half, the compiler would emit a
+    /// rounding multiplication (SMMLAR) on cores that have one, and that instruction drops the
+    /// fraction.
     #[inline(always)]
     pub(super) fn new(c: i32) -> Self {
         Self::from_parts(c, (1 << 31) - 1)
     }
 
-    /// `c + self v / 2^32`, with what is left of it: one SMLAL. The sum is known to fit.
+    /// Returns `c + value v / 2^32` with the fraction carried over: one SMLAL. The caller ensures that the sum fits.
     #[inline(always)]
     pub(super) fn times(self, v: i32, c: i32) -> Self {
         Self::from_parts(c, self.0 as u32).plus(self.value(), v)
     }
 
-    /// `self + a v / 2^32`.
+    /// Returns `self + a v / 2^32`.
     #[inline(always)]
     pub(super) fn plus(self, a: i32, v: i32) -> Self {
         Self(self.0.wrapping_add((i64::from(a) * i64::from(v)) as u64))
     }
 
-    /// This value, with what another one left.
+    /// Returns this value with the fraction of another accumulator.
     #[inline(always)]
     pub(super) fn carrying(self, other: Self) -> Self {
         Self::from_parts(self.value(), other.0 as u32)

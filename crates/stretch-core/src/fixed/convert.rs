@@ -1,8 +1,8 @@
-//! From real numbers, and from wider integers.
+//! Conversion to 32-bit integers.
 
 use crate::DesignError;
 
-/// `x 2^bits`, rounded to the nearest integer (halves away from zero).
+/// Returns `x 2^bits`, rounded to the nearest integer (halves away from zero).
 ///
 /// # Errors
 /// [`DesignError::OutOfRange`], naming `field`, for a value that is not finite
@@ -19,7 +19,7 @@ pub fn from_f64(field: &'static str, x: f64, bits: u32) -> Result<i32, DesignErr
     if fits { Ok(scaled as i32) } else { Err(DesignError::OutOfRange { field, value: x }) }
 }
 
-/// The nearest 32-bit value.
+/// Returns the nearest 32-bit value.
 ///
 /// ```
 /// assert_eq!(stretch_core::fixed::saturate(1 << 40), i32::MAX);

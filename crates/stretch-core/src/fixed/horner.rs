@@ -1,9 +1,9 @@
-//! Room for Horner's rule.
+//! Overflow check for Horner's rule.
 
 use crate::DesignError;
 
-/// Checks that `|terms[0]| + |terms[1]|/2 + |terms[2]|/4 + ...`, and every tail
-/// of that sum, stays inside 32 bits with room for the roundings; gives the sum.
+/// Checks that `terms[0] + terms[1]/2 + terms[2]/4 + ...` and every tail of that sum stay inside 32
+/// bits, with room for rounding errors. Returns the sum.
 pub(super) fn check_horner(field: &'static str, terms: &[u32]) -> Result<u32, DesignError> {
     const MOST: u32 = i32::MAX as u32 - 8;
     let mut sum = 0u32;

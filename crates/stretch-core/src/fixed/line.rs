@@ -3,10 +3,10 @@
 use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
 use crate::DesignError;
 
-/// A line over an input in -1/2..1/2, for any `i32`: `intercept + slope v`.
+/// A line `intercept + slope v` over an input `v = volts / 2^32` in -1/2..1/2. `volts` may be any
+/// `i32`.
 ///
-/// `v = volts / 2^32`; coefficients and result are in units of the output's
-/// least bit, which the caller chooses.
+/// Coefficients and result are in units of the output's least bit, which the caller chooses.
 ///
 /// ```
 /// use stretch_core::fixed::FixedLine;
@@ -28,16 +28,16 @@ impl FixedLine {
     /// numbers, in least bits: two rounded coefficients and one rounded product.
     pub const ROUNDING: f64 = 0.5 + 0.25 + 0.5;
 
-    /// The line with these coefficients, rounded.
+    /// Creates the line with these coefficients, rounded.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] when some `i32` input would leave 32 bits.
+    /// [`DesignError::OutOfRange`] if the result for some `i32` input would not fit 32 bits.
     pub fn new(intercept: f64, slope: f64) -> Result<Self, DesignError> {
         let round = |x| from_f64("fixed.line", x, 0);
         Self::try_from((round(intercept)?, round(slope)?))
     }
 
-    /// The line at `volts / 2^32`, in least bits.
+    /// Evaluates the line at `volts / 2^32`, in least bits.
     #[inline(always)]
     #[must_use]
     pub fn eval(&self, volts: i32) -> i32 {

@@ -1,4 +1,4 @@
-//! Fixed point: 32-bit numbers, 64-bit products, and nothing that can overflow.
+//! Fixed-point arithmetic with 32-bit numbers and 64-bit products, in which nothing can overflow.
 //!
 //! Two formats are used, both carried by a plain `i32`:
 //!
@@ -7,13 +7,11 @@
 //! | Q27 | `n / 2^27`, from -16 to 16 | [`FixedRange`]: normalised channels with headroom |
 //! | half | `n / 2^32`, from -1/2 to 1/2 | inputs of [`FixedPoly13`] and [`FixedLine`] |
 //!
-//! In the second one the upper word of a 64-bit product is the product, so that
-//! a step of Horner's rule is one multiply-accumulate (`SMLAL`) and no shift.
+//! In the format "half" the product is the upper word of a 64-bit product. A step of Horner's rule is therefore one
+//! multiply-accumulate (`SMLAL`) without a shift.
 //!
-//! Integer arithmetic rounds the same way everywhere: results are the same bits
-//! on a computer and on any core. Designs are computed in `f64` and refused when
-//! they do not fit ([`DesignError::OutOfRange`](crate::DesignError::OutOfRange)); a step takes any `i32` and
-//! never panics or wraps.
+//! Integer arithmetic gives the same bits on every processor. Designs are computed in `f64`, and refused if they do not
+//! fit ([`DesignError::OutOfRange`](crate::DesignError::OutOfRange)). A step takes any `i32` and never panics or wraps.
 
 mod accumulator;
 mod convert;

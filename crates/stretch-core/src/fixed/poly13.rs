@@ -1,19 +1,18 @@
-//! The paper's surface in fixed point.
+//! The surface of the published method ("the paper") in fixed point.
 
 use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
 use crate::{DesignError, Poly13};
 
-/// A [`Poly13`] over inputs in -1/2..1/2, for any two `i32`.
+/// A [`Poly13`] over two inputs in -1/2..1/2. The integers `rate` and `volts` may be any `i32`.
 ///
 /// ```text
 /// r = rate / 2^32,  v = volts / 2^32
 /// p00 + p10 r + p01 v + p11 r v + p02 v^2 + p12 r v^2 + p03 v^3
 /// ```
 ///
-/// Coefficients and result are in units of the output's least bit, which the
-/// caller chooses. A surface is only made when no pair of inputs can take any
-/// intermediate sum out of 32 bits, so that [`eval`](Self::eval) needs no
-/// saturation: six multiply-accumulates with rounding.
+/// Coefficients and result are in units of the output's least bit, which the caller chooses.
+/// Construction fails if any intermediate sum could exceed 32 bits for some pair of inputs.
+/// Therefore [`eval`](Self::eval) needs no saturation, only six multiply-accumulates.
 ///
 /// ```
 /// use stretch_core::{Poly13, fixed::FixedPoly13};
@@ -30,28 +29,29 @@ use crate::{DesignError, Poly13};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "[i32; 7]", into = "[i32; 7]"))]
 pub struct FixedPoly13 {
-    /// p11 p12, p10 p00, p02 p03, p01: as they are used, so that few are held at a time.
+    /// p11 p12, p10 p00, p02 p03, p01: in the order of use, so that few registers are needed at a time.
     ordered: [i32; 7],
 }
 
-/// What an error names.
+/// The field that errors name.
 const FIELD: &str = "fixed.surface";
 
 impl FixedPoly13 {
-    /// The largest error of [`eval`](Self::eval) against the same surface in
-    /// real numbers, in least bits: each of the seven coefficients is rounded by
-    /// half a bit and each of the six products by one, halved by every product behind it.
+    /// The largest error of [`eval`](Self::eval) against the same surface in real numbers, in
+    /// least bits. Each of the seven coefficients is rounded by up to half a bit, and each of
+    /// the six products by up to one bit. Every later product halves these errors, because its
+    /// input is at most 1/2.
     pub const ROUNDING: f64 = {
         let at_rest = 0.5 * (1.0 + 0.5 + 0.25 + 0.125) + (1.0 + 0.5 + 0.25);
         let by_rate = 0.5 * (1.0 + 0.5 + 0.25) + (1.0 + 0.5);
         at_rest + 0.5 * by_rate + 1.0
     };
 
-    /// The surface with these coefficients, rounded.
+    /// Creates the surface with these coefficients, rounded.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] when some pair of inputs would take an
-    /// intermediate sum out of 32 bits, or a coefficient is not finite.
+    /// [`DesignError::OutOfRange`] if an intermediate sum would exceed 32 bits for some pair of
+    /// inputs, or if a coefficient is not finite.
     pub fn new(surface: &Poly13) -> Result<Self, DesignError> {
         let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = *surface;
         let round = |x| from_f64(FIELD, x, 0);
@@ -66,7 +66,7 @@ impl FixedPoly13 {
         ])
     }
 
-    /// The surface at `rate / 2^32` and `volts / 2^32`, in least bits.
+    /// Evaluates the surface at `rate / 2^32` and `volts / 2^32`, in least bits.
     #[inline(always)]
     #[must_use]
     pub fn eval(&self, rate: i32, volts: i32) -> i32 {
@@ -78,7 +78,7 @@ impl FixedPoly13 {
         moving.carrying(at_rest).plus(at_rest.value(), volts).value()
     }
 
-    /// The rounded coefficients.
+    /// Returns the rounded coefficients.
     #[must_use]
     pub fn coefficients(&self) -> Poly13 {
         let [p11, p12, p10, p00, p02, p03, p01] = self.ordered.map(f64::from);
@@ -88,7 +88,7 @@ impl FixedPoly13 {
 
 impl TryFrom<[i32; 7]> for FixedPoly13 {
     type Error = DesignError;
-    /// From p00, p10, p01, p11, p02, p12, p03.
+    /// Creates the surface from p00, p10, p01, p11, p02, p12, p03.
     fn try_from(coefficients: [i32; 7]) -> Result<Self, DesignError> {
         let [p00, p10, p01, p11, p02, p12, p03] = coefficients;
         let [a00, a10, a01, a11, a02, a12, a03] = coefficients.map(i32::unsigned_abs);

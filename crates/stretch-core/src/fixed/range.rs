@@ -3,23 +3,23 @@
 use super::convert::{from_f64, saturate};
 use crate::{DesignError, Range};
 
-/// What one step of a channel's integer means, in the channel's unit.
+/// The affine relation between a channel's integers and its unit: `zero + step x`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeUnits {
-    /// The channel at an integer of zero.
+    /// Value of the channel at the integer 0.
     pub zero: f64,
-    /// The channel's change per step of the integer, above zero.
+    /// Change of the channel per step of the integer, above zero.
     pub step: f64,
 }
 
-/// A [`Range`] between a channel's integers and Q27, saturating.
+/// Conversion between a channel's integers and normalised Q27 numbers over a [`Range`], with saturation.
 ///
 /// ```text
 /// normalise:    n = (x - offset) / span       x integer, n in Q27 (-16..16)
 /// denormalise:  x = offset + n span
 /// ```
 ///
-/// A result outside 32 bits becomes the nearest end.
+/// A result outside 32 bits becomes the nearest `i32`.
 ///
 /// ```
 /// use stretch_core::{Normalisation, Range, RangeSpec, fixed::{FixedRange, RangeUnits}};
@@ -34,16 +34,16 @@ pub struct RangeUnits {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FixedRange {
-    /// The offset's whole steps, and what is left of it in Q27.
+    /// The offset in whole steps; `rest` is the negative remainder, normalised, in Q27.
     offset: i32,
     rest: i32,
     gain: Scale,
     inverse: Scale,
-    /// What is left of the offset, in 2^-16 steps.
+    /// Remainder of the offset, in 2^-16 steps.
     inverse_rest: i32,
 }
 
-/// A factor `mantissa / 2^shift` with 31 significant bits.
+/// A factor `mantissa / 2^shift` with 30 significant bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Scale {
     mantissa: i32,
@@ -54,13 +54,14 @@ impl Scale {
     fn new(field: &'static str, factor: f64) -> Result<Self, DesignError> {
         let (_, exponent) = libm::frexp(factor);
         let shift = 30 - exponent;
-        // below 2^-32 nothing is left of the product, above 2^30 nothing fits
+        // allows factors from 2^-33 to below 2^29: with smaller ones every product rounds to 0, with larger ones nearly
+        // none fits
         DesignError::check(field, factor, factor > 0.0 && (1..=62).contains(&shift))?;
         let shift = shift as u32;
         Ok(Self { mantissa: from_f64(field, factor, shift)?, shift })
     }
 
-    /// `x factor + extra`, rounded, saturated.
+    /// Returns `x factor + extra`, rounded and saturated.
     #[inline]
     fn apply(self, x: i32, extra: i32) -> i32 {
         // at most 2^61 + 2^61: no overflow
@@ -70,11 +71,10 @@ impl Scale {
 }
 
 impl FixedRange {
-    /// The range for a channel whose integers mean `units`.
+    /// Converts a range for a channel whose integers have the scale `units`.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`] when offset or span cannot be written in 32
-    /// bits of these units.
+    /// [`DesignError::OutOfRange`] if the offset or the span does not fit 32 bits in these units.
     pub fn new(range: &Range, units: RangeUnits) -> Result<Self, DesignError> {
         const FIELD: &str = "fixed.range";
         DesignError::check("fixed.range.step", units.step, units.step > 0.0)?;
@@ -92,19 +92,19 @@ impl FixedRange {
         })
     }
 
-    /// `(x - offset)/span` in Q27.
+    /// Returns `(x - offset)/span` in Q27.
     #[inline]
     #[must_use]
     pub fn normalise(&self, x: i32) -> i32 {
         self.gain.apply(x.saturating_sub(self.offset), self.rest)
     }
 
-    /// `offset + n span` in steps, for `n` in Q27.
+    /// Returns `offset + n span` in steps, for `n` in Q27.
     #[inline]
     #[must_use]
     pub fn denormalise(&self, n: i32) -> i32 {
         let product = i64::from(n) * i64::from(self.inverse.mantissa);
-        // sixteen fractional bits are kept until the rest of the offset is in
+        // sixteen fractional bits are kept until the remainder of the offset is added
         let fine = (product >> self.inverse.shift) + i64::from(self.inverse_rest);
         saturate(((fine + (1 << 15)) >> 16) + i64::from(self.offset))
     }

@@ -1,18 +1,19 @@
-//! The paper's differentiator.
+//! Central differences, the differentiator of the published method ("the paper").
 
 use super::check::check_samples;
 use crate::{FilterError, sample};
 use stretch_core::{Real, SampleRate};
 
-/// Rate by central differences, as the paper took it; one sample ahead, so not live.
+/// Computes the rate of a log by central differences, as in the paper. It needs the next sample, so
+/// it cannot run live.
 ///
 /// ```text
 /// out[i] = (log[i+1] - log[i-1]) fs/2
 /// ```
 ///
-/// At both ends the slope of the parabola through the three outermost samples
-/// (exact to the same degree as inside), or of the line through two. It passes
-/// nearly all noise: its noise gain is fs/sqrt(2).
+/// At both ends it is the slope of the parabola through the three outermost samples, which is exact
+/// to the same degree as inside. For a log of two samples it is the slope of the line. The noise
+/// gain is high: fs/sqrt(2).
 ///
 /// # Errors
 /// [`FilterError::LengthsDiffer`]; [`FilterError::TooShort`] below two samples;

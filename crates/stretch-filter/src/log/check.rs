@@ -1,9 +1,9 @@
-//! What every function of a log refuses.
+//! Checks that are common to all functions on logs.
 
 use crate::{FilterError, sample};
 use stretch_core::Real;
 
-/// Fails for the first sample that is not usable.
+/// Fails for the first sample that is NaN or beyond `LARGEST_SAMPLE`.
 pub(super) fn check_samples<T: Real>(log: &[T]) -> Result<(), FilterError> {
     match log.iter().position(|&x| !sample::usable(x)) {
         Some(index) => Err(FilterError::NotFinite { index }),

@@ -1,21 +1,20 @@
-//! Local least squares at the actual times.
+//! Local least-squares fits at the actual times of the samples.
 
 use super::check::check_times;
 use crate::gram::Basis;
 use crate::{FilterError, MAX_SG_DEGREE};
 use stretch_core::{DesignError, Real, Seconds};
 
-/// How [`local_polynomial`] fits.
+/// Parameters of [`local_polynomial`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalFit {
-    /// Samples in the window about each sample; odd.
+    /// Samples in the window around each sample; odd.
     pub window: usize,
     /// Degree of the polynomial, below `window`, at most [`MAX_SG_DEGREE`].
     pub degree: usize,
     /// Derivative: 0 smooths, 1 gives the rate.
     pub order: usize,
-    /// A longer step than this from one sample to the next is a gap, which no
-    /// fit reaches across.
+    /// A longer interval between two samples is a gap. No window contains a gap.
     pub longest_step: Seconds,
 }
 
@@ -32,15 +31,16 @@ impl LocalFit {
     }
 }
 
-/// The value or a derivative of an unevenly sampled log at each of its samples,
-/// by a least squares polynomial in the actual times of the window about it.
+/// Computes the value or a derivative of an unevenly sampled log at each of its samples, by a least-squares polynomial
+/// through the window around the sample, at the actual times.
 ///
-/// On even times it equals the centred [`SgFilter::over_log`](crate::SgFilter::over_log).
-/// At the ends of the log, and on both sides of a gap, the nearest whole window
-/// is used one-sided. A stretch between two gaps that has fewer samples than
-/// the window is fitted as a whole; `None` where it has no more than `degree`
-/// samples, or where times are too close together to determine the polynomial. Polynomials orthogonal on the window's own times (Forsythe 1957,
-/// doi:10.1137/0105007): no matrix is formed. O(window degree^2) a sample.
+/// For even times the result equals the centred [`SgFilter::over_log`](crate::SgFilter::over_log). At the ends of the
+/// log, and on both sides of a gap, the nearest whole window is used. A segment between two gaps with fewer samples
+/// than the window is fitted as a whole. The result is `None` if the segment has no more than `degree` samples, or if
+/// its times are too close together to determine the polynomial.
+///
+/// The polynomials are orthogonal on the times of the window (Forsythe 1957, doi:10.1137/0105007), so no matrix is
+/// formed. The cost is O(window degree^2) per sample.
 ///
 /// # Errors
 /// [`FilterError::LengthsDiffer`], [`FilterError::NotFinite`] (samples or
@@ -95,13 +95,12 @@ fn stretch_between_gaps<T: Real>(fit: LocalFit, times: &[f64], log: &[T], out: &
     }
 }
 
-/// The derivative at `at_s` of the polynomial that fits the window best.
+/// Returns the derivative at `at_s` of the least-squares polynomial through the window.
 ///
-/// `None` when two times are so close that they count as one and the degree is
-/// not determined.
+/// `None` if times are so close that, to rounding, they do not determine a polynomial of the degree.
 fn derivative<T: Real>(fit: LocalFit, times: &[f64], log: &[T], at_s: f64) -> Option<f64> {
-    /// Below this a squared norm is rounding: u is within one, and even degree
-    /// 10 on one side has norms of 1e-11.
+    /// A squared norm below this is rounding error. For |u| <= 1, even degree 10 on a one-sided window has norms of
+    /// 1e-11.
     const LOST: f64 = 1e-24;
     let scale = (times[times.len() - 1] - at_s).max(at_s - times[0]);
     let unit = if scale > 0.0 { 1.0 / scale } else { 1.0 };
@@ -119,7 +118,7 @@ fn derivative<T: Real>(fit: LocalFit, times: &[f64], log: &[T], at_s: f64) -> Op
             let p = value_at(&a, &b, k, u);
             norm += p * p;
             first_moment += u * p * p;
-            // Relative to the newest sample: a large offset costs no digits.
+            // The value is relative to the newest sample, so that a large offset costs no digits.
             product += p * (x.as_f64() - log[log.len() - 1].as_f64());
         }
         if norm <= LOST {
@@ -143,7 +142,7 @@ fn derivative<T: Real>(fit: LocalFit, times: &[f64], log: &[T], at_s: f64) -> Op
     Some((0..fit.order).fold(sum, |value, _| value * unit))
 }
 
-/// p(k) at `u` by the recurrence so far.
+/// Evaluates p(k) at `u` by the recurrence.
 fn value_at(a: &Basis, b: &Basis, k: usize, u: f64) -> f64 {
     let (mut before, mut p) = (0.0, 1.0);
     for j in 0..k {

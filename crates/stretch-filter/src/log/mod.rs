@@ -1,4 +1,4 @@
-//! Whole logs: estimators that may look ahead, and honest ways with uneven time stamps.
+//! Estimators for whole logs, which may use future samples, and functions for uneven time stamps.
 //!
 //! | time stamps | use |
 //! | --- | --- |
@@ -6,9 +6,9 @@
 //! | uneven | [`local_polynomial`]: a fit at the actual times |
 //! | uneven, and an even grid is needed | [`resample`] first, at no finer a grid than the log has |
 //!
-//! [`noise_of_differences`] gives the noise of a log, whatever the motion in the log.
+//! [`noise_of_differences`] estimates the noise of a log and is robust to motion in the log.
 //!
-//! Every function writes into the caller's slice and allocates nothing.
+//! The functions allocate nothing. Those with an output series write it to the caller's slice.
 
 mod central;
 mod check;

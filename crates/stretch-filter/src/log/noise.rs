@@ -1,7 +1,7 @@
-//! The noise of a log, separated from its motion.
+//! Estimation of the noise of a log in the presence of motion.
 
-/// The second differences `x[i-1] - 2 x[i] + x[i+1]` of a log: of a slow motion
-/// next to nothing, of white noise six times its variance.
+/// Returns the second differences `x[i-1] - 2 x[i] + x[i+1]` of a log. Slow motion contributes almost nothing to them.
+/// White noise contributes six times its variance.
 ///
 /// ```
 /// use stretch_filter::log::second_differences;
@@ -11,12 +11,12 @@ pub fn second_differences(log: &[f64]) -> impl Iterator<Item = f64> + '_ {
     log.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2])
 }
 
-/// The standard deviation of white noise from the second differences of what it lies on, robust
-/// to motion: `1.4826 median|d| / sqrt(6)`; none without a difference.
+/// Estimates the standard deviation of white noise from the second differences `d` of a log, robust to motion:
+/// `1.4826 median|d| / sqrt(6)`. `None` if there are no differences.
 ///
-/// The median of a normal variable's size is 1/1.4826 of its standard deviation, and 6 is
-/// the sum of the squares of 1, -2 and 1. Differences of several logs may be put together; their order
-/// is lost.
+/// The median magnitude of a normal variable is 1/1.4826 of its standard deviation, and 6 is the sum of the squares of
+/// 1, -2 and 1. The differences of several logs may be concatenated. The function overwrites the slice with reordered
+/// magnitudes.
 ///
 /// ```
 /// use stretch_filter::log::{noise_of_differences, second_differences};

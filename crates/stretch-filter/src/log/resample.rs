@@ -1,31 +1,31 @@
-//! From uneven times to an even grid.
+//! Resampling from uneven times to an even grid.
 
 use super::check::check_times;
 use crate::FilterError;
 use stretch_core::{DesignError, Real, SampleRate, Seconds};
 
-/// An even grid of times: `start`, then one point a period.
+/// An even grid of times: `start`, then one point per period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     /// Time of the first point.
     pub start: Seconds,
-    /// Points a second.
+    /// Points per second.
     pub sample_rate: SampleRate,
 }
 
 impl Grid {
-    /// Time of point `index`, in seconds.
+    /// Returns the time of point `index`, in seconds.
     pub fn time_s(&self, index: usize) -> f64 {
         self.start.0 + index as f64 * self.sample_rate.period_s()
     }
 
-    /// How many points fit up to and with `last`; zero when it is before the start.
+    /// Returns the number of points up to and including `last`; zero if `last` is before the start.
     pub fn points_until(&self, last: Seconds) -> usize {
         let periods = (last.0 - self.start.0) * self.sample_rate.hz();
         if periods < 0.0 {
             return 0;
         }
-        // A saturating cast, then the rounding of the product is undone.
+        // The cast saturates. The adjustments below correct the rounding of the product.
         let mut points = (periods as usize).saturating_add(1);
         if self.time_s(points) <= last.0 {
             points += 1;
@@ -37,29 +37,28 @@ impl Grid {
     }
 }
 
-/// The value between two samples when [`resample`] fills a grid.
+/// Interpolation method of [`resample`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Between {
-    /// The line through both: never leaves their range.
+    /// The line through the two neighbouring samples, which never leaves their range.
     Linear,
-    /// The cubic through the four nearest samples (fewer at the ends of a short
-    /// log): exact for a cubic, may overshoot at a corner.
+    /// The cubic through four neighbouring samples, or a lower degree through all samples of a log
+    /// with two or three. Exact for a cubic; may overshoot at a corner.
     Cubic,
 }
 
 /// Resamples an unevenly sampled log onto an even grid of `out.len()` points.
 ///
-/// Interpolation colours noise: a grid finer than the log adds no knowledge,
-/// and a point amid a long gap is a guess. Prefer [`local_polynomial`](super::local_polynomial)
-/// when only the rate is wanted.
+/// Interpolation colours noise. A grid finer than the log adds no information, and a point within a
+/// long gap is a guess. Prefer [`local_polynomial`](super::local_polynomial) if you need only the
+/// rate.
 ///
 /// # Errors
 /// [`FilterError::TooShort`] below two samples, [`FilterError::LengthsDiffer`],
-/// [`FilterError::NotFinite`], [`FilterError::NotIncreasing`];
-/// [`FilterError::OutsideLog`] when the grid leaves the log: nothing is
-/// extrapolated; [`FilterError::Design`] for a start that is not finite.
-/// `out` is then unchanged.
+/// [`FilterError::NotFinite`], [`FilterError::NotIncreasing`]; [`FilterError::OutsideLog`] if the
+/// grid extends beyond the log, because nothing is extrapolated; [`FilterError::Design`] for a
+/// start that is not finite. `out` is then unchanged.
 ///
 /// ```
 /// use stretch_core::{SampleRate, Seconds};
@@ -111,7 +110,7 @@ pub fn resample<T: Real>(
     Ok(())
 }
 
-/// The polynomial through at most four points, by Neville's scheme.
+/// Evaluates the polynomial through at most four points, by Neville's scheme.
 fn neville<T: Real>(times: &[f64], values: &[T], at_s: f64) -> T {
     let mut p = [0.0; 4];
     for (p, x) in p.iter_mut().zip(values) {

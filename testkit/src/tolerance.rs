@@ -175,9 +175,8 @@ pub const FIT_BACKWARD: f64 = 1e-14;
 /// Relative: SSE, R^2 and RMSE, whose residuals lose at most six digits to the values.
 pub const FIT_STATISTICS: f64 = 1e-9;
 
-/// Relative: Student and Fisher quantiles by inverting an incomplete beta function whose
-/// logarithms of gamma functions cancel.
-pub const FIT_QUANTILE: f64 = 1e-9;
+/// Relative: Student and Fisher quantiles by bisection of an incomplete beta function.
+pub const FIT_QUANTILE: f64 = 1e-12;
 
 /// Relative: a condition number estimated from below by a dozen power iterations.
 pub const FIT_CONDITION: f64 = 0.1;

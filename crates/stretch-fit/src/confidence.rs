@@ -1,9 +1,9 @@
 //! Confidence bounds of a fit.
 
 use stretch_core::{MAX_TERMS, Real};
-use stretch_metrics::student_t::critical;
+use stretch_metrics::{fisher_f, student_t::critical};
 
-use crate::{Fit, FitError, quantile::fisher};
+use crate::{Fit, FitError};
 
 /// A value and the bounds around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,7 +117,9 @@ impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
 
     fn scheffe(&self) -> T {
         let terms = self.fit.terms() as u64;
-        T::from_f64(libm::sqrt(terms as f64 * fisher(self.level, terms, self.fit.dof())))
+        T::from_f64(libm::sqrt(
+            terms as f64 * fisher_f::critical(1.0 - self.level, terms, self.fit.dof()),
+        ))
     }
 
     fn at(&self, rate: T, volts: T, factor: T, noise: T) -> Bounds<T> {

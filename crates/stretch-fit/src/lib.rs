@@ -10,7 +10,6 @@ mod factor;
 mod fit;
 mod fold;
 mod order_table;
-mod quantile;
 mod robust;
 mod sample;
 mod scores;

@@ -2,9 +2,11 @@
 #![no_std]
 
 mod agreement;
+mod beta;
 mod blocks;
 mod error;
 mod error_stats;
+pub mod fisher_f;
 mod lag;
 mod paired;
 #[cfg(feature = "proptest")]

@@ -2,7 +2,7 @@
 
 use approx::relative_eq;
 use stretch_metrics::{
-    Agreement, Delta, PairedBlocks, PairedT, TTest, lag,
+    Agreement, Delta, PairedBlocks, PairedT, TTest, fisher_f, lag,
     student_t::{critical, ln_two_tailed, two_tailed},
 };
 use testkit::{tolerance, vectors::columns};
@@ -100,4 +100,30 @@ fn critical_values() {
     }
     assert_eq!(critical(0.0, 5.0), f64::INFINITY);
     assert!(critical(f64::NAN, 5.0).is_nan() && critical(0.5, 0.0).is_nan());
+}
+
+#[test]
+fn quantiles_agree_with_sixty_digits() {
+    let table = columns("fit/quantiles.csv");
+    for (row, expected) in table["t"].iter().enumerate() {
+        let [level, terms, dof] = ["level", "terms", "dof"].map(|name| table[name][row]);
+        let near =
+            |a: f64, b| relative_eq!(a, b, epsilon = 0.0, max_relative = tolerance::FIT_QUANTILE);
+        let t = critical(1.0 - level, dof);
+        assert!(near(t, *expected), "t at {level} of {dof}: {t:?}");
+        let f = fisher_f::critical(1.0 - level, terms as u64, dof as u64);
+        assert!(near(f, table["f"][row]), "F at {level} of {terms}, {dof}: {f:?}");
+    }
+}
+
+#[test]
+fn critical_values_of_extreme_levels_and_counts_stay_finite() {
+    for level in [1e-300, 1e-9, 0.5, 1.0 - 1e-15] {
+        for dof in [1, 2, 999, 1000, u64::MAX] {
+            let t = critical(1.0 - level, dof as f64);
+            assert!(t.is_finite(), "t at {level:e} of {dof}");
+            let f = fisher_f::critical(1.0 - level, 21, dof);
+            assert!(f.is_finite() && f >= 0.0, "F at {level:e} of {dof}: {f}");
+        }
+    }
 }

@@ -312,7 +312,7 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     let folder = bench(&scratch, "bench", &[]);
     both(&folder, "bridge_v", |_, v| v.min(1.9));
     let text = runs(&mut diagnose(&folder));
-    assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
+    assert!(text.contains("bridge_v is at 1.9 V, its greatest value, in"), "{text}");
     // A clipped recording may be explained by a saturated amplifier or a slack sleeve, and by
     // nothing else.
     let first = text.lines().next().unwrap();

@@ -66,7 +66,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     stretch().arg("init").arg(folder.path()).assert().failure();
     let file = folder.path().join("problem.toml");
     let first = fs::read_to_string(&file).unwrap();
-    assert!(first.contains("# Guessed: the last column that is no command is the output"));
+    assert!(first.contains("# Guessed: the last column that is not a command is the output"));
     let own = first
         .replace("wrap = \"all\"", "wrap = [\"input.delay\", \"output.lag\", \"output.backlash\"]")
         .replace("sim.py", "servo.py");
@@ -144,12 +144,12 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     fs::write(&both, two).unwrap();
     let json = folder.path().join("by.json");
     let (is_good, text) = said(&both, &["--by", "trial", json_to(&json).as_str()]);
-    assert!(is_good && text.contains("the 2 runs agree in every value that they tell"), "{text}");
+    assert!(is_good && text.contains("the 2 runs agree within their intervals in every value"), "{text}");
     let value: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(value["by_trial"]["runs"][1]["values"][2]["name"], "brake.brake");
     let (is_good, text) = said(&both, &["--by", "load_kg"]);
-    assert!(!is_good && text.contains("there is no column load_kg"), "{text}");
+    assert!(!is_good && text.contains("no recording has a column load_kg"), "{text}");
 
     // A Python object as the simulator, which raises an error.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";
@@ -193,7 +193,7 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         assert!(is_fmu || !to.contains("fmu ="), "{to}: {text}");
     }
     let (is_good, text) = said(folder.path(), &["--rig", "x.toml"]);
-    assert!(!is_good && text.contains("--rig: it is for the built-in simulators"), "{text}");
+    assert!(!is_good && text.contains("--rig: it works with the built-in simulators only"), "{text}");
 }
 
 #[test]

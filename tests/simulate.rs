@@ -156,10 +156,10 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
     let moved = apart(&clamped_at, &shunt_at, "bridge_v");
     assert!((0.03..0.1).contains(&moved), "{moved}");
     for (head, cell, parts) in [
-        ("set_pressure_kpa", "100", ["next.csv", "set_pressure_kpa", "cannot do that"]),
+        ("set_pressure_kpa", "100", ["next.csv", "set_pressure_kpa", "does not know this command"]),
         ("heater_share", "0.5", ["next.csv", "heater_share", "excitation_share"]),
-        ("shunt_share", "0.02", ["next.csv", "shunt_share", "add set_length_mm"]),
-        ("excitation_share", "-1", ["next.csv", "excitation_share", "0 .. 2"]),
+        ("shunt_share", "0.02", ["next.csv", "shunt_share", "add the column set_length_mm"]),
+        ("excitation_share", "-1", ["next.csv", "excitation_share", "above 0 and at most 2"]),
     ] {
         let (mut command, at) =
             replayed(&format!("inlet,outlet,{head}"), &|i| format!("{},{cell}", fills(i)));
@@ -169,7 +169,7 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
     let (mut command, _) = replayed("inlet,outlet,excitation_share", &|i| {
         format!("{},{}", fills(i), if i < 400 { "1" } else { "0.7" })
     });
-    fails(&mut command, &["next.csv", "excitation_share", "0.7 stands beside 1"]);
+    fails(&mut command, &["next.csv", "excitation_share", "it holds 0.7, and 1 in the first row"]);
     // An experiment for a gauge alone sets a quantity that this rig does not have.
     let (mut command, _) = replayed("set_angle_deg", &|_| "10".to_owned());
     fails(&mut command, &["next.csv", "set_angle_deg"]);

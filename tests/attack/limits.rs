@@ -170,6 +170,6 @@ fn a_worker_that_says_hello_with_gigabytes_is_refused() {
         "problem.toml",
         "simulator = [\"sh\", \"-c\", \"cat hello.bin /dev/zero\"]\n[[stage]]\noutput = \"y\"\ninputs = [\"u\"]\n[[trial]]\nfile = \"a.csv\"\n",
     );
-    let told = ["a frame says that its body is 4294967296 bytes long", "at most 65536"];
+    let told = ["a frame states a length of 4294967296 bytes for its body", "at most 65536"];
     refused(&scratch, "diagnose problem.toml", &told);
 }

@@ -65,7 +65,7 @@ fn entries_of_a_problem_that_cannot_be_are_refused() {
             "a noise of 1000000000000 hides all of angle_deg, which spans 6",
         ),
         ("unit = \"V\"", "unit = \"V\"\nnoise = 1e12", "hides all of command_V, which spans 2"),
-        ("noise = 0.1", "unit = \"kg\"", "its unit is kg, and its column angle_deg is in deg"),
+        ("noise = 0.1", "unit = \"kg\"", "its unit is kg, but its column angle_deg is in deg"),
         ("off = 0", "off = -3", "off = -3 is outside of its range, 0 to 20"),
         ("[\"command_V\"]", "[\"command_V\", \"angle_deg\"]", own),
         ("output.backlash", "output.backslash", "effect brake: there is no twin output.backslash"),

@@ -133,7 +133,7 @@ fn noise_is_neither_a_unit_nor_a_swap() {
         assert!(told.contains("The record is wrong: "), "{name}: {told}");
     }
     let bar = changed(&scratch, "bar", &column("pressure_kpa", |p, _| p / 100.0));
-    assert!(said(&bar).contains("this looks like bar: times 100"));
+    assert!(said(&bar).contains("this looks like bar: multiply by 100"));
 }
 
 #[test]

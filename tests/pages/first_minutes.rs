@@ -123,7 +123,7 @@ fn with_python_a_worker_that_takes_no_other_inputs_is_diagnosed_as_init_proposes
         + &parameter("tau", "s", 0.1);
     fs::write(&file, whole).expect("the problem");
     let told = one_line(&runs(stretch().arg("diagnose").arg(&file)));
-    assert!(told.contains("nothing was looked for on the input's side"), "{told}");
+    assert!(told.contains("no effect was looked for in front of a stage"), "{told}");
     // A brake in front of the servo is not among the effects behind it.
     assert!(told.starts_with("There is a gap in plant"), "{told}");
 }

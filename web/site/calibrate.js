@@ -86,7 +86,7 @@ const calibration = {
     tell.list("doubts", doubts.map((doubt) => doubt.text));
     const names = trials.map((t) => t.trial);
     const own = pooled[pooled.length - 1];
-    const where = held_out ? "on recordings that were not fitted" : "on what was fitted: for an honest figure drop another recording and choose “only test” for it above";
+    const where = held_out ? "on recordings that were not fitted" : "on the data of the fit: for an honest error drop another recording and choose “only test” for it above";
     html("fitted").textContent += ` Off by ${shown(own.rmse, 3)} ${unit} (root mean square) ${where}.`;
     html("judged-on").textContent = `Judged on ${names.slice(0, 4).join(", ")}${names.length > 4 ? ` and ${names.length - 4} more` : ""}.`;
   },

@@ -258,11 +258,11 @@ const dropped = {
     html("version").textContent = version;
     page.options("model", ["auto", ...models], "auto");
     /** @type {Record<string, string>} What a name alone does not say; a model that is not here remembers what the signal did. */
-    const words = { auto: "the best on trials left out", linear: "a line", poly13: "as published" };
+    const words = { auto: "the model with the least error on trials left out", linear: "a line", poly13: "as published" };
     for (const option of select("model").options) {
       const rest = option.value.endsWith("+rest") ? ", and follows a baseline that drifts" : "";
       option.text = `${option.value}: ${words[option.value] ?? "with memory"}${rest}`;
     }
-    html("bits").textContent = `${await first.call("sound")} receptors were just run here and answer bit by bit as on a desk and on boards`;
+    html("bits").textContent = `${await first.call("sound")} calibrations were just run in this browser, with the same results, bit for bit, as in the program and on boards`;
   }).catch(tell.wrong);
 })();

@@ -109,7 +109,7 @@ const tell = {
   /** Does something that takes its time; one thing at once. @param {string} what @param {() => Promise<void>} work */
   async busy(what, work) {
     if (crew.isBusy) {
-      tell.wrong("Something is being worked out: wait for it, or cancel it.");
+      tell.wrong("A calculation is running: wait for it, or cancel it.");
       return;
     }
     crew.isBusy = true;

@@ -457,7 +457,8 @@ fn report(
     let mut reservations: Vec<Note> =
         implausible_noise_notes(cause.problem, &sanity).into_iter().map(Note::from).collect();
     if cause.problem.is_held {
-        let held = "re-tuned parameters could not be simulated over all trials, and the simulator without effects keeps those that could";
+        let held = "the re-tuned parameters could not be simulated over all trials, so the simulator without effects keeps the last \
+            parameters that could";
         reservations.push(Note::from(held.to_owned()));
     }
     let not_examined = searched.lost(&candidates);

@@ -59,7 +59,7 @@ fn records_that_are_not_whole_are_refused_with_where() {
     let said = refused(&record).to_string();
     assert!(
         said.starts_with(
-            "line: 1234 measured samples in a row are finite and below 1e100, the trials hold 4000"
+            "line: only the first 1234 measured samples are finite and below 1e100, but the trials have 4000 samples"
         ),
         "{said}"
     );

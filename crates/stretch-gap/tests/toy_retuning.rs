@@ -132,7 +132,7 @@ fn a_parameter_at_the_end_of_its_tolerances_is_told() {
     assert!(gain.at_bound && !zero.at_bound);
     assert_eq!(
         gain.sentence().as_deref(),
-        Some("line.gain is at the end of what its tolerance allows")
+        Some("line.gain is at the limit of what its tolerance allows")
     );
 }
 

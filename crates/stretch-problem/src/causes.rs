@@ -64,7 +64,7 @@ impl Causes {
         let left_out: Vec<Cause> = self.found.extract_if(.., |cause| needs(cause)).collect();
         self.notes.extend(left_out.iter().map(|cause| {
             let (effect, column) = (&cause.effect, &options.pressure);
-            format!("{effect} needs the pressure, and no {column} was recorded: it is left out")
+            format!("{effect} is left out, because it needs the pressure and some trial has no column {column}")
         }));
         self
     }

@@ -143,7 +143,7 @@ impl ProblemError {
     /// Returns the error for too few samples to fit.
     pub(crate) fn few_samples(samples: usize, least: usize) -> Self {
         let what = format!("the trials to fit have {samples} samples");
-        Self::too_little(what, format!("at least {least} are needed to tell anything"))
+        Self::too_little(what, format!("at least {least} are needed for a diagnosis"))
     }
 
     pub(crate) fn too_little(what: impl Into<String>, hint: impl Into<String>) -> Self {

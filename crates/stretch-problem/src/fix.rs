@@ -75,7 +75,7 @@ pub enum NoFix {
     },
     /// The catalogue does not explain the gap.
     #[error(
-        "the gap is not explained, so that no file closes it; what is known of it is in the diagnosis"
+        "the gap is not explained, so no file can close it; read the diagnosis for what is known about it"
     )]
     Unknown,
     /// A rig file cannot express the effects or values that were found.
@@ -180,13 +180,13 @@ impl<'a> Chosen<'a> {
             }
             VerdictKind::Parameters => "Parameters are re-tuned; no effect is added.".into(),
             VerdictKind::Partial => format!(
-                "{:.0} % of the gap stay: this file does not close it.",
+                "{:.0} % of the gap remain: this file does not close it.",
                 100.0 * self.diagnosis.unexplained.as_ref().map_or(0.0, |u| u.share)
             ),
             _ => "Parameters are re-tuned with the effects in place.".to_owned(),
         });
         lines.push(
-            "Tolerances are as found: one standard deviation of the fit, if the model is right."
+            "Each tolerance is one standard deviation of the fit, if the model is right."
                 .into(),
         );
         lines

@@ -51,10 +51,10 @@ pub fn first_problem(folder: impl AsRef<Path>) -> Result<String, ProblemError> {
     let (trials, time, left) = recordings(folder)?;
     let Some((_, first)) = trials.first() else {
         let found = match left.first() {
-            Some(why) => format!("no recording in it could be read; the first: {why}"),
+            Some(why) => format!("no recording in it could be read; the error of the first: {why}"),
             None => "there is no recording in it".to_owned(),
         };
-        let hint = "put recordings with named columns and a column of time there";
+        let hint = "put recordings with named columns and a time column there";
         return Err(ProblemError::value(shown, found, hint));
     };
     Ok(text(folder, &trials, first, &time, &left))
@@ -100,7 +100,7 @@ fn recordings(folder: &Path) -> Result<Found, ProblemError> {
                 trials.push((name, trial));
             }
             (_, Some(why)) => left.push(why.to_string()),
-            _ => left.push(format!("{name}: it has no column but its time")),
+            _ => left.push(format!("{name}: it has no column except its time")),
         }
     }
     Ok((trials, time.unwrap_or_else(|| "time_s".into()), left))
@@ -163,11 +163,11 @@ fn text(
     out += "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"].\n";
     out += "wrap = \"all\"\n";
     out += "\n# The simulator: a worker, which answers requests on its standard input, or python = \"module:object\", or builtin = \"rig\" or \"gauge\".\n";
-    out += "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it\n";
+    out += "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write your own command\n";
     out += "\n# Columns, with the least and the greatest value:\n";
     for c in columns.iter().take(LISTED) {
-        let kind = if c.is_command() { ", held or called like a command" } else { "" };
-        let unit = unit(&c.name).unwrap_or("unit not in its name");
+        let kind = if c.is_command() { ", constant at times or named like a command" } else { "" };
+        let unit = unit(&c.name).unwrap_or("its name states no unit");
         out += &toml_comment(&format!(
             "  {} ({unit}): {} to {}{kind}",
             c.name, c.range[0], c.range[1]
@@ -183,7 +183,7 @@ fn text(
 
 /// The text in place of a stage if no column looks measured.
 const NO_OUTPUT: &str = "
-# No output is proposed: every column that moves is called like a command. Name the one that was measured:
+# No output is proposed: every column that changes is named like a command. Name the one that was measured:
 # [[stage]]
 # name = \"plant\"
 # output = \"COLUMN\"
@@ -208,11 +208,11 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
         commands = others.filter(|name| is_force(name) && !is_force(&own)).collect();
     }
     let inputs: Vec<String> = commands.iter().map(|name| quoted(name)).collect();
-    let mut out = "\n# Guessed: the last column that is no command is the output, and commands drive the stage.\n"
+    let mut out = "\n# Guessed: the last column that is not a command is the output, and the commands drive the stage.\n"
         .to_owned();
     out += &format!("[[stage]]\nname = \"plant\"\noutput = {}\n", quoted(own));
     if unit(own).is_none() {
-        out += "unit = \"\"  # the name gives no unit\n";
+        out += "unit = \"\"  # the name states no unit\n";
     }
     out += &format!("inputs = [{}]\n", inputs.join(", "));
     out += &match noise(own, &commands, trials) {
@@ -221,15 +221,15 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
             rounded(noise.sd()),
             noise.source()
         ),
-        None => "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings\n".to_owned(),
+        None => "# noise = 0.01     # one standard deviation, if the noise is known; otherwise it is estimated from the recordings\n".to_owned(),
     };
     let guessed = rubbing(own, &commands, moving().filter(|c| !c.is_called).map(|c| &*c.name));
     out + &match guessed {
         Some((key, column)) => {
-            format!("{key} = {}  # guessed: at which a force or torque rubs\n", quoted(column))
+            format!("{key} = {}  # guessed: motion at which friction acts\n", quoted(column))
         }
         None => {
-            "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs\n"
+            "# velocity = \"COLUMN\"  # or position = \"COLUMN\": motion at which friction acts\n"
                 .to_owned()
         }
     }
@@ -292,9 +292,9 @@ fn trials_of(trials: &[(String, Trial)]) -> String {
     let tested = tested(trials);
     let all = trials.len();
     let mut out = match tested {
-        0 => "\n# There is one trial: its last quarter is held back and tested on.\n".to_owned(),
+        0 => "\n# There is one trial: its last quarter is held back for the test.\n".to_owned(),
         _ => format!(
-            "\n# Guessed: the last {tested} of {all} trials are tested on, read once at the end.\n"
+            "\n# Guessed: the last {tested} of {all} trials are used only for the test, once at the end.\n"
         ),
     };
     for (i, (name, trial)) in trials.iter().enumerate() {

@@ -101,7 +101,8 @@ impl Prediction {
     pub fn sentence(&self) -> String {
         let better = self.outputs().filter(|o| o.ratio < 1.0).count();
         format!(
-            "with {} the simulator predicts {better} of {} outputs better than without, parameters re-tuned: the ratio of the errors is {:.2} (geometric mean), the largest error is {:.1} times the noise",
+            "with {} the simulator predicts {better} of {} outputs better than without (with re-tuned parameters): the ratio of the \
+             errors is {:.2} (geometric mean), the largest error is {:.1} times the noise",
             self.effects.join(" and "),
             self.outputs().count(),
             self.ratio,
@@ -129,7 +130,7 @@ pub fn predict(
     let file = ProblemSpec::read(fixed)?;
     let shown = fixed.display().to_string();
     let workers = file.workers(1)?.ok_or_else(|| {
-        let hint = "predict needs a simulator of your own; for the rig: stretch diagnose NEW --rig fixed.toml";
+        let hint = "predict needs a simulator of your own; for the built-in rig, run stretch diagnose NEW --rig fixed.toml";
         ProblemError::value(&shown, "its simulator is built in", hint)
     })?;
     if effects_of(&file).is_empty() {
@@ -138,7 +139,7 @@ pub fn predict(
     }
     if let Some(announce) = reading.announce {
         let (program, folder) = (workers.shown(), workers.folder.display());
-        announce(&format!("{shown} runs, in the folder {folder}: {program}"));
+        announce(&format!("{shown} runs this program in the folder {folder}: {program}"));
     }
     let mut spec = file.load()?;
     let fitted = spec.trials.len();
@@ -277,7 +278,8 @@ fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
         let outside = own.iter().filter(|x| **x < low - margin || **x > high + margin).count();
         let share = 100.0 * outside as f64 / own.len() as f64;
         let (least, greatest) = ends(own);
-        (outside > 0).then(|| format!("{name} is {least:.4} to {greatest:.4}, fitted were {low:.4} to {high:.4}: {share:.1} % of the recording are outside"))
+        (outside > 0).then(|| format!("{name} is {least:.4} to {greatest:.4}, but {low:.4} to {high:.4} was fitted: {share:.1} % of the \
+            recording is outside"))
     };
     let mut names: Vec<&String> =
         problem.stages.iter().flat_map(|s| s.inputs.iter().chain([&s.output])).collect();

@@ -130,8 +130,8 @@ impl Problem {
         let recorded = reading.recorded.cloned().unwrap_or_default().strict(reading.strict);
         if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
             if rig.is_some() {
-                let hint = "diagnose one signal at a time with it";
-                return Err(no_option("--rig", "it is of one signal", hint));
+                let hint = "diagnose the signals one at a time";
+                return Err(no_option("--rig", "a rig file describes one signal", hint));
             }
             let source = Box::new(read_sensors(path, several, reading.without, recorded)?);
             return Ok(Self { name: name_of(path), source });
@@ -143,7 +143,7 @@ impl Problem {
             Some(gauge) => Box::new(gauge),
             None if path.is_dir() => Box::new(RigSimulator::read(path, rig, &catalogue, recorded)?),
             None => {
-                let hint = "say which columns with --reference and --signal, or give the folder of a data set";
+                let hint = "name its columns with --reference and --signal, or give the folder of a data set";
                 return Err(ProblemError::too_little(
                     "a single trial is diagnosed as a gauge alone",
                     hint,
@@ -160,8 +160,8 @@ impl Problem {
         reading: &Reading<'_>,
     ) -> Result<Self, ProblemError> {
         if reading.rig.is_some() {
-            let hint = "its parameters are in the problem's file";
-            return Err(no_option("--rig", "it is for the built-in simulators", hint));
+            let hint = "set the parameters in the problem's file";
+            return Err(no_option("--rig", "it works with the built-in simulators only", hint));
         }
         if let Some((reference, signal)) = reading.columns {
             (file.reference, file.signal) = (Some(reference.into()), Some(signal.into()));
@@ -171,18 +171,18 @@ impl Problem {
         let recorded = reading.recorded.cloned().unwrap_or_else(|| file.reading());
         let recorded = recorded.strict(reading.strict);
         let workers = file.workers(1)?;
-        let workers = workers.ok_or_else(|| ProblemError::Simulator("it is built in".into()))?;
+        let workers = workers.ok_or_else(|| ProblemError::Simulator("the simulator is built in".into()))?;
         let program = workers.shown();
         if path.is_dir() {
             let inside = path.join(IN_FOLDER);
             let inside = inside.display();
             return Err(ProblemError::Simulator(format!(
-                "{inside}: it names a program to run ({program}), and a folder runs none; where you trust it, give the file itself, {inside}"
+                "{inside}: it names a program to run ({program}), but no program is run for a folder; if you trust it, give the file itself, {inside}"
             )));
         }
         if let Some(announce) = reading.announce {
             let folder = workers.folder.display();
-            announce(&format!("{} runs, in the folder {folder}: {program}", path.display()));
+            announce(&format!("{} runs this program in the folder {folder}: {program}", path.display()));
         }
         let (checked, source) = Workers::bound(file.load_as(&recorded)?, workers)?;
         let name = file.shown_name().to_owned();

@@ -160,7 +160,7 @@ fn runs_of_one_load_are_fitted_together_and_a_value_that_goes_with_it_is_told() 
     // A column that moves within trials: the servo is the same in each quarter of it.
     assert_eq!(by("command_V").expect("fits").runs.len(), 4);
     let refused = by("payload_kg").unwrap_err().to_string();
-    assert!(refused.contains("there is no column payload_kg"), "{refused}");
+    assert!(refused.contains("no recording has a column payload_kg"), "{refused}");
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn what_another_absorbs_and_what_is_free_is_said() {
     let sentences = found.sentences().join("; ");
     assert!(
         sentences.contains("gain cannot be distinguished from gear")
-            && sentences.contains("inertia does nothing"),
+            && sentences.contains("inertia has no influence"),
         "{sentences}"
     );
 }

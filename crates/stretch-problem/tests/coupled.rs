@@ -238,7 +238,7 @@ fn joints_that_do_not_hang_together_are_diagnosed_as_ever() {
 fn a_parameter_that_moves_an_output_it_is_not_said_to_act_on_is_told() {
     let (_, bench) = diagnosed(problem(CARRIED, DEAD, &NAMES[..1]), CARRIED, true);
     let told = bench.afterwards();
-    let begun = "gain0 and tau0 are said to act on hip alone, but one tolerance of each moves knee by up to ";
+    let begun = "gain0 and tau0 are declared to act on hip alone, but a change of each by one tolerance moves knee by up to ";
     assert!(told[1].starts_with(begun), "{told:?}");
     assert!(told[1].ends_with(" times its noise: add knee to the `stages`"), "{told:?}");
     assert_eq!(told.len(), 2, "{told:?}");

@@ -124,7 +124,7 @@ fn each_spelling_of_a_force_or_torque_rubs_alike() {
 fn a_note_says_where_friction_is_not_looked_for() {
     for (columns, says) in [
         (["torque_nm", "level"], "at torque_nm: name velocity or position in stage joint"),
-        (["u", "angle_rad"], "at u: it does not say that it is a force or a torque"),
+        (["u", "angle_rad"], "at u: its unit does not show that it is a force or a torque"),
         (["command_V", "angle_rad"], ""),
         (["command_deg", "angle_deg"], ""),
         (["u", "level_V"], ""),
@@ -139,7 +139,7 @@ fn a_note_says_where_friction_is_not_looked_for() {
     let mut named = spec(["command_V", "angle_rad"]);
     named.stages[0].position = Some("angle_rad".into());
     let notes = Checked::new(named).expect("a problem").notes().join("; ");
-    assert!(notes.contains("friction is not looked for at command_V: it does not say"), "{notes}");
+    assert!(notes.contains("friction is not looked for at command_V: its unit does not show"), "{notes}");
 }
 
 #[test]

@@ -107,7 +107,7 @@ const DOUBTFUL: [Doubtful; 7] = [
         |_, force, _| sound(2.0, force),
         false,
         &[
-            "ignores the parameters of spring: its output is the same to the bit whatever compliance is",
+            "ignores the parameters of spring: its output is bit for bit the same for all values of compliance",
         ],
     ),
     // a difference by rounding, as from a sum in another order, is accepted

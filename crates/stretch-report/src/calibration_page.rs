@@ -154,8 +154,8 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
         });
     }
     page.text(
-        "Raw is the signal itself, its extremes laid on those of the reference, which no \
-         calibration may look at. Average error is the mean absolute error over the range of the \
+        "Raw is the signal itself, scaled so that its extremes match those of the reference, which no calibration may use. Average \
+         error is the mean absolute error over the range of the \
          estimate; a positive lag means that the estimate runs behind; outside domain counts \
          samples whose signal or rate the fit had never seen.",
     );
@@ -176,8 +176,8 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
         page.folded("Are the differences more than chance?", |page| {
             page.table(&comparison_table(&evaluation.comparisons, &evaluation.unit, called));
             page.text(
-                "Neighbouring samples resemble each other: P over means of half-second blocks is \
-                 nearer to the truth than P over samples, which is given as the paper gives it.",
+                "Neighbouring samples resemble each other: P over means of half-second blocks is more reliable than P over samples, \
+                 which is reported as in the paper.",
             );
         });
     }
@@ -303,8 +303,8 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
         }
         page.heading(&format!("The surfaces ({name})"));
         page.text(
-            "One surface serves rising targets, one falling ones. It is filled where samples support it and a bare net \
-             where it goes beyond them; no net where it leaves the frame. The outermost percent of rates is left out.",
+            "One surface serves rising targets, one falling ones. It is filled where samples support it, drawn as a net where it is \
+             extrapolated, and not drawn where it leaves the frame. The outermost percent of rates is left out.",
         );
         let inks = [Ink::Fourth, Ink::Fifth];
         let solid: Vec<_> = views
@@ -319,8 +319,8 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
             .collect();
         page.figures(&solid);
         page.text(
-            "The same surfaces cut at three rates: samples in motion are parted in thirds from \
-             slow to fast, each line is the surface at the median rate of its third. Samples at \
+            "The same surfaces cut at three rates: samples in motion are divided into thirds from slow to fast, and each line is the \
+             surface at the median rate of its third. Samples at \
              less than a twentieth of the fastest rate are left out.",
         );
         let cuts: Vec<_> =
@@ -349,8 +349,8 @@ fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) 
                 }
             }
             page.text(
-                "r is the normalised rate and v the normalised signal. Bounds take the samples \
-                 as independent; those of a log are not, so the true ones are wider.",
+                "r is the normalised rate and v the normalised signal. The bounds assume independent samples. Samples of a recording \
+                 are not independent, so the true bounds are wider.",
             );
         });
     }

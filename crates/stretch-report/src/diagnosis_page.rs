@@ -63,9 +63,9 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
 }
 
 /// Caption of the figure in which a reader can vary the parameters of an effect.
-const TURNED: &str = "What is left on the test trials as each number of the effect is turned, all else as it was fitted: the dot is \
-    the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
-    once the changes are added.";
+const TURNED: &str = "What is left on the test trials when one number of the effect is changed and all others stay as fitted; the dot \
+    is the fit. The corners of the line are the values that were simulated. If several numbers are changed at once, their changes are \
+    added.";
 
 /// Adds the first picture, which shows the evidence for the headline.
 fn left_over(page: &mut Page, subject: &Subject<'_>) {
@@ -154,7 +154,7 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     let d = subject.diagnosis;
     page.section(
         "Where the gap sits",
-        "Every stage is run on its measured input, so that no stage pays for another. The scale is the root mean \
+        "Every stage is run on its measured input, so that the error of one stage does not count for another. The scale is the root mean \
          square of what is left on the test trials, in multiples of the noise: at 1 only noise is left.",
     );
     let rms = |excess: f64| multiple(excess).max(1.0);
@@ -189,8 +189,7 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
         let figure = bar_figure("Share of every stage", &rows, Scale::Percent, "%");
         page.figure(
             &figure,
-            "Who causes the gap of the last output when the stages run one on the other from the commands alone \
-             (Shapley value).",
+            "Which stage causes the gap of the last output when the stages are simulated in series, from the commands alone (Shapley value).",
         );
     }
     slices(page, subject);
@@ -281,8 +280,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
         return;
     }
     page.text(
-        "Every candidate is fitted together with all nominal parameters, so that none wins by hiding in a wrong \
-         parameter.",
+        "Every candidate is fitted together with all nominal parameters, so that none wins only because a nominal parameter is wrong.",
     );
     let label = |c: &&stretch_gap::Candidate| c.effects.join(" + ");
     let odds: Vec<Row> = tried
@@ -381,9 +379,8 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     if let Some(table) = parameter_table(d) {
         page.table(&table);
         page.text(
-            "The last column is what the simulator without the effect had been bent to: parameters that moved between \
-             the two hid the effect. A star marks parameters that others can stand in for: their values are no \
-             evidence by themselves.",
+            "The last column has the parameters re-tuned without the effect: those that differ between the two columns hid the effect. \
+             A star marks parameters that others can replace: their values alone are not evidence.",
         );
     }
 }
@@ -395,10 +392,9 @@ fn detectable(page: &mut Page, d: &Diagnosis) {
     }
     page.section(
         "What would have been seen",
-        "An effect weaker than its limit may be there unseen, and one that is stronger is not: it would \
-         have been named nine times in ten. \
-         These are linearised draws: a twin whose \
-         form is fitted may be named in its place. Without a limit these data do not show an effect, or not which of several it is.",
+        "An effect weaker than its limit may be present without being seen. A stronger effect would have been named nine times in ten. \
+         The limits come from linearised draws: a similar effect whose form is fitted may be named instead. An effect without a limit \
+         cannot be seen in these data, or cannot be distinguished from others.",
     );
     page.table(&limit_table(&d.detection_limits));
 }

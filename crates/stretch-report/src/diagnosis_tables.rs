@@ -55,7 +55,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
         ]
     };
     Table::new(
-        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before \
+        "Candidates, the most probable set first, nothing and unknown last: probability given this catalogue; what is left before \
          and after in multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted",
         &["Effects", "Probability", "Left before", "Left after", "Closes", "95 % interval"],
         candidates.iter().map(row),

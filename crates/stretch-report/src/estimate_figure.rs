@@ -94,7 +94,7 @@ fn window_figure(
     let y_label = y_label(evaluation);
     let axes = (window, 0.04, ["time, s", &*y_label]);
     let heights = [FigureSize::NARROW, FigureSize::WIDE].map(|frame| frame.height);
-    let missing = "Reference and estimates hold no number here.";
+    let missing = "Reference and estimates have no values here.";
     let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
     let figure = lines_figure(&description, axes, heights, (&trial.time_s, &lines), missing);
     if figure.missing.is_some() {

@@ -36,7 +36,7 @@ fn to_add(named: &[String], tied: &[String]) -> String {
         }
         (_, tied) => {
             format!(
-                "{} (or {} in the place of one: these data cannot tell)",
+                "{} (or {} instead of one of them: these data cannot tell)",
                 listed(named),
                 tied.join(" or ")
             )
@@ -105,7 +105,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::NoGap => "Nothing.".to_owned(),
         VerdictKind::Record => {
             let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
-            format!("Nothing before the record is right: {}.", what.concat())
+            format!("Nothing until the recording and the rig file are right: {}.", what.concat())
         }
     };
     let sure = match (d.verdict, best) {
@@ -126,7 +126,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
             format!("Probability {} compared with every set of effects, {GIVEN}.", percent(c.probability))
         }
-        (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
+        (VerdictKind::Record, _) => "The columns alone show this, whatever the simulator is.".to_owned(),
         (VerdictKind::Unknown, _) => {
             "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
         }
@@ -139,9 +139,9 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
         VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
         VerdictKind::Record if d.gross.iter().any(Gross::is_plain) => {
-            "A record from which something can be learnt.".to_owned()
+            "A recording from which something can be learnt.".to_owned()
         }
-        VerdictKind::Record => format!("{gain} Then what effects do can be seen."),
+        VerdictKind::Record => format!("{gain} After that, effects can be seen."),
         VerdictKind::Parameters if d.is_faint() => {
             format!(
                 "With re-tuned parameters {} times the noise is left.",
@@ -164,7 +164,7 @@ fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
         Some(e) => format!(
-            " A non-linear calibration trained in the simulator then errs {} in place of {} of full scale.",
+            " A non-linear calibration trained in the simulator then has an error of {} instead of {} of full scale.",
             percent(0.01 * e.sim_with_effect),
             percent(0.01 * e.sim)
         ),

@@ -59,7 +59,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
     let up = |t: f64| if (HOLD_S..2.0 * HOLD_S).contains(&t) { 1.0 } else { 0.0 };
     let Some(answer) = Answer::new(calibration, 3.0 * HOLD_S, up) else {
         return Figure::missing(
-            "This calibration needs more than the signal: it cannot be shown alone.",
+            "This calibration needs more inputs than the signal, so it cannot be shown for the signal alone.",
         );
     };
     let Some(y) = extent(answer.estimate.iter().copied()) else {
@@ -112,7 +112,7 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
     let all = || loops.iter().flatten();
     let (Some(x), Some(y)) = (extent(all().map(|p| p.0)), extent(all().map(|p| p.1))) else {
         return Figure::missing(
-            "This calibration needs more than the signal: it cannot be shown alone.",
+            "This calibration needs more inputs than the signal, so it cannot be shown for the signal alone.",
         );
     };
     let labels = [&*calibration.spec().signal.to_string(), &labelled("estimate", unit)];

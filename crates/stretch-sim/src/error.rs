@@ -7,14 +7,14 @@ use stretch_effects::Effect;
 #[non_exhaustive]
 pub enum SimError {
     /// No effect of that name.
-    #[error("no effect is called `{name}`{}", suggestion(.nearest))]
+    #[error("no effect is called `{name}`{}", or_list(.nearest))]
     UnknownEffect {
         /// The name that was given.
         name: String,
         /// The nearest name of the catalogue, when one is near.
         nearest: Option<String>,
     },
-    /// A parameter, table or kind of that name is not known there.
+    /// A parameter of that name is not known there.
     #[error("`{owner}` has no parameter `{name}`{}", suggestion(.nearest))]
     UnknownParameter {
         /// The effect, table or file it was given to.
@@ -24,8 +24,26 @@ pub enum SimError {
         /// The nearest name, when one is near.
         nearest: Option<String>,
     },
+    /// A rig file has a table that this kind of rig does not have.
+    #[error("a rig file of {rig} has no table `{name}`{}", suggestion(.nearest))]
+    UnknownTable {
+        /// The kind of rig.
+        rig: &'static str,
+        /// The table.
+        name: String,
+        /// The nearest table, when one is near.
+        nearest: Option<String>,
+    },
+    /// A rig file describes another kind of rig.
+    #[error("the rig file is of kind `{found}`; give a rig file {needed}")]
+    Kind {
+        /// The kind in the file.
+        found: String,
+        /// The kind that is needed.
+        needed: &'static str,
+    },
     /// A value outside its plausible range.
-    #[error("`{owner}`: {name} = {value} is outside {min} .. {max} {unit}")]
+    #[error("`{owner}`: {name} = {value} is outside {min} .. {max}{}", shown(.unit))]
     OutOfRange {
         /// The effect or table.
         owner: String,
@@ -76,7 +94,7 @@ pub enum SimError {
     },
     /// The sleeve would be slack within the stroke, so the bridge would not respond.
     #[error(
-        "the sleeve goes slack: gauge strain {strain} at full contraction, at least {least} is needed"
+        "the sleeve goes slack: the gauge strain at full contraction is {strain}, but at least {least} is needed; check the geometry in the rig file"
     )]
     SlackSleeve {
         /// Strain at the supply pressure.
@@ -95,7 +113,7 @@ pub enum SimError {
         value: f64,
     },
     /// Time does not advance uniformly.
-    #[error("sample {sample}: time advances by {found} s where the trial's step is {expected} s")]
+    #[error("sample {sample}: time advances by {found} s, but the trial's step is {expected} s")]
     NotUniform {
         /// Which sample, from 0.
         sample: usize,
@@ -106,7 +124,7 @@ pub enum SimError {
     },
     /// A grid that is not split where the valves switch.
     #[error(
-        "the grid of time is made for a valve delay of {found} s, the effects ask for {expected} s"
+        "the time grid was made for a valve delay of {found} s, but the effects have a delay of {expected} s"
     )]
     GridDelay {
         /// Delay of the effects, s.
@@ -129,7 +147,7 @@ pub enum SimError {
         problem: String,
     },
     /// Slices that must have the same (or a derived) length do not.
-    #[error("`{name}` has {found} values where {expected} are needed")]
+    #[error("`{name}` has {found} values, but {expected} are needed")]
     Length {
         /// Name of the slice.
         name: &'static str,
@@ -151,6 +169,19 @@ pub enum SimError {
 /// Returns the words that offer a suggestion; empty without one.
 fn suggestion(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
+}
+
+/// Returns the words that offer a suggestion, or the command that lists the effects.
+fn or_list(nearest: &Option<String>) -> String {
+    match nearest {
+        Some(_) => suggestion(nearest),
+        None => "; `stretch effects` lists the names".to_owned(),
+    }
+}
+
+/// Returns a space and the unit; empty for the unit 1.
+fn shown(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 /// The candidate that was probably meant.

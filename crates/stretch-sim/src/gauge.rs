@@ -249,10 +249,12 @@ impl GaugeRig {
         let unknown = SimError::unknown_parameter;
         let kind = file.kind.as_deref().unwrap_or("rig");
         if kind != KIND {
-            return Err(unknown("a gauge alone", &format!("kind = \"{kind}\""), None));
+            let needed = "of a gauge alone, with kind = \"gauge\"";
+            return Err(SimError::Kind { found: kind.to_owned(), needed });
         }
         if let Some(table) = file.stages.keys().find(|table| *table != TABLE) {
-            return Err(unknown("a gauge alone", table, Some(TABLE.to_owned())));
+            let (rig, nearest) = ("a gauge alone", Some(TABLE.to_owned()));
+            return Err(SimError::UnknownTable { rig, name: table.clone(), nearest });
         }
         let empty = BTreeMap::new();
         let table = file.stages.get(TABLE).unwrap_or(&empty);

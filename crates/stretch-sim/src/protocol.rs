@@ -274,7 +274,7 @@ fn check_columns(trial: &Trial) -> Result<(), SimError> {
         Some(other) => Err(SimError::Column {
             name: other.name.clone(),
             problem: format!(
-                "the simulated rig cannot do that; besides inlet and outlet it takes {}",
+                "the simulated rig does not know this command; except for inlet and outlet, it takes only {}",
                 known.join(", ")
             ),
         }),
@@ -290,7 +290,7 @@ fn excitation(trial: &Trial) -> Result<f64, SimError> {
         Some(other) => Err(SimError::Column {
             name: EXCITATION.to_owned(),
             problem: format!(
-                "{other} stands beside {share}; give one number in 0 .. 2 in every row"
+                "it holds {other}, and {share} in the first row; give one number above 0 and at most 2, the same in every row"
             ),
         }),
     }
@@ -304,7 +304,7 @@ fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
         return fail(format!("{share} is outside 0 .. 1"));
     }
     if trial.channel(SET_LENGTH).is_none() {
-        return fail(format!("a shunt is simulated at a set length only; add {SET_LENGTH}"));
+        return fail(format!("a shunt is simulated only at a set length; add the column {SET_LENGTH}"));
     }
     Ok(Some(shares.to_vec()))
 }

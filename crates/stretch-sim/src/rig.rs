@@ -90,8 +90,8 @@ impl Rig {
     /// "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
-            let kind = format!("kind = \"{kind}\"");
-            return Err(SimError::unknown_parameter("a whole rig", &kind, None));
+            let needed = "of a whole rig, without kind";
+            return Err(SimError::Kind { found: kind.clone(), needed });
         }
         let mut rig = Self::default();
         let tables =
@@ -99,7 +99,8 @@ impl Rig {
         for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
             if !tables.iter().any(|stage| stage.name() == table) {
                 let nearest = nearest(table, tables.iter().map(|s| s.name()));
-                return Err(SimError::unknown_parameter("a rig file", table, nearest));
+                let (rig, name) = ("a whole rig", table.clone());
+                return Err(SimError::UnknownTable { rig, name, nearest });
             }
             for (name, parameter) in parameters {
                 let known = PARAMETERS.iter().find(|p| p.name == name && p.stage.name() == table);
@@ -135,6 +136,15 @@ impl Rig {
                 });
             }
         }
+        let bits = self.params[Key::Bits];
+        if bits.fract() != 0.0 {
+            return Err(SimError::BadParameter {
+                owner: Key::Bits.info().stage.name().into(),
+                name: Key::Bits.info().name.into(),
+                value: bits,
+                needs: "a whole number",
+            });
+        }
         for (key, min, max) in [
             (Key::B, 0.0, 0.95),
             (Key::UMin, 0.0, 1.0),
@@ -142,8 +152,7 @@ impl Rig {
             (Key::KMax, 0.0, 0.5),
         ] {
             let value = self.params[key];
-            let whole = key != Key::Bits || value.fract() == 0.0;
-            if !(value >= min && value <= max && whole) {
+            if !(min..=max).contains(&value) {
                 return Err(SimError::OutOfRange {
                     owner: key.info().stage.name().into(),
                     name: key.info().name.into(),

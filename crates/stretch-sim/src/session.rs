@@ -188,7 +188,7 @@ impl Session {
             return Err(SimError::Column {
                 name: "start_s".into(),
                 problem: format!(
-                    "a pause of {pause_s} s is {samples} samples; at most {MOST_PAUSE} are simulated"
+                    "the pause before this trial, {pause_s} s, has {samples} samples; at most {MOST_PAUSE} are simulated"
                 ),
             });
         }

@@ -93,7 +93,7 @@ fn forms_that_are_left_out_are_neutral() {
         assert_eq!(given, left_out, "{}", effect.name);
     }
     let error = EffectSet::new().push(effect_named("muscle_creep").unwrap(), &[0.1]).unwrap_err();
-    assert_eq!(error.to_string(), "`muscle_creep` has 1 values where 3 are needed");
+    assert_eq!(error.to_string(), "`muscle_creep` has 1 values, but 3 are needed");
 }
 
 #[test]
@@ -101,5 +101,5 @@ fn forms_are_taken_up_to_their_neutral_value() {
     let mut effects = EffectSet::new();
     effects.insert("gauge_softening", &[("m", 0.1), ("tail", 0.01)]).unwrap();
     let error = effects.insert("gauge_relaxation", &[("c", 0.1), ("spread", 0.9)]).unwrap_err();
-    assert_eq!(error.to_string(), "`gauge_relaxation`: spread = 0.9 is outside 1 .. 8 1");
+    assert_eq!(error.to_string(), "`gauge_relaxation`: spread = 0.9 is outside 1 .. 8");
 }

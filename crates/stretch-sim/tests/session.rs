@@ -181,11 +181,11 @@ fn rig_files_are_read_strictly() {
     );
     assert_eq!(
         error("value = 12.0", "value = 12.5"),
-        "`sensing`: bits = 12.5 is outside 1 .. 24 1"
+        "`sensing`: bits = 12.5 must be a whole number"
     );
     assert_eq!(
         error("[muscle]", "[muscles]"),
-        "`a rig file` has no parameter `muscles`; did you mean `muscle`?"
+        "a rig file of a whole rig has no table `muscles`; did you mean `muscle`?"
     );
     assert!(error("e0 = { value = 0.22", "e0 = { value = 0.1").contains("slack"));
     let with = |effect: &str| {

@@ -52,7 +52,7 @@ impl Choices {
     fn trials(&self, files: &Files) -> Result<(Vec<Trial>, Vec<String>), Said> {
         let trials = files.trials(Split::Fit)?;
         if trials.is_empty() {
-            return Err(Said("there is no recording to fit: drop one, or fit one of those that are only tested on".to_owned()));
+            return Err(Said("there is no recording to fit: drop one, or choose “fit” for one that is only tested".to_owned()));
         }
         Ok(without_gross_errors(trials, &[&self.reference, &self.signal]))
     }

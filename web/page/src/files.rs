@@ -116,7 +116,7 @@ impl Files {
         let text = text(name, bytes)?;
         if name == "problem.toml" {
             return Err(Said(format!(
-                "{name}: a simulator of your own runs outside of a browser: stretch diagnose {name}"
+                "{name}: the page cannot run a simulator of your own; use the program: stretch diagnose {name}"
             )));
         }
         if name == "dataset.toml" {
@@ -197,7 +197,7 @@ impl Files {
 }
 
 fn missing(file: &str) -> Said {
-    Said(format!("dataset.toml names {file}, and it was not dropped: drop it, too"))
+    Said(format!("dataset.toml names {file}, but it was not dropped: drop it, too"))
 }
 
 fn text<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a str, Said> {

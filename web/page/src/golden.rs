@@ -43,7 +43,7 @@ pub(crate) fn sound() -> Result<usize, Said> {
     match found.lines().eq(golden) {
         true => Ok(found.lines().count()),
         false => Err(Said(
-            "this browser computes other bits than the program: use the program, and report the browser to the authors of stretch"
+            "this browser computes other results than the program: use the program, and report the browser to the authors of stretch"
                 .to_owned(),
         )),
     }

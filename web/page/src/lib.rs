@@ -171,7 +171,7 @@ impl Desk {
 }
 
 fn nothing() -> Said {
-    Said("nothing has been worked out yet".to_owned())
+    Said("nothing has been calculated yet".to_owned())
 }
 
 /// Returns the sample data for new users, the paper's session simulated, as a list of files.

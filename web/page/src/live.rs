@@ -123,7 +123,7 @@ impl Live {
 fn read(record: &str) -> Result<Option<Calibration>, Said> {
     match record {
         "" => Ok(None),
-        text => Ok(Some(calibration_from_json(text, "the record")?)),
+        text => Ok(Some(calibration_from_json(text, "the calibration file")?)),
     }
 }
 
@@ -220,7 +220,7 @@ impl Frames {
             );
         }
         if self.compared.0 > 0 {
-            text += &format!("; differs from the record by {:.4} {unit}", self.compared.1);
+            text += &format!("; differs from the calibration by {:.4} {unit}", self.compared.1);
         }
         text
     }

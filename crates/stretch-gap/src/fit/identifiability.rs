@@ -84,7 +84,7 @@ impl Identified {
     ///     like: vec![],
     ///     at_bound: false,
     /// };
-    /// assert_eq!(gear.sentence().unwrap(), "gear does nothing in these data: it is dead, or nothing excites it");
+    /// assert_eq!(gear.sentence().unwrap(), "gear has no influence in these data: the simulator ignores it, or nothing excites it");
     /// ```
     pub fn sentence(&self) -> Option<String> {
         let name = &self.name;
@@ -92,12 +92,12 @@ impl Identified {
         let mut said = match self.knowledge {
             Knowledge::Dead => {
                 return Some(format!(
-                    "{name} does nothing in these data: it is dead, or nothing excites it"
+                    "{name} has no influence in these data: the simulator ignores it, or nothing excites it"
                 ));
             }
             _ if !self.like.is_empty() => {
                 format!(
-                    "{name} cannot be distinguished from {}: they do the same",
+                    "{name} cannot be distinguished from {}: they have the same influence",
                     self.like.join(", ")
                 )
             }
@@ -111,7 +111,7 @@ impl Identified {
             Knowledge::Determined => String::new(),
         };
         if self.at_bound {
-            let at = "at the end of what its tolerance allows";
+            let at = "at the limit of what its tolerance allows";
             said = match said.is_empty() {
                 true => format!("{name} is {at}"),
                 false => format!("{said}; it is {at}"),

@@ -154,8 +154,8 @@ fn descended(
     match compare.runs.is_spent() {
         false => Ok(best),
         true => Err(GapError::TooLittle {
-            what: "the runs of the simulator are spent".into(),
-            hint: "give a larger budget".into(),
+            what: "the budget of model runs is spent".into(),
+            hint: "allow more runs".into(),
         }),
     }
 }

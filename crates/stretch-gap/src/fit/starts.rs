@@ -53,7 +53,7 @@ const ALIKE: f64 = 0.01;
 /// ```
 /// use stretch_gap::Starts;
 /// assert_eq!(Starts { tried: 4, agreed: 3 }.note().as_deref(), Some(
-///     "re-tuning has several ends: of 4 starts within the tolerances 3 came to the best one, which the diagnosis goes on from; tell the parameters more narrowly if you can"
+///     "re-tuning ends at different values: 3 of 4 starts within the tolerances reached the best fit, with which the diagnosis continues; narrow the tolerances of the parameters if you can"
 /// ));
 /// assert_eq!(Starts { tried: 1, agreed: 1 }.note(), None);
 /// ```
@@ -73,7 +73,8 @@ impl Starts {
         let Self { tried, agreed } = self;
         (agreed < tried).then(|| {
             format!(
-                "re-tuning has several ends: of {tried} starts within the tolerances {agreed} came to the best one, which the diagnosis goes on from; tell the parameters more narrowly if you can"
+                "re-tuning ends at different values: {agreed} of {tried} starts within the tolerances reached the best fit, with which \
+                 the diagnosis continues; narrow the tolerances of the parameters if you can"
             )
         })
     }

@@ -103,20 +103,20 @@ impl Course {
             ),
             Self::Swings { hertz, amplitude } => {
                 format!(
-                    "it swings at {} Hz, {} to either side",
+                    "it oscillates at {} Hz with an amplitude of {}",
                     three_digits(hertz),
                     sized(amplitude)
                 )
             }
             Self::Jumps { per_s, size } => {
                 format!(
-                    "it jumps at random, some {} times a second, by {}",
+                    "it jumps at random, about {} times a second, by {}",
                     three_digits(per_s),
                     sized(size)
                 )
             }
             Self::Drifts { size, correlation_s } => format!(
-                "it drifts at random by {}, and is forgotten after {} s",
+                "it drifts at random by {}, with a correlation time of {} s",
                 sized(size),
                 three_digits(correlation_s)
             ),
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn words_have_units() {
         let swing = Course::Swings { hertz: 0.7, amplitude: 0.012 };
-        assert_eq!(swing.words("V"), "it swings at 0.700 Hz, 0.0120 V to either side");
+        assert_eq!(swing.words("V"), "it oscillates at 0.700 Hz with an amplitude of 0.0120 V");
         let jitter = Course::Jitters { sd_s: 0.0042 };
         let told = "time stamps jitter by about 4.20 ms, which is noise that follows the rate";
         assert_eq!(jitter.words("V"), told);

@@ -229,7 +229,7 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
         (true, _) => {
             let course = proposed.course.map(|c| format!(": {} in {channel}", c.words(unit)));
             format!(
-                "What is left in {stage} is random or periodic in time, nothing that was recorded explains it{}.",
+                "What is left in {stage} is random or periodic in time, and nothing that was recorded explains it{}.",
                 course.unwrap_or_default()
             )
         }

@@ -12,7 +12,8 @@ pub enum GapError {
     /// A measured channel has fewer finite samples than the trials. A value of 1e100 or more counts
     /// as infinite.
     #[error(
-        "{stage}: {found} measured samples in a row are finite and below 1e100, the trials hold {needed}; give one such number for each sample"
+        "{stage}: only the first {found} measured samples are finite and below 1e100, but the trials have {needed} samples; give such a \
+         number for each sample"
     )]
     Measured {
         /// The stage.
@@ -36,7 +37,9 @@ pub enum GapError {
     /// The integration step is so coarse that halving it changes the output noticeably against the
     /// noise.
     #[error(
-        "{stage}: halving the step of integration moves the output by {moved} of its noise, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
+        "{stage}: halving the step of integration moves the output by {moved} of its noise, so the step is too long for an accurate \
+         result: a number in the rig file makes this stage much faster than a real rig (a volume that is too small, a conductance, \
+         friction or time constant in another unit); if the simulator is your own, shorten its step"
     )]
     Solver {
         /// The stage.
@@ -67,7 +70,8 @@ pub enum GapError {
     Broken(Box<dyn std::error::Error + Send + Sync>),
     /// The probabilities of the hypotheses are not finite.
     #[error(
-        "the probabilities of the hypotheses are no numbers (the re-tuned simulator leaves {retuned:e} times the noise): check the noise that is stated; if that is right, this is an error of the program"
+        "the probabilities of the hypotheses are not numbers (the re-tuned simulator leaves {retuned:e} times the noise): check the \
+         noise that is stated; if it is right, this is an error of the program"
     )]
     NoProbability {
         /// Gap that the re-tuned simulator leaves, in multiples of the noise variance.
@@ -75,7 +79,7 @@ pub enum GapError {
     },
     /// The budget of model runs is used up.
     #[error(
-        "the budget of {budget} model runs is spent before there is an answer; give {least} or more, the least that one needs"
+        "the budget of {budget} model runs is spent before there is an answer; allow at least {least} runs"
     )]
     Spent {
         /// Number of runs that are allowed.

@@ -89,7 +89,8 @@ impl ModelRuns {
     pub(crate) fn note(&self) -> Option<String> {
         let budget = self.budget.filter(|_| self.is_spent)?;
         Some(format!(
-            "the budget of {budget} model runs was spent before the search was over ({} were made): the answer is based on what was fitted until then; give more to look further",
+            "the budget of {budget} model runs was spent before the search was over ({} were made): the answer is based on what was \
+             fitted until then; allow more runs to continue the search",
             self.count
         ))
     }

@@ -95,8 +95,9 @@ pub(crate) fn implausible_noise_notes(
         let spec = &problem.simulator().stages()[*stage];
         let noise = &problem.compare.metrics[*stage].noise;
         format!(
-            "the noise of {} is implausible, {:.2e} {} ({}): without any effect the simulator leaves {share:.2} of it, which no \
-             noise does, and it hides every gap of its size; state the noise of the stage as it is",
+            "the noise of {} is implausible, {:.2e} {} ({}): even without an effect the simulator \
+             leaves only {share:.2} of it, so the true noise is smaller, and the assumed noise hides every gap of its size; state the \
+             true noise of the stage",
             spec.channel, noise.rms, spec.unit, noise.source
         )
     };
@@ -215,7 +216,7 @@ pub(crate) fn detection_limit_note(
         let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
         note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0))))
     };
-    let begin = Note::default().text("It would have been named if it were stronger than: ");
+    let begin = Note::default().text("An effect would have been named if it were stronger than its limit: ");
     let listed = known.iter().take(LISTED).enumerate().fold(begin, one);
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     let how = format!("{rest} (with probability 0.9, by linearised draws).");
@@ -253,7 +254,7 @@ mod tests {
         let words = detection_limit_note(&limits, &effects).expect("limits").to_string();
         assert!(
             words.starts_with(
-                "It would have been named if it were stronger than: e8 0.2 V, e7 0.3 V, "
+                "An effect would have been named if it were stronger than its limit: e8 0.2 V, e7 0.3 V, "
             ),
             "{words}"
         );

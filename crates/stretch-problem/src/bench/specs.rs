@@ -57,7 +57,8 @@ pub(crate) fn shown(
                 return Some((effect, place));
             };
             notes.push(format!(
-                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be distinguished from motion and drift; from {needed} on it can",
+                "{} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from motion and drift; \
+                 record at least {needed} samples a second",
                 effect.name
             ));
             None

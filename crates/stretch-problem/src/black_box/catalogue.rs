@@ -195,7 +195,7 @@ pub(crate) fn own_effects(
         if effect.arguments.is_empty() || effect.arguments.iter().all(|a| a.off.is_none()) {
             return Err(ProblemError::value(
                 format!("effect {}", effect.name),
-                "no argument says at which value it does nothing",
+                "no argument states the value at which the effect does nothing",
                 "give off = VALUE",
             ));
         }
@@ -211,7 +211,7 @@ pub(crate) fn own_effects(
                 return Err(ProblemError::value(
                     format!("effect {name}"),
                     format!("off = {off} is outside of its range, {min} to {max}"),
-                    "give a range that holds the value at which it does nothing",
+                    "give a range that contains off, the value at which the effect does nothing",
                 ));
             }
             let middle = if a.is_log { (min * max).sqrt() } else { 0.5 * (min + max) };

@@ -75,7 +75,7 @@ impl Checked {
         let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;
         let mut notes: Vec<String> = cut.into_iter().chain(columns.notes.iter().cloned()).collect();
         let grid = Grid::samples(columns.dt_s)
-            .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time"))?;
+            .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time columns"))?;
         let stated = |column: &str| stated_unit(stages, inputs, column);
         let unit_of = |column: &str| match stated(column) {
             "" => unit_of(column),
@@ -269,7 +269,8 @@ fn begins_note(begun: &[Begins], wrappers: &[Placed]) -> Option<String> {
     let (column, trials) = (&first.site.column, unknown(first));
     let s = if trials == 1 { "" } else { "s" };
     Some(format!(
-        "{column} steps at the first sample of {trials} trial{s}, and nothing says from where, so that a memory in front of the stage begins with the step; log some rest before it"
+        "{column} steps at the first sample of {trials} trial{s}, but its value before the step is unknown, so an effect with memory in \
+         front of the stage begins with the step; record some rest before it"
     ))
 }
 
@@ -471,8 +472,8 @@ fn check_known(
     let fed_back = stages.iter().find(|s| s.inputs.contains(&s.output));
     fed_back.map_or(Ok(()), |s| {
         let found =
-            format!("its output {} is one of its inputs, which tells it the answer", s.output);
-        let hint = "drive it by what is commanded or by the output of another stage";
+            format!("its output {} is one of its inputs, so the simulator would get the answer", s.output);
+        let hint = "drive the stage by a command or by the output of another stage";
         Err(ProblemError::value(format!("stage {}", s.name), found, hint))
     })
 }
@@ -497,8 +498,8 @@ fn check_stated(
             && let (Some(own), Some(other)) = (measured(named), measured(stated))
             && own != other
         {
-            let found = format!("its unit is {stated}, and its column {column} is in {named}");
-            let hint = "give the unit that the column has, or leave it out";
+            let found = format!("its unit is {stated}, but its column {column} is in {named}");
+            let hint = "give the unit of the column, or leave the unit out";
             return Err(ProblemError::value(owner(), found, hint));
         }
         let (least, greatest) = ends(columns.of(column).unwrap_or(&[]));

@@ -32,7 +32,8 @@ const MOVED: f64 = 0.02;
 const ROUNDING: f64 = 1e-9;
 /// Ends of the note on coupled stages.
 const LOOKED_AT: &str = "these outputs are compared as well";
-const LEFT_OUT: &str = "this is left out, for the simulator takes altered inputs of one stage at a time (several in a worker's hello)";
+const LEFT_OUT: &str = "this is left out, because the simulator takes altered inputs of one stage at a time (a worker that can take \
+    more sets several = true in its hello)";
 
 /// Stages on which the wrappers in front of stages act.
 #[derive(Debug, Clone)]

@@ -134,7 +134,7 @@ impl BlackBox {
         match all.iter().find(unpredicted) {
             Some((at, _)) => {
                 let name = &self.problem.wrappers[*at].name;
-                let why = format!("{name} looks at a column that no experiment predicts");
+                let why = format!("{name} needs a column that no experiment predicts");
                 Err(GapError::simulator(SourceError::Refused(why)))
             }
             None => Ok(all),

@@ -110,7 +110,8 @@ pub struct ProblemSpec {
 }
 
 /// Note for a simulator that takes no altered inputs, for which fewer effects are looked for.
-pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side: the simulator takes no altered inputs (inputs = false in a worker's hello)";
+pub(crate) const ONLY_BEHIND: &str = "no effect was looked for in front of a stage, because the simulator takes no altered inputs \
+    (inputs = false in a worker's hello)";
 
 impl ProblemSpec {
     /// The problem for a simulator that can run only on the recorded inputs: `all` becomes
@@ -248,7 +249,7 @@ impl TryFrom<WrittenEffect> for OwnEffect {
         let has_own = range.is_some() || off.is_some() || value.is_some() || is_log;
         let arguments = match (argument.is_empty(), range) {
             (false, _) if has_own => {
-                return Err("range, off, log and value belong into its [[effect.argument]]".into());
+                return Err("range, off, log and value belong in its [[effect.argument]]".into());
             }
             (false, _) => argument,
             (true, Some(range)) => {
@@ -258,7 +259,7 @@ impl TryFrom<WrittenEffect> for OwnEffect {
         };
         match arguments.iter().find(|a| a.is_log && a.range[0] <= 0.0) {
             Some(a) => Err(format!(
-                "its range begins at {}; what is searched in equal ratios (log) is above 0",
+                "its range begins at {}; with log = true it must begin above 0",
                 a.range[0]
             )),
             None => Ok(Self { name, arguments, stages, twins }),

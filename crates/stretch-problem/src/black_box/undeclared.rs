@@ -87,8 +87,8 @@ impl Undeclared {
             let own = about.stages[stage].parameters.iter().map(|&p| &about.parameters[p]);
             let tuned = own.filter(|p| p.sd > 0.0).map(|p| p.name.clone());
             format!(
-                "the simulator ignores the parameters of {}: its output is the same to the bit whatever {} is; nothing could be re-tuned there, so \
-                 check that the simulator takes them",
+                "the simulator ignores the parameters of {}: its output is bit for bit the same for all values of {}; nothing could be re-tuned \
+                 there, so check that the simulator uses them",
                 about.stages[stage].name,
                 listed(&tuned.collect::<Vec<_>>())
             )
@@ -128,7 +128,8 @@ impl Alike<'_> {
             _ => ("are", "each", "up to "),
         };
         format!(
-            "{} {are} said to act on {} alone, but one tolerance of {each} moves {moves} by {up_to}{most:.1} times its noise: add {moves} to the `stages`",
+            "{} {are} declared to act on {} alone, but a change of {each} by one tolerance moves {moves} by {up_to}{most:.1} times its \
+             noise: add {moves} to the `stages`",
             listed(&names),
             listed(&self.said),
         )

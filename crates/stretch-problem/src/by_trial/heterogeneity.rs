@@ -75,7 +75,7 @@ impl Apart {
         let each = self.values.iter().zip(&self.deviations);
         let each: Vec<String> = each.map(|(name, z)| format!("{name} ({z:+.1} sd)")).collect();
         let other = match self.is_set_up {
-            true => "; the other runs agree without it: it is another set-up",
+            true => "; the other runs agree without it, so its set-up is probably different",
             false => "",
         };
         format!("{} differs from the others in {}{other}", self.run, each.join(", "))

@@ -49,7 +49,7 @@ impl ByTrial {
         out.extend(self.apart.iter().map(Apart::sentence));
         if out.is_empty() {
             out.push(format!(
-                "the {} runs agree in every value that they tell, within their intervals",
+                "the {} runs agree within their intervals in every value that they determine",
                 self.runs.len()
             ));
         }
@@ -84,7 +84,7 @@ impl Problem {
     ) -> Result<ByTrial, GapError> {
         let trials = self.simulator().trials();
         if trials.len() < 2 {
-            return refused("there is one run");
+            return refused("there is only one run");
         }
         compared(self.simulator(), ("trial", &groups::by_trial(trials)), examined, progress, stop)
     }
@@ -112,7 +112,7 @@ impl Problem {
     ) -> Result<ByTrial, GapError> {
         let simulator = self.simulator();
         let Some(values) = self.source().column(column) else {
-            return refused(&format!("there is no column {column} in what was recorded"));
+            return refused(&format!("no recording has a column {column}"));
         };
         let groups = groups::by_column(column, &values, simulator.trials());
         if groups.len() < 2 {
@@ -137,7 +137,7 @@ fn compared(
         p.drift.is_some() || p.per_trial_sd.is_some() || p.per_tick_sd.is_some()
     };
     if simulator.parameters().iter().any(is_nuisance) {
-        return refused("its nuisances are of all runs together");
+        return refused("the runs share parameters that drift or differ between trials, so they cannot be fitted separately");
     }
     let Examined { diagnosis, evidence, .. } = examined;
     let found = evidence.candidates.first().filter(|_| !diagnosis.named.is_empty());
@@ -168,4 +168,4 @@ fn compared(
 }
 
 /// Advice if runs cannot be compared.
-const HINT: &str = "runs are compared of a simulator of your own, or of a gauge alone, with two recordings or more, or by a column that was recorded and changes";
+const HINT: &str = "comparing runs needs a simulator of your own or a gauge alone, with at least two recordings or a recorded column that changes";

@@ -82,7 +82,7 @@ fn table(out: &mut String, root: &Value, schema: &Value, path: &str) {
     let text = |value: &Value| value.as_str().unwrap_or_default().replace('\n', " ");
     let words = text(&schema["description"]);
     // Writing to a String does not fail.
-    let _ = write!(out, "## {head}\n\n{words}\n\n| key | holds | what |\n| --- | --- | --- |\n");
+    let _ = write!(out, "## {head}\n\n{words}\n\n| key | type | meaning |\n| --- | --- | --- |\n");
     let is_needed = |key: &String| {
         schema["required"].as_array().is_some_and(|all| all.iter().any(|one| one == key))
     };

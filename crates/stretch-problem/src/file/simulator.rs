@@ -106,11 +106,11 @@ impl SimulatorEntry {
             return fail("command", "it is empty; write the program and its arguments".into());
         }
         if let Some(jobs) = self.jobs.filter(|jobs| jobs.get() > MOST_JOBS) {
-            return fail("jobs", format!("{jobs} is more than {MOST_JOBS} workers at once"));
+            return fail("jobs", format!("{jobs} workers are too many; give at most {MOST_JOBS}"));
         }
         match &self.python {
             Some(object) if object.split(':').filter(|part| !part.is_empty()).count() != 2 => {
-                fail("python", format!("{object:?} is no object; write \"module:object\""))
+                fail("python", format!("{object:?} is not an object; write \"module:object\""))
             }
             _ => Ok(()),
         }
@@ -214,7 +214,7 @@ mod tests {
             ),
             (
                 "python = \"a\"",
-                "row 2, key simulator.python: \"a\" is no object; write \"module:object\"",
+                "row 2, key simulator.python: \"a\" is not an object; write \"module:object\"",
             ),
             (
                 "python = \"a:b\"\ncommand = \"c\"",
@@ -228,7 +228,7 @@ mod tests {
             ),
             (
                 "command = \"a\"\njobs = 1000000000",
-                "row 3, key simulator.jobs: 1000000000 is more than 256 workers at once",
+                "row 3, key simulator.jobs: 1000000000 workers are too many; give at most 256",
             ),
             (
                 "builtin = \"rig\"\nsignal = \"u\"",

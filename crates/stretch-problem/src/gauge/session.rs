@@ -105,7 +105,7 @@ impl GaugeSession {
         }
         if reference == "bridge_v" || signal == "length_mm" {
             let column = format!("--reference {reference}, --signal {signal}");
-            let hint = "the reference is the length, the signal what the gauge says";
+            let hint = "exchange them: the reference is the length, the signal is the output of the gauge";
             return Err(ProblemError::implausible(column, "the two look swapped", hint));
         }
         let mut shares = Vec::new();
@@ -133,7 +133,8 @@ impl GaugeSession {
                 let share = self.standing(values, end);
                 if share > 0.01 {
                     notes.push(format!(
-                        "{name} stands at its {which} value, {end}, in {:.1} % of the samples: if that is an end of its converter, what happened there is lost",
+                        "{name} is at its {which} value, {end}, in {:.1} % of the samples: if this is a limit of its converter, all \
+                         values beyond it are lost",
                         100.0 * share
                     ));
                 }

@@ -80,9 +80,9 @@ fn columns_of<'a>(
             let (own, names) = (&first.name, names.join(", "));
             Err(ProblemError::too_little(
                 format!(
-                    "{own} is a gauge alone, and nothing says which columns are the reference and the signal"
+                    "{own} is a gauge alone, but its reference and its signal are not known"
                 ),
-                format!("name them with --reference and --signal; the columns are {names}"),
+                format!("name their columns with --reference and --signal; the columns are {names}"),
             ))
         }
     }

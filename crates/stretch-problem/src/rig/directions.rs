@@ -46,11 +46,11 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
         return ("length_mm", "it is below 0 throughout: its sign looks reversed".into());
     }
     if length.0 < 0.25 * length.1 && (is_length_wrong || !seen) {
-        let hint = "it looks like a contraction: take it from the resting length";
+        let hint = "it looks like a contraction: subtract it from the resting length";
         return ("length_mm", hint.into());
     }
     if is_length_wrong {
-        let hint = "it looks upside down, for the pressure goes with the valves: check the potentiometer's polarity";
+        let hint = "it looks upside down, because the pressure follows the valves: check the potentiometer's polarity";
         return ("length_mm", hint.into());
     }
     let unless = if seen { "" } else { ", unless length_mm is upside down" };
@@ -59,19 +59,19 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
             ("inlet, outlet", format!("they look swapped: exchange the two names{unless}"))
         }
         Some(Wrong::Reversed) => {
-            ("time_s", "the recording looks reversed in time: turn the rows of each trial round".into())
+            ("time_s", "the recording looks reversed in time: reverse the rows of each trial".into())
         }
         Some(Wrong::Shifted(late_s)) => {
             let word = if late_s > 0.0 { "late" } else { "early" };
             let hint = format!(
-                "they look {:.1} s {word} compared with the other columns: check how the recordings were brought together",
+                "they look {:.1} s {word} compared with the other columns: check how the recordings were aligned in time",
                 late_s.abs()
             );
             ("inlet, outlet", hint)
         }
         None => (
             "inlet, outlet",
-            "exchanged or shifted names do not explain it, nor does reversed time: are these columns of one recording?"
+            "exchanged columns, a time shift or reversed time do not explain it: do these columns belong to one recording?"
                 .into(),
         ),
     }

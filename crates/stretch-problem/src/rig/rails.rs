@@ -35,8 +35,8 @@ fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
                 values.iter().filter(|v| **v == end).count() as f64 / values.len().max(1) as f64;
             if share > SHARE && noise_off(&values, end) > NOISY * sigma {
                 said.push(format!(
-                    "{column} stands at {end} {unit}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, \
-                     and what happened there is lost; change range, gain or zero",
+                    "{column} is at {end} {unit}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, \
+                     and all values beyond it are lost; change range, gain or zero",
                     100.0 * share
                 ));
             }

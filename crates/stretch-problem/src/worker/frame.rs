@@ -23,14 +23,14 @@ const BODY: u64 = 4 << 30;
 pub enum FrameError {
     /// The first bytes are those of no frame; most often they are text that was printed.
     #[error(
-        "its standard output holds {text:?} where a frame begins; only frames may go there, print to standard error"
+        "its standard output holds {text:?} where a frame should begin; only frames may be written there, so print to standard error"
     )]
     Magic {
         /// The bytes, as text.
         text: String,
     },
     /// A length is beyond the limits of a frame.
-    #[error("a frame says that its {part} is {bytes} bytes long; {hint}")]
+    #[error("a frame states a length of {bytes} bytes for its {part}; {hint}")]
     Length {
         /// Header or body.
         part: &'static str,
@@ -40,7 +40,7 @@ pub enum FrameError {
         hint: &'static str,
     },
     /// The header is no JSON object.
-    #[error("the header of a frame is no JSON object: {why}")]
+    #[error("the header of a frame is not a JSON object: {why}")]
     Header {
         /// What is wrong.
         why: String,
@@ -73,7 +73,7 @@ impl Prefix {
             return Err(FrameError::Length { part: "header", bytes, hint });
         }
         if body > BODY || body % 8 != 0 {
-            let hint = "it is a multiple of 8 and at most 4294967296";
+            let hint = "it must be a multiple of 8 and at most 4294967296";
             return Err(FrameError::Length { part: "body", bytes: body, hint });
         }
         Ok(Self { header: header as usize, body: body as usize })

@@ -48,8 +48,8 @@ pub(super) fn kind(frame: &WorkerFrame, wanted: &str) -> Result<(), Wrong> {
     let text = |key: &str| frame.header.get(key).and_then(Value::as_str);
     match text("kind") {
         Some(kind) if kind == wanted => Ok(()),
-        Some("error") => Err(format!("it says: {}", text("message").unwrap_or("no message"))),
-        other => Err(format!("it answers kind {other:?} where {wanted:?} is due")),
+        Some("error") => Err(format!("it reports: {}", text("message").unwrap_or("no message"))),
+        other => Err(format!("it answers with kind {other:?} instead of {wanted:?}")),
     }
 }
 
@@ -65,10 +65,10 @@ pub(super) fn bye() -> Vec<u8> {
 pub(super) fn read_hello(frame: &WorkerFrame, session: &RecordedSession) -> Result<Hello, Wrong> {
     kind(frame, "hello")?;
     let hello: Hello = serde_json::from_value(Value::Object(frame.header.clone()))
-        .map_err(|e| format!("its hello does not do: {e}"))?;
+        .map_err(|e| format!("its hello is invalid: {e}"))?;
     if hello.version != VERSION {
         return Err(format!(
-            "it speaks version {} of the protocol, this is {VERSION}",
+            "it speaks version {} of the protocol, but this program speaks version {VERSION}",
             hello.version
         ));
     }
@@ -90,7 +90,7 @@ pub(super) fn read_hello(frame: &WorkerFrame, session: &RecordedSession) -> Resu
         let other = hello.units.get(&column.name).filter(|u| **u != column.unit);
         if let Some(unit) = other.filter(|_| !column.unit.is_empty()) {
             return Err(format!(
-                "it has column {} in {unit}, the problem in {}; convert it in the simulator, or give the stage or input the unit that it has",
+                "it has column {} in {unit}, but the problem has it in {}; convert it in the simulator, or correct the unit of the stage or input",
                 column.name, column.unit
             ));
         }
@@ -164,7 +164,7 @@ pub(super) fn read_outputs(
     let models = frame.header.get("models").and_then(Value::as_array);
     let models = models.ok_or("its outputs have no list of models")?;
     if models.len() != count {
-        return Err(format!("it gives {} outputs, {count} models were asked for", models.len()));
+        return Err(format!("it returned {} outputs for {count} models", models.len()));
     }
     let (mut out, mut rest) = (Vec::with_capacity(count), frame.body.as_slice());
     for model in models {
@@ -176,14 +176,14 @@ pub(super) fn read_outputs(
         let samples = model.get("samples").and_then(Value::as_u64);
         let samples = samples.and_then(|n| usize::try_from(n).ok()).filter(|n| *n <= rest.len());
         let samples =
-            samples.ok_or("an output says another number of samples than the body holds")?;
+            samples.ok_or("an output states no number of samples, or more than the body holds")?;
         let (own, behind) = rest.split_at(samples);
         out.push(Ok(own.to_vec()));
         rest = behind;
     }
     match rest.is_empty() {
         true => Ok(out),
-        false => Err(format!("{} numbers are left behind the last output", rest.len())),
+        false => Err(format!("{} numbers are left after the last output", rest.len())),
     }
 }
 
@@ -228,10 +228,10 @@ mod tests {
         let left = outputs(json!({ "kind": "outputs", "models": two }), &[1.0, 2.0, 3.0]);
         assert!(left.unwrap_err().contains("1 numbers are left"));
         let few = outputs(json!({ "kind": "outputs", "models": two }), &[1.0]);
-        assert!(few.unwrap_err().contains("another number of samples"));
+        assert!(few.unwrap_err().contains("or more than the body holds"));
         let one = outputs(json!({ "kind": "outputs", "models": [{ "samples": 0 }] }), &[]);
-        assert_eq!(one.unwrap_err(), "it gives 1 outputs, 2 models were asked for");
+        assert_eq!(one.unwrap_err(), "it returned 1 outputs for 2 models");
         let said = outputs(json!({ "kind": "error", "message": "out of memory" }), &[]);
-        assert_eq!(said.unwrap_err(), "it says: out of memory");
+        assert_eq!(said.unwrap_err(), "it reports: out of memory");
     }
 }

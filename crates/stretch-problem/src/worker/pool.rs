@@ -218,7 +218,7 @@ impl Workers {
             Ok(answers) => answers,
             Err(why) => {
                 let again =
-                    if why == lost { String::new() } else { format!("\nbefore that: {lost}") };
+                    if why == lost { String::new() } else { format!("\nthe first failure: {lost}") };
                 all(SourceError::Gone(format!(
                     "simulator {}: the worker failed twice on a batch of {} model(s): {why}{again}",
                     self.spec.shown(),

@@ -99,7 +99,7 @@ impl Process {
         match self.from.recv_timeout(most) {
             Ok(Ok(frame)) => Ok(frame),
             Ok(Err(why)) => Err(self.failed(&why)),
-            Err(RecvTimeoutError::Disconnected) => Err(self.failed("it is gone")),
+            Err(RecvTimeoutError::Disconnected) => Err(self.failed("it has ended")),
             Err(RecvTimeoutError::Timeout) => {
                 self.group.kill();
                 let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
@@ -166,7 +166,7 @@ fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
             Ok(0) => {
                 return Err(Prefix::parse(&prefix).map_or_else(
                     |e| e.to_string(),
-                    |_| "it closed its standard output amid a frame".into(),
+                    |_| "it closed its standard output in the middle of a frame".into(),
                 ));
             }
             Ok(n) => have += n,
@@ -178,7 +178,7 @@ fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
     let most = most.load(SeqCst);
     if body as u64 > most {
         return Err(format!(
-            "a frame says that its body is {body} bytes long; the answer that is due has at most {most}"
+            "a frame states a length of {body} bytes for its body, but the expected answer has at most {most}"
         ));
     }
     // The worker may state wrong lengths, so memory is allocated only for bytes that arrive.
@@ -187,7 +187,7 @@ fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
         let read = from.by_ref().take(bytes as u64).read_to_end(&mut out);
         match read {
             Ok(n) if n == bytes => Ok(out),
-            Ok(_) => Err("it closed its standard output amid a frame".to_owned()),
+            Ok(_) => Err("it closed its standard output in the middle of a frame".to_owned()),
             Err(e) => Err(e.to_string()),
         }
     };

@@ -101,7 +101,7 @@ pub(crate) fn placed(
                 false => (!is_asked(is_usual(kind, site, among))).then(|| {
                     let stage = among.stages[site.stage];
                     format!(
-                        "{} is not looked for at {}: a lag of the output does the same; name velocity or position in stage {stage}",
+                        "{} is not looked for at {}, because a lag of the output has the same effect; name velocity or position in stage {stage}",
                         kind.title, site.column
                     )
                 }),
@@ -123,7 +123,8 @@ pub(crate) fn placed(
         let needed = p.shown_at(rate_hz);
         notes.extend(needed.map(|needed| {
             format!(
-                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be distinguished from other causes; from {needed} on it can",
+                "{} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from other causes; record at \
+                 least {needed} samples a second",
                 p.name
             )
         }));
@@ -140,8 +141,8 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     if is_friction && among.velocities.iter().all(Option::is_none) {
         return ProblemError::value(
             format!("wrap, {pattern}"),
-            "no stage says at which velocity it rubs",
-            "give the stage velocity = \"COLUMN\", or position = \"COLUMN\" whose change it is",
+            "no stage names the velocity at which friction acts",
+            "give the stage velocity = \"COLUMN\", or position = \"COLUMN\", from which the velocity is computed",
         );
     }
     let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).chain(["all"]).collect();
@@ -169,7 +170,7 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     Err(ProblemError::value(
         format!("column {column}"),
         format!("it is {} in every sample that may be fitted", extent.low),
-        "the channel is dead: check the sensor and its cable, or take no wrapper for it",
+        "the channel is dead: check the sensor and its cable, or leave out its wrappers",
     ))
 }
 
@@ -243,14 +244,14 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
         Beside::Nothing | Beside::Itself => return None,
         Beside::Another => {
             format!(
-                "{} is not looked for at {}: name another column in beside",
+                "{} is not looked for at {}: name another column in the key beside",
                 kind.name, site.column
             )
         }
         Beside::VelocityAndLoad | Beside::PositionAndLoad => {
             rubs.filter(|_| site.is_force())?;
             format!(
-                "friction that grows with a load is not looked for at {}: name the column of the load in beside",
+                "friction that grows with a load is not looked for at {}: name the column of the load in the key beside",
                 site.column
             )
         }
@@ -267,7 +268,8 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
                 return None;
             }
             format!(
-                "friction is not looked for at {}: it does not say that it is a force or a torque; give its unit in [[input]], and velocity or position in stage {stage}",
+                "friction is not looked for at {}: its unit does not show that it is a force or a torque; give its unit in [[input]], \
+                 and velocity or position in stage {stage}",
                 site.column
             )
         }
@@ -391,10 +393,10 @@ impl Placed {
         let x = Quantity { unit: unit(&self.site.unit), ..x };
         let beside = match self.kind.beside {
             Beside::Velocity | Beside::VelocityAndLoad => {
-                Quantity::new("v", "velocity", "velocity at which the stage rubs")
+                Quantity::new("v", "velocity", "velocity at which friction acts")
             }
             Beside::Position | Beside::PositionAndLoad => {
-                Quantity::new("p", "position", "position at which the stage rubs")
+                Quantity::new("p", "position", "position at which friction acts")
             }
             _ => Quantity::new("e", "1", "the other channel"),
         };

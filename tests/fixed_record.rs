@@ -110,10 +110,10 @@ fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
     let plain: &[&str] = &[];
     for (fitted, exported, parts) in [
         (["--model", "poly22"].as_slice(), plain, ["poly22", "linear, poly13"]),
-        (&["--model", "history"], plain, ["that remembers", "observer"]),
+        (&["--model", "history"], plain, ["the history model", "observer"]),
         (&["--rate", "tracker:0.1"], plain, ["Tracker", "savgol:WINDOW,DEGREE"]),
-        (plain, &["--adc", "12,0,1"], ["from 1.2", "sees 0 to 1"]),
-        (plain, &["--adc", "12,0,1000000"], ["does not fit", "fixed.error"]),
+        (plain, &["--adc", "12,0,1"], ["between 1.2", "measures from 0 to 1"]),
+        (plain, &["--adc", "12,0,1000000"], ["cannot be converted to integers", "fixed.error"]),
     ] {
         runs(calibrate(&trial, &float).args(fitted));
         let before = scratch.names();

@@ -144,7 +144,10 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     fs::write(&both, two).unwrap();
     let json = folder.path().join("by.json");
     let (is_good, text) = said(&both, &["--by", "trial", json_to(&json).as_str()]);
-    assert!(is_good && text.contains("the 2 runs agree within their intervals in every value"), "{text}");
+    assert!(
+        is_good && text.contains("the 2 runs agree within their intervals in every value"),
+        "{text}"
+    );
     let value: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(value["by_trial"]["runs"][1]["values"][2]["name"], "brake.brake");
@@ -193,7 +196,10 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         assert!(is_fmu || !to.contains("fmu ="), "{to}: {text}");
     }
     let (is_good, text) = said(folder.path(), &["--rig", "x.toml"]);
-    assert!(!is_good && text.contains("--rig: it works with the built-in simulators only"), "{text}");
+    assert!(
+        !is_good && text.contains("--rig: it works with the built-in simulators only"),
+        "{text}"
+    );
 }
 
 #[test]

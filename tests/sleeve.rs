@@ -302,7 +302,7 @@ fn priors_refuse_what_they_have_not_seen() {
         fails(&mut scratch.sleeve(&arguments), says);
     };
     scratch.worn("brief.csv", Worn { seconds: 1.0, ..SHORT }, |_| ());
-    renew("brief.csv", &["brief.csv", "no whole movement", "reference"]);
+    renew("brief.csv", &["brief.csv", "no complete movement", "reference"]);
     // The gain of wearer 1 differed by 0.02 between sessions, and in this session by 0.18.
     let far = Worn { wearer: 1, number: 9, seconds: 60.0, hz: 50.0 };
     scratch.worn("far.csv", far, |row| row[2] = f64::NAN);

@@ -43,7 +43,7 @@ fn a_table_without_a_time_gives_a_line_or_a_curve() {
     let scratch = Scratch::new();
     for model in ["linear", "curve", "auto"] {
         let said = calibrated(&scratch, TABLE, model);
-        for word in ["muscle", "branch", "inflation", "deflation", "moves one way"] {
+        for word in ["muscle", "branch", "inflation", "deflation", "one direction"] {
             assert!(!said.contains(word), "{model}: {word} in {said}");
         }
         let (rows, _) = live(&scratch, &[], "raw\n84213\n94120\n282600\n");

@@ -66,7 +66,7 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
         for model in models {
             let mut command = calibrate(&log, &out);
             command.args(["--model", model, "--report"]).arg(scratch.path("r.html"));
-            let parts = ["explains nothing", "R^2", "sensor that is not connected", "--force"];
+            let parts = ["explains nothing", "R^2", "the sensor is not connected", "--force"];
             fails(&mut command, &parts);
             assert!(!out.exists() && !scratch.path("r.html").exists(), "{model}");
         }

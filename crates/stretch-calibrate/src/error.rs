@@ -16,7 +16,7 @@ pub enum CalibrateError {
     NoTrials,
     /// No model can be evaluated on samples that were left out of its fit.
     #[error(
-        "no model can be judged on samples that are left out of its fit: these are too few; record more, or choose one model with --model"
+        "there are too few samples to leave some out of the fit, so that the models cannot be compared; record more, or choose one model with --model"
     )]
     TooFewToJudge,
     /// The trial has too few samples.
@@ -29,7 +29,8 @@ pub enum CalibrateError {
     },
     /// Trials at different rates cannot share an estimator.
     #[error(
-        "{trial} was sampled at {rate_hz:.4} Hz and {first} at {first_hz:.4} Hz; resample one of them, or calibrate them apart"
+        "{trial} was sampled at {rate_hz:.4} Hz and {first} at {first_hz:.4} Hz; resample one of them \
+         (stretch convert --grid {first_hz:.4}), or calibrate them separately"
     )]
     SampleRates {
         /// The trial.
@@ -53,7 +54,8 @@ pub enum CalibrateError {
     },
     /// One of the two branches (directions of motion) has too few samples.
     #[error(
-        "the {branch} branch has {samples} samples and the model has {terms} terms; add trials that move that way, or fit --model curve or --model linear, which have no branches"
+        "the {branch} branch (one direction of motion) has only {samples} samples for the {terms} terms of the model; \
+         add trials that move in this direction, or fit --model curve or --model linear, which have no branches"
     )]
     OneBranch {
         /// The branch that is missing.
@@ -74,7 +76,8 @@ pub enum CalibrateError {
     },
     /// The trials do not determine the numbers of a model.
     #[error(
-        "the trials do not determine the {model} model: record trials that move up and down at several speeds, or fit --model linear"
+        "the trials do not determine the {model} model: record trials that move up and down at several speeds{}",
+        or_linear(.model)
     )]
     Undetermined {
         /// The model.
@@ -82,11 +85,14 @@ pub enum CalibrateError {
     },
     /// The diagnosed model was asked for, but no effect was named.
     #[error(
-        "no effect of the gauge or its reference was named: diagnose first (stretch diagnose) and give its answer with --from, or fit --model observer"
+        "--model diagnosed needs the effects of the gauge or its reference: run stretch diagnose first and give \
+         its result with --from, or fit --model observer"
     )]
     NotDiagnosed,
     /// A cause is no effect of the gauge or of its reference.
-    #[error("{effect} is no effect of the gauge or its reference; a calibration can use {known}")]
+    #[error(
+        "{effect} is not an effect of the gauge or its reference; a calibration can use {known}"
+    )]
     UnknownCause {
         /// The name that was given.
         effect: String,
@@ -107,8 +113,8 @@ pub enum CalibrateError {
     },
     /// The signal is an angle that wraps. A calibration reads it sample by sample and therefore cannot know the turn.
     #[error(
-        "{trial}: the signal {column} jumps by {turn} between neighbours: it is an angle that wraps; unwrap it before you calibrate \
-         and before you apply, or move its zero so that the motion stays within one turn"
+        "{trial}: the signal {column} jumps by {turn} between neighbouring samples, because it is an angle that wraps; unwrap it before \
+         you calibrate and before you apply the calibration, or move its zero so that the motion stays within one turn"
     )]
     WrappedSignal {
         /// The trial.
@@ -129,7 +135,7 @@ pub enum CalibrateError {
     Design(#[from] DesignError),
     /// The model has no integer form.
     #[error(
-        "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: calibrate with one of them"
+        "{model} has no integer form for a board; calibrate with --model linear, poly13, observer or observer+rest"
     )]
     NoFixedForm {
         /// The model.
@@ -137,7 +143,7 @@ pub enum CalibrateError {
     },
     /// The converter has too many bits for 32-bit integer arithmetic.
     #[error(
-        "a converter of {bits} bits has no form in integers of 32 bits: write it in float (stretch export --c DIR --form float), or \
+        "codes of a converter of {bits} bits are too large for 32-bit integers: export in float (stretch export --c DIR --form float), or \
          give the board the upper 16 bits of each code (--adc 16,ZERO_V,FULL_SCALE_V)"
     )]
     FixedBits {
@@ -146,7 +152,8 @@ pub enum CalibrateError {
     },
     /// The rate estimator has no integer form in this program.
     #[error(
-        "the rate is {rate}; in integers for a board it can be --rate savgol:WINDOW,DEGREE of degree 1 or 2, window {windows}, without delay"
+        "the rate estimator {rate} has no integer form for a board; calibrate with \
+         --rate savgol:WINDOW,DEGREE of degree 1 or 2, window {windows}, without delay"
     )]
     FixedRate {
         /// The estimator.
@@ -156,8 +163,8 @@ pub enum CalibrateError {
     },
     /// The steps of an integer estimate would be larger than the calibration's error, or coarse for its range.
     #[error(
-        "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a calibration that is off by {error:.2e}: \
-         give {reference} in a smaller unit, such as mm in place of m, and calibrate again"
+        "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a \
+         calibration with an error of {error:.2e}: convert {reference} to a smaller unit, such as mm instead of m, and calibrate again"
     )]
     FixedStep {
         /// Column of the reference.
@@ -167,7 +174,8 @@ pub enum CalibrateError {
     },
     /// All of the signal lies outside the converter's range.
     #[error(
-        "the signal ran from {min} to {max}, and the converter sees {zero_v} to {full_scale_v}; name the converter that the board has with --adc, in the signal's unit"
+        "the signal of the trials is between {min} and {max}, but the converter measures from {zero_v} to {full_scale_v}; \
+         give the converter of the board with --adc, in the unit of the signal"
     )]
     OutsideConverter {
         /// The least signal of the trials.
@@ -181,7 +189,7 @@ pub enum CalibrateError {
     },
     /// The numbers of the calibration do not fit integers with this converter.
     #[error(
-        "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
+        "the calibration cannot be converted to integers for this converter: {0}; give the converter of the board with --adc"
     )]
     Fixed(#[source] ReceptorError),
     /// A calibration file does not load.
@@ -214,14 +222,19 @@ pub enum CalibrateError {
 /// equal.
 pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 
+/// Returns the advice to fit a line, except for the models of `stretch-sleeve`, which replace `--model`.
+fn or_linear(model: &str) -> &'static str {
+    if matches!(model, "array" | "prior") { "" } else { ", or fit --model linear" }
+}
+
 /// Explains why no sample of a trial has an estimate. If samples come more slowly than a calibration expects, samples
 /// are missing between them, and the rate estimator restarts at each sample.
 fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
     if (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         format!(
-            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: resample it (stretch convert --grid {expected_hz})"
+            "it has {rate_hz:.4} samples a second, but the calibration needs {expected_hz}: resample it (stretch convert --grid {expected_hz})"
         )
     } else {
-        "it is shorter than the warm-up of the rate estimator".to_owned()
+        "it is shorter than the warm-up of the rate estimator: use a longer trial".to_owned()
     }
 }

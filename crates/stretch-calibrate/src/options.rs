@@ -162,7 +162,7 @@ impl fmt::Display for ModelKind {
 }
 
 const RATES: &str = "savgol:WINDOW,DEGREE[,DELAY] in samples, difference:CUTOFF_HZ, \
-                     tracker:INDEX, or central (a log only)";
+                     tracker:INDEX, or central (logs only, not live)";
 
 /// Parses a rate estimator: `savgol:11,2`, `savgol:11,2,5`, `difference:8`, `tracker:0.1`, `central`.
 ///
@@ -331,5 +331,5 @@ impl Cause {
 ///     assert!(MODELS_IN_WORDS.contains(&kind.to_string()), "{kind}");
 /// }
 /// ```
-pub const MODELS_IN_WORDS: &str = "linear is a line, curve a polynomial of the signal alone, poly13 the published surfaces over signal and rate; history and observer \
-    remember what the signal did before, and with +rest follow a baseline that drifts";
+pub const MODELS_IN_WORDS: &str = "linear is a line; curve is a polynomial of the signal; poly13 is a polynomial of the signal \
+    and its rate for each direction of motion; history and observer also use earlier samples; with +rest they follow a drifting baseline";

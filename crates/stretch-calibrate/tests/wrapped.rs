@@ -66,7 +66,7 @@ fn trials_on_both_sides_of_the_seam_are_calibrated_as_one_motion() {
     for (usual, found) in usual.iter().zip(&found) {
         approx::assert_relative_eq!(usual, found, max_relative = 1e-6);
     }
-    let says = "angle_deg begins in different turns: 1 of the trials' parts";
+    let says = "angle_deg is an angle that begins in different turns: 1 of the trial parts";
     assert!(notes.iter().any(|note| note.starts_with(says)), "{notes:?}");
 }
 

@@ -79,26 +79,29 @@ impl fmt::Display for DesignError {
         match *self {
             // without an exponent, a large value would be printed with up to 309 digits
             Self::OutOfRange { field, value } if value.abs() >= 1e16 && value.is_finite() => {
-                write!(f, "{field} is {value:e}, which is outside what it may be")
+                write!(f, "{field} is {value:e}, which is outside its allowed range")
             }
             Self::OutOfRange { field, value } => {
-                write!(f, "{field} is {value}, which is not finite or outside what it may be")
+                write!(f, "{field} is {value}, which is not finite or outside its allowed range")
             }
             Self::EmptyRange { field, min, max } => {
-                write!(f, "{field} runs from {min} to {max}: it has no extent to divide by")
+                write!(
+                    f,
+                    "{field} runs from {min} to {max}, but its upper end must be above its lower end"
+                )
             }
             Self::Damaged { stored, computed } => write!(
                 f,
-                "the record's seal is {stored:08x} and its bytes give {computed:08x}: it was damaged or changed; copy it \
-                 again from where it was made, or calibrate again"
+                "the calibration's seal is {stored:08x}, but its bytes give {computed:08x}: it was damaged or changed; copy \
+                 the original file again, or calibrate again"
             ),
             Self::NoRecord => {
-                write!(f, "the bytes are no record of this kind, or not one alone: calibrate again")
+                write!(f, "the bytes are not exactly one calibration of this kind: calibrate again")
             }
             Self::Schema { found: 3, .. } => write!(
                 f,
-                "schema is 3, bytes with where movements turn, which release 0.1.0 reads: make the record again from its \
-                 JSON, or calibrate again"
+                "schema is 3 (bytes with turning points of movements), which only release 0.1.0 reads: write the bytes again \
+                 from the JSON calibration file, or calibrate again"
             ),
             Self::Schema { found, newest } => write!(
                 f,
@@ -106,14 +109,14 @@ impl fmt::Display for DesignError {
             ),
             Self::Removed { model } => write!(
                 f,
-                "this record holds a `{model}` model, which only builds of stretch 0.1.0 before 27 November 2026 read; calibrate \
+                "this calibration holds a `{model}` model, which only builds of stretch 0.1.0 before 27 November 2026 read; calibrate \
                  again with --model observer or history"
             ),
             Self::Mismatch { field, expected, found } => {
-                write!(f, "the calibration's {field} is {found}, but this takes {expected}")
+                write!(f, "the calibration's {field} is {found}, but {expected} is needed here")
             }
             Self::TooLarge { field, asked, most } => {
-                write!(f, "{field} is {asked}, but there is room for {most}")
+                write!(f, "{field} is {asked}, but can be at most {most}")
             }
         }
     }

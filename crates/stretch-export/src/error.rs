@@ -12,7 +12,7 @@ use crate::Form;
 pub enum ExportError {
     /// A model that has no C code.
     #[error(
-        "{model} has no form in C; those that have are linear, poly13, curve, observer, observer+rest and diagnosed: calibrate with one of them as --model"
+        "{model} cannot be exported to C; calibrate with --model linear, poly13, curve, observer, observer+rest or diagnosed"
     )]
     NoForm {
         /// The model.
@@ -22,24 +22,26 @@ pub enum ExportError {
     #[error("{0}; or export in --form float, which needs no converter")]
     NoFixedForm(#[source] CalibrateError),
     /// Integers were requested for several gauges.
-    #[error("several gauges have no form in integers: leave --form away, or give --form float")]
+    #[error(
+        "several gauges cannot be exported in integers: leave out --form, or give --form float"
+    )]
     FixedArray,
     /// A rate estimator that has no C code in any arithmetic.
     #[error(
-        "the rate is {rate}, which has no form in C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"
+        "the rate estimator {rate} cannot be exported to C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"
     )]
     Rate {
         /// The estimator.
         rate: String,
     },
     /// A calibration from which no receptor can be created.
-    #[error("the calibration gives no receptor: {0}")]
+    #[error("no receptor can be created from the calibration: {0}")]
     Receptor(#[from] ReceptorError),
     /// In single precision, in which a board computes, the estimate changes by more than a tenth of the fit's error.
     #[error(
-        "in 32 bits, which the board computes in, the estimate of {reference} differs from that in 64 bits by {rms:.3} (root mean square), \
-         but the calibration itself is off by {error:.3}: calibrate the recordings again, because this release keeps surfaces about the \
-         middle of the signal's range, or subtract the signal's constant offset before"
+        "in 32 bits, as on the board, the estimate of {reference} differs from that in 64 bits by {rms:.3} (root mean square), which is \
+         too much because the calibration has an error of only {error:.3}: calibrate the recordings again, because this release expands \
+         surfaces about the middle of the signal's range, or subtract the signal's constant offset first"
     )]
     Rounding {
         /// Root mean square difference, in the unit of the reference.
@@ -55,7 +57,7 @@ pub enum ExportError {
     /// A converted calibration that does not run on the computer, so that there are no answers to test the C code
     /// against.
     #[error(
-        "the record in the form {form} does not run on the computer; there is nothing to hold the C against"
+        "the calibration in the form {form} does not run on this computer, so that the C code cannot be tested against it"
     )]
     NoAnswers {
         /// The form.

@@ -160,7 +160,7 @@ fn float(
         Model::Diagnosed(_) => diagnosed_float(calibration)?,
         other => {
             let model = match other {
-                Model::History(_) => "a model that remembers, other than the observer,",
+                Model::History(_) => "the history model",
                 _ => "this model",
             };
             return Err(ExportError::NoForm { model: model.into() });
@@ -262,7 +262,7 @@ fn assembled(
     let mut text = opening(source, form, &model, &has) + &frame(source, options);
     text += "\n";
     text += include_str!("c/flash.h");
-    text += "\n/* ---- the record ---- */\n\n";
+    text += "\n/* ---- the calibration ---- */\n\n";
     text += &constants.into_text();
     text.push('\n');
     text += include_str!("c/common.h");
@@ -305,7 +305,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
         (trials, date) if date.is_empty() => format!("{trials} trials"),
         (trials, date) => format!("{trials} trials, {date}"),
     };
-    let libm = if has.contains(&"sd") { "of libm sqrtf alone (gcc wants -lm)" } else { "no libm" };
+    let libm = if has.contains(&"sd") { "only sqrtf of libm (gcc needs -lm)" } else { "no libm" };
     let mut of = has.to_vec();
     of.extend((!has.contains(&"array")).then_some("one"));
     of.extend((form == Form::Fixed).then_some("fixed"));
@@ -333,7 +333,7 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
         .word(
             "SEAL",
             format!("0x{:08x}u", source.seal),
-            "of the record, as stretch export --calibration says it",
+            "of the calibration, as stretch export --calibration prints it",
         )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .define("PERIOD_NS", (1e9 * period_s).round() as i64, "from a sample to the next");
@@ -345,6 +345,6 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
     constants
         .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")
         .define("ADC_ZERO", spec.zero_v as f32, "the signal at code 0")
-        .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "what a code adds to it");
+        .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "signal per code");
     constants.into_text()
 }

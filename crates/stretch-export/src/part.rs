@@ -25,18 +25,18 @@ impl Part {
         let watch = ZeroWatch::<f32>::new(polarity, turns);
         let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
         self.constants
-            .define("ZERO_LEVELS", Turns::MEDIAN_OF as i32, "that a median is taken of")
-            .define("ZERO_SPAN", finder.least_span, "what the signal goes through in a movement")
-            .define("ZERO_SIGN", sign, "-1 where the signal falls as the target rises")
-            .define("ZERO_LOW_SHARE", low, "of the low end in a level")
-            .define("ZERO_HIGH_SHARE", high, "of the high end")
-            .define("ZERO_LEVEL", level, "of the calibration, times the sign")
-            .define("ZERO_LIMIT", limit, "how far the median of levels may be off")
-            .define("ZERO_MEAN_LIMIT", watch.mean_limit, "how far their running mean may be off")
-            .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in it")
-            .define("ZERO_MOST", most, "what a level counts for at most in a zero that is followed")
-            .define("ZERO_FOLLOW", watch.following(turns).follow, "the share by which it moves")
-            .define("ZERO_REFERENCE", watch.reference, "the estimate per signal, times the sign");
+            .define("ZERO_LEVELS", Turns::MEDIAN_OF as i32, "number of levels in a median")
+            .define("ZERO_SPAN", finder.least_span, "least signal span of a movement")
+            .define("ZERO_SIGN", sign, "-1 if the signal falls as the target rises")
+            .define("ZERO_LOW_SHARE", low, "share of the low end in a level")
+            .define("ZERO_HIGH_SHARE", high, "share of the high end")
+            .define("ZERO_LEVEL", level, "level in the calibration, times the sign")
+            .define("ZERO_LIMIT", limit, "limit for the deviation of the median")
+            .define("ZERO_MEAN_LIMIT", watch.mean_limit, "limit for the deviation of the mean")
+            .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in the mean")
+            .define("ZERO_MOST", most, "largest deviation of a level that counts")
+            .define("ZERO_FOLLOW", watch.following(turns).follow, "share by which the zero follows")
+            .define("ZERO_REFERENCE", watch.reference, "estimate per signal, times the sign");
         self.step.push(include_str!("c/zero_float.h"));
         self
     }

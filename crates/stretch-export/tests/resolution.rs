@@ -36,15 +36,11 @@ fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_f
     for calibration in in_millimetres() {
         let fixed = header(&calibration, &options(Some(Form::Fixed))).unwrap();
         assert_eq!(fixed.step.as_deref(), Some("0.001 mm"), "{}", fixed.model);
-        assert!(
-            fixed.text.contains("The least step of an estimate is 0.001 mm."),
-            "{}",
-            fixed.text
-        );
+        assert!(fixed.text.contains("Estimates have steps of 0.001 mm."), "{}", fixed.text);
 
         let metres = in_metres(calibration);
         let error = header(&metres, &options(Some(Form::Fixed))).unwrap_err().to_string();
-        for part in ["length_m", "steps of 0.001", "mm in place of m", "--form float"] {
+        for part in ["length_m", "steps of 0.001", "mm instead of m", "--form float"] {
             assert!(error.contains(part), "{part}: {error}");
         }
         let error = fixed_record(&metres, &options(None).adc).unwrap_err();

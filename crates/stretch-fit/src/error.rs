@@ -96,12 +96,12 @@ impl fmt::Display for FitError {
                 f.write_str("the data cannot determine the term ")?;
                 write_term(f, rate_power, volts_power)?;
                 f.write_str(
-                    ": over these samples it is a combination of the terms before it, or nearly so; count volts \
-                     that vary little from their middle",
+                    ": over these samples it is nearly a combination of the terms before it; if the volts vary \
+                     little, subtract their middle first",
                 )
             }
             Self::TooManyTerms { terms, room } => {
-                write!(f, "the degree has {terms} terms, but there is room for {room}")
+                write!(f, "the degree has {terms} terms, but at most {room} are possible here")
             }
             Self::MissingTerm { rate_power, volts_power } => {
                 f.write_str("the samples were not accumulated for the term ")?;
@@ -111,7 +111,7 @@ impl fmt::Display for FitError {
                 write!(f, "a confidence level must be above 0 and below 1, but is {level}")
             }
             Self::ShortMemory { needed, got } => {
-                write!(f, "room for {needed} numbers is needed, but {got} were lent")
+                write!(f, "a buffer for {needed} numbers is needed, but the given one holds {got}")
             }
             Self::NotFinite => {
                 f.write_str("the result is not finite: the samples span too many powers of ten")

@@ -49,7 +49,9 @@ fn a_pendulum_that_turns_over_is_retuned_and_lacks_nothing() {
         let Starts { tried, agreed } = told.starts;
         assert!(agreed < tried, "the first descent ended elsewhere: {agreed} of {tried}");
         assert!(
-            texts(&told.notes).iter().any(|note| note.starts_with("re-tuning ends at different values"))
+            texts(&told.notes)
+                .iter()
+                .any(|note| note.starts_with("re-tuning ends at different values"))
         );
     }
 }

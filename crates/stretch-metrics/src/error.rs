@@ -39,7 +39,7 @@ impl fmt::Display for MetricsError {
         match *self {
             Self::TooFew { needed, got } => write!(f, "{got} samples, but {needed} are needed"),
             Self::Lengths { truth, estimate } => {
-                write!(f, "the truth has {truth} samples and the estimate {estimate}")
+                write!(f, "the truth has {truth} samples, but the estimate has {estimate}")
             }
             Self::NotFinite { index } => write!(f, "sample {index} is not finite"),
             Self::Constant { signal } => write!(f, "the {signal} is constant"),

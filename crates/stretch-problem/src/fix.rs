@@ -186,8 +186,7 @@ impl<'a> Chosen<'a> {
             _ => "Parameters are re-tuned with the effects in place.".to_owned(),
         });
         lines.push(
-            "Each tolerance is one standard deviation of the fit, if the model is right."
-                .into(),
+            "Each tolerance is one standard deviation of the fit, if the model is right.".into(),
         );
         lines
     }

@@ -171,7 +171,8 @@ impl Problem {
         let recorded = reading.recorded.cloned().unwrap_or_else(|| file.reading());
         let recorded = recorded.strict(reading.strict);
         let workers = file.workers(1)?;
-        let workers = workers.ok_or_else(|| ProblemError::Simulator("the simulator is built in".into()))?;
+        let workers =
+            workers.ok_or_else(|| ProblemError::Simulator("the simulator is built in".into()))?;
         let program = workers.shown();
         if path.is_dir() {
             let inside = path.join(IN_FOLDER);
@@ -182,7 +183,10 @@ impl Problem {
         }
         if let Some(announce) = reading.announce {
             let folder = workers.folder.display();
-            announce(&format!("{} runs this program in the folder {folder}: {program}", path.display()));
+            announce(&format!(
+                "{} runs this program in the folder {folder}: {program}",
+                path.display()
+            ));
         }
         let (checked, source) = Workers::bound(file.load_as(&recorded)?, workers)?;
         let name = file.shown_name().to_owned();

@@ -139,7 +139,10 @@ fn a_note_says_where_friction_is_not_looked_for() {
     let mut named = spec(["command_V", "angle_rad"]);
     named.stages[0].position = Some("angle_rad".into());
     let notes = Checked::new(named).expect("a problem").notes().join("; ");
-    assert!(notes.contains("friction is not looked for at command_V: its unit does not show"), "{notes}");
+    assert!(
+        notes.contains("friction is not looked for at command_V: its unit does not show"),
+        "{notes}"
+    );
 }
 
 #[test]

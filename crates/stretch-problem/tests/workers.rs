@@ -210,7 +210,10 @@ fn with_python_what_a_worker_does_wrong_is_told_with_its_last_lines() {
         ("begin(); receive(); os.abort()", "it ended with"),
         ("begin(); receive(); time.sleep(60)", "did not answer within 0.5 s"),
         ("begin(); receive(); print('step 1 of 10 is done')", "only frames may be written there"),
-        ("begin(); receive(); send({'kind': 'outputs', 'models': []})", "it returned 0 outputs for 1 models"),
+        (
+            "begin(); receive(); send({'kind': 'outputs', 'models': []})",
+            "it returned 0 outputs for 1 models",
+        ),
         ("begin(); receive(); send({'kind': 'error', 'message': 'no GPU'})", "it reports: no GPU"),
     ];
     for (script, expected) in cases {

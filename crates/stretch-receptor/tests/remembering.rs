@@ -222,7 +222,7 @@ fn a_model_needs_its_own_receptor_and_hears_so() {
     let refused = FixedCalibration::<11, 2>::new(&Calibration::new(spec).unwrap(), &adc);
     assert_eq!(
         refused.unwrap_err().to_string(),
-        "the calibration's rate estimator is a tracker, but this takes Savitzky-Golay"
+        "the calibration's rate estimator is a tracker, but Savitzky-Golay is needed here"
     );
 }
 

@@ -104,7 +104,13 @@ pub(crate) fn trace_figures(
         let description = format!("{name} over time, eight seconds of a test trial");
         let axes = (window, 0.06, [TIME, name]);
         let heights = [height.min(250), height];
-        lines_figure(&description, axes, heights, (time, lines), "There are no values to draw here.")
+        lines_figure(
+            &description,
+            axes,
+            heights,
+            (time, lines),
+            "There are no values to draw here.",
+        )
     };
     let top = figure(&lines, &name, 280).legend(legend).live(whole);
     (top, figure(&left, LEFT, 190).legend(left_legend).live(whole_left))

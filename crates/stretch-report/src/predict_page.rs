@@ -79,10 +79,16 @@ fn traces(prediction: &Prediction, output: &PredictedOutput, window: &Range<f64>
     let name = labelled(&output.column, &output.unit);
     let axes = (window, 0.06, ["time in the recording, s", &*name]);
     let description = format!("{name} over time, measured and predicted");
-    lines_figure(&description, axes, [250, 280], (&time, &lines), "There are no values to draw here.")
-        .legend(vec![
-            (Ink::Truth, "measured".to_owned()),
-            (BEFORE, "predicted without the fix".to_owned()),
-            (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
-        ])
+    lines_figure(
+        &description,
+        axes,
+        [250, 280],
+        (&time, &lines),
+        "There are no values to draw here.",
+    )
+    .legend(vec![
+        (Ink::Truth, "measured".to_owned()),
+        (BEFORE, "predicted without the fix".to_owned()),
+        (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
+    ])
 }

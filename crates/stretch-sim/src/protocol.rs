@@ -304,7 +304,9 @@ fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
         return fail(format!("{share} is outside 0 .. 1"));
     }
     if trial.channel(SET_LENGTH).is_none() {
-        return fail(format!("a shunt is simulated only at a set length; add the column {SET_LENGTH}"));
+        return fail(format!(
+            "a shunt is simulated only at a set length; add the column {SET_LENGTH}"
+        ));
     }
     Ok(Some(shares.to_vec()))
 }

@@ -209,7 +209,10 @@ fn records_with_sorted_fields_or_an_edit_are_told_as_such_and_sealed_again() {
         let message = SleeveCalibration::read(&path).unwrap_err().to_string();
         let says =
             "or its fields were sorted; check every number, then renew it with: stretch export";
-        assert!(message.contains(says) && message.contains("and its text gives"), "{message}");
+        assert!(
+            message.contains(says) && message.contains("but its text has the digest"),
+            "{message}"
+        );
         let sealed = seal_record(&path).unwrap();
         assert_eq!(SleeveCalibration::read(&path).unwrap(), sealed);
         assert_eq!(&sealed == calibration, edited.is_none());

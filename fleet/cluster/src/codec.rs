@@ -85,12 +85,12 @@ impl<C: Default> Marked<C> {
 impl<C> Marked<C> {
     fn decoded_aggregate(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
         self.release.check(name, buffer)?;
-        aggregate(name).map_or_else(|| not_impl_err!("{name} is no aggregate"), Ok)
+        aggregate(name).map_or_else(|| not_impl_err!("{name} is not an aggregate function"), Ok)
     }
 
     fn decoded_scalar(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
         self.release.check(name, buffer)?;
-        scalar(name).map_or_else(|| not_impl_err!("{name} is no scalar function"), Ok)
+        scalar(name).map_or_else(|| not_impl_err!("{name} is not a scalar function"), Ok)
     }
 }
 

@@ -18,12 +18,12 @@ use crate::{
 
 /// What an executor is started with.
 #[derive(Debug, Clone, clap::Parser)]
-#[command(name = "stretch-executor", version, about = "Computes the tasks that a scheduler gives")]
+#[command(name = "stretch-executor", version, about = "Computes tasks for a scheduler")]
 pub struct ExecutorOptions {
     /// The scheduler: host:port.
     #[arg(long, default_value = "127.0.0.1:50050")]
     pub scheduler: String,
-    /// Address to listen on; if missing, the one under which the scheduler sees this machine.
+    /// Address to listen on; by default, the one under which the scheduler sees this machine.
     #[arg(long)]
     pub bind_host: Option<String>,
     /// Host under which other machines reach this one, if it is not that address.
@@ -32,17 +32,17 @@ pub struct ExecutorOptions {
     /// Allow an address that other machines reach, although there is no authentication.
     #[arg(long)]
     pub insecure: bool,
-    /// Port on which others fetch results; 0 is a free one.
+    /// Port on which others fetch results; 0 chooses a free one.
     #[arg(long, default_value_t = 0)]
     pub port: u16,
-    /// Tasks at once; 0 is one a core.
+    /// Number of simultaneous tasks; 0 means one per core.
     #[arg(long, default_value_t = 0)]
     pub tasks: usize,
-    /// Folder for intermediate results of stages; a temporary one if missing.
+    /// Folder for intermediate results of stages; by default, a temporary one.
     #[arg(long)]
     pub work_dir: Option<PathBuf>,
-    /// Memory for all tasks, in megabytes, beyond which groups spill to the folder; nine tenths of
-    /// the machine if missing.
+    /// Memory for all tasks, in megabytes; groups that need more are written to the folder. By
+    /// default, nine tenths of the machine's memory.
     #[arg(long)]
     pub memory_mb: Option<u64>,
     /// Claims another release than that of this program, to test a cluster's reaction.
@@ -62,17 +62,17 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
         .trim_start_matches("df://")
         .rsplit_once(':')
         .with_context(|| format!("--scheduler {}: write host:port", options.scheduler))?;
-    let scheduler_port: u16 = port
-        .parse()
-        .with_context(|| format!("--scheduler {}: {port} is no port", options.scheduler))?;
+    let scheduler_port: u16 = port.parse().with_context(|| {
+        format!("--scheduler {}: {port} is not a port number", options.scheduler)
+    })?;
     let seen_as = address_towards(host, scheduler_port)?;
     let listens_on = options.bind_host.as_deref().map_or(Ok(seen_as), address)?;
     guard("executor", listens_on, options.insecure)?;
     // The announced address must be the one on which the executor listens.
     ensure!(
         options.external_host.is_some() || !listens_on.is_loopback() || seen_as.is_loopback(),
-        "--bind-host {listens_on}: no other machine reaches it there, and the scheduler at {host} would send them; leave it out, \
-         or name --external-host"
+        "--bind-host {listens_on}: other machines cannot reach this address, but the scheduler at {host} would send them there; leave \
+         the option out, or add --external-host"
     );
     let own = if listens_on.is_unspecified() { seen_as } else { listens_on };
     let shown = options.external_host.unwrap_or_else(|| before_port(own));

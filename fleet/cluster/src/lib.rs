@@ -44,7 +44,7 @@ pub async fn connect(
     runtime: Arc<RuntimeEnv>,
 ) -> Result<SessionContext> {
     let address = url.strip_prefix("df://").filter(|rest| !rest.is_empty()).ok_or_else(|| {
-        config_datafusion_err!("{url:?} names no scheduler: write df://host:port")
+        config_datafusion_err!("{url:?} is not the address of a scheduler: write df://host:port")
     })?;
     let release = Release::own("this program");
     let config = config

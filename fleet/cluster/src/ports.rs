@@ -11,9 +11,10 @@ use anyhow::{Context, ensure};
 /// Resolves a host name to an address, preferring IPv4.
 pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
     let host = host.trim_start_matches('[').trim_end_matches(']');
-    let found = (host, 0).to_socket_addrs().with_context(|| format!("{host} is no address"))?;
+    let unknown = || format!("the host {host} has no address");
+    let found = (host, 0).to_socket_addrs().with_context(unknown)?;
     let found = found.min_by_key(|address| address.is_ipv6());
-    Ok(found.with_context(|| format!("{host} has no address"))?.ip())
+    Ok(found.with_context(unknown)?.ip())
 }
 
 /// Formats an address so that a port can follow it.
@@ -31,7 +32,7 @@ pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
         IpAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
         IpAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
     };
-    let told = || format!("no way leads from this machine to {to}");
+    let told = || format!("{to} cannot be reached from this machine");
     let socket = UdpSocket::bind((any, 0)).with_context(told)?;
     socket.connect((to, port)).with_context(told)?;
     Ok(socket.local_addr().with_context(told)?.ip())
@@ -46,7 +47,7 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
     ensure!(
         is_insecure,
         "a {who} on {listens_on} obeys everyone who reaches it: nothing is encrypted, no caller is authenticated, and queries \
-         read and write files as this user. Listen on 127.0.0.1, or give the cluster a separate network and say --insecure"
+         read and write files as this user. Listen on 127.0.0.1, or use a separate network for the cluster and add --insecure"
     );
     // If the warning cannot be written, there is no way to report that.
     let _ = writeln!(

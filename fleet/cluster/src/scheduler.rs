@@ -21,15 +21,15 @@ use crate::{
 
 /// What a scheduler is started with.
 #[derive(Debug, Clone, clap::Parser)]
-#[command(name = "stretch-scheduler", version, about = "Gives the tasks of queries to executors")]
+#[command(name = "stretch-scheduler", version, about = "Distributes tasks of queries to executors")]
 pub struct SchedulerOptions {
     /// Address to listen on.
     #[arg(long, default_value = "127.0.0.1")]
     pub bind_host: String,
-    /// Port to listen on; 0 is a free one.
+    /// Port to listen on; 0 chooses a free one.
     #[arg(long, default_value_t = 50050)]
     pub port: u16,
-    /// Seconds without a sign of life after which an executor's tasks go to others.
+    /// Seconds without a message from an executor after which its tasks go to others.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(2..))]
     pub executor_timeout_s: u64,
     /// Allow an address that other machines reach, although there is no authentication.

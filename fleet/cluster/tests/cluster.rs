@@ -282,9 +282,9 @@ fn nobody_listens_to_other_machines_unless_that_was_asked_for() {
         [env!("CARGO_BIN_EXE_stretch-scheduler"), env!("CARGO_BIN_EXE_stretch-executor")];
     for host in ["0.0.0.0", "::", "192.0.2.1"] {
         let said = refused(scheduler, &["--bind-host", host, "--port", "0"]);
-        assert!(said.contains("say --insecure") && said.contains(host), "{said}");
+        assert!(said.contains("add --insecure") && said.contains(host), "{said}");
         let said = refused(executor, &["--bind-host", host]);
-        assert!(said.contains("say --insecure") && said.contains(host), "{said}");
+        assert!(said.contains("add --insecure") && said.contains(host), "{said}");
     }
     let mut child = Command::new(scheduler)
         .args(["--bind-host", "0.0.0.0", "--port", "0", "--insecure"])

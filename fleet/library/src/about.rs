@@ -65,5 +65,7 @@ fn said<'a>(fields: &'a [FieldRef], key: &str) -> Option<&'a str> {
 }
 
 fn unreadable(key: &str, text: &str) -> datafusion::error::DataFusionError {
-    plan_datafusion_err!("the metadata {key} of a column is {text:?}, which is none of its kind")
+    plan_datafusion_err!(
+        "the metadata {key} of a column is {text:?}, which is not valid; ingest the trials again"
+    )
 }

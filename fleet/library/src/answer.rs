@@ -111,7 +111,7 @@ fn answer<const TERMS: usize>(degree: Degree, is_line: bool, outcome: &Outcome<T
                 coefficients: Some(
                     sides.iter().flat_map(|side| side.fit.coefficients().to_vec()).collect(),
                 ),
-                refused: record.as_ref().err().map(|why| format!("no record: {why}")),
+                refused: record.as_ref().err().map(|why| format!("no calibration: {why}")),
                 record: record.ok().flatten(),
                 ..counted
             }
@@ -129,7 +129,7 @@ fn fitted<const TERMS: usize>(
     if rows == 0 {
         return Err(match partial.left_out {
             0 => "there are no rows".to_owned(),
-            n => format!("all {n} rows lack a finite number"),
+            n => format!("all {n} rows have a value that is missing or not finite"),
         });
     }
     let [up, down] = partial.sides;
@@ -165,7 +165,9 @@ fn fitted<const TERMS: usize>(
 }
 
 fn one_branch(moves: &str, have: &str, rows: u64) -> String {
-    format!("the signal never {moves} (all {rows} rows have {have}): one branch is no calibration")
+    format!(
+        "the signal never {moves} (all {rows} rows have {have}): a calibration needs rows with a rising and with a falling signal"
+    )
 }
 
 /// Returns the sign of the slope of the signal over the reference, from a line through all rows.

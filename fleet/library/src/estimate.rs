@@ -94,8 +94,8 @@ impl Map {
         let calibration = calibration_from_json(record, "record").map_err(|e| refuse(&e))?;
         if let Some(estimator) = estimator.filter(|e| *e != calibration.spec().rate_estimator) {
             return exec_err!(
-                "{NAME}: the rates are by {} ({estimator:?}), and the record was fitted on those by {} ({:?}): ingest \
-                 again with the record's estimator, or fit a record of this lake",
+                "{NAME}: the rates of the table come from {} ({estimator:?}), but the calibration was fitted with {} ({:?}): ingest \
+                 again with the estimator of the calibration, or use a calibration that was fitted on this lake",
                 estimator.name(),
                 calibration.spec().rate_estimator.name(),
                 calibration.spec().rate_estimator
@@ -107,7 +107,7 @@ impl Map {
             }
             _ => {
                 return exec_err!(
-                    "{NAME}: the record's model, {}, remembers what was before, and rows of a table have no order: use \
+                    "{NAME}: the model of the calibration ({}) depends on earlier samples, but rows of a table have no order: use \
                      stretch apply on the trial",
                     calibration.spec().model.name()
                 );

@@ -89,7 +89,7 @@ impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
 
     fn retract_batch(&mut self, _: &[ArrayRef]) -> Result<()> {
         not_impl_err!(
-            "{} takes no row back, for a triangle does not say what one row did to it: use a frame that begins at \
+            "{} cannot remove a row from its sums, so that a sliding window is not possible: use a frame that begins at \
              UNBOUNDED PRECEDING, or group by the time",
             self.name
         )

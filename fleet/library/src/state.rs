@@ -94,18 +94,18 @@ pub(crate) enum Stored<const TERMS: usize> {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StateError {
     /// Bytes that were not written by an aggregate of this library.
-    #[error("it does not begin with \"STRF\": these bytes are no state of a fit")]
+    #[error("it does not begin with \"STRF\": these bytes are not a state of a fit")]
     NoState,
     /// A state of another release.
     #[error(
-        "it is of version {found}, and this release reads version {STATE_VERSION}: merge it with the release that stored it"
+        "it has version {found}, but this release reads version {STATE_VERSION}: merge it with the release that stored it"
     )]
     Version {
         /// The version found.
         found: u8,
     },
     /// A state of another fit.
-    #[error("it is of {found}, where {expected} is merged")]
+    #[error("it is a state of {found}, but states of {expected} are merged")]
     Kind {
         /// The fit to which the state belongs.
         found: String,
@@ -113,7 +113,7 @@ pub enum StateError {
         expected: String,
     },
     /// A state of other columns, or of rates of another estimator.
-    #[error("it is of {found}, where {expected} is merged: merge them apart")]
+    #[error("it is a state of {found}, but states of {expected} are merged: merge them separately")]
     Columns {
         /// Columns and rates of the state.
         found: String,
@@ -218,7 +218,7 @@ pub(crate) fn read<const TERMS: usize>(
         *side = from.side(degree)?;
     }
     if !from.0.is_empty() {
-        return Err(damaged("bytes behind its end"));
+        return Err(damaged("bytes after its end"));
     }
     Ok(Stored::Partial(Partial { left_out, about, sides }))
 }

@@ -24,7 +24,7 @@ const LONG: [&str; 2] = ["record", "state"];
 /// Merges all batches into one without structs. A field keeps its name if the name is unique,
 /// otherwise its struct's name precedes it.
 pub(crate) fn flat(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
-    let first = batches.first().context("the query has no answer")?;
+    let first = batches.first().context("the query has no result")?;
     let whole = concat_batches(&first.schema(), batches)?;
     let schema = whole.schema();
     let is_struct = |field: &&Arc<Field>| matches!(field.data_type(), DataType::Struct(_));
@@ -97,7 +97,7 @@ pub(crate) fn write_records(
     folder: &Path,
 ) -> anyhow::Result<(usize, Vec<Refused>)> {
     let records = column(answer, "record").context(
-        "the answer has no column record: select a fit, such as poly13_fit(rate, bridge_v, contraction)",
+        "the result has no column record: select a fit, such as poly13_fit(rate, bridge_v, contraction)",
     )?;
     let records = texts(records)?;
     let reasons = column(answer, "refused").map(texts).transpose()?;
@@ -107,7 +107,7 @@ pub(crate) fn write_records(
         keys.into_iter().map(|(key, own)| Ok((key, texts(own)?))).collect::<anyhow::Result<_>>()?;
     ensure!(
         !keys.is_empty() || records.len() == 1,
-        "nothing names the {} records: select site, rig or sensor in addition to the fit",
+        "the {} calibrations have no names: select site, rig or sensor in addition to the fit",
         records.len()
     );
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -121,13 +121,13 @@ pub(crate) fn write_records(
         let place = of.iter().try_for_each(|(key, name)| check_name(key, name));
         let place = place.and_then(|()| match taken.insert(name.clone()) {
             true => Ok(()),
-            false => Err(anyhow::anyhow!("another row of the answer has that name")),
+            false => Err(anyhow::anyhow!("another row of the result has the same name")),
         });
         let reason = reasons.as_ref().map_or("", |reasons| &reasons[row]);
         let made = match (record.is_empty(), reason) {
             (false, _) => place.and_then(|()| completed(lake, record, &of)),
             (true, "") => Err(anyhow::anyhow!(
-                "its fit has no record: the columns must be those of the lake, rate and signal among them"
+                "its fit has no calibration: fit the columns of the lake, with its rate and signal"
             )),
             (true, reason) => Err(anyhow::anyhow!("{reason}")),
         };
@@ -162,10 +162,11 @@ fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<S
     let mut spec = calibration_from_json(record, "record")?.into_spec();
     if lake.about.is_contraction && spec.reference.as_str() == lake.about.target() {
         let mut rests = files.iter().filter_map(|file| file.footer.rest_length);
-        let rest_length = rests.next().context("no trial says its rest length")?;
+        let rest_length = rests.next().context("no trial has a rest length")?;
         if let Some(other) = rests.find(|other| *other != rest_length) {
             anyhow::bail!(
-                "its trials have rest lengths {rest_length} and {other}: contractions of two scales are fitted as one; fit {} instead, or each sensor by itself",
+                "its trials have the rest lengths {rest_length} and {other}, so that their contractions have different \
+                 scales: fit {} instead, or fit each sensor separately",
                 lake.about.reference
             );
         }

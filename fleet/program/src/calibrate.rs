@@ -23,7 +23,7 @@ const SHOWN: usize = 20;
 ///   stretch-fleet calibrate --lake lake --out calibrations
 ///   stretch-fleet calibrate --lake lake --out january --from 2026-01-01 --to 2026-01-31
 ///
-/// Writes one record per sensor, which stretch apply takes, and calibrations.parquet with the
+/// Writes one calibration file per sensor for stretch apply, and calibrations.parquet with the
 /// results of each fit. Partial fits, one per day, are stored in the lake's folder states as they
 /// are computed. A run that was killed continues where it stopped, and a year is merged in seconds.
 #[derive(Debug, clap::Args)]
@@ -31,7 +31,7 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(flatten)]
     on: On,
-    /// Folder for the records and calibrations.parquet
+    /// Folder for the calibration files and calibrations.parquet
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// First day
@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// Last day
     #[arg(long)]
     to: Option<NaiveDate>,
-    /// Print JSON in place of a table
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
@@ -101,9 +101,9 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
             answer.num_rows() - SHOWN
         ))?;
     }
-    warn_of("no record of", &summary.refused);
+    warn_of("no calibration of", &summary.refused);
     say(format!(
-        "{}: {records} records of {} sensors, {} refused; {months_computed} months of rigs computed now",
+        "{}: {records} calibrations of {} sensors, {} refused; {months_computed} months of rigs computed now",
         args.out.display(),
         summary.sensors,
         summary.refused.len()

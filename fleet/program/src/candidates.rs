@@ -29,7 +29,8 @@ pub(crate) fn candidates(sources: &[Source]) -> (Vec<Candidate<'_>>, Vec<(&Path,
 fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
     let place = source.place.as_ref().map_err(|why| format!("{why:#}"))?;
     if source.is_endless() {
-        return Err("it is no file, but a device or a pipe, which may have no end".to_owned());
+        let why = "it is not a regular file but a device or a pipe, which may have no end";
+        return Err(why.to_owned());
     }
     let digest = digest_of_file(&source.path).map_err(|e| format!("it cannot be read: {e}"))?;
     Ok(Candidate { source, place, digest })
@@ -53,12 +54,12 @@ pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<St
         match in_lake.get(one.digest.as_str()) {
             _ if counts == Some(one.source.path.as_path()) => None,
             Some(file) if file.place != *one.place => Some(format!(
-                "the lake has it already as a trial of {}, and here it is said to be of {}: take it out there, or leave it",
+                "the lake already has it as a trial of {}, but here it is given as a trial of {}: remove it from the lake first, or leave it there",
                 file.place, one.place
             )),
             _ => counts.map(|path| {
                 format!(
-                    "it has the same bytes as {}, which counts: a trial counted twice would weigh double",
+                    "it has the same bytes as {}, which is used: a trial that is used twice would have twice its weight",
                     path.display()
                 )
             }),
@@ -88,13 +89,13 @@ impl Known {
     pub(crate) fn claim(&mut self, footer: &Footer, place: &Place) -> Result<(), String> {
         if let Some(other) = self.by_samples.get(&footer.samples) {
             return Err(format!(
-                "its samples are those of {other}, which is in the lake already: a trial counted twice would weigh double"
+                "it has the same samples as {other}, which is already in the lake: a trial that is used twice would have twice its weight"
             ));
         }
         if let Some(other) = self.by_name.get(&name(footer, place)) {
             return Err(format!(
-                "it is a second record of trial {} of {place}, with other samples than {other}, which stays: rename it if it is \
-                 another trial, or take that one out of the lake",
+                "the lake already has a trial {} of {place} with other samples, from {other}: rename this file if it is another trial, \
+                 or remove that trial from the lake",
                 footer.trial
             ));
         }

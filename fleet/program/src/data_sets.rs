@@ -53,7 +53,7 @@ pub(crate) fn lake_with_trials(folder: &Path) -> anyhow::Result<Lake> {
         .iter()
         .map(|file| Refused { file: file.path.display().to_string(), why: file.why.clone() });
     warn_of("left out:", &left_out.collect::<Vec<_>>());
-    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", folder.display());
+    ensure!(!lake.files.is_empty(), "{}: the lake contains no trial", folder.display());
     Ok(lake)
 }
 

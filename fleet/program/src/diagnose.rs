@@ -16,7 +16,7 @@ use crate::{
     show::{bar, say, say_json},
 };
 
-/// Say of every sensor and day which effect causes a gap
+/// Diagnose for every sensor and day which effect causes a gap
 ///
 ///   stretch-fleet diagnose --lake lake --out verdicts
 ///   stretch-fleet diagnose --lake lake --out verdicts --by sensor --share 1/3
@@ -35,19 +35,19 @@ pub(crate) struct Args {
     /// Folder for verdicts.parquet
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What a data set is
+    /// Which trials form a data set
     #[arg(long, value_enum, default_value_t = By::Day)]
     by: By,
-    /// Which of how many shares of the data sets is diagnosed here
+    /// Share of the data sets that is diagnosed here, such as 1/3 for the first third
     #[arg(long, default_value = "1/1", value_parser = share)]
     share: (usize, usize),
-    /// Threads of each diagnosis, at most one a core, 0 for all; the verdict is the same
+    /// Threads of each diagnosis, at most one per core, 0 for all; they do not change the verdict
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Seed of the intervals
+    /// Seed of the random numbers for the intervals
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print JSON in place of a table
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
@@ -56,7 +56,7 @@ fn share(text: &str) -> Result<(usize, usize), String> {
     let (which, of) = text.split_once('/').unwrap_or_default();
     match (which.parse(), of.parse()) {
         (Ok(which), Ok(of)) if (1..=of).contains(&which) => Ok((which, of)),
-        _ => Err(format!("{text:?} is no share: write 1/3, 2/3 or 3/3")),
+        _ => Err(format!("{text:?} is not a share: write 1/3, 2/3 or 3/3")),
     }
 }
 

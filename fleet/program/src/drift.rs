@@ -24,7 +24,7 @@ use crate::{
     states::bring_up,
 };
 
-/// Say which sensors moved from one month to another
+/// Report which sensors drifted from one month to another
 ///
 ///   stretch-fleet drift --lake lake --from 2026-01 --to 2026-02 --out drift.parquet
 ///
@@ -43,13 +43,13 @@ pub(crate) struct Args {
     /// Month that is compared with it
     #[arg(long, value_name = "MONTH", value_parser = month)]
     to: NaiveDate,
-    /// Most false ones among the sensors that are said to have moved
+    /// Largest expected share of false reports among the sensors that are reported as moved
     #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
     false_discoveries: f64,
-    /// Where the table goes, in Parquet, every sensor a row
+    /// Output file in Parquet, one row per sensor
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print JSON in place of a table
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
@@ -57,7 +57,7 @@ pub(crate) struct Args {
 /// Parses a month and returns its first day.
 fn month(text: &str) -> Result<NaiveDate, String> {
     NaiveDate::parse_from_str(&format!("{text}-01"), "%Y-%m-%d")
-        .map_err(|_| format!("{text:?} is no month: write 2026-01"))
+        .map_err(|_| format!("{text:?} is not a month: write 2026-01"))
 }
 
 /// A sensor and its days in both months.
@@ -79,7 +79,7 @@ struct Row {
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.from != args.to, "a month cannot be compared with itself");
     let level = args.false_discoveries;
-    ensure!(level > 0.0 && level < 1.0, "--false-discoveries {level} is no share between 0 and 1");
+    ensure!(level > 0.0 && level < 1.0, "--false-discoveries {level} is not between 0 and 1");
     let (_lock, lake, session) = args.on.open_to_write().await?;
     bring_up(&lake, &session, args.on.shares()).await?;
     let within = |first: NaiveDate| -> anyhow::Result<String> {
@@ -207,7 +207,7 @@ fn tell(args: &Args, rows: &[Row], batch: &RecordBatch) -> anyhow::Result<()> {
         say(table(&shown)?)?;
     }
     say(format!(
-        "{count} of {} sensors moved (at most {} of them falsely, as expected), {refused} could not be judged",
+        "{count} of {} sensors moved (expected share of false reports: at most {}), {refused} could not be judged",
         rows.len(),
         args.false_discoveries
     ))

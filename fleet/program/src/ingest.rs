@@ -25,7 +25,7 @@ use crate::{
     sources::{Source, Where, sources},
 };
 
-/// Bring trials into a lake, rates computed
+/// Add trials to a lake, and compute their rates
 ///
 ///   stretch-fleet ingest logs --lake lake --from-path '{site}/{rig}/{sensor}/{date}_*.csv'
 ///   stretch-fleet ingest monday/*.csv --lake lake --sensor 0042 --date 2026-11-21
@@ -41,12 +41,12 @@ pub(crate) struct Args {
     /// Trials, or folders of them
     #[arg(required = true, value_name = "TRIAL")]
     trials: Vec<PathBuf>,
-    /// Folder of the lake; made where there is none
+    /// Folder of the lake; created if it does not exist
     #[arg(long, value_name = "DIR")]
     lake: PathBuf,
     #[command(flatten)]
     places: Where,
-    /// Column that rates are of [default: the lake's, else bridge_v]
+    /// Column of the signal, from which rates are computed [default: the lake's, else bridge_v]
     #[arg(long, value_name = "COL")]
     signal: Option<String>,
     /// Column of the reference [default: the lake's, else length_mm]
@@ -55,13 +55,13 @@ pub(crate) struct Args {
     /// Estimator of the rate [default: the lake's, else savgol:11,2]
     #[arg(long, value_parser = parse_rate)]
     rate: Option<RateEstimator>,
-    /// Length at a contraction of zero [default: the greatest of a sensor's first trial]
+    /// Length at a contraction of zero [default: the greatest length of a sensor's first trial]
     #[arg(long, value_name = "X")]
     rest_length: Option<f64>,
     /// Column of the time; its last part may be ms, us or ns
     #[arg(long, default_value = "time_s", value_name = "COL")]
     time: String,
-    /// Print JSON in place of sentences
+    /// Print JSON instead of sentences
     #[arg(long)]
     json: bool,
 }
@@ -77,7 +77,7 @@ struct Summary {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(length) = args.rest_length {
-        ensure!(length.is_finite() && length > 0.0, "--rest-length {length} is no length above 0");
+        ensure!(length.is_finite() && length > 0.0, "--rest-length {length} must be above 0");
     }
     fs::create_dir_all(&args.lake).with_context(|| args.lake.display().to_string())?;
     let _lock = Lock::of(&args.lake, usize::MAX)?;
@@ -88,7 +88,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let path = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
         named.insert((path, source.place.as_ref().ok().cloned()))
     });
-    ensure!(!sources.is_empty(), "there is no file among what was named");
+    ensure!(!sources.is_empty(), "the named paths contain no file");
     let about = about(&args, &sources)?;
     let there = Lake::open(&args.lake)?;
     let mut summary = Summary { refused: set_aside(&there)?, ..Summary::default() };
@@ -139,7 +139,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let (refused, lake) = (summary.refused.len(), args.lake.display());
     ensure!(
         refused == 0,
-        "{refused} files are not in the lake: {lake}/refused has a sentence for each"
+        "{refused} files were not added to the lake: {lake}/refused contains the reason for each"
     );
     Ok(())
 }
@@ -180,7 +180,7 @@ fn about(args: &Args, sources: &[Source]) -> anyhow::Result<About> {
         let shown = args.lake.display();
         return match there.check(&asked) {
             Ok(()) => Ok(there),
-            Err(why) => bail!("{shown}: what is asked for is not as the lake: {why}"),
+            Err(why) => bail!("{shown}: the options do not fit this lake: {why}"),
         };
     }
     let options = ReadOptions::new().time(&args.time).require(&signal).require(&reference);
@@ -308,12 +308,16 @@ impl Ingest<'_> {
                 && known != given
             {
                 bail!(
-                    "its sensor rests at {known} in the lake, and --rest-length says {given}: one fit cannot have two zeros"
+                    "the rest length of its sensor is {known} in the lake, but --rest-length is {given}, and one fit cannot use both: \
+                     leave out --rest-length"
                 );
             }
             let longest = || lengths.iter().copied().fold(f64::MIN, f64::max);
             let own = known.or(self.rest_length).unwrap_or_else(longest);
-            ensure!(own > 0.0, "{reference} is {own} at most: no length above 0 to be at rest at");
+            ensure!(
+                own > 0.0,
+                "the greatest {reference} is {own}, but a rest length must be above 0"
+            );
             rest = Some(own);
             samples.contraction = Some(lengths.iter().map(|x| (own - x) / own).collect());
         }

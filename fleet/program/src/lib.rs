@@ -28,7 +28,7 @@ use clap::{Parser, Subcommand};
 
 use show::{message, tell_in_a_line, warn};
 
-/// Years of logs and thousands of sensors: a lake of trials, and queries of it.
+/// Collect the trials of many sensors in a lake, and calibrate, query and diagnose them.
 #[derive(Debug, Parser)]
 #[command(name = "stretch-fleet", version, max_term_width = 100)]
 struct Cli {
@@ -58,7 +58,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(e) => {
-            warn(format!("stretch-fleet: no thread can be started: {e}"));
+            warn(format!("stretch-fleet: the threads cannot be started: {e}"));
             return ExitCode::FAILURE;
         }
     };
@@ -91,7 +91,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
     anyhow::anyhow!(
-        "a reader gave up: {}. Damaged rows of a file do this: ingest its trial again, or report a fault of the program",
+        "a reader failed: {}. Damaged rows of a file can cause this: ingest its trial again, or report an error of this program",
         message(panic)
     )
 }

@@ -34,7 +34,7 @@ impl Lock {
     /// A folder without write permission, a file system without locks.
     pub(crate) fn of(folder: &Path, depth: usize) -> anyhow::Result<Self> {
         let path = folder.join(FILE);
-        let told = || format!("{}: it cannot be locked", path.display());
+        let told = || format!("{}: the file cannot be locked", path.display());
         let mut options = File::options();
         let file = options.read(true).write(true).create(true).truncate(false).open(&path);
         let file = file.with_context(told)?;
@@ -43,7 +43,7 @@ impl Lock {
             Err(TryLockError::Error(e)) => return Err(e).with_context(told),
             Err(TryLockError::WouldBlock) => {
                 warn(format!(
-                    "{}: another command writes into it; this one goes on when that has ended",
+                    "{}: another command is writing into this folder; this command continues when it has ended",
                     folder.display()
                 ));
                 file.lock().with_context(told)?;

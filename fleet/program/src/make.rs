@@ -20,7 +20,7 @@ use crate::{
     show::{bar, say, say_json},
 };
 
-/// Write a lake of simulated sensors: S sensors by D days, a trial each
+/// Write a lake of simulated sensors: S sensors by D days, one trial for each
 ///
 ///   stretch-fleet make --lake lake --sensors 100 --days 60 --drifting 0.1
 ///
@@ -55,16 +55,16 @@ pub(crate) struct Args {
     /// Share of the sensors that drift
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     drifting: f64,
-    /// By how much of its gain a drifting sensor does
+    /// Drift of a drifting sensor, as a share of its gain
     #[arg(long, value_name = "SHARE", default_value_t = 0.03)]
     drift: f64,
-    /// Scatter of gain from day to day, one standard deviation of its value
+    /// Standard deviation of the gain from day to day, as a share of its value
     #[arg(long, value_name = "SHARE", default_value_t = 0.003)]
     scatter: f64,
     /// Seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print JSON in place of a sentence
+    /// Print JSON instead of a sentence
     #[arg(long)]
     json: bool,
 }
@@ -88,8 +88,15 @@ const REST_MM: f64 = 180.0;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let Args { lake, sensors, days, rows, .. } = &args;
-    ensure!(*sensors > 0 && *days > 0 && *rows > 20, "there must be a sensor, a day and 20 rows");
-    ensure!((0.0..=1.0).contains(&args.drifting), "--drifting {} is not 0 to 1", args.drifting);
+    ensure!(
+        *sensors > 0 && *days > 0 && *rows > 20,
+        "--sensors and --days must be at least 1, and --rows at least 21"
+    );
+    ensure!(
+        (0.0..=1.0).contains(&args.drifting),
+        "--drifting {} is not between 0 and 1",
+        args.drifting
+    );
     std::fs::create_dir_all(lake).with_context(|| lake.display().to_string())?;
     let _lock = Lock::of(lake, usize::MAX)?;
     let about =
@@ -168,7 +175,7 @@ impl Gauge {
     /// Writes the trial of a day. Returns the number of rows written.
     fn day(&self, args: &Args, about: &About, day: u32) -> anyhow::Result<u64> {
         let Some(date) = args.from.checked_add_days(Days::new(day.into())) else {
-            anyhow::bail!("{} days after {} there is no date", day, args.from);
+            anyhow::bail!("the day {} days after {} is not a valid date", day, args.from);
         };
         let rig = self.number % args.rigs.max(1);
         let [site, rig] = [format!("site-{}", rig % args.sites.max(1)), format!("rig-{rig:02}")];

@@ -44,7 +44,7 @@ pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String>
     for (which, days) in [("first", first), ("second", second)] {
         if days.len() < LEAST_DAYS {
             return Err(format!(
-                "{} days in the {which} month are too few to tell its scatter from: {LEAST_DAYS} are needed",
+                "{} days in the {which} month are too few to estimate its scatter: {LEAST_DAYS} are needed",
                 days.len()
             ));
         }
@@ -118,7 +118,7 @@ impl Branch {
         let deviation = (squares / freedom.max(1) as f64).sqrt();
         if !(deviation.is_finite() && deviation > 0.0) {
             return Err(format!(
-                "{name} signal: the fit leaves nothing, so that nothing can be concluded from it"
+                "{name} signal: the fit has no residuals, so that a change cannot be tested"
             ));
         }
         let share = fit.information(&months[0]).map_err(|e| e.to_string())?;

@@ -12,7 +12,7 @@ use crate::{
     show::{bar, say, say_json, warn_of},
 };
 
-/// Learn what the sensors of a lake say of the next one
+/// Learn a prior for a new sensor from the sensors of a lake
 ///
 ///   stretch-fleet prior --lake lake --out prior.json
 ///   stretch calibrate --prior prior.json --of rig-1/s042 today.csv --out cal.json
@@ -28,13 +28,13 @@ pub(crate) struct Args {
     /// Folder of the lake
     #[arg(long, value_name = "DIR")]
     lake: PathBuf,
-    /// Where the prior goes
+    /// Output file of the prior
     #[arg(long, value_name = "prior.json")]
     out: PathBuf,
-    /// What a session is
+    /// Which trials form a session
     #[arg(long, value_enum, default_value_t = By::Day)]
     by: By,
-    /// Print JSON in place of a table
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
@@ -64,19 +64,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let number = |rmse: Option<f64>| rmse.map_or_else(|| "-".to_owned(), |x| format!("{x:.4}"));
     let unit = prior.unit();
-    say(format!("RMSE on the end of each session when it is left out, {unit}:"))?;
+    say(format!("RMSE on the end of each session if it is left out, {unit}:"))?;
     let whole = LEVELS[above];
     let is_judged = |e: &&Expected| e.rmse_known.or(e.rmse_new).is_some();
     for Expected { seconds, rmse_known, rmse_new, .. } in prior.expected.iter().filter(is_judged) {
         let (known, new) = (number(*rmse_known), number(*rmse_new));
-        say(format!(
-            "  after {seconds:>2} s of reference {known}, of a {whole} that was not seen {new}"
-        ))?;
+        say(format!("  after {seconds:>2} s of reference: {known}, and {new} for a new {whole}"))?;
     }
     let (out, count) = (args.out.display(), prior.sessions);
     let path = LEVELS[above..].join("/").to_uppercase();
     say(format!(
-        "{out}: {count} sessions, {} left out; --of {path} says which sensor is new",
+        "{out}: {count} sessions, {} left out; give the sensor to stretch calibrate with --of {path}",
         refused.len()
     ))
 }

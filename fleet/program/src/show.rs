@@ -51,7 +51,7 @@ pub(crate) fn bar(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
     // The template is a constant. If it were wrong, the plain bar would be shown.
     if let Ok(style) =
-        ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go")
+        ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {elapsed} elapsed, {eta} left")
     {
         bar.set_style(style);
     }
@@ -91,13 +91,13 @@ pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> anyhow::Result<T> {
     let outer = IS_CAUGHT.replace(true);
     let answer = catch_unwind(AssertUnwindSafe(read));
     IS_CAUGHT.set(outer);
-    answer.map_err(|panic| anyhow::anyhow!("its reader gave up: {}", message(panic.as_ref())))
+    answer.map_err(|panic| anyhow::anyhow!("reading the file failed: {}", message(panic.as_ref())))
 }
 
 /// Returns the message of a panic.
 pub(crate) fn message(panic: &(dyn Any + Send)) -> &str {
     let owned = panic.downcast_ref::<String>().map(String::as_str);
-    owned.or(panic.downcast_ref::<&str>().copied()).unwrap_or("it does not say why")
+    owned.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no reason given")
 }
 
 #[cfg(test)]
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(caught(|| 1).unwrap(), 1);
         let words: [fn(); 2] = [|| panic!("no type"), || panic!("type {}", 133)];
         let told = words.map(|word| caught(word).unwrap_err().to_string());
-        assert_eq!(told, ["its reader gave up: no type", "its reader gave up: type 133"]);
+        assert_eq!(told, ["reading the file failed: no type", "reading the file failed: type 133"]);
         assert!(!IS_CAUGHT.get());
     }
 }

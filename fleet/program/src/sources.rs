@@ -26,7 +26,7 @@ impl FromStr for Pattern {
         while let Some(next) = rest.find(['{', '*']) {
             if next == 0 && is_open {
                 return Err(format!(
-                    "there is nothing between two of the names in {text:?}: where would one end?"
+                    "two names in {text:?} have no text between them, so that the end of the first is unknown"
                 ));
             }
             pattern += &regex::escape(&rest[..next]);
@@ -38,15 +38,15 @@ impl FromStr for Pattern {
             }
             let (name, behind) = rest[next + 1..]
                 .split_once('}')
-                .ok_or_else(|| format!("a {{ of {text:?} has no }} behind it"))?;
+                .ok_or_else(|| format!("a {{ in {text:?} has no }} after it"))?;
             if !COLUMNS.contains(&name) {
                 return Err(format!(
-                    "{{{name}}} is none of {{site}}, {{rig}}, {{sensor}} and {{date}}"
+                    "{{{name}}} is not one of {{site}}, {{rig}}, {{sensor}} and {{date}}"
                 ));
             }
             let group = format!("(?<{name}>[^/]*?)");
             if pattern.contains(&group) {
-                return Err(format!("{{{name}}} is in it twice"));
+                return Err(format!("{{{name}}} occurs twice in {text:?}"));
             }
             pattern += &group;
             rest = behind;
@@ -73,16 +73,16 @@ pub(crate) struct Where {
     /// Site, rig, sensor and date from the end of each path, such as {site}/{rig}/{sensor}/{date}_*.csv
     #[arg(long, value_name = "PATTERN")]
     from_path: Option<Pattern>,
-    /// Site of all trials whose path does not say it
+    /// Site of all trials whose path does not contain it
     #[arg(long, default_value = "site")]
     site: String,
-    /// Rig of all trials whose path does not say it
+    /// Rig of all trials whose path does not contain it
     #[arg(long, default_value = "rig")]
     rig: String,
-    /// Sensor of all trials whose path does not say it
+    /// Sensor of all trials whose path does not contain it
     #[arg(long)]
     sensor: Option<String>,
-    /// Date of all trials whose path does not say it: 2026-11-21
+    /// Date of all trials whose path does not contain it: 2026-11-21
     #[arg(long)]
     date: Option<String>,
 }
@@ -93,7 +93,7 @@ impl Where {
             None => [const { None }; 4],
             Some(pattern) => match pattern.read(path) {
                 Some(found) => found,
-                None => bail!("its path does not fit the pattern of --from-path"),
+                None => bail!("its path does not match the pattern of --from-path"),
             },
         };
         let [site, rig, sensor, date] = found;
@@ -203,9 +203,9 @@ mod tests {
     #[test]
     fn a_pattern_that_cannot_be_read_says_why() {
         let refused = |text: &str| text.parse::<Pattern>().unwrap_err();
-        assert!(refused("{sensr}.csv").contains("{sensr} is none of"));
+        assert!(refused("{sensr}.csv").contains("{sensr} is not one of"));
         assert!(refused("{sensor.csv").contains("has no }"));
-        assert!(refused("{sensor}{date}.csv").contains("where would one end"));
+        assert!(refused("{sensor}{date}.csv").contains("the end of the first is unknown"));
         assert!(refused("{date}/{date}.csv").contains("twice"));
     }
 }

@@ -20,7 +20,7 @@ use crate::{
     show::{say, warn, warn_of},
 };
 
-/// Ask a lake in SQL
+/// Query a lake in SQL
 ///
 ///   stretch-fleet sql --lake lake "select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor"
 ///   stretch-fleet sql --lake lake "select ..." --records calibrations
@@ -32,14 +32,14 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// The question
+    /// The query
     query: String,
     #[command(flatten)]
     on: On,
-    /// Print CSV in place of a table
+    /// Print CSV instead of a table
     #[arg(long)]
     csv: bool,
-    /// Write the records of the fits, a file a row, into a folder: stretch apply takes them
+    /// Write the calibrations of the fits into a folder, one file per row, for stretch apply
     #[arg(long, value_name = "DIR")]
     records: Option<PathBuf>,
     /// Allow statements that write, such as copy ... to, insert, create and set; without it a query
@@ -54,10 +54,10 @@ pub(crate) struct On {
     /// Folder of the lake
     #[arg(long, value_name = "DIR")]
     pub lake: PathBuf,
-    /// Scheduler of a cluster that answers: df://host:port [default: this machine]
+    /// Scheduler of a cluster that runs the query: df://host:port [default: this machine]
     #[arg(long, value_name = "URL")]
     pub cluster: Option<String>,
-    /// Threads on this machine, at most one a core [default: all]
+    /// Threads on this machine, at most one per core [default: all]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
 }
@@ -82,7 +82,7 @@ impl On {
     /// As `On::open`, for a command that writes partial fits into the lake. No other command
     /// writes until the lock is released.
     pub(crate) async fn open_to_write(&self) -> anyhow::Result<(Lock, Lake, SessionContext)> {
-        ensure!(self.lake.is_dir(), "{}: there is no such folder", self.lake.display());
+        ensure!(self.lake.is_dir(), "{}: this folder does not exist", self.lake.display());
         let lock = Lock::of(&self.lake, usize::MAX)?;
         let (lake, session) = self.open().await?;
         Ok((lock, lake, session))
@@ -98,7 +98,7 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     let answer =
         session.sql_with_options(&args.query, writes).await.map_err(|e| match args.write {
             false if is_of_writing(&e) => anyhow::anyhow!(
-                "{}: a question of a lake only reads; --write allows what writes",
+                "{}: a query may only read; allow statements that write with --write",
                 e.strip_backtrace()
             ),
             _ => e.into(),
@@ -113,8 +113,12 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         let _lock = Lock::of(folder, RECORDS_DEPTH)?;
         let (written, refused) = write_records(&lake, &answer, folder)?;
-        warn_of("no record of", &refused);
-        return say(format!("{}: {written} records, {} refused", folder.display(), refused.len()));
+        warn_of("no calibration of", &refused);
+        return say(format!(
+            "{}: {written} calibrations, {} refused",
+            folder.display(),
+            refused.len()
+        ));
     }
     say(match args.csv {
         true => csv(&answer)?.trim_end().to_owned(),

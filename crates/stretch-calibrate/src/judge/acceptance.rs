@@ -25,9 +25,9 @@ pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     let left = (1.0 - worst.r_squared).max(0.0).sqrt();
     (left > LEFT || worst.r_squared.is_nan()).then(|| {
         format!(
-            "the {} explains nothing: R^2 is {:.4}, so that its error is {:.0} % of what the mean of the reference alone \
-             would err; look at signal and reference side by side (a sensor that is not connected, a column of \
-             something else, values that the recorder makes up)",
+            "the {} explains nothing: R^2 is {:.4}, so that its error is {:.0} % of the error of a constant, the mean of \
+             the reference; plot signal and reference (possible causes: the sensor is not connected, a column holds \
+             another quantity, or the recorder writes a placeholder for missing values)",
             worst.name,
             worst.r_squared,
             100.0 * left
@@ -40,7 +40,9 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     (worst.r_squared < 0.5).then(|| {
         let (name, r_squared) = (&worst.name, worst.r_squared);
-        format!("the {name} leaves more of the reference than it explains: R^2 is {r_squared:.4}")
+        format!(
+            "the {name} explains less than half of the variance of the reference: R^2 is {r_squared:.4}"
+        )
     })
 }
 
@@ -65,8 +67,8 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
         format!(
-            "it errs more than the mean of the reference would (R^2 {r_squared:.4}): this log does not belong to \
-             that calibration, or its reference is not what was calibrated on"
+            "its error is larger than that of a constant, the mean of the reference (R^2 {r_squared:.4}): this log does \
+             not belong to that calibration, or its reference is another quantity than that of the calibration"
         )
     })
 }
@@ -86,9 +88,9 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
         let off = format!("{:.4} {unit}", bias.abs());
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
-            "it is {} {side} the reference on average, which is most of its error: is the reference in the unit of the calibration \
-             (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was put on again or has drifted: \
-             calibrate again; half a minute of reference is enough with a prior of earlier sessions (calibrate --prior)",
+            "the estimate is {} {side} the reference on average, which is most of its error: is the reference in the unit of the \
+             calibration? If not, convert it (stretch convert --column 'length_mm=length_cm*10'). If it is, the sensor was mounted again \
+             or has drifted: calibrate again; half a minute of reference is enough with a prior of earlier sessions (calibrate --prior)",
             off.trim_end()
         )
     })
@@ -98,7 +100,7 @@ pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String
 pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     (!errors.r_squared.is_finite()).then(|| {
         format!(
-            "the reference is constant, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
+            "the reference is constant, so that R^2 is undefined, and the mean absolute error is {:.4}: is the reference connected?",
             errors.mae
         )
     })
@@ -129,7 +131,7 @@ pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<S
             true if is_named => "",
             true => " (under another name)",
             false if !is_named => return None,
-            false if has_checksums => " (by its name: its samples are others)",
+            false if has_checksums => " (only the name is the same: its samples differ)",
             false => "",
         };
         Some(format!("{}{how}", trial.name))

@@ -224,17 +224,17 @@ fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String>
     }
     if !memory_shows {
         notes.push(
-            "every trial moves one way: ramps cannot tell memory from rate, so no model that \
-             remembers was chosen; record one minute of arbitrary motion (segments of 0.15 to \
-             1.5 s, up, down or held, in random order and at several speeds, over the whole \
-             range), add it, and choose again"
+            "every trial moves in one direction only: ramps cannot distinguish memory from rate, so \
+             no model with memory was chosen; record one minute of arbitrary motion (segments of \
+             0.15 to 1.5 s, up, down or held, in random order and at several speeds, over the \
+             whole range), add it, and calibrate again"
                 .to_owned(),
         );
     }
     if trials.len() < LEAST_TRIALS {
         notes.push(format!(
-            "{} {} left out in {PARTS} parts each: a drift from session to session stays unseen; \
-             record a second session to be sure",
+            "{} {} left out in {PARTS} parts each, which cannot show a drift between sessions; \
+             record a second session to check for it",
             trials.len(),
             if trials.len() == 1 { "trial was" } else { "trials were" }
         ));

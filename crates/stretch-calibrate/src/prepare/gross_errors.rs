@@ -63,8 +63,8 @@ fn sentence(
 ) -> String {
     let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
     format!(
-        "{gross} of {of} values of {column} are gross errors ({shown}, all others {low} .. {high}); their rows are left out: see \
-         what the recorder writes where it has no sample"
+        "{gross} of {of} values of {column} are gross errors ({shown}, all others {low} .. {high}); their rows are left out: \
+         check what the recorder writes for a missing sample"
     )
 }
 

@@ -170,7 +170,7 @@ impl Evened {
             let column = &options.reference;
             let signal = &options.signal;
             evened.notes.push(format!(
-                "{column} begins in different turns: {moved} of the trials' parts were moved by whole turns to agree with {signal}"
+                "{column} is an angle that begins in different turns: {moved} of the trial parts were moved by whole turns to agree with {signal}"
             ));
         }
         Ok((sample_rate, evened))

@@ -58,7 +58,7 @@ pub fn verified(text: &str, advice: &str) -> Result<String, String> {
     match found {
         Some(found) if found == computed => Ok(object),
         Some(found) => Err(format!(
-            "its digest is {found} and its text gives {computed}: it was edited or damaged, or its fields were sorted; {advice}"
+            "its digest is {found}, but its text has the digest {computed}: it was edited or damaged, or its fields were sorted; {advice}"
         )),
         None => Err(format!("it has no digest; {advice}")),
     }
@@ -90,7 +90,7 @@ pub fn join(object: &str) -> Option<String> {
 /// # Errors
 /// [`CalibrateError::Record`] if the record is not an object, or has numbers that are not finite.
 pub fn seal(record: &impl Serialize) -> Result<String, CalibrateError> {
-    let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
+    let problem = |problem| CalibrateError::Record { file: "calibration".to_owned(), problem };
     let object = serde_json::to_string_pretty(record).map_err(|e| problem(e.to_string()))?;
     join(&object).ok_or_else(|| problem("it is not a JSON object".to_owned()))
 }

@@ -39,13 +39,13 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
         // Errors of the kind `Other` come from this program and already contain advice.
         let what_to_do = match e.kind() {
             ErrorKind::Other => "",
-            _ => "; name a record made by stretch calibrate",
+            _ => "; give a calibration file that stretch calibrate wrote",
         };
         problem(format!("cannot read it: {e}{what_to_do}"))
     })?;
     if !is_postcard(path) {
         let text = String::from_utf8(bytes);
-        let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is no text: {e}")))?;
+        let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is not a text file: {e}")))?;
         return calibration_from_json(&text, &file);
     }
     // The specification is loaded without its checks, so that a message can name the field.
@@ -155,7 +155,7 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
         let cause = error.into_inner();
         if object.contains("\"largest_jump\"") {
             return unusable(
-                "it is of several gauges, which stretch apply, sleeve renew and export take alone"
+                "it is for several gauges: only stretch apply, sleeve renew and export accept it"
                     .into(),
             );
         }

@@ -84,10 +84,8 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
                 return none(branch.surface.degree().to_string());
             }
         }
-        Model::History(_) => {
-            return none("a model that remembers, other than the observer,".into());
-        }
-        Model::Diagnosed(_) => return none("a diagnosed model".into()),
+        Model::History(_) => return none("the history model".into()),
+        Model::Diagnosed(_) => return none("the diagnosed model".into()),
         _ => return none("this model".into()),
     }
     if FIXED_STEP > fit_error(calibration) {

@@ -1,12 +1,13 @@
 @if one
-// Length from the bridge's amplifier on A0, a line a sample, at 115200 baud.
+// Reads the bridge's amplifier on A0 and prints the estimate, one line per sample, at 115200 baud.
 @end
 @if array
-// Several gauges, one amplifier each on A0 and the pins after it, a line a sample, at 115200 baud.
+// Reads several gauges, one amplifier each on A0 and the pins after it, and prints the estimate, one line
+// per sample, at 115200 baud.
 @end
 #include <stretch_@NAME@.h>
 
-// analogRead of these boards gives 10 bits, whatever is asked of it
+// analogRead of these boards always returns 10 bits
 #if defined(__AVR__) && STRETCH_ADC_BITS != 10
 #error "the converter of this board has 10 bits: stretch export --adc 10,0,5 (from 0 to 5 V)"
 #endif
@@ -43,7 +44,7 @@ void loop() {
   if ((int32_t)(micros() - due_us) < 0) {
     return;
   }
-  // a period that was missed is a sample that did not come
+  // each period that was missed is a missing sample
   while ((int32_t)(micros() - due_us) >= STRETCH_PERIOD_US) {
     stretch_lost(&state);
     due_us += STRETCH_PERIOD_US;
@@ -54,7 +55,7 @@ void loop() {
   stretch_reading reading = stretch_step(&state, analogRead(A0));
 @end
 @if pressure
-  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw
+  float pressure = 0.0f;  // insert your measurement here, in the unit of the calibration's pressure
   stretch_set_pressure(&state, pressure);
 @end
 @if float
@@ -88,7 +89,7 @@ void loop() {
   Serial.print(reading.estimate, 3);
   Serial.print(" " STRETCH_UNIT " +/- ");
   Serial.print(reading.sd, 3);
-  // stretch_readmit(&state, k) takes gauge k back, once it was looked at
+  // stretch_readmit(&state, k) uses gauge k again, after you have checked it
   for (int k = 0; k < STRETCH_CHANNELS; k++) {
     if (reading.lost & (1u << k)) {
       Serial.print(" without ");

@@ -2,23 +2,23 @@
 
 /* Why a channel is left out: stretch_loss(). */
 #define STRETCH_IN_USE 0
-#define STRETCH_LOST_MISSING 1 /* its samples do not come */
-#define STRETCH_LOST_OUTSIDE 2 /* cut off, or at the end of the converter */
+#define STRETCH_LOST_MISSING 1 /* its samples are missing */
+#define STRETCH_LOST_OUTSIDE 2 /* outside its range: disconnected, or the converter at its limit */
 #define STRETCH_LOST_STILL 3   /* it repeats one value while others change */
 @if several
-#define STRETCH_LOST_SLIPPED 4 /* it jumped away from what the others make of it */
+#define STRETCH_LOST_SLIPPED 4 /* it jumped away from the value that the others predict */
 @end
 
 typedef struct stretch_reading {
     float estimate; /* in STRETCH_UNIT */
-    float sd;       /* standard deviation of the estimate, with the channels that are left */
-    uint16_t lost;  /* a bit for each channel that is left out, the first channel's the least */
+    float sd;       /* standard deviation of the estimate with the remaining channels */
+    uint16_t lost;  /* bit k is set if channel k is left out */
     uint8_t status;
-    uint8_t clamped; /* 1 where a state was outside of the calibrated domain */
+    uint8_t clamped; /* 1 if a state was outside the calibrated domain */
 } stretch_reading;
 
 @if several
-#define STRETCH_JUMP 8 /* ticks that a jump is looked for in */
+#define STRETCH_JUMP 8 /* number of ticks in which a jump is searched */
 
 @end
 typedef struct stretch_channel {
@@ -27,10 +27,10 @@ typedef struct stretch_channel {
     float low_passes[STRETCH_RELAXATIONS];
 @end
 @if several
-    float differences[STRETCH_JUMP]; /* from what the others make of it, tick by tick */
+    float differences[STRETCH_JUMP]; /* from the prediction of the others, one per tick */
 @end
     float held;       /* the value that is repeated */
-    uint16_t repeats; /* how often, of late; 0 before the first sample */
+    uint16_t repeats; /* how often recently; 0 before the first sample */
     uint8_t begun;
     uint8_t missing;
     uint8_t loss;
@@ -38,12 +38,12 @@ typedef struct stretch_channel {
 
 typedef struct stretch_state {
     stretch_channel of[STRETCH_CHANNELS];
-    uint8_t silent; /* samples in a row that no channel in use had */
+    uint8_t silent; /* consecutive samples that no channel in use had */
     uint8_t warmed; /* ticks in which the channels were compared */
     uint16_t tick;  /* samples since the last tick */
 } stretch_state;
 
-/* All but whether it is left out. */
+/* Resets a channel, except for whether it is left out. */
 static STRETCH_APART void stretch_forget(stretch_channel *c)
 {
 @if relaxes several
@@ -66,7 +66,7 @@ static STRETCH_APART void stretch_forget(stretch_channel *c)
     c->missing = 0;
 }
 
-/* Takes a channel back that was left out, as if its next sample were its first. */
+/* Uses a channel again that was left out, as if its next sample were its first. */
 static STRETCH_APART void stretch_readmit(stretch_state *s, int channel)
 {
     if (channel >= 0 && channel < STRETCH_CHANNELS) {
@@ -87,7 +87,7 @@ static inline void stretch_init(stretch_state *s)
     s->tick = 0;
 }
 
-/* Why a channel is left out; STRETCH_IN_USE where it is not. */
+/* Why a channel is left out; STRETCH_IN_USE if it is not. */
 static inline uint8_t stretch_loss(const stretch_state *s, int channel)
 {
     return channel >= 0 && channel < STRETCH_CHANNELS ? s->of[channel].loss : STRETCH_IN_USE;
@@ -106,7 +106,7 @@ STRETCH_INLINE stretch_reading stretch_answer(uint8_t status)
 
 /* ---- a channel's sample ---- */
 
-/* Takes a sample, or the last one again. */
+/* Takes a new sample, or the last one again. */
 STRETCH_INLINE void stretch_pass(stretch_channel *c, float x)
 {
 @if relaxes
@@ -125,7 +125,7 @@ STRETCH_INLINE void stretch_pass(stretch_channel *c, float x)
     c->begun = 1;
 }
 
-/* How often one value was repeated of late: a repetition adds one, another value takes one away. */
+/* How often one value was repeated recently: a repetition adds one, another value subtracts one. */
 STRETCH_INLINE uint16_t stretch_repeats(stretch_channel *c, float x, int others_change)
 {
     if (c->repeats > 0 && !(x < c->held) && !(x > c->held)) {
@@ -141,7 +141,7 @@ STRETCH_INLINE uint16_t stretch_repeats(stretch_channel *c, float x, int others_
     return c->repeats;
 }
 
-/* Why the channel is lost, where it is. */
+/* Takes a sample. Returns why the channel is lost, or STRETCH_IN_USE. */
 STRETCH_INLINE uint8_t stretch_take(stretch_channel *c, int k, float x, int others_change)
 {
     if (!stretch_usable(x)) {
@@ -166,10 +166,10 @@ STRETCH_INLINE uint8_t stretch_take(stretch_channel *c, int k, float x, int othe
 }
 
 @if several
-/* ---- channels beside each other ---- */
+/* ---- comparison of the channels ---- */
 
-/* The distance between all of the last four differences and all of the four before, with its sign; zero
- * where they overlap. */
+/* The signed distance between the range of the last four differences and that of the four before; zero
+ * if the ranges overlap. */
 STRETCH_INLINE float stretch_jump(stretch_channel *c, float difference)
 {
     float least[2], most[2];
@@ -193,7 +193,7 @@ STRETCH_INLINE float stretch_jump(stretch_channel *c, float difference)
     return most[1] - least[0] < 0.0f ? most[1] - least[0] : 0.0f;
 }
 
-/* The channel whose slip explains most of all jumps; -1 for none. */
+/* The channel whose slip explains the jumps best; -1 if there is none. */
 static STRETCH_APART int stretch_cause(const float *jumps)
 {
     float most = 0.0f;
@@ -251,7 +251,7 @@ STRETCH_INLINE void stretch_watch(stretch_state *s)
 @end
 /* ---- the estimate ---- */
 
-/* What one channel adds to a sum, term by term; gains are a row of a table. */
+/* Adds the terms of one channel to a sum; gains is a row of a table. */
 STRETCH_INLINE float stretch_add(const stretch_channel *c, int k, const float *gains, float sum,
                                  uint8_t *clamped)
 {
@@ -278,7 +278,7 @@ STRETCH_INLINE float stretch_add(const stretch_channel *c, int k, const float *g
     return sum;
 }
 
-/* With the channels that are left: all, all but one, or the best of them alone. */
+/* The estimate from the remaining channels: all, all but one, or the best one alone. */
 STRETCH_INLINE stretch_reading stretch_estimate(const stretch_state *s)
 {
     stretch_reading reading = stretch_answer(STRETCH_OK);
@@ -326,7 +326,7 @@ STRETCH_INLINE stretch_reading stretch_estimate(const stretch_state *s)
 
 /* ---- samples in, a reading out ---- */
 
-/* A sample that no channel in use has: the recorder is silent. */
+/* Takes a sample that is missing in all channels in use, because the recorder is silent. */
 static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
 {
     int in_use = 0, waiting = 0, k;
@@ -357,7 +357,7 @@ static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
     return stretch_estimate(s);
 }
 
-/* One sample a channel, in the signals' unit; NaN, or STRETCH_NO_VOLTS, is one that did not come. */
+/* Takes one sample per channel, in the unit of the signals; NaN or STRETCH_NO_VOLTS is a missing sample. */
 static STRETCH_APART stretch_reading stretch_step(stretch_state *s, const float *volts)
 {
     int change = 0, heard = 0, waiting = 0, k;

@@ -1,12 +1,12 @@
-/* How a reading came about: stretch_reading.status. */
-#define STRETCH_OK 0      /* estimate, branch and domain hold */
-#define STRETCH_WARMING 1 /* the rate has not seen enough samples yet, and the model needs it */
-#define STRETCH_MISSING 2 /* the sample did not come */
+/* Status of a reading: stretch_reading.status. */
+#define STRETCH_OK 0      /* estimate, branch and domain are valid */
+#define STRETCH_WARMING 1 /* too few samples so far for the rate, which the model needs */
+#define STRETCH_MISSING 2 /* the sample is missing */
 
-/* Missing samples in a row that are bridged; one more forgets the stream. */
+/* Consecutive missing samples that are bridged; after one more, past samples are discarded. */
 #define STRETCH_MAX_BRIDGED 3
 
-/* What a sample always needs belongs into the step, what it seldom needs apart from it. */
+/* Code for every sample is inlined into the step; code that is seldom needed is kept out of it. */
 #if defined(__GNUC__)
 #define STRETCH_INLINE static inline __attribute__((always_inline))
 #define STRETCH_APART __attribute__((noinline, unused))

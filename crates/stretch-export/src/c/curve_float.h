@@ -1,5 +1,5 @@
 
-/* The estimate, and its change per change of the signal. */
+/* The estimate; *slope is its derivative with respect to the signal. */
 STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
                                      uint8_t *outside)
 {

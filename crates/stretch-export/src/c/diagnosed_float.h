@@ -1,5 +1,5 @@
 
-/* The only function that is not here; every library rounds it correctly. */
+/* The only function from a library; every library rounds it correctly. */
 #if defined(__GNUC__)
 #define STRETCH_SQRT __builtin_sqrtf
 #else
@@ -14,17 +14,17 @@ typedef struct stretch_state {
 @if slip
     float slipped; /* by how much the muscle is ahead of its sleeve */
     float hidden;  /* variance of the target that the slip hides */
-    float came;    /* how far the sleeve has come where it last moved to, in signal */
-    float shown;   /* the signal without memory, a little smoothed */
+    float came;    /* how far the sleeve has moved in its last direction, in units of the signal */
+    float shown;   /* the signal without memory, slightly smoothed */
 @end
 @if crosstalk
-    float pressed; /* what the pressure adds to the drive */
+    float pressed; /* contribution of the pressure to the drive */
 @end
 @if hysteresis
     float plays[3];
 @end
 @if relaxation
-    float fading[3]; /* what each lag adds to the next drive */
+    float fading[3]; /* contribution of each lag to the next drive */
 @end
 @if worn
     float travelled;
@@ -40,7 +40,7 @@ typedef struct stretch_state {
     uint8_t missing;
 } stretch_state;
 
-/* All but branch, baseline, pressure, and how far the gauge was worked. */
+/* Resets all but branch, baseline, pressure and the distance that the gauge has travelled. */
 static inline void stretch_forget(stretch_state *s)
 {
 @if slip
@@ -69,7 +69,7 @@ static inline void stretch_init(stretch_state *s)
 }
 
 @if crosstalk
-/* The pressure of the samples to come; one that is not a number changes nothing. */
+/* Sets the pressure for the following samples; NaN changes nothing. */
 static inline void stretch_set_pressure(stretch_state *s, float pressure)
 {
     if (stretch_usable(pressure)) {
@@ -78,7 +78,7 @@ static inline void stretch_set_pressure(stretch_state *s, float pressure)
 }
 
 @end
-/* x held to low .. high; low for what is not a number */
+/* x limited to low .. high; low if x is NaN */
 STRETCH_INLINE float stretch_held(float x, float low, float high)
 {
     x = x > low ? x : low;
@@ -86,7 +86,7 @@ STRETCH_INLINE float stretch_held(float x, float low, float high)
 }
 
 @if knee
-/* A floor with a knee. */
+/* A lower bound with a rounded knee. */
 STRETCH_INLINE float stretch_knee(float u, float at, float round)
 {
     const float above = u - at;
@@ -95,7 +95,7 @@ STRETCH_INLINE float stretch_knee(float u, float at, float round)
 
 @end
 @if slack
-/* What a sleeve that may go slack has of a target. */
+/* The strain of a sleeve that may go slack at a target. */
 STRETCH_INLINE float stretch_taut(float u)
 {
 @if slack_low
@@ -109,7 +109,7 @@ STRETCH_INLINE float stretch_taut(float u)
 
 @end
 @if bounded
-/* What an amplifier with ends has of a drive. */
+/* The output of an amplifier that saturates at a drive. */
 STRETCH_INLINE float stretch_bounded(float u)
 {
 @if floor
@@ -123,7 +123,7 @@ STRETCH_INLINE float stretch_bounded(float u)
 
 @end
 @if hysteresis
-/* How far a play stays behind u. */
+/* How far a play lags behind u. */
 STRETCH_INLINE float stretch_apart(float at, float u, float radius)
 {
     const float behind = u - at;
@@ -131,7 +131,7 @@ STRETCH_INLINE float stretch_apart(float at, float u, float radius)
     return size <= radius ? behind : behind > 0.0f ? radius : -radius;
 }
 
-/* What the plays leave of a drive. */
+/* The drive after the plays. */
 STRETCH_INLINE float stretch_played(const stretch_state *s, float u)
 {
     return u - STRETCH_PLAYED * (stretch_apart(s->plays[0], u, STRETCH_FLOAT(stretch_radii[0])) +
@@ -141,7 +141,7 @@ STRETCH_INLINE float stretch_played(const stretch_state *s, float u)
 
 @end
 @if relaxation
-/* What the past adds to the drive. */
+/* Contribution of the past to the drive. */
 STRETCH_INLINE float stretch_past(const stretch_state *s)
 {
     return s->fading[0] + s->fading[1] + s->fading[2];
@@ -149,7 +149,7 @@ STRETCH_INLINE float stretch_past(const stretch_state *s)
 
 @end
 @if worn
-/* What is left of the response. */
+/* The drive after the loss of response by wear. */
 STRETCH_INLINE float stretch_worn(const stretch_state *s, float u)
 {
     const float left = 1.0f - STRETCH_WORN_M * s->travelled / (STRETCH_WORN_N + s->travelled);
@@ -158,7 +158,7 @@ STRETCH_INLINE float stretch_worn(const stretch_state *s, float u)
 
 @end
 @if worn
-/* Moves the way on; turns that are smaller than a reversal do not count. */
+/* Adds to the distance travelled; turns that are smaller than a reversal do not count. */
 STRETCH_INLINE void stretch_work(stretch_state *s, float u)
 {
     const float moved = u - s->reached;
@@ -172,14 +172,14 @@ STRETCH_INLINE void stretch_work(stretch_state *s, float u)
 
 @end
 @if initial_hysteresis
-/* Hysteresis state of the plays where a stream begins: 1 as if the target had come up from far below. */
+/* Initial hysteresis state of the plays: 1 as if the target had come up from far below. */
 STRETCH_INLINE float stretch_initial_hysteresis(float y)
 {
     return stretch_held(STRETCH_INITIAL_HYSTERESIS + STRETCH_INITIAL_HYSTERESIS_SLOPE * y, -1.0f, 1.0f);
 }
 
 @end
-/* The drive of a target in this sample. */
+/* The drive at a target in this sample. */
 STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
 {
     float u = y;
@@ -206,7 +206,7 @@ STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
 }
 
 @if remembers
-/* The defects follow the target. */
+/* Updates the states of the defects with the target. */
 STRETCH_INLINE void stretch_follow(stretch_state *s)
 {
     float u = s->target;
@@ -252,7 +252,7 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
 }
 
 @end
-/* The signal at a drive and the slope there; beyond an end as the last line goes on. */
+/* The signal at a drive and the slope there; beyond an end, the last segment is extrapolated. */
 STRETCH_INLINE float stretch_forward(float drive, float *slope)
 {
     const float place = (drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP;
@@ -263,7 +263,7 @@ STRETCH_INLINE float stretch_forward(float drive, float *slope)
     return knot + (place - (float)below) * rise;
 }
 
-/* The drive that a signal suggests by itself; beyond an end as the last line goes on. */
+/* The drive at which the curve gives a signal; beyond an end, the last segment is extrapolated. */
 STRETCH_INLINE float stretch_inverse(float signal)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
@@ -281,7 +281,7 @@ STRETCH_INLINE float stretch_inverse(float signal)
     return STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
 }
 
-/* What the defects remember of a target that has rested at y. */
+/* Sets the states of the defects to those after the target has rested at y. */
 STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
 {
 @if remembers
@@ -323,7 +323,7 @@ STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
     (void)y;
 }
 
-/* The target that would rest at a signal. */
+/* Starts at the target that would rest at a signal. */
 static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
 {
     const float to = stretch_inverse(signal);
@@ -335,7 +335,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
 @if worn
     const float travelled = s->travelled;
 @end
-    /* plays offset the drive by a constant; the repetitions take the bends */
+    /* plays offset the drive by a constant; the repetitions handle the knees */
     for (k = 0; k < 3; k++) {
         stretch_settle(s, target);
         target = stretch_held(target + (to - stretch_drive(s, target)), STRETCH_LOW, STRETCH_HIGH);
@@ -357,7 +357,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
     s->begun = 1;
 }
 
-/* Keeps target and rate where they can be. */
+/* Keeps the target in its range. At an end of the range, the rate cannot lead outwards. */
 STRETCH_INLINE void stretch_hold(stretch_state *s)
 {
     if (s->target < STRETCH_LOW) {
@@ -370,7 +370,7 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
     }
 }
 
-/* Moves target, rate and covariance on by a sample. */
+/* Advances target, rate and covariance by one sample. */
 STRETCH_INLINE void stretch_predict(stretch_state *s)
 {
     float across = s->yr + STRETCH_PERIOD_S * s->rr;
@@ -378,7 +378,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     s->target = s->target + STRETCH_PERIOD_S * s->rate;
     s->rate = STRETCH_KEPT * s->rate;
     across = STRETCH_KEPT * across;
-    /* a variance without end would throw the target from end to end of a flat */
+    /* an unlimited variance would move the target from end to end of a flat part of the curve */
     if (grown > STRETCH_WIDEST) {
         const float share = STRETCH_WIDEST / grown;
         grown = share * grown;
@@ -391,7 +391,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
 }
 
 @if slip
-/* The muscle is ahead of its sleeve where that last moved to; while it stands, anywhere inside. */
+/* The muscle is ahead of its sleeve in the direction of the last movement; at rest, it is anywhere in the slip. */
 STRETCH_INLINE void stretch_turn(stretch_state *s)
 {
     const float toward = s->slipped < 0.0f ? -1.0f : 1.0f;
@@ -411,7 +411,7 @@ STRETCH_INLINE void stretch_turn(stretch_state *s)
 }
 
 @end
-/* Takes in a signed signal above its baseline; whether it lay on the curve. */
+/* Corrects the states with a signed signal above its baseline. Returns whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 {
     const float first = STRETCH_FLOAT(stretch_curve[0]);
@@ -421,16 +421,16 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     const float drive = stretch_drive(s, here);
     float tangent;
     const float predicted = stretch_forward(drive, &tangent);
-    /* a spike counts as a signal one whole curve away, no more */
+    /* a spike is limited to one span of the curve beyond its ends */
     const float input = stretch_held(signal, first - span, last + span);
     const int on_curve = input >= first && input <= last;
     const float run = stretch_inverse(input) - drive, surprise = input - predicted;
     const int far = (run < 0.0f ? -run : run) > STRETCH_LEAST_RUN;
-    /* the slope of the drive, as a secant to where the target would have to be */
+    /* the slope of the drive, as a secant to the target that would explain the signal */
     const float probe = far ? run : run < 0.0f ? -STRETCH_LEAST_RUN : STRETCH_LEAST_RUN;
     const float asked = (stretch_drive(s, here + probe) - drive) / probe;
     const float answer = asked > STRETCH_LEAST_ANSWER ? asked : STRETCH_LEAST_ANSWER;
-    /* and of the curve, so that a flat end of it cannot throw the estimate */
+    /* the same for the curve, so that a flat end of it cannot move the estimate too far */
     const float secant = far ? surprise / run : tangent;
     const float slope = answer * (secant > tangent ? secant : tangent);
     const float by_y = slope * s->yy, by_r = slope * s->yr;
@@ -444,7 +444,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     stretch_hold(s);
 @if slip
     {
-        /* the signal of a gauge that remembers nothing */
+        /* the signal of a gauge without memory */
         const float shown = stretch_forward(here, &tangent) + surprise;
         s->shown = s->shown + STRETCH_SMOOTH * (shown - s->shown);
         stretch_turn(s);
@@ -457,7 +457,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 }
 
 @if rest
-/* The signal above the baseline, which is moved on. */
+/* Returns the signal above the baseline, and updates the baseline. */
 STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
 {
     float shift = 0.0f, slope, excess, wanted, before;
@@ -478,7 +478,7 @@ STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
     if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
-        /* by the motion that it predicts */
+        /* bridged by the predicted motion */
         s->missing = (uint8_t)(s->missing + 1u);
         stretch_predict(s);
 @if remembers
@@ -490,14 +490,14 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* A sample that did not come. */
+/* Takes a missing sample. */
 static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
 {
     stretch_missed(s);
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
 }
 
-/* A sample in the signal's unit; NaN, or STRETCH_NO_VOLTS, is one that did not come. */
+/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_VOLTS is a missing sample. */
 static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
 {
     stretch_reading reading;
@@ -536,7 +536,7 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
     reading = stretch_answer(STRETCH_OK, s->branch, domain, STRETCH_ZERO + STRETCH_GAIN * target,
                              STRETCH_GAIN * s->rate);
     reading.sd = STRETCH_SPREAD * STRETCH_SQRT(variance > 0.0f ? variance : 0.0f);
-    /* numbers beyond all bounds: the next sample begins anew */
+    /* the numbers have overflowed: the next sample restarts the filter */
     s->begun = stretch_usable(s->target) ? 1 : 0;
     return reading;
 }

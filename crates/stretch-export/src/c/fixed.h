@@ -1,4 +1,4 @@
-/* In place of a code: a sample that did not come, as any number that is no code. */
+/* Instead of a code: a missing sample, like any other number that is not a code. */
 #define STRETCH_NO_CODE (-1)
 
 /* Shifts of negative numbers must keep the sign, as on every known compiler for a board. */

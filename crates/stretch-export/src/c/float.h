@@ -7,23 +7,23 @@
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
 #error "stretch: float is computed in more than 32 bits; on x86 add -msse2 -mfpmath=sse"
 #endif
-/* No fused multiply-add. GCC takes it from here; for other compilers pass -ffp-contract=off or
- * what they call it. */
+/* No fused multiply-add. Clang and GCC obey these pragmas; for other compilers pass
+ * -ffp-contract=off or the equivalent option. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
 @if sd
-#pragma GCC optimize("no-math-errno") /* a square root is one instruction where there is one */
+#pragma GCC optimize("no-math-errno") /* the square root becomes one instruction if the CPU has it */
 @end
 #endif
 
-/* A sample beyond this size, or one that is not a number, is a sample that did not come. */
+/* A sample beyond this size, or one that is not a number, is a missing sample. */
 #define STRETCH_LARGEST 1e18f
 #define STRETCH_NO_VOLTS 2e18f
 
-/* false for what is not a number as well */
+/* false for NaN as well */
 STRETCH_INLINE int stretch_usable(float x)
 {
     return x >= -STRETCH_LARGEST && x <= STRETCH_LARGEST;

@@ -1,6 +1,6 @@
 typedef struct stretch_reading {
     float estimate; /* in STRETCH_UNIT */
-    float rate;     /* of the estimate, a second */
+    float rate;     /* of the estimate, per second */
 @if sd
     float sd;       /* standard deviation of the estimate */
 @end

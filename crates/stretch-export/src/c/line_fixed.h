@@ -1,7 +1,7 @@
 typedef struct stretch_surface {
     int32_t centre;
     stretch_span signal;
-    int32_t thousandths; /* 2^32 of these make a thousandth of a least bit */
+    int32_t thousandths; /* thousandths of the unit per least bit of the sum, times 2^32 */
     int32_t intercept;
     int32_t slope;
 } stretch_surface;

@@ -1,9 +1,9 @@
-/* Bits behind the point: targets, drives and rates a sample 26, weights 20, places between
+/* Fractional bits: targets, drives and rates per sample 26, weights 20, places between
  * knots 16, shares 31. Signals are in 2^-12 of a 16-bit sample, signed by polarity. */
 
 typedef struct stretch_state {
     int32_t target;
-    int32_t rate; /* a sample, not a second */
+    int32_t rate; /* per sample, not per second */
     int32_t slow[2];
     int32_t plays[3];
     int32_t baseline;
@@ -13,7 +13,7 @@ typedef struct stretch_state {
     uint8_t missing;
 } stretch_state;
 
-/* All but branch and baseline. */
+/* Resets all but branch and baseline. */
 static inline void stretch_forget(stretch_state *s)
 {
     int k;
@@ -45,7 +45,7 @@ STRETCH_INLINE int32_t stretch_saturate(int64_t x)
     return x < INT32_MIN ? INT32_MIN : (int32_t)x;
 }
 
-/* x held to low .. high */
+/* x limited to low .. high */
 STRETCH_INLINE int32_t stretch_held(int32_t x, int32_t low, int32_t high)
 {
     if (x < low) {
@@ -66,7 +66,7 @@ STRETCH_INLINE int32_t stretch_play(int32_t before, int32_t x, int32_t radius)
     return stretch_held(before, x - radius, x + radius);
 }
 
-/* The place, in knots, that a signal suggests by itself; *held: the signal held to the curve. */
+/* The place on the curve, in knots, that gives a signal; *held: the signal, limited to the curve. */
 STRETCH_INLINE int32_t stretch_inverse(int32_t signal, int32_t *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
@@ -86,7 +86,7 @@ STRETCH_INLINE int32_t stretch_inverse(int32_t signal, int32_t *held)
                      STRETCH_RECIP_BITS);
 }
 
-/* The signal at a drive; *segment it lies in; *place held to the curve. */
+/* The signal at a drive; *segment: that of the drive; *place: in knots, limited to the curve. */
 STRETCH_INLINE int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t *place)
 {
     const int32_t from_low = stretch_saturate((int64_t)drive - STRETCH_DRIVE_LOW);
@@ -106,7 +106,7 @@ STRETCH_INLINE int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t 
                      16);
 }
 
-/* The drive of a target that stands at y and moves by rate a sample. */
+/* The drive if the target is at y and moves by rate per sample. */
 STRETCH_INLINE int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t rate)
 {
     const int64_t most = (int64_t)1 << 30;
@@ -126,7 +126,7 @@ STRETCH_INLINE int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t 
     return (int32_t)(sum < -most ? -most : sum);
 }
 
-/* Moves the states on by a sample. */
+/* Advances the states by one sample. */
 STRETCH_INLINE void stretch_predict(stretch_state *s)
 {
     int i;
@@ -136,7 +136,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     }
 }
 
-/* Keeps target and rate where they can be. */
+/* Keeps the target in its range. At an end of the range, the rate cannot lead outwards. */
 STRETCH_INLINE void stretch_hold(stretch_state *s)
 {
     int i;
@@ -153,14 +153,14 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
     }
 }
 
-/* What a gain makes of a surprise, rounded. */
+/* Product of a gain and a surprise, rounded. */
 STRETCH_INLINE int32_t stretch_pull(int32_t gain, int32_t surprise)
 {
     return stretch_saturate((stretch_product(gain, surprise) + STRETCH_GAIN_HALF) >>
                             STRETCH_GAIN_BITS);
 }
 
-/* Takes in a signal above its baseline; whether it lay on the curve. */
+/* Corrects the states with a signal above its baseline. Returns whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, int32_t signal)
 {
     const int32_t first = STRETCH_INT(stretch_curve[0]);
@@ -173,14 +173,14 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, int32_t signal)
     at = (int)STRETCH_INT(stretch_tangents[segment]);
     run = to > from ? to - from : from - to;
     change = held > predicted ? held - predicted : predicted - held;
-    /* the secant, where it is steeper, over at least a hundredth of the way between knots */
+    /* the secant, if it is steeper and spans at least a hundredth of the distance between knots */
     if (run > 65536 / 100) {
         const int64_t scaled = (int64_t)change * 65536;
         while (at < STRETCH_SLOPES - 1 && scaled >= stretch_product(STRETCH_INT(stretch_ends[at]), run)) {
             at++;
         }
     }
-    /* a spike counts as a signal one whole curve away, no more */
+    /* a spike is limited to one span of the curve beyond its ends */
     surprise = stretch_held(signal, first - (last - first), last + (last - first)) - predicted;
     gains = stretch_gains[at];
     s->target = stretch_saturate((int64_t)s->target + stretch_pull(STRETCH_INT(gains[0]), surprise));
@@ -198,7 +198,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, int32_t signal)
 }
 
 #if STRETCH_FOLLOWS_REST
-/* The signal above the baseline, which is moved on. */
+/* Returns the signal above the baseline, and updates the baseline. */
 STRETCH_INLINE int32_t stretch_above_rest(stretch_state *s, int32_t signal)
 {
     int32_t shift = 0, segment, place, excess, before;
@@ -240,7 +240,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, int32_t signal)
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
     if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
-        /* by the motion that it predicts */
+        /* bridged by the predicted motion */
         s->missing = (uint8_t)(s->missing + 1u);
         stretch_predict(s);
         stretch_hold(s);
@@ -250,14 +250,14 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* A sample that did not come. */
+/* Takes a missing sample. */
 static inline stretch_reading stretch_lost(stretch_state *s)
 {
     stretch_missed(s);
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0);
 }
 
-/* A code of the converter; any other number is a sample that did not come. */
+/* Takes a code of the converter; any other number is a missing sample. */
 static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
 {
     int32_t signal;

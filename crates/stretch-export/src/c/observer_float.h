@@ -10,7 +10,7 @@ typedef struct stretch_state {
     uint8_t missing;
 } stretch_state;
 
-/* All but branch and baseline. */
+/* Resets all but branch and baseline. */
 static inline void stretch_forget(stretch_state *s)
 {
     int k;
@@ -34,7 +34,7 @@ static inline void stretch_init(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* x held to low .. high */
+/* x limited to low .. high */
 STRETCH_INLINE float stretch_held(float x, float low, float high)
 {
     if (x < low) {
@@ -49,7 +49,7 @@ STRETCH_INLINE float stretch_play(float before, float x, float radius)
     return stretch_held(before, x - radius, x + radius);
 }
 
-/* The drive that a signal suggests by itself; *held: the signal held to the curve. */
+/* The drive at which the curve gives a signal; *held: the signal, limited to the curve. */
 STRETCH_INLINE float stretch_inverse(float signal, float *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
@@ -69,7 +69,7 @@ STRETCH_INLINE float stretch_inverse(float signal, float *held)
     return STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
 }
 
-/* The signal at a drive; *tangent: the slope there; *held: the drive held to the curve. */
+/* The signal at a drive; *tangent: the slope there; *held: the drive, limited to the curve. */
 STRETCH_INLINE float stretch_forward(float drive, float *tangent, float *held)
 {
     const float place = stretch_held((drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP, 0.0f,
@@ -86,7 +86,7 @@ STRETCH_INLINE float stretch_forward(float drive, float *tangent, float *held)
     return knot + (place - (float)below) * rise;
 }
 
-/* The drive of a target that stands at y now. */
+/* The drive if the target is at y now. */
 STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
 {
     float drive = y;
@@ -101,7 +101,7 @@ STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
     return drive;
 }
 
-/* Moves the states on by a sample. */
+/* Advances the states by one sample. */
 STRETCH_INLINE void stretch_predict(stretch_state *s)
 {
     int i;
@@ -111,7 +111,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     }
 }
 
-/* Keeps target and rate where they can be. */
+/* Keeps the target in its range. At an end of the range, the rate cannot lead outwards. */
 STRETCH_INLINE void stretch_hold(stretch_state *s)
 {
     int i;
@@ -128,7 +128,7 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
     }
 }
 
-/* The place of the gains for a slope, by halving. */
+/* The index of the gains for a slope, by bisection. */
 STRETCH_INLINE int stretch_nearest(float slope)
 {
     int from = 0, to = STRETCH_SLOPES - 1;
@@ -143,7 +143,7 @@ STRETCH_INLINE int stretch_nearest(float slope)
     return from;
 }
 
-/* Takes in a signed signal above its baseline; whether it lay on the curve. */
+/* Corrects the states with a signed signal above its baseline. Returns whether it lay on the curve. */
 STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 {
     const float first = STRETCH_FLOAT(stretch_curve[0]);
@@ -157,12 +157,12 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     to = stretch_inverse(signal, &held);
     run = to - from;
     slope = tangent;
-    /* the secant, where it is steeper; over a hair's breadth rounding alone would decide it */
+    /* the secant, if it is steeper; over a very short run it would consist of rounding errors */
     if ((run < 0.0f ? -run : run) > STRETCH_LEAST_RUN) {
         const float secant = (held - predicted) / run;
         slope = secant > tangent ? secant : tangent;
     }
-    /* a spike counts as a signal one whole curve away, no more */
+    /* a spike is limited to one span of the curve beyond its ends */
     surprise = stretch_held(signal, first - span, last + span) - predicted;
     gains = stretch_gains[stretch_nearest(slope)];
     s->target = s->target + STRETCH_FLOAT(gains[0]) * surprise;
@@ -175,7 +175,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 }
 
 #if STRETCH_FOLLOWS_REST
-/* The signal above the baseline, which is moved on. */
+/* Returns the signal above the baseline, and updates the baseline. */
 STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
 {
     float shift = 0.0f, tangent, at, excess, wanted, before;
@@ -212,7 +212,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
     if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
-        /* by the motion that it predicts */
+        /* bridged by the predicted motion */
         s->missing = (uint8_t)(s->missing + 1u);
         stretch_predict(s);
         stretch_hold(s);
@@ -222,14 +222,14 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* A sample that did not come. */
+/* Takes a missing sample. */
 static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
 {
     stretch_missed(s);
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
 }
 
-/* A sample in the signal's unit; NaN, or STRETCH_NO_VOLTS, is one that did not come. */
+/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_VOLTS is a missing sample. */
 static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
 {
     float signal;

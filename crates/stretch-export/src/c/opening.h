@@ -1,9 +1,9 @@
 /* A stretch receptor: @SIGNAL@ in, @REFERENCE@ out, every @PERIOD@ s.
  *
  * Model @MODEL@, form @FORM@: @TAKEN@ in,
- * @GIVEN@ out; the same bits as on the computer.
+ * @GIVEN@ out, with the same bits as on the computer.
 @if fixed
- * The least step of an estimate is @STEP@.
+ * Estimates have steps of @STEP@.
 @end
  * Written by stretch @VERSION@ from a calibration of @FROM@.
  *
@@ -14,16 +14,16 @@
  *     stretch_set_pressure(&state, pressure);
 @end
 @if one
- *     reading = stretch_step(&state, sample); or stretch_lost(&state) where none came
+ *     reading = stretch_step(&state, sample); or stretch_lost(&state) if it is missing
  *
- * One state a channel. C99 and C++11; no malloc, @LIBM@.
+ * One state per channel. C99 and C++11; no malloc, @LIBM@.
 @end
 @if array
- *     reading = stretch_step(&state, samples); or stretch_lost(&state) where none came
+ *     reading = stretch_step(&state, samples); or stretch_lost(&state) if all are missing
  *
- * One state an array of gauges; samples is an array of STRETCH_CHANNELS. C99 and C++11; no malloc, @LIBM@.
+ * One state per array of gauges; samples is an array of STRETCH_CHANNELS values. C99 and C++11; no malloc, @LIBM@.
 @end
- * stretch_self_test() is 0 where the board computes as the computer does.
+ * stretch_self_test() returns 0 if the board computes the same results as the computer.
  */
 #ifndef STRETCH_H
 #define STRETCH_H

@@ -2,13 +2,13 @@ typedef struct stretch_surface {
     int32_t centre;
     stretch_span signal;
     stretch_span rate;
-    int32_t thousandths; /* 2^32 of these make a thousandth of a least bit */
-    int32_t p[7];        /* p11 p12 p10 p00 p02 p03 p01, as they are used */
+    int32_t thousandths; /* thousandths of the unit per least bit of the sum, times 2^32 */
+    int32_t p[7];        /* p11 p12 p10 p00 p02 p03 p01, in the order of use */
 } stretch_surface;
 
 static const stretch_surface stretch_surfaces[2] STRETCH_FLASH = STRETCH_SURFACES;
 
-/* Horner's rule; what a product leaves below the point is carried into the next. */
+/* Horner's rule; the fraction of each product is carried into the next. */
 STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {

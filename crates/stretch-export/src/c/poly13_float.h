@@ -6,7 +6,7 @@ typedef struct stretch_surface {
 
 static const stretch_surface stretch_surfaces[2] STRETCH_FLASH = STRETCH_SURFACES;
 
-/* The estimate, and its change per change of the signal. */
+/* The estimate; *slope is its derivative with respect to the signal. */
 STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
                                      uint8_t *outside)
 {

@@ -7,8 +7,8 @@ typedef struct stretch_sample {
 
 /* ---- self-test ---- */
 
-/* Runs the samples below, 0 when every answer is the computer's, bit for bit; else the number of the
- * first that is not, from 1. */
+/* Runs the samples below. Returns 0 if every result equals the computer's bit for bit, otherwise the
+ * number of the first sample with another result, counted from 1. */
 static STRETCH_APART int stretch_self_test(void)
 {
     static const stretch_sample samples[STRETCH_SELF_TEST] STRETCH_FLASH = {

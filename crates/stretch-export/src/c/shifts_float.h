@@ -1,8 +1,8 @@
 
-/* ---- whether a gauge has shifted against the others ---- */
+/* ---- whether a gauge has shifted relative to the others ---- */
 
-/* A state beside the receptor's. After every stretch_step or stretch_lost
- *     if (stretch_shifts_step(&blocks, &state, &told)) { a block of some seconds has ended: see told }
+/* A separate state. After every stretch_step or stretch_lost, call
+ *     if (stretch_shifts_step(&blocks, &state, &shifts)) { a block of some seconds has ended: read shifts }
  */
 typedef struct stretch_shifts_state {
     float sums[STRETCH_CHANNELS];
@@ -10,11 +10,11 @@ typedef struct stretch_shifts_state {
     uint32_t samples;
 } stretch_shifts_state;
 
-/* What a block of time said of every gauge. */
+/* Result of a block of time for every gauge. */
 typedef struct stretch_shifts {
-    float off[STRETCH_CHANNELS]; /* from what the others say, in STRETCH_UNIT */
+    float off[STRETCH_CHANNELS]; /* difference from the estimate of the others, in STRETCH_UNIT */
     uint16_t shifted;            /* a bit for each gauge that is off by more than its limit */
-    int8_t most;                 /* the gauge that is the most times its limit off; -1 where that cannot be told */
+    int8_t most;                 /* the gauge that is farthest off relative to its limit; -1 if it is unknown */
 } stretch_shifts;
 
 static inline void stretch_shifts_init(stretch_shifts_state *b)
@@ -27,7 +27,7 @@ static inline void stretch_shifts_init(stretch_shifts_state *b)
     b->samples = 0u;
 }
 
-/* The estimate of one channel alone less that of all others. */
+/* The estimate of one channel alone minus that of all others. */
 STRETCH_INLINE float stretch_difference(const stretch_state *s, int k)
 {
     uint8_t clamped = 0;
@@ -44,7 +44,7 @@ STRETCH_INLINE float stretch_difference(const stretch_state *s, int k)
     return own - others;
 }
 
-/* 1 at the end of a block. One begins anew where a channel is left out or has no sample. */
+/* Returns 1 at the end of a block. A block begins anew if a channel is left out or has no sample. */
 static STRETCH_APART int stretch_shifts_step(stretch_shifts_state *b, const stretch_state *s,
                                              stretch_shifts *told)
 {

@@ -33,7 +33,7 @@ static inline void stretch_init(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* B_0 += x - old,  B_k += B_(k-1) - C(n, k) old; 1 when the window is full */
+/* B_0 += x - old,  B_k += B_(k-1) - C(n, k) old; returns 1 if the window is full */
 STRETCH_INLINE int stretch_slide(stretch_state *s, uint32_t sample)
 {
     const uint32_t at = s->oldest < STRETCH_WINDOW ? s->oldest : 0u;
@@ -76,7 +76,7 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
         s->last = s->ring[s->oldest > 0 ? s->oldest - 1u : STRETCH_WINDOW - 1u];
         s->last_rate = s->remaining == 0 ? stretch_rate(s) : 0;
     }
-    /* the last sample, moved on by the last rate */
+    /* the last sample, extrapolated with the last rate */
     bridged = ((int64_t)s->last_rate * STRETCH_CHANGE) >> (STRETCH_CHANGE_SHIFT - 9);
     bridged = (int64_t)s->last + ((bridged * s->missing + 256) >> 9);
     if (bridged < 0) {
@@ -93,10 +93,10 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
 typedef struct stretch_span {
     int32_t min;
     uint32_t width; /* from the lower end to the upper one */
-    int32_t factor; /* spreads it over 32 bits */
+    int32_t factor; /* scales the range to 32 bits */
 } stretch_span;
 
-/* The nearest value inside, spread; *outside is set for one that was outside. */
+/* The nearest value inside the range, scaled; *outside is set if the value was outside. */
 STRETCH_INLINE int32_t stretch_clamp(const stretch_span *span, int32_t x, uint8_t flag,
                                     uint8_t *outside)
 {

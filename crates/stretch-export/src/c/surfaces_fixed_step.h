@@ -1,13 +1,13 @@
 /* ---- a sample in, a reading out ---- */
 
-/* A sample that did not come. */
+/* Takes a missing sample. */
 static inline stretch_reading stretch_lost(stretch_state *s)
 {
     stretch_missed(s);
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0);
 }
 
-/* A code of the converter; any other number is a sample that did not come. */
+/* Takes a code of the converter; any other number is a missing sample. */
 static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
 {
     const uint32_t band = STRETCH_DEAD_BAND;
@@ -20,7 +20,7 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
     sample = (uint32_t)code * STRETCH_ALIGN;
     s->missing = 0;
 @if static
-    /* the estimate needs no rate: 0 until the window is full */
+    /* the estimate needs no rate, which is 0 until the window is full */
     rate = stretch_slide(s, sample) ? stretch_rate(s) : 0;
 @end
 @if moving
@@ -29,7 +29,7 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
     }
     rate = stretch_rate(s);
 @end
-    /* outside the dead band, in one comparison, the sign of the target's rate */
+    /* outside the dead band (one comparison), the branch is the sign of the target's rate */
     if ((uint32_t)rate + band > 2u * band) {
         s->branch = (uint8_t)(((uint32_t)rate ^ STRETCH_MIRROR) >> 31);
     }

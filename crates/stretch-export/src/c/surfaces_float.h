@@ -1,7 +1,7 @@
 /* ---- the rate ---- */
 
 typedef struct stretch_state {
-    float sums[STRETCH_WINDOW]; /* what the samples so far add to the rates to come */
+    float sums[STRETCH_WINDOW]; /* contributions of the samples so far to the following rates */
     float last;
     float last_rate;
     uint16_t remaining;
@@ -27,7 +27,7 @@ static inline void stretch_init(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-/* The transposed filter: 1 and the rate when the window is full. */
+/* The transposed filter. Returns 1, and the rate in *rate, if the window is full. */
 STRETCH_INLINE int stretch_rate(stretch_state *s, float x, float *rate)
 {
     int j;
@@ -45,7 +45,7 @@ STRETCH_INLINE int stretch_rate(stretch_state *s, float x, float *rate)
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
     if (s->missing < STRETCH_MAX_BRIDGED) {
-        /* the last sample, moved on by the last rate */
+        /* the last sample, extrapolated with the last rate */
         const float bridged = s->last + s->last_rate * STRETCH_PERIOD_S;
         s->missing = (uint8_t)(s->missing + 1u);
         if (bridged >= -FLT_MAX && bridged <= FLT_MAX) {
@@ -63,7 +63,7 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
 
 /* ---- the surface ---- */
 
-/* The nearest value inside; *outside is set for one that was outside. */
+/* The nearest value inside the range; *outside is set if the value was outside. */
 STRETCH_INLINE float stretch_clamp(float x, float min, float max, uint8_t flag, uint8_t *outside)
 {
     if (x < min) {

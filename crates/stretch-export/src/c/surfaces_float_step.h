@@ -1,13 +1,13 @@
 /* ---- a sample in, a reading out ---- */
 
-/* A sample that did not come. */
+/* Takes a missing sample. */
 static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
 {
     stretch_missed(s);
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
 }
 
-/* A sample in the signal's unit; NaN, or STRETCH_NO_VOLTS, is one that did not come. */
+/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_VOLTS is a missing sample. */
 static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
 {
     uint8_t outside = STRETCH_INSIDE;
@@ -18,7 +18,7 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
     s->missing = 0;
     s->last = volts;
 @if static
-    /* the estimate needs no rate: 0 until the window is full */
+    /* the estimate needs no rate, which is 0 until the window is full */
     if (!stretch_rate(s, volts, &rate)) {
         rate = 0.0f;
     }

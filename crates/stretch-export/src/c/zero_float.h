@@ -1,8 +1,9 @@
 
 /* ---- whether the zero is still that of the calibration ---- */
 
-/* A state beside the receptor's: stretch_zero_init(&zero, 1) follows a slow change of zero, 0 does not. Then every period
- *     if (stretch_zero_step(&zero, sample, &told)) { a movement has ended: see told }
+/* A separate state: stretch_zero_init(&zero, 1) follows a slow change of zero, stretch_zero_init(&zero, 0) does not.
+ * Then in every period
+ *     if (stretch_zero_step(&zero, sample, &result)) { a movement has ended: read result }
  *     reading = stretch_step(&state, stretch_zero_corrected(&zero, sample));
  */
 typedef struct stretch_zero_state {
@@ -24,11 +25,11 @@ typedef struct stretch_zero_state {
     uint8_t shifted;
 } stretch_zero_state;
 
-/* What a movement said of the zero. */
+/* Result of a movement: the state of the zero. */
 typedef struct stretch_zero {
-    float off;              /* from the zero of the calibration, in the signal's unit */
-    float off_reference;    /* what that makes of the estimate, in STRETCH_UNIT */
-    float followed;         /* how far it is followed, in the signal's unit */
+    float off;              /* difference from the zero of the calibration, in the signal's unit */
+    float off_reference;    /* the same as a change of the estimate, in STRETCH_UNIT */
+    float followed;         /* the part of it that is followed, in the signal's unit */
     uint32_t since_samples; /* samples since the first movement that was off */
     uint8_t shifted;        /* whether the calibration no longer describes the signal */
 } stretch_zero;
@@ -72,7 +73,7 @@ STRETCH_INLINE float stretch_within(float x, float most)
     return stretch_less(stretch_more(x, -most), most);
 }
 
-/* 1 at the end of a movement, with its level. */
+/* Returns 1 at the end of a movement, and its level in *level. */
 STRETCH_INLINE int stretch_zero_turn(stretch_zero_state *z, float x, float *level)
 {
     const float first = z->before[0], second = z->before[1];
@@ -108,7 +109,7 @@ STRETCH_INLINE int stretch_zero_turn(stretch_zero_state *z, float x, float *leve
     return 0;
 }
 
-/* The middle of the last levels. */
+/* The median of the last levels. */
 STRETCH_INLINE float stretch_zero_median(const stretch_zero_state *z)
 {
     float sorted[STRETCH_ZERO_LEVELS];
@@ -123,7 +124,7 @@ STRETCH_INLINE float stretch_zero_median(const stretch_zero_state *z)
     return sorted[STRETCH_ZERO_LEVELS / 2];
 }
 
-/* The end of the first of the last movements that is off by half of what their median is. */
+/* The end of the first of the last movements whose level is off by at least half as much as their median. */
 STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float off)
 {
     const float half = 0.5f * off;
@@ -136,13 +137,13 @@ STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float of
     return z->samples;
 }
 
-/* A sample less the zero that is followed: what stretch_step is to be given. */
+/* A sample minus the followed zero. Pass the result to stretch_step. */
 static inline float stretch_zero_corrected(const stretch_zero_state *z, float volts)
 {
     return volts - STRETCH_ZERO_SIGN * z->followed;
 }
 
-/* A sample in the signal's unit; 1 where a movement has ended, from the fifth on. */
+/* Takes a sample in the unit of the signal. Returns 1 if a movement has ended, from the fifth on. */
 static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, stretch_zero *told)
 {
     float level = 0.0f, off = 0.0f, limit, share, clipped, before;
@@ -170,7 +171,7 @@ static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, s
     if ((z->mean > 0.0f) != (before > 0.0f)) {
         z->turned = z->samples;
     }
-    /* one that has shifted is back within half of the limits */
+    /* a shifted zero counts as restored only within half of the limits */
     share = z->shifted ? 0.5f : 1.0f;
     limit = share * STRETCH_ZERO_LIMIT;
     jumped = whole && (off - z->followed > limit || off - z->followed < -limit);

@@ -15,20 +15,16 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
     let mut constants = Constants::default();
     constants
         .define("CHANNELS", count as i32, "samples of a step, in this order")
-        .define(
-            "STATES",
-            1 + numbers.relaxations as i32,
-            "of a channel: its signal, and its memory",
-        )
-        .define("TERMS", numbers.terms as i32, "of a channel");
+        .define("STATES", 1 + numbers.relaxations as i32, "states of a channel: signal and memory")
+        .define("TERMS", numbers.terms as i32, "terms of a channel");
     let names = calibration.spec().channels.iter().map(|c| comment_safe(c.signal.as_str()));
     let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
-    constants.word("SIGNALS", format!("{{{}}}", names.join(", ")), "the columns of the channels");
+    constants.word("SIGNALS", format!("{{{}}}", names.join(", ")), "columns of the channels");
     let mut has = vec!["array"];
     if numbers.relaxations > 0 {
         has.push("relaxes");
         constants
-            .define("RELAXATIONS", numbers.relaxations as i32, "low-passes of a channel")
+            .define("RELAXATIONS", numbers.relaxations as i32, "low-pass filters of a channel")
             .array("float", "shares", &numbers.shares[..numbers.relaxations]);
     }
     channels(&mut constants, numbers);
@@ -86,7 +82,7 @@ fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, 
     };
     let (without, alone) = (&numbers.without[..count], &numbers.alone[..count]);
     constants
-        .define("CONSTANT", numbers.all.constant, "the estimate where every term is zero")
+        .define("CONSTANT", numbers.all.constant, "the estimate if every term is zero")
         .define("SD", numbers.all.sd, "standard deviation of the estimate")
         .rows("float", "all", &rows(&numbers.all));
     if count > 1 {
@@ -100,17 +96,17 @@ fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, 
         .array("float", "alone_constant", &each(alone, |gains| gains.constant))
         .array("float", "alone_sd", &each(alone, |gains| gains.sd))
         .rows("float", "alone", &each(alone, |gains| gains.terms[0][..terms].to_vec()))
-        .define("LOW", numbers.low, "the least estimate")
-        .define("HIGH", numbers.high, "the greatest");
+        .define("LOW", numbers.low, "smallest estimate")
+        .define("HIGH", numbers.high, "largest estimate");
 }
 
 /// Writes the usual values and the limits of the differences between the channels.
 fn shifts<const N: usize>(constants: &mut Constants, watch: &ShiftWatch<f32, N>) {
     let count = watch.channels;
     constants
-        .define("SHIFT_SAMPLES", watch.samples_a_value, "between two values of a block")
-        .define("SHIFT_VALUES", watch.values_a_block, "of a block")
-        .define("SHIFT_PER_BLOCK", watch.per_block, "one over them")
+        .define("SHIFT_SAMPLES", watch.samples_a_value, "samples between two values")
+        .define("SHIFT_VALUES", watch.values_a_block, "values in a block")
+        .define("SHIFT_PER_BLOCK", watch.per_block, "1 / SHIFT_VALUES")
         .array("float", "shift_usual", &watch.usual[..count])
         .array("float", "shift_limits", &watch.limits[..count]);
 }

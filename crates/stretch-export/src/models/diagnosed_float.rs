@@ -23,10 +23,10 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
         has.push("slip");
         constants
             .define("SLIP", model.slip, "half-width of the sleeve's slip")
-            .define("SMOOTH", SMOOTH as f32, "share of a sample in what the signal shows")
-            .define("TURN_THRESHOLD", model.turn_threshold, "way back in signal that makes a turn")
-            .define("SLIP_VARIANCE", model.slip_variance, "variance of a target in the slip")
-            .define("SLIP_VARIANCE_SHARE", model.slip_variance_share, "share added a sample");
+            .define("SMOOTH", SMOOTH as f32, "share of a sample in the smoothed signal")
+            .define("TURN_THRESHOLD", model.turn_threshold, "signal change back that is a turn")
+            .define("SLIP_VARIANCE", model.slip_variance, "variance of a target within the slip")
+            .define("SLIP_VARIANCE_SHARE", model.slip_variance_share, "share added per sample");
     }
     if has.contains(&"slip") || has.contains(&"hysteresis") {
         has.push("initial_hysteresis");
@@ -37,7 +37,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     }
     if model.ahead_s != 0.0 {
         has.push("skew");
-        constants.define("AHEAD_S", model.ahead_s, "by which the estimate is ahead of the signal");
+        constants.define("AHEAD_S", model.ahead_s, "lead of the estimate over the signal, s");
     }
     if model.rest.follows() {
         has.push("rest");
@@ -58,32 +58,28 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
     let tenth = 0.1 * span;
     constants
         .word("TELLS_SD", 1, "stretch_reading.sd")
-        .define("SIGN", model.sign, "-1 where the signal falls as the target rises")
+        .define("SIGN", model.sign, "-1 if the signal falls as the target rises")
         .define("PERIOD_S", model.period_s, "from a sample to the next")
-        .define("KNOTS", curve.knots as i32, "of the curve from drive to signal")
+        .define("KNOTS", curve.knots as i32, "knots of the curve from drive to signal")
         .array("float", "curve", &curve.values[..curve.knots])
         .define("DRIVE_LOW", curve.low, "the drive of the first knot")
-        .define("DRIVE_STEP", curve.step, "from knot to knot")
-        .define("PER_STEP", curve.per_step, "its reciprocal")
-        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "the least that a secant is taken over")
-        .define("LEAST_ANSWER", LEAST_ANSWER as f32, "of a drive to a target")
-        .define("KEPT", model.kept, "what a rate keeps of itself in a sample")
+        .define("DRIVE_STEP", curve.step, "distance of knots")
+        .define("PER_STEP", curve.per_step, "1 / DRIVE_STEP")
+        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "least run of a secant")
+        .define("LEAST_ANSWER", LEAST_ANSWER as f32, "least slope of the drive over the target")
+        .define("KEPT", model.kept, "share of the rate kept per sample")
         .define("KEPT_TWICE", model.kept_twice, "the same squared")
-        .define("PROCESS_NOISE", model.process_noise, "variance that a sample adds to the rate")
+        .define("PROCESS_NOISE", model.process_noise, "variance added to the rate per sample")
         .define("NOISE", model.noise, "variance of the signal around the model")
-        .define("WIDEST", model.widest, "greatest variance of a target")
+        .define("WIDEST", model.widest, "largest variance of a target")
         .define("BEGIN_YY", tenth * tenth, "variance of the first target")
         .define("BEGIN_RR", span * span, "variance of the first rate")
-        .define("LOW", model.low, "the least target")
-        .define("HIGH", model.high, "the greatest")
-        .define(
-            "DEAD_BAND",
-            model.dead_band,
-            "the largest rate of the target that keeps the branch",
-        )
-        .define("ZERO", model.zero, "the reference at a target of 0")
-        .define("GAIN", model.gain, "the reference per target")
-        .define("SPREAD", model.spread, "the same per standard deviation of the filter");
+        .define("LOW", model.low, "smallest target")
+        .define("HIGH", model.high, "largest target")
+        .define("DEAD_BAND", model.dead_band, "rates up to this one keep the branch")
+        .define("ZERO", model.zero, "reference at a target of 0")
+        .define("GAIN", model.gain, "reference per target")
+        .define("SPREAD", model.spread, "reference per standard deviation");
 }
 
 /// Writes the constants of the defects, first those without memory, then those with memory.
@@ -104,22 +100,22 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
     if let Some([pressed, twice]) = defects.crosstalk {
         has.push("crosstalk");
         constants
-            .word("TAKES_PRESSURE", 1, "by stretch_set_pressure, before a sample")
+            .word("TAKES_PRESSURE", 1, "call stretch_set_pressure before a sample")
             .define("PRESSED", pressed, "drive per pressure")
-            .define("PRESSED_TWICE", twice, "and per its square");
+            .define("PRESSED_TWICE", twice, "drive per squared pressure");
     }
     if let Some(plays) = defects.hysteresis {
         has.extend(["remembers", "hysteresis"]);
         constants.array("float", "radii", &plays.radii).define(
             "PLAYED",
             plays.each,
-            "the share of each play",
+            "share of each play",
         );
     }
     if let Some(lags) = defects.relaxation {
         has.extend(["remembers", "relaxation"]);
         constants
-            .define("OWN", lags.own, "what a sample's own drive counts for")
+            .define("OWN", lags.own, "weight of the present sample's drive")
             .array("float", "kept", &lags.kept)
             .array("float", "taken", &lags.taken)
             .array("float", "settled", &lags.settled);
@@ -127,11 +123,11 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
     if let Some(worn) = defects.worn {
         has.extend(["remembers", "worn"]);
         constants
-            .define("WORN_M", worn.m, "what the gauge loses in the end")
-            .define("WORN_N", worn.n, "the way by which half of it is lost")
-            .define("WORN_ZERO", worn.zero, "the drive at which nothing is lost")
+            .define("WORN_M", worn.m, "loss of response in the end")
+            .define("WORN_N", worn.n, "distance travelled at half the loss")
+            .define("WORN_ZERO", worn.zero, "drive at which nothing is lost")
             .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
-            .define("WORN_TRAVELLED", worn.travelled, "the way that it had gone before");
+            .define("WORN_TRAVELLED", worn.travelled, "distance travelled before");
     }
     // The delay of a slow amplifier is part of the skew, so the live step has no poles.
 }

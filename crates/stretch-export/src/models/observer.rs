@@ -21,12 +21,12 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     let follows = n.rest.pull != 0;
     let mut constants = Constants::default();
     constants
-        .define("CODES", 1u32 << adc_bits, "the first number that is no code")
+        .define("CODES", 1u32 << adc_bits, "number of codes")
         .define("SIGNAL_PER_CODE", if n.falling { -per_code } else { per_code }, "")
-        .define("KNOTS", knots as i32, "of the curve from drive to signal")
+        .define("KNOTS", knots as i32, "knots of the curve from drive to signal")
         .array("int32_t", "curve", &n.curve[..knots])
         .array("int32_t", "recips", &recips[..knots])
-        .define("RECIP_BITS", *recip_bits as i32, "places per signal, times 2 to this: recips")
+        .define("RECIP_BITS", *recip_bits as i32, "recips: places per signal, times 2^this")
         .array(
             "int32_t",
             "tangents",
@@ -42,16 +42,16 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         [&n.shares, &n.amplitudes, &n.radii, &n.play_weights],
     );
     constants
-        .define("SLOPES", n.gains.len() as i32, "that there are gains for")
+        .define("SLOPES", n.gains.len() as i32, "number of slopes with gains")
         .array("int32_t", "ends", &n.ends)
         .rows("int32_t", "gains", &n.gains)
-        .define("GAIN_BITS", i32::from(n.gain_bits), "state per signal, times 2 to this: gains")
+        .define("GAIN_BITS", i32::from(n.gain_bits), "gains: state per signal, times 2^this")
         .define("GAIN_HALF", (1i64 << n.gain_bits) >> 1, "")
-        .define("LOW", n.low, "the least target")
-        .define("HIGH", n.high, "the greatest")
-        .define("DEAD_BAND", n.dead_band, "the largest rate that keeps the branch")
-        .define("ZERO", n.zero, "the output at a target of 0")
-        .define("GAIN", n.gain, "the output per target")
+        .define("LOW", n.low, "smallest target")
+        .define("HIGH", n.high, "largest target")
+        .define("DEAD_BAND", n.dead_band, "rates up to this one keep the branch")
+        .define("ZERO", n.zero, "output at a target of 0")
+        .define("GAIN", n.gain, "output per target")
         .define("OUTPUT_SHIFT", 26 + i32::from(n.output_bits), "")
         .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
     if follows {
@@ -77,14 +77,14 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
     let follows = o.rest.follows();
     let mut constants = Constants::default();
     constants
-        .define("SIGN", o.sign, "-1 where the signal falls as the target rises")
+        .define("SIGN", o.sign, "-1 if the signal falls as the target rises")
         .define("PERIOD_S", o.period_s, "from a sample to the next")
-        .define("KNOTS", o.knots as i32, "of the curve from drive to signal")
+        .define("KNOTS", o.knots as i32, "knots of the curve from drive to signal")
         .array("float", "curve", &o.curve[..o.knots])
         .define("DRIVE_LOW", o.drive_low, "the drive of the first knot")
-        .define("DRIVE_STEP", o.drive_step, "from knot to knot")
-        .define("PER_STEP", o.per_step, "its reciprocal")
-        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "the least that a secant is taken over");
+        .define("DRIVE_STEP", o.drive_step, "distance of knots")
+        .define("PER_STEP", o.per_step, "1 / DRIVE_STEP")
+        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "least run of a secant");
     constants.define("LEAD_S", o.lead_s, "seconds by which the signal leads");
     define_memory(
         &mut constants,
@@ -93,14 +93,14 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         [&o.shares, &o.amplitudes, &o.radii, &o.play_weights],
     );
     constants
-        .define("SLOPES", o.gains.len() as i32, "that there are gains for")
+        .define("SLOPES", o.gains.len() as i32, "number of slopes with gains")
         .array("float", "ends", &o.ends)
         .rows("float", "gains", &o.gains)
-        .define("LOW", o.low, "the least target")
-        .define("HIGH", o.high, "the greatest")
-        .define("DEAD_BAND", o.dead_band, "the largest rate of the target that keeps the branch")
-        .define("ZERO", o.zero, "the reference at a target of 0")
-        .define("GAIN", o.gain, "the reference per target")
+        .define("LOW", o.low, "smallest target")
+        .define("HIGH", o.high, "largest target")
+        .define("DEAD_BAND", o.dead_band, "target rates up to this one keep the branch")
+        .define("ZERO", o.zero, "reference at a target of 0")
+        .define("GAIN", o.gain, "reference per target")
         .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
     if follows {
         define_rest(&mut constants, o.at_rest, o.rest);
@@ -134,11 +134,11 @@ fn define_memory<L: Literal>(
 pub(super) fn define_rest<L: Literal>(constants: &mut Constants, at_rest: L, rest: RestLevel<L>) {
     let RestLevel { level, pull, leak, average, furthest, most } = rest;
     constants
-        .define("AT_REST", at_rest, "the signal where the target rests, memory settled")
-        .define("REST_LEVEL", level, "the resting signal")
-        .define("REST_PULL", pull, "the share of an excess below rest that is taken up")
-        .define("REST_LEAK", leak, "what the baseline rises by otherwise")
+        .define("AT_REST", at_rest, "signal at rest, with settled memory")
+        .define("REST_LEVEL", level, "signal at rest in the calibration")
+        .define("REST_PULL", pull, "share of a negative excess that is followed")
+        .define("REST_LEAK", leak, "rise of the baseline otherwise")
         .define("REST_AVERAGE", average, "share of a sample in the running average")
-        .define("REST_MOST", most, "what an excess counts for at most")
-        .define("REST_FURTHEST", furthest, "the furthest that the baseline goes");
+        .define("REST_MOST", most, "largest excess that counts")
+        .define("REST_FURTHEST", furthest, "largest size of the baseline");
 }

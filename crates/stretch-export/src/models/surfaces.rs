@@ -21,7 +21,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     let (factor, shift) = (rate.change_factor, rate.change_shift);
     let mut constants = Constants::default();
     constants
-        .define("CODES", 1u32 << adc_bits, "the first number that is no code")
+        .define("CODES", 1u32 << adc_bits, "number of codes")
         .define("ALIGN", 1u32 << (16 - adc_bits), "moves a code to the upper end of 16 bits")
         .define("WINDOW", rate.window as i32, "samples")
         .define("DEGREE", rate.degree as i32, "of the polynomial that gives the rate");
@@ -35,13 +35,13 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     constants
         .define("SHIFT", rate.shift as i32, "low bits of the weighted sum that are rounded away")
         .define("HALF", half, "")
-        .define("CHANGE", factor, "from a rate to a change a sample")
+        .define("CHANGE", factor, "from a rate to a change per sample")
         .define("CHANGE_SHIFT", shift as i32, "")
-        .define("DEAD_BAND", *dead_band as u32, "the largest rate that keeps the branch")
+        .define("DEAD_BAND", *dead_band as u32, "rates up to this one keep the branch")
         .define(
             "MIRROR",
             if *falling { u32::MAX } else { 0 },
-            "all ones where a rising signal means a falling target",
+            "all ones if a rising signal means a falling target",
         );
     let (model, surface, has) = match surfaces {
         CodeMap::Line(ranged) => {
@@ -108,14 +108,14 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         .define("WINDOW", window as i32, "samples")
         .array("float", "taps", filter.taps())
         .define("PERIOD_S", model.period_s(), "from a sample to the next")
-        .define("DEAD_BAND", direction.dead_band, "the largest rate that keeps the branch")
+        .define("DEAD_BAND", direction.dead_band, "rates up to this one keep the branch")
         .word("RISING", rising, "the branch of a rising signal")
         .word("FALLING", falling, "");
     let (name, surface) = match model.map() {
         Map::Line(line) => {
             let Line { signal, offset, slope, intercept } = line;
             constants
-                .define("SIGNAL_MIN", signal.min, "the signal that the fit saw")
+                .define("SIGNAL_MIN", signal.min, "range of the signal in the fit")
                 .define("SIGNAL_MAX", signal.max, "")
                 .define("OFFSET", *offset, "")
                 .define("SLOPE", *slope, "")
@@ -130,9 +130,9 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             let degree = curve.surface.degree();
             let coefficients = curve.surface.coefficients();
             constants
-                .define("SIGNAL_MIN", curve.signal.min, "the signal that the fit saw")
+                .define("SIGNAL_MIN", curve.signal.min, "range of the signal in the fit")
                 .define("SIGNAL_MAX", curve.signal.max, "")
-                .define("RATE_MIN", curve.rate.min, "its rate")
+                .define("RATE_MIN", curve.rate.min, "range of its rate in the fit")
                 .define("RATE_MAX", curve.rate.max, "")
                 .define("OFFSET", curve.offset, "")
                 .define("DEGREE", i32::from(degree.volts()), "")

@@ -132,7 +132,13 @@ fn check_effect_parameter(effect: &str, p: &EffectParameter) -> Result<(), Descr
         return Err(DescriptionError::Range { owner: owner(), min: p.min, max: p.max });
     }
     if p.is_log() {
-        number(&owner, "min", p.min, "above 0, because it is searched on a logarithmic scale", |x| x > 0.0)?;
+        number(
+            &owner,
+            "min",
+            p.min,
+            "above 0, because it is searched on a logarithmic scale",
+            |x| x > 0.0,
+        )?;
     }
     let form = p.usual_form().unwrap_or(p.min);
     number(&owner, "form", form, "within its range", |x| (p.min..=p.max).contains(&x))?;

@@ -161,7 +161,9 @@ impl RecordFacts {
     ) -> Result<(), DescriptionError> {
         let owner = || "record".to_owned();
         let whole = |what, found: usize| {
-            number(&owner, what, found as f64, "equal to the number of samples", |_| found == samples)
+            number(&owner, what, found as f64, "equal to the number of samples", |_| {
+                found == samples
+            })
         };
         if !self.is_lost.is_empty() {
             whole("the number of flags of lost samples", self.is_lost.len())?;

@@ -216,7 +216,8 @@ pub(crate) fn detection_limit_note(
         let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
         note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0))))
     };
-    let begin = Note::default().text("An effect would have been named if it were stronger than its limit: ");
+    let begin = Note::default()
+        .text("An effect would have been named if it were stronger than its limit: ");
     let listed = known.iter().take(LISTED).enumerate().fold(begin, one);
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     let how = format!("{rest} (with probability 0.9, by linearised draws).");

@@ -74,8 +74,9 @@ impl Checked {
         let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());
         let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;
         let mut notes: Vec<String> = cut.into_iter().chain(columns.notes.iter().cloned()).collect();
-        let grid = Grid::samples(columns.dt_s)
-            .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time columns"))?;
+        let grid = Grid::samples(columns.dt_s).map_err(|e| {
+            ProblemError::value("recordings", e.to_string(), "check their time columns")
+        })?;
         let stated = |column: &str| stated_unit(stages, inputs, column);
         let unit_of = |column: &str| match stated(column) {
             "" => unit_of(column),
@@ -471,8 +472,10 @@ fn check_known(
     }
     let fed_back = stages.iter().find(|s| s.inputs.contains(&s.output));
     fed_back.map_or(Ok(()), |s| {
-        let found =
-            format!("its output {} is one of its inputs, so the simulator would get the answer", s.output);
+        let found = format!(
+            "its output {} is one of its inputs, so the simulator would get the answer",
+            s.output
+        );
         let hint = "drive the stage by a command or by the output of another stage";
         Err(ProblemError::value(format!("stage {}", s.name), found, hint))
     })

@@ -34,7 +34,8 @@ impl Agreed {
             Family::Late => format!("late {}", by(low, high)),
             Family::Loop => format!("behind after a turn {}", by(low, high)),
         };
-        let names = Note::default().text("these data cannot distinguish ").effects(&self.names, " from ");
+        let names =
+            Note::default().text("these data cannot distinguish ").effects(&self.names, " from ");
         names.text(format!("; all of them agree on: {}", range.trim_end()))
     }
 }

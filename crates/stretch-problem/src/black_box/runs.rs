@@ -223,8 +223,11 @@ impl Runs {
         let mut made = self.lock();
         for &i in mine {
             let run = &wanted[i];
-            let nothing =
-                || Err(SourceError::Gone("the simulator returned fewer outputs than were requested".into()));
+            let nothing = || {
+                Err(SourceError::Gone(
+                    "the simulator returned fewer outputs than were requested".into(),
+                ))
+            };
             let answer = answers.next().unwrap_or_else(nothing);
             let answer = answer.and_then(|values| self.checked(session, run, values)).map(Arc::new);
             let kept = (run.trials, answer);

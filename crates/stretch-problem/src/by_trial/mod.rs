@@ -137,7 +137,9 @@ fn compared(
         p.drift.is_some() || p.per_trial_sd.is_some() || p.per_tick_sd.is_some()
     };
     if simulator.parameters().iter().any(is_nuisance) {
-        return refused("the runs share parameters that drift or differ between trials, so they cannot be fitted separately");
+        return refused(
+            "the runs share parameters that drift or differ between trials, so they cannot be fitted separately",
+        );
     }
     let Examined { diagnosis, evidence, .. } = examined;
     let found = evidence.candidates.first().filter(|_| !diagnosis.named.is_empty());

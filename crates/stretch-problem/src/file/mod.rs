@@ -101,7 +101,9 @@ impl ProblemSpec {
     pub fn to_toml_with(&self, path: &Path, remarks: &Remarks) -> String {
         let mut remarks = remarks.clone();
         if self.simulator.is_none() {
-            remarks.head.push("The simulator was an object in memory: add the key simulator.".into());
+            remarks
+                .head
+                .push("The simulator was an object in memory: add the key simulator.".into());
         }
         remarks.write(&Self { folder: self.folder_from(path).unwrap_or_default(), ..self.clone() })
     }

@@ -105,7 +105,8 @@ impl GaugeSession {
         }
         if reference == "bridge_v" || signal == "length_mm" {
             let column = format!("--reference {reference}, --signal {signal}");
-            let hint = "exchange them: the reference is the length, the signal is the output of the gauge";
+            let hint =
+                "exchange them: the reference is the length, the signal is the output of the gauge";
             return Err(ProblemError::implausible(column, "the two look swapped", hint));
         }
         let mut shares = Vec::new();

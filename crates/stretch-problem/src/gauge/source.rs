@@ -79,10 +79,10 @@ fn columns_of<'a>(
             let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
             let (own, names) = (&first.name, names.join(", "));
             Err(ProblemError::too_little(
+                format!("{own} is a gauge alone, but its reference and its signal are not known"),
                 format!(
-                    "{own} is a gauge alone, but its reference and its signal are not known"
+                    "name their columns with --reference and --signal; the columns are {names}"
                 ),
-                format!("name their columns with --reference and --signal; the columns are {names}"),
             ))
         }
     }

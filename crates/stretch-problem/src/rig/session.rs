@@ -252,7 +252,11 @@ impl RigSession {
                 return bad("pressure_kpa", spread(pressure), "this looks like Pa: divide by 1000");
             }
             if pressure.1 < 20.0 {
-                return bad("pressure_kpa", spread(pressure), "this looks like bar: multiply by 100");
+                return bad(
+                    "pressure_kpa",
+                    spread(pressure),
+                    "this looks like bar: multiply by 100",
+                );
             }
         }
         self.check_directions()

@@ -217,8 +217,11 @@ impl Workers {
         match self.try_once(asks) {
             Ok(answers) => answers,
             Err(why) => {
-                let again =
-                    if why == lost { String::new() } else { format!("\nthe first failure: {lost}") };
+                let again = if why == lost {
+                    String::new()
+                } else {
+                    format!("\nthe first failure: {lost}")
+                };
                 all(SourceError::Gone(format!(
                     "simulator {}: the worker failed twice on a batch of {} model(s): {why}{again}",
                     self.spec.shown(),

@@ -175,7 +175,7 @@ fn without_an_open_end(
     cut.channels.iter_mut().for_each(|channel| channel.values.truncate(last));
     let end_s = cut.time_s.last().copied().unwrap_or_default();
     let note = format!(
-        "{}: {reference} ends at {end_s:.2} s; the {} samples behind it are not fitted",
+        "{}: {reference} ends at {end_s:.2} s; the {} samples after it are not fitted",
         trial.name,
         values.len() - last
     );

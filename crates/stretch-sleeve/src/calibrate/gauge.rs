@@ -45,11 +45,11 @@ impl LiveGauge {
         };
         let (Some((watch, memory)), Some(turns)) = (self.watch, gauge.turns()) else {
             return refused(
-                "it does not hold where movements turn, so that its zero cannot be followed: calibrate on a minute or more of movements",
+                "it holds no turning points of movements, so that its zero cannot be followed: calibrate on a minute or more of movements",
             );
         };
         if follows_rest(gauge.calibration()) {
-            return refused("its model follows the zero at rest already");
+            return refused("its model already follows the zero at rest");
         }
         Ok(Self { watch: Some((watch.following(turns), memory)), ..self })
     }

@@ -30,7 +30,7 @@ fn a_state_of_another_version_is_refused_by_name() {
     assert_eq!(newer[..5], *b"STRF\x01");
     newer[4] = 2;
     let told = merged(&[Some(state()), Some(newer)]).refused.unwrap();
-    assert!(told.contains("it is of version 2, and this release reads version 1"), "{told}");
+    assert!(told.contains("it has version 2, but this release reads version 1"), "{told}");
 }
 
 #[test]
@@ -38,9 +38,9 @@ fn a_state_of_another_fit_is_refused_by_name() {
     let mut other = state();
     other[7] = 2;
     let told = merged(&[Some(other)]).refused.unwrap();
-    assert!(told.contains("it is of poly12, where poly13 is merged"), "{told}");
+    assert!(told.contains("it is a state of poly12, but states of poly13 are merged"), "{told}");
     let told = merged(&[Some(b"PAR1".to_vec())]).refused.unwrap();
-    assert!(told.contains("these bytes are no state of a fit"), "{told}");
+    assert!(told.contains("these bytes are not a state of a fit"), "{told}");
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn states_of_other_rates_are_not_merged() {
     let mut theirs = ours.clone();
     theirs[at..at + 2].copy_from_slice(b"15");
     let told = merged(&[Some(ours), Some(theirs)]).refused.unwrap();
-    assert!(told.contains("\"window\":15") && told.contains("merge them apart"), "{told}");
+    assert!(told.contains("\"window\":15") && told.contains("merge them separately"), "{told}");
 }
 
 #[test]

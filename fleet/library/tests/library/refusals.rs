@@ -18,11 +18,12 @@ fn changed(change: impl Fn(usize, &mut Row)) -> Vec<Row> {
 
 #[test]
 fn what_no_fit_is_possible_of_says_why() {
+    const MISSING: &str = "all 600 rows have a value that is missing or not finite";
     let cases: [(Vec<Row>, &str); 10] = [
         (vec![], "there are no rows"),
-        (changed(|_, row| row.1 = None), "all 600 rows lack a finite number"),
-        (changed(|_, row| row.3 = Some(f64::NAN)), "all 600 rows lack a finite number"),
-        (changed(|_, row| row.2 = Some(f64::INFINITY)), "all 600 rows lack a finite number"),
+        (changed(|_, row| row.1 = None), MISSING),
+        (changed(|_, row| row.3 = Some(f64::NAN)), MISSING),
+        (changed(|_, row| row.2 = Some(f64::INFINITY)), MISSING),
         (changed(|_, row| row.1 = row.1.map(f64::abs)), "the signal never falls"),
         (changed(|_, row| row.1 = row.1.map(|r| -r.abs() - 1e-9)), "the signal never rises"),
         (changed(|_, row| row.2 = Some(1.5)), "the signal is 1.5 in all 600 rows"),
@@ -65,7 +66,7 @@ fn one_bad_sensor_of_many_is_a_row() {
     let batch = ask(&session(&rows, 2), sql).unwrap();
     let all = fits(batch.column(1));
     assert_eq!(all[0].refused, None);
-    assert!(all[1].refused.as_ref().unwrap().contains("one branch is no calibration"));
+    assert!(all[1].refused.as_ref().unwrap().contains("the signal never falls"));
 }
 
 #[test]
@@ -106,6 +107,6 @@ fn rates_of_another_estimator_than_the_records_are_refused() {
     let other = stretch_calibrate::calibration_to_json(&other).unwrap();
     let sql = format!("select strain_estimate('{other}', rate, bridge_v) from trials");
     let error = ask(&session, &sql).unwrap_err().to_string();
-    assert!(error.contains("the rates are by Savitzky-Golay"), "{error}");
+    assert!(error.contains("the rates of the table come from Savitzky-Golay"), "{error}");
     assert!(error.contains("a central difference"), "{error}");
 }

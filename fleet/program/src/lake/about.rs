@@ -68,7 +68,7 @@ impl About {
         let found = about.schema;
         ensure!(
             found == SCHEMA,
-            "{}: this is layout {found} of a lake, and this release reads layout {SCHEMA}",
+            "{}: the lake has layout {found}, but this release reads layout {SCHEMA}",
             path.display()
         );
         about.sample_rate().with_context(|| path.display().to_string())?;
@@ -96,7 +96,7 @@ impl About {
     pub(crate) fn check(&self, other: &Self) -> Result<(), String> {
         let differs = |what: &str, own: &str, other: &str| {
             format!(
-                "its {what} is {other}, and that of the lake is {own}: one query cannot fit both; make another lake of it"
+                "its {what} is {other}, but that of the lake is {own}, and one query cannot fit both: use another lake for it"
             )
         };
         let at = |about: &Self| format!("{} at {} Hz", spelled(about.rate), about.sample_rate_hz);
@@ -168,7 +168,7 @@ impl Footer {
         let pair = pairs.into_iter().flatten().find(|pair| pair.key == KEY);
         let Some(text) = pair.and_then(|pair| pair.value.as_ref()) else {
             bail!(
-                "its footer says nothing of the trial: it is no file of a lake; ingest the trial"
+                "its footer does not describe a trial, so that it is not a file of a lake; ingest the trial"
             );
         };
         serde_json::from_str(text).context("its footer cannot be read")

@@ -4,7 +4,7 @@
 //! DIR/lake.json                                                    signal, reference, rate estimator, sample rate
 //! DIR/trials/site=S/rig=R/sensor=N/date=YYYY-MM-DD/<digest>.parquet  one trial, sorted by time
 //! DIR/states/poly13/site=S/rig=R/<YYYY-MM>.parquet                 partial fits, a row a sensor and day
-//! DIR/refused/                                                     a sentence for each file that is not in the lake
+//! DIR/refused/                                                     the reason for each file that is not in the lake
 //! DIR/.stretch-lock                                                locked by the command that writes
 //! ```
 
@@ -76,7 +76,9 @@ impl Lake {
     pub(crate) fn open(folder: &Path) -> anyhow::Result<Self> {
         let shown = folder.display();
         let Some(about) = About::read(folder)? else {
-            bail!("{shown} is no lake: it has no lake.json; stretch-fleet ingest makes one");
+            bail!(
+                "{shown} is not a lake, because it has no lake.json; stretch-fleet ingest creates one"
+            );
         };
         let folder = folder.canonicalize().with_context(|| shown.to_string())?;
         let paths = files(&folder.join("trials"))?;
@@ -252,8 +254,8 @@ pub(crate) fn set_aside(lake: &Lake) -> anyhow::Result<Vec<Refused>> {
     if let Some(Unfit { path, why, .. }) = others.first() {
         ensure!(
             others.len() <= lake.files.len(),
-            "lake.json fits {} of the lake's files and does not fit {}, the first {}: {why}. Nothing was moved: put lake.json \
-             right, or take those files out",
+            "lake.json fits {} of the lake's files but not {} others, the first of them {}: {why}. Nothing was moved: correct \
+             lake.json, or remove those files",
             lake.files.len(),
             others.len(),
             path.display()

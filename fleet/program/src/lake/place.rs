@@ -69,7 +69,7 @@ impl Place {
         let forms = ["%Y-%m-%d", "%Y%m%d"];
         let read = forms.iter().find_map(|form| NaiveDate::parse_from_str(date, form).ok());
         let Some(date) = read else {
-            bail!("{date:?} is no date: write 2026-11-21 or 20261121");
+            bail!("{date:?} is not a date: write 2026-11-21 or 20261121");
         };
         let [site, rig, sensor] = [site, rig, sensor].map(str::to_owned);
         Ok(Self { site, rig, sensor, date })
@@ -84,7 +84,7 @@ impl Place {
     /// Parses the place of a path below `trials`.
     pub(crate) fn of(path: &Path) -> anyhow::Result<Self> {
         let named = folder_values(path).filter(|_| path.components().count() == COLUMNS.len() + 1);
-        let named = named.context("it is in no folder site=../rig=../sensor=../date=..")?;
+        let named = named.context("it is not in a folder site=../rig=../sensor=../date=..")?;
         Self::new(named.each_ref().map(String::as_str))
     }
 
@@ -164,7 +164,7 @@ fn partition(path: &Path) -> anyhow::Result<Option<[String; 4]>> {
     };
     ensure!(
         values.as_ref().is_none_or(is_place),
-        "{}: no query can leave it out, for its folders are no places; take it out of the lake",
+        "{}: no query can leave this file out, because its folders are not valid places; move it out of the lake",
         path.display()
     );
     Ok(values)

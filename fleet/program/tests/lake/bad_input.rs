@@ -51,7 +51,7 @@ fn a_column_that_one_file_lacks_is_null_there_and_said() {
         told.contains("note: 1 of 3 files have no column bridge_v, the first is 2.csv"),
         "{told}"
     );
-    assert!(told.contains("no record of site/rig/2:"), "{told}");
+    assert!(told.contains("no calibration of site/rig/2:"), "{told}");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn a_sensor_with_too_little_is_a_row_that_says_so() {
         assert!(row[2] == lost && row[3].is_empty() && !row[4].is_empty(), "{row:?}");
     }
     let told = said("calibrate --lake {} --out {}", &[&lake, &folder.path().join("out")]);
-    assert!(told.contains("0 records of 2 sensors, 2 refused"), "{told}");
+    assert!(told.contains("0 calibrations of 2 sensors, 2 refused"), "{told}");
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn rates_of_another_estimator_are_refused() {
         "ingest {} --lake {} --sensor 3 --date 2026-01-01 --rate difference:8",
         &[&path, &lake],
     );
-    let sentence = "its rate estimator is difference:8 at 100 Hz, and that of the lake is savgol:11,2 at 100 Hz";
+    let sentence = "its rate estimator is difference:8 at 100 Hz, but that of the lake is savgol:11,2 at 100 Hz";
     assert!(told.contains(sentence), "{told}");
     // A calibration for rates that the lake does not have.
     let out = folder.path().join("out");
@@ -155,7 +155,7 @@ fn a_sensor_has_one_rest_length() {
     let path = file(folder.path(), &trial("again.csv", 0.5));
     let line = "ingest {} --lake {} --sensor 1 --date 2026-01-02";
     let told = warned(&format!("{line} --rest-length 190"), &[&path, &lake]);
-    assert!(told.contains("and --rest-length says 190: one fit cannot have two zeros"), "{told}");
+    assert!(told.contains("but --rest-length is 190, and one fit cannot use both"), "{told}");
     assert!(said(line, &[&path, &lake]).contains("1 trials written"));
     // (L0 - L)/L0 has the same L0 for both trials.
     let rests = "select max(r) - min(r) from (select length_mm / (1.0 - contraction) as r from trials where sensor = '1')";
@@ -171,7 +171,9 @@ fn two_records_of_one_trial_are_said() {
     let again = file(&folder.path().join("again"), &trial("1.csv", 0.1));
     let told = warned(line, &[&again, &lake]);
     assert!(
-        told.contains("it is a second record of trial 1.csv of site/rig/1 of 2026-01-01"),
+        told.contains(
+            "the lake already has a trial 1.csv of site/rig/1 of 2026-01-01 with other samples"
+        ),
         "{told}"
     );
     // the same samples in another format
@@ -179,11 +181,11 @@ fn two_records_of_one_trial_are_said() {
     let semicolons = folder.path().join("other.csv");
     fs::write(&semicolons, text.replace(',', ";")).unwrap();
     let told = warned(line, &[&semicolons, &lake]);
-    assert!(told.contains("a trial counted twice would weigh double"), "{told}");
+    assert!(told.contains("a trial that is used twice would have twice its weight"), "{told}");
     // the same file for another sensor
     let first = folder.path().join("1.csv");
     let told = warned("ingest {} --lake {} --sensor 9 --date 2026-01-01", &[&first, &lake]);
-    assert!(told.contains("the lake has it already as a trial of site/rig/1"), "{told}");
+    assert!(told.contains("the lake already has it as a trial of site/rig/1"), "{told}");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["1200"]]);
 }
 
@@ -196,7 +198,7 @@ fn a_damaged_file_of_the_lake_is_set_aside() {
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     let told = said("calibrate --lake {} --out {}", &[&lake, &folder.path().join("out")]);
     assert!(told.contains("it is damaged; ingest its trial again"), "{told}");
-    assert!(told.contains("1 records of 1 sensors"), "{told}");
+    assert!(told.contains("1 calibrations of 1 sensors"), "{told}");
     assert!(path.exists(), "a question moved a file");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
     // The next ingest moves the file to `refused`, adds its trial again, and reports this.
@@ -233,7 +235,7 @@ fn what_stands_beside_a_damaged_file_is_read() {
     assert_eq!(told.len(), 2);
     let out = folder.path().join("out");
     let told = said("calibrate --lake {} --out {}", &[&lake, &out]);
-    assert!(told.contains("left out:") && told.contains("2 records of 2 sensors"), "{told}");
+    assert!(told.contains("left out:") && told.contains("2 calibrations of 2 sensors"), "{told}");
 }
 
 /// If lake.json contradicts all trials, lake.json is wrong: queries report this, and no trial is
@@ -247,14 +249,14 @@ fn a_wrong_number_in_lake_json_moves_nothing() {
     fs::write(&path, text.replace("100.0", "101.0")).unwrap();
     let before = tree(&lake);
     let (is_answered, told) = asked(&lake, "select count(*) from trials", &[]);
-    assert!(!is_answered && told.contains("and that of the lake is"), "{told}");
+    assert!(!is_answered && told.contains("but that of the lake is"), "{told}");
     for line in ["calibrate --lake {} --out {}", "diagnose --lake {} --out {}"] {
         refused(line, &[&lake, &folder.path().join("out")]);
     }
     let more = file(folder.path(), &trial("3.csv", 0.5));
     let line = "ingest {} --lake {} --sensor 3 --date 2026-01-01";
     let told = refused(line, &[&more, &lake]);
-    assert!(told.contains("Nothing was moved: put lake.json right"), "{told}");
+    assert!(told.contains("Nothing was moved: correct lake.json"), "{told}");
     assert!(tree(&lake) == before);
     for wrong in ["-100.0", "1e999", "\"100\"", "null"] {
         fs::write(&path, text.replace("100.0", wrong)).unwrap();

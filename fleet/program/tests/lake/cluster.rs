@@ -71,7 +71,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     std::fs::remove_dir_all(lake.join("states")).unwrap();
     let told = said(&format!("calibrate --lake {{}} --out {{}} --cluster {url}"), &[&lake, &there]);
     assert!(
-        told.contains("5 records of 5 sensors, 0 refused; 3 months of rigs computed now"),
+        told.contains("5 calibrations of 5 sensors, 0 refused; 3 months of rigs computed now"),
         "{told}"
     );
     assert_eq!(bytes(&here).len(), bytes(&there).len());
@@ -83,7 +83,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     assert!(told.contains("left out:") && told.contains("1 months of rigs computed now"), "{told}");
     std::fs::remove_dir_all(lake.join("states")).unwrap();
     let told = said(&format!("calibrate --lake {{}} --out {{}} --cluster {url}"), &[&lake, &there]);
-    assert!(told.contains("left out:") && told.contains("5 records of 5 sensors"), "{told}");
+    assert!(told.contains("left out:") && told.contains("5 calibrations of 5 sensors"), "{told}");
     assert_same_fits(&here, &there);
 }
 

@@ -37,7 +37,8 @@ fn drift_names_the_sensors_that_moved() {
         refused("drift --lake {} --from 2026-01 --to 2026-01", &[&lake])
             .contains("compared with itself")
     );
-    assert!(refused("drift --lake {} --from 1.26 --to 2026-01", &[&lake]).contains("is no month"));
+    let told = refused("drift --lake {} --from 1.26 --to 2026-01", &[&lake]);
+    assert!(told.contains("is not a month"), "{told}");
 }
 
 #[test]
@@ -96,14 +97,14 @@ fn answers_come_as_a_table_csv_and_records() {
     assert!(csv.starts_with("sensor,rows,rows_left_out,rmse,"), "{csv}");
     assert!(ask(&["--csv"], "select 1 as a where 1 = 2").starts_with('a'));
     let told = ask(&["--records", &out.display().to_string()], fit);
-    assert!(told.contains("2 records, 0 refused"), "{told}");
+    assert!(told.contains("2 calibrations, 0 refused"), "{told}");
     let record = stretch_calibrate::read_calibration(&out.join("a.json")).unwrap();
     assert_eq!(
         (record.spec().signal.as_str(), record.spec().reference.as_str()),
         ("bridge_v", "length_mm")
     );
     let told = ask(&["--records", &out.display().to_string()], "select count(*) from trials");
-    assert!(told.contains("the answer has no column record"), "{told}");
+    assert!(told.contains("the result has no column record"), "{told}");
     let told = ask(&[], "select nonsense from trials");
     assert!(told.contains("nonsense"), "{told}");
     // A custom query on the estimates of a calibration.
@@ -196,7 +197,8 @@ fn a_question_only_reads_unless_it_may_write() {
         "set datafusion.execution.batch_size = 1",
     ] {
         let (is_answered, told) = asked(&lake, query, &[]);
-        assert!(!is_answered && told.contains("--write allows what writes"), "{query}: {told}");
+        let says = "allow statements that write with --write";
+        assert!(!is_answered && told.contains(says), "{query}: {told}");
     }
     assert!(!to.exists() && tree(&lake) == before);
     for query in ["select * from '/etc/passwd'", "select 1 from trials where"] {
@@ -226,7 +228,7 @@ fn records_stay_in_their_folder() {
     let absolute = format!("'{}'", folder.path().join("absolute").display());
     for sensor in ["'../../escaped'", "'..'", "'a/b'", "'.hidden'", "''", "null", &absolute] {
         let (is_answered, told) = asked(&lake, &fit(sensor), &["--records", &shown]);
-        assert!(is_answered && told.contains("0 records, 1 refused"), "{sensor}: {told}");
+        assert!(is_answered && told.contains("0 calibrations, 1 refused"), "{sensor}: {told}");
         assert!(told.contains("cannot be a sensor"), "{sensor}: {told}");
     }
     let names: Vec<_> = tree(folder.path()).into_keys().collect();
@@ -234,8 +236,8 @@ fn records_stay_in_their_folder() {
     // A second row with the same name is refused.
     let twice = format!("({0}) union all ({0})", fit("'00000'"));
     let (is_answered, told) = asked(&lake, &twice, &["--records", &shown]);
-    assert!(is_answered && told.contains("1 records, 1 refused"), "{told}");
-    assert!(told.contains("another row of the answer has that name"), "{told}");
+    assert!(is_answered && told.contains("1 calibrations, 1 refused"), "{told}");
+    assert!(told.contains("another row of the result has the same name"), "{told}");
 }
 
 /// Sums are added in the order of files and rows, whichever thread computes them.

@@ -83,7 +83,7 @@ fn a_record_is_that_of_a_calibration() {
     );
     assert!(
         said("calibrate --lake {} --out {}", &[&lake, &out])
-            .contains("1 records of 1 sensors, 0 refused")
+            .contains("1 calibrations of 1 sensors, 0 refused")
     );
     let found = read_calibration(&out.join("site/rig/1.json")).unwrap();
     let read = |path: &Path| {
@@ -131,9 +131,9 @@ fn a_damaged_trial_is_named_and_the_rest_goes_on() {
     let line = "ingest {} --lake {} --from-path {sensor}_{date}.csv";
     let told = warned(line, &[&logs, &lake]);
     assert!(told.contains("1 trials written (600 rows), 0 there already, 2 refused"), "{told}");
-    assert!(told.contains("2 files are not in the lake"), "{told}");
+    assert!(told.contains("2 files were not added to the lake"), "{told}");
     assert!(told.contains("2_20260101.csv") && told.contains("nonsense"), "{told}");
-    assert!(told.contains("does not fit the pattern"), "{told}");
+    assert!(told.contains("does not match the pattern"), "{told}");
     assert_eq!(bytes(&lake.join("refused")).len(), 2);
     // Once corrected, the trial is in the lake, and its error is removed.
     fs::write(logs.join("2_20260101.csv"), text).unwrap();
@@ -156,9 +156,9 @@ fn what_nobody_says_is_asked_for() {
     let told = warned("ingest {} --lake {} --sensor a/b --date 2026-01-01", &[&path, &lake]);
     assert!(told.contains("cannot be a sensor"), "{told}");
     let told = warned("ingest {} --lake {} --sensor 1 --date 3.1.2026", &[&path, &lake]);
-    assert!(told.contains("is no date: write 2026-11-21"), "{told}");
+    assert!(told.contains("is not a date: write 2026-11-21"), "{told}");
     let told = refused("sql --lake {} x", &[folder.path()]);
-    assert!(told.contains("is no lake"), "{told}");
+    assert!(told.contains("is not a lake"), "{told}");
     let told =
         refused("ingest {} --lake {} --signal knee_v", &[&path, &folder.path().join("other")]);
     assert!(told.contains("knee_v"), "{told}");
@@ -208,7 +208,7 @@ fn the_same_samples_under_another_date_are_refused() {
     let semicolons = folder.path().join("b.csv");
     fs::write(&semicolons, fs::read_to_string(&first).unwrap().replace(',', ";")).unwrap();
     let told = warned(&format!("{line} --date 2026-01-02"), &[&semicolons, &lake]);
-    assert!(told.contains("a trial counted twice would weigh double"), "{told}");
+    assert!(told.contains("a trial that is used twice would have twice its weight"), "{told}");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
 }
 
@@ -272,5 +272,5 @@ fn a_device_or_a_pipe_among_the_logs_is_refused() {
     let told = String::from_utf8_lossy(&told);
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(told.contains("1 trials written (600 rows), 0 there already, 2 refused"), "{told}");
-    assert_eq!(told.matches("it is no file").count(), 2, "{told}");
+    assert_eq!(told.matches("it is not a regular file").count(), 2, "{told}");
 }

@@ -127,7 +127,7 @@ fn calibrations_go_on_where_they_were_killed() {
     let computed = 9 - left;
     assert!(
         told.contains(&format!(
-            "6 records of 6 sensors, 0 refused; {computed} months of rigs computed now"
+            "6 calibrations of 6 sensors, 0 refused; {computed} months of rigs computed now"
         )),
         "{told}"
     );
@@ -213,7 +213,10 @@ fn the_lock_of_a_dead_command_is_nobodys() {
     let mut waits = Command::new(PROGRAM).args(words).stderr(Stdio::piped()).spawn().unwrap();
     let mut told = String::new();
     BufReader::new(waits.stderr.take().unwrap()).read_line(&mut told).unwrap();
-    assert!(told.contains("another command writes into it") && left.exists(), "{told}");
+    assert!(
+        told.contains("another command is writing into this folder") && left.exists(),
+        "{told}"
+    );
     drop(held);
     assert!(waits.wait().unwrap().success());
     assert!(!left.exists() && fleet("sql --lake {} x", &[&lake]).status.code() == Some(1));

@@ -23,7 +23,7 @@ use super::{
 };
 
 /// Note on data that are too short to show the usual differences between channels.
-const TOO_SHORT: &str = "too little was recorded to say when a gauge has shifted against the others: that takes a minute or more";
+const TOO_SHORT: &str = "the trials are too short to detect later whether a gauge has shifted relative to the others: record at least a minute";
 
 /// Options of [`calibrate_array`].
 #[derive(Debug, Clone, PartialEq, Default)]

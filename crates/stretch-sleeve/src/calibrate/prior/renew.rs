@@ -230,7 +230,7 @@ impl Prior {
         Err(SleeveError::Prior {
             file: "these data".into(),
             problem: format!(
-                "they hold no whole movement: {:.3} {} from end to end (earlier sessions: {:.3}), and {passes} passes between the ends; \
+                "they contain no complete movement: {:.3} {} from end to end (earlier sessions: {:.3}), and {passes} passes between the ends; \
                  move over the whole range, at least once up and down, or record some seconds with a reference (stretch calibrate --prior)",
                 span * unit,
                 unit_of(&self.reference),

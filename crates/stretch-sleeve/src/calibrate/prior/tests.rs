@@ -284,7 +284,7 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
         let error = prior.renew(&[without(trial)], &options).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     };
-    refused(session(9, 0, 1.0), RenewOptions::default(), "no whole movement");
+    refused(session(9, 0, 1.0), RenewOptions::default(), "no complete movement");
     refused(session(2, 9, 60.0), options, "999 of 1000 sessions");
     let exchanged = |mut trial: Trial| {
         let (first, second) = trial.channels.split_at_mut(1);

@@ -350,7 +350,7 @@ impl Prior {
             ),
             known => {
                 format!(
-                    "the prior has sessions of {}, none of {}",
+                    "the prior has sessions of {}, but none of {}",
                     path[..known].join("/"),
                     path.join("/")
                 )

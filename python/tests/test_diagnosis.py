@@ -236,7 +236,9 @@ def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
 
 
 def test_no_effect_can_be_named_at_a_depth_of_0():
-    with pytest.raises(stretch_gap.StretchError, match="depth: 0 effects cannot be named; give 1 or more"):
+    with pytest.raises(
+        stretch_gap.StretchError, match="depth is 0, the largest number of effects that may be named; give 1 or more"
+    ):
         diagnose(Spring(), BENT, depth=0)
 
 
@@ -351,7 +353,7 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
     ("more", "words"),
     [
         ({"output": "width_mm"}, "there is no column width_mm; the columns are force_N, length_mm"),
-        ({"output": None}, "say what is compared with the measurement"),
+        ({"output": None}, "give either output, the name of the measured column, or stages"),
         ({"wrap": ["output.backlsh"]}, "did you mean output.backlash"),
         ({"wrap": ["input.delay"]}, "must take the argument inputs"),
         ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),
@@ -445,7 +447,7 @@ def test_a_problem_that_is_a_file_takes_an_object_or_its_own_simulator(problem_f
     here = stretch_gap.diagnose(names["Spring"](), problem_file)
     # the same object in another process: the same bits
     assert here.probabilities == own.probabilities and here.parameters == own.parameters
-    with pytest.raises(stretch_gap.StretchError, match="says what is diagnosed"):
+    with pytest.raises(stretch_gap.StretchError, match="defines output, stages, parameters and effects"):
         stretch_gap.diagnose(Spring(), problem_file, output="length_mm")
     with pytest.raises(stretch_gap.StretchError, match="there is no simulator"):
         stretch_gap.diagnose(None, {"force_N": FORCE, "length_mm": BENT})

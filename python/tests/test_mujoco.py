@@ -153,17 +153,17 @@ def test_what_cannot_be_right_is_told_with_what_to_do():
     asked = commands(["elbow"], 4.0)["elbow"]
     seen = measured(ONE, lambda spec: None, {"elbow": asked})["elbow"]
     told("never moved.*leave it out", joints=["elbow"], columns={"elbow_rad": np.zeros_like(asked)})
-    told("is the measurement", columns={"elbow_cmd_rad": seen})
-    told("same in every row, yet the joint moves", columns={"elbow_cmd_rad": np.zeros_like(asked)})
-    told("one is in degrees by its name", called={"elbow_rad": "elbow_deg"})
+    told("is equal to the measurement", columns={"elbow_cmd_rad": seen})
+    told("same value in every row, although the joint moves", columns={"elbow_cmd_rad": np.zeros_like(asked)})
+    told("one of elbow_cmd_rad and elbow_deg is in degrees and one is not", called={"elbow_rad": "elbow_deg"})
     narrow = ONE.replace('armature="0.02"', 'armature="0.02" range="-60 60"')
     turned = {"elbow_cmd": np.degrees(asked), "elbow": np.degrees(seen)}
     names = {"elbow_cmd_rad": "x", "elbow_rad": "y"}
-    told("these are degrees. Say degrees=True", model=narrow, columns=turned, called=names)
+    told("in degrees; give degrees=True", model=narrow, columns=turned, called=names)
     ball = ONE.replace("<geom", '<geom name="g"').replace('type="hinge" axis="0 1 0" armature="0.02"', 'type="ball"')
     told("quaternion", model=ball.split("<actuator>")[0] + "</mujoco>", joints=["elbow"])
     told(
-        "is no position actuator",
+        "is not a position actuator",
         model=ONE.replace('<position name="motor" joint="elbow" kp="20" kv="1"/>', '<motor name="motor" joint="elbow"/>'),
     )
 

@@ -161,7 +161,7 @@ def test_an_mcap_file_that_breaks_off_is_read_up_to_there(tmp_path):
     path.write_bytes(path.read_bytes()[:3000])
     recording = stretch_gap.read(path)
     assert 5 < recording["a.b"].size < 50
-    assert any("it breaks off after" in note for note in recording.notes)
+    assert any("the file breaks off after" in note for note in recording.notes)
     path.write_bytes(whole[:20])
     with pytest.raises(stretch_gap.StretchError, match=r"run\.mcap: this MCAP file cannot be read: .*mcap recover"):
         stretch_gap.read(path)
@@ -195,7 +195,7 @@ def test_messages_of_ros_in_mcap_have_their_own_stamps_and_names(tmp_path):
             writer.write_message(topic="/gauge", schema=gauge, message=message, log_time=stamp_ns(t), publish_time=late)
         writer.finish()
     recording = is_the_same_in_the_program(path, tmp_path)
-    assert "time is what the messages' own stamps say: /joint_states" in recording.notes
+    assert "the time is taken from the stamps in the messages: /joint_states" in recording.notes
     np.testing.assert_allclose(recording.time_s, TIME_S, atol=1e-9)
     np.testing.assert_array_equal(recording["joint_states.position.elbow"], LENGTH_MM)
     np.testing.assert_array_equal(recording["gauge.code"], -np.arange(SAMPLES))
@@ -270,7 +270,7 @@ def test_bags_of_ros2_are_read_as_folder_and_as_file(tmp_path):
     of_folder = is_the_same_in_the_program(folder, tmp_path)
     of_file = stretch_gap.read(next(folder.glob("*.db3")))
     for recording in (of_folder, of_file):
-        assert "time is what the messages' own stamps say: /joint_states" in recording.notes
+        assert "the time is taken from the stamps in the messages: /joint_states" in recording.notes
         np.testing.assert_allclose(recording.time_s, TIME_S, atol=1e-9)
         np.testing.assert_array_equal(recording["joint_states.position.elbow"], LENGTH_MM)
         np.testing.assert_array_equal(recording["gauge.data"], BRIDGE_V)

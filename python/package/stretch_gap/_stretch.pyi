@@ -1,4 +1,4 @@
-"""The native part of the package: use `stretch_gap`."""
+"""Native module of the package, written in Rust. Import its public names from `stretch_gap`."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -11,42 +11,91 @@ __all__: list[str]
 __version__: str
 
 class StretchError(ValueError):
-    """What is wrong with the data or the question, and what to do about it, in a sentence."""
+    """Error in the data or in the arguments.
+
+    The message is one sentence that names the wrong value and says what to do.
+    """
 
 class Refused(StretchError):
-    """Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."""
+    """Error that a simulator raises if it cannot simulate the requested values.
+
+    A simulator that runs inside `stretch_gap.diagnose` raises this exception for values that it cannot simulate. The fit then
+    continues with other values. Any other exception of the simulator ends the diagnosis.
+    """
 
 @final
 class Reading:
-    """What a receptor answers for one sample."""
+    """Estimate for one sample, as returned by `Receptor.step`."""
 
     @property
     def estimate(self) -> float:
-        """The estimate, in the reference's unit."""
+        """Estimate, float, in the unit of the reference."""
     @property
     def rate(self) -> float:
-        """Its rate, in that unit per second."""
+        """Rate of change of the estimate, float, in the unit of the reference per second.
+
+        The rate is NaN while the rate estimator of a line or of a curve still warms up, because these two models give estimates
+        without a rate.
+        """
     @property
     def branch(self) -> str:
-        """Which way it moves: `rising` or `falling`."""
+        """Direction of motion, `"rising"` or `"falling"`.
+
+        The direction is that of the calibrated quantity. A length that is calibrated as a contraction becomes shorter while the
+        direction is `"rising"`.
+        """
     @property
     def domain(self) -> str:
-        """Whether the sample lay where the calibration was fitted: `inside`, else what was clamped."""
+        """Position of the sample relative to the fitted range.
+
+        The value is `"inside"`, `"signal_clamped"`, `"rate_clamped"` or `"both_clamped"`. A signal or a rate outside the fitted
+        range is clamped to the end of the range, because a calibration is never extrapolated.
+        """
     @property
     def sd(self) -> float | None:
-        """Standard deviation of the estimate, where the model knows it."""
+        """Standard deviation of the estimate in the unit of the reference, or None if the model does not estimate it."""
 
 @final
 class Receptor:
-    """A calibration that takes one sample after the other and minds their time stamps."""
+    """Calibration that runs live, one sample at a time.
+
+    `Calibration.receptor` creates a receptor. The receptor checks the time stamps of the samples and counts their faults.
+    """
 
     def step(self, time_s: float, signal: float) -> Reading | None:
-        """The reading of the next sample; None while the rate estimator warms up, and where a sample is not a number."""
+        """Process the next sample.
+
+        Parameters
+        ----------
+        time_s : float
+            Time of the sample in seconds. Time stamps must increase. If samples are missing, a short gap is bridged, and a longer
+            gap restarts the warm-up.
+        signal : float
+            Value of the signal, in the unit of the signal that was calibrated.
+
+        Returns
+        -------
+        Reading or None
+            Estimate for the sample. None if there is no estimate, because the rate estimator still warms up or because the
+            sample is not a number.
+        """
     def set_pressure(self, pressure: float) -> None:
-        """The pressure of the samples to come, for a calibration that needs it."""
+        """Set the pressure of the following samples.
+
+        A calibration needs the pressure only if its gauge depends on the pressure.
+
+        Parameters
+        ----------
+        pressure : float
+            Pressure in kPa.
+        """
     @property
     def faults(self) -> dict[str, int]:
-        """What was wrong with the time stamps so far: samples missing, jittered, and running backwards."""
+        """Number of faulty time stamps so far, by kind.
+
+        `missing` counts samples that did not arrive, `jittered` samples that were early or late by more than a fifth of the
+        sample interval, and `backwards` time stamps that were repeated or ran backwards.
+        """
 
 @final
 class CalibrationRecord:

@@ -1,4 +1,4 @@
-"""Named arrays as they are found in a file."""
+"""Named arrays that were read from a file, and notes on what was left out."""
 
 from __future__ import annotations
 
@@ -14,15 +14,21 @@ from ._stretch import StretchError
 
 Array = NDArray[np.float64]
 LISTED = 4
-"""Names that a note lists; more are counted."""
+"""Largest number of names that a note lists. Further names are only counted."""
 PER_SECOND = {"ms": 1e3, "us": 1e6, "ns": 1e9}
-"""Counts in a second, by the last part of the name of a time."""
+"""Time units per second, by the last part of the name of a time array."""
 EPOCH_S = 1e8
-"""Times above this count from 1970, s: no recorder runs for three years."""
+"""Smallest time stamp that is interpreted as a time since 1970, s.
+
+A time since the start of a recorder is smaller, because no recorder runs for three years.
+"""
 
 
 def library(module: str, extra: str) -> Any:
-    """A library that reads a format, or the sentence that says how to install it."""
+    """Import a module that reads a file format.
+
+    If it is not installed, raise a `StretchError` with the command that installs the extra.
+    """
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -31,21 +37,33 @@ def library(module: str, extra: str) -> Any:
 
 
 def with_unit(name: str, unit: Any) -> str:
-    """The name of a column with its unit as the last part, where it is a unit that the program knows."""
+    """Return the name of a column with the unit as its last part, if the unit is known."""
     if isinstance(unit, bytes):
         unit = unit.decode("utf-8", "replace")
     return _stretch.tidy_column(f"{name} ({unit})" if isinstance(unit, str) and unit.strip() else name)
 
 
 def listed(names: Sequence[str]) -> str:
-    """A few names, and how many more there are."""
+    """Return the first names and the number of further names as text."""
     if len(names) > LISTED + 1:
         return f"{', '.join(names[:LISTED])} and {len(names) - LISTED} more"
     return ", ".join(names)
 
 
 class Arrays:
-    """The arrays of numbers of a file by their paths, and notes on what is left out."""
+    """Numeric arrays of a file by their paths, and notes on what was left out.
+
+    `convert` returns this class.
+
+    Attributes
+    ----------
+    file : str
+        Path of the file.
+    numbers : dict of str to ndarray
+        Arrays of numbers by their path in the file.
+    notes : list of str
+        Sentences on assumptions and on parts of the file that were left out.
+    """
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -55,15 +73,18 @@ class Arrays:
         self._stamps: dict[str, NDArray[np.int64]] = {}
 
     def cannot(self, what: str, why: object, todo: str) -> StretchError:
-        """The error that this file cannot be read."""
+        """Return the error that this file cannot be read. `why` is the reason, and `todo` tells the user what to do."""
         return StretchError(f"{self.file}: this {what} cannot be read: {why}; {todo}")
 
     def leave(self, path: str, why: str) -> None:
-        """Says that something is left out."""
+        """Record that `path` is left out, with the reason."""
         self._left_out.append(f"{path} ({why})")
 
     def take(self, path: str, values: Any) -> None:
-        """Takes an array where it is one of numbers or dates; the fields of a table of numbers each for itself."""
+        """Store an array of numbers or dates.
+
+        Each field of a structured array is stored separately. Other arrays are left out with a note.
+        """
         array = np.asarray(values)
         kind = array.dtype.kind
         if array.dtype.names:
@@ -79,11 +100,17 @@ class Arrays:
             self.leave(path, {"c": "complex numbers", "O": "no numbers", "V": "no numbers"}.get(kind, "text"))
 
     def take_stamps(self, path: str, stamps_ns: NDArray[np.int64]) -> None:
-        """Takes times in nanoseconds since 1970, or since a recorder began; double precision does not hold the former."""
+        """Store time stamps in nanoseconds since 1970 or since the start of a recorder.
+
+        They stay integers until `finish`, because double precision cannot represent nanoseconds since 1970.
+        """
         self._stamps[path] = stamps_ns
 
     def finish(self) -> None:
-        """Counts times from the first of all, and notes what was left out."""
+        """Convert the time stamps to seconds, and note what was left out.
+
+        Stamps since 1970 are counted from the first stamp of all.
+        """
         first = min((int(stamps[0]) for stamps in self._stamps.values() if stamps.size), default=0)
         if first >= EPOCH_S * 1e9:
             self.notes.append(f"time counts from the first sample, {np.datetime64(first, 'ns')}Z")

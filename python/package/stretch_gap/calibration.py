@@ -1,4 +1,4 @@
-"""From a signal and its reference to a calibration, and from a signal to estimates."""
+"""Calibrations: fitted to a signal and its reference, then applied to further signals."""
 
 from __future__ import annotations
 
@@ -22,20 +22,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimates of a recording, one a sample, as the calibration would give them live."""
+    """Estimates of a recording, one per sample, identical to those of a live receptor.
+
+    An estimate converts to a NumPy array: `np.asarray(estimate)` is `estimate.value`.
+
+    Attributes
+    ----------
+    value : ndarray of shape (samples,)
+        Estimate of the reference, in `unit`. NaN for samples without an estimate, because the rate estimator still warms up or
+        because the sample is missing.
+    rate : ndarray of shape (samples,)
+        Rate of change of the estimate, in `unit` per second. NaN for samples without an estimate or without a rate.
+    sd : ndarray of shape (samples,)
+        Standard deviation of the estimate, in `unit`. NaN if the model does not estimate it.
+    inside : ndarray of bool, of shape (samples,)
+        Whether the sample lies in the range that was fitted. Outside this range, signal and rate are clamped to its ends,
+        because a calibration is never extrapolated. False for samples without an estimate.
+    faults : dict of str to int
+        Number of faulty time stamps: `missing` counts samples that are not in the recording, `jittered` samples that are early or
+        late by more than a fifth of the sample interval, and `backwards` time stamps that repeat or run backwards.
+    unit : str
+        Unit of the estimate.
+    """
 
     value: Array
-    """The estimate, in the reference's unit; NaN where the rate estimator warms up."""
     rate: Array
-    """Its rate, in that unit per second."""
     sd: Array
-    """Standard deviation of the estimate; NaN where the model does not know it."""
     inside: NDArray[np.bool_]
-    """Whether the sample lay where the calibration was fitted; outside it is clamped, not extrapolated."""
     faults: dict[str, int]
-    """What was wrong with the time stamps: samples `missing`, `jittered` and running `backwards`."""
     unit: str
-    """Unit of the estimate."""
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.value.astype(dtype) if dtype is not None else self.value
@@ -46,7 +61,25 @@ class Estimate:
 
 
 class Calibration:
-    """A calibration record: apply it to recordings, run it live, write it for the program and for boards."""
+    """Calibration record that converts the signal of a sensor to an estimate of its reference.
+
+    `calibrate` fits a calibration; `Calibration.load` and `Calibration.from_json` read one. A calibration can be applied to
+    recordings (`apply`), run live (`receptor`), and written for the program `stretch` and for boards (`save`). Two calibrations
+    are equal if their records are equal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 20, 0.01)
+    >>> angle_deg = 45 - 45 * np.cos(1.5 * time_s)
+    >>> gauge = 0.002 * angle_deg + 1e-4 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> calibration = stretch_gap.calibrate(gauge, angle_deg, time_s=time_s, model="linear", reference_name="angle_deg")
+    >>> calibration.unit
+    'deg'
+    >>> stretch_gap.Calibration.from_json(calibration.to_json()) == calibration
+    True
+    """
 
     def __init__(self, record: _stretch.CalibrationRecord, made: dict[str, Any] | None = None) -> None:
         self._record = record
@@ -54,65 +87,134 @@ class Calibration:
 
     @staticmethod
     def from_json(text: str) -> Calibration:
-        """From the JSON that `to_json` gives, or `stretch calibrate` writes."""
+        """Create a calibration from JSON.
+
+        Parameters
+        ----------
+        text : str
+            JSON as returned by `to_json` or written by `stretch calibrate`.
+
+        Returns
+        -------
+        Calibration
+            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the record does not contain them.
+
+        Raises
+        ------
+        StretchError
+            If the text is not a calibration that can be used.
+        """
         return Calibration(_stretch.CalibrationRecord.from_json(text))
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Calibration:
-        """From a file: postcard where its name ends in `.postcard`, else JSON."""
+        """Read a calibration from a file.
+
+        Parameters
+        ----------
+        path : str or path-like
+            File to read. The format is postcard if the name ends in `.postcard`, and otherwise JSON.
+
+        Returns
+        -------
+        Calibration
+            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the record does not contain them.
+
+        Raises
+        ------
+        StretchError
+            If the file cannot be read, or is not a calibration that can be used.
+        """
         return Calibration(_stretch.CalibrationRecord.load(path))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Into a file, whole or not at all: postcard for a board where its name ends in `.postcard`, else JSON."""
+        """Write the calibration to a file.
+
+        If writing fails, no partial file is left.
+
+        Parameters
+        ----------
+        path : str or path-like
+            File to write. The format is postcard, for a board, if the name ends in `.postcard`, and otherwise JSON. An existing
+            file is replaced only if its name ends in `.json` or `.postcard`.
+
+        Raises
+        ------
+        StretchError
+            If the file exists under a name with another ending, or cannot be written.
+        """
         self._record.save(replaceable(path, ".json", ".postcard"))
 
     def to_json(self) -> str:
-        """The record that the program reads: `stretch apply`, `stretch listen`, `stretch export`."""
+        """Return the record as JSON.
+
+        Returns
+        -------
+        str
+            JSON that `Calibration.from_json` and the program `stretch` read (`stretch apply`, `stretch listen`, `stretch
+            export`).
+        """
         return self._record.to_json()
 
     @property
     def signal(self) -> str:
-        """Name of the signal."""
+        """Name of the signal, str."""
         return self._record.signal
 
     @property
     def reference(self) -> str:
-        """Name of the reference."""
+        """Name of the reference, str."""
         return self._record.reference
 
     @property
     def unit(self) -> str:
-        """Unit of the estimate: the last part of the reference's name."""
+        """Unit of the estimate, str: the unit that is the last part of the reference's name."""
         return self._record.unit
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second at which it was fitted and runs."""
+        """Sample rate of the calibration, float, in Hz."""
         return self._record.rate_hz
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest reference that was fitted."""
+        """Least and greatest value of the reference in the fitted recordings, tuple of two floats, in `unit`."""
         return self._record.range
 
     @property
     def model(self) -> str:
-        """The model that was fitted, as `calibrate` takes it; empty for a record that was read."""
+        """Name of the fitted model, as in the argument `model` of `calibrate`.
+
+        Empty if the calibration was read from a file or text.
+        """
         return str(self._made.get("model", ""))
 
     @property
     def models(self) -> list[dict[str, Any]]:
-        """With `model="auto"`: every model with its errors on recordings left out of the fit, the best first."""
+        """Models that `model="auto"` compared, list of dicts, the best first.
+
+        Each dict holds among others `model`, `rmse` (root mean square error on recordings that were left out of the fit, in
+        `unit`), `worst` (greatest absolute error, in `unit`), `lag_s` (mean delay of the estimate, s) and `parameters` (number
+        of fitted parameters). The list is empty if the model was given, or if the calibration was read from a file or text.
+        """
         return list(self._made.get("models", []))
 
     @property
     def fits(self) -> list[dict[str, Any]]:
-        """What was fitted: coefficients with bounds, R squared, and neighbouring orders; empty for a record that was read."""
+        """Statistics of each fit, list of dicts.
+
+        Each dict holds among others `name`, `model`, `samples`, `r_squared`, `rmse` (in the normalised target), `coefficients`
+        with 95 % bounds, and `orders` (fits of neighbouring degrees). The list is empty if the calibration was read from a file
+        or text.
+        """
         return list(self._made.get("fits", []))
 
     @property
     def notes(self) -> list[str]:
-        """What had to be done to the data, and what they cannot say."""
+        """Notes of the fit, list of str: changes that were made to the data, and questions that the data cannot answer.
+
+        The list is empty if the calibration was read from a file or text.
+        """
         return list(self._made.get("notes", []))
 
     def apply(
@@ -123,10 +225,37 @@ class Calibration:
         time_s: ArrayLike | None = None,
         pressure: ArrayLike | None = None,
     ) -> Estimate:
-        """Estimates of a recording, sample by sample, as they would come live.
+        """Estimate the reference of a recording, sample by sample, as a live receptor does.
 
-        Without `rate_hz` and `time_s` the recording is taken to be at the calibration's own rate. `pressure` is needed by a
-        calibration whose gauge depends on it. A `DoubtWarning` says where the recording does not look like one of that sensor.
+        Give at most one of `rate_hz` and `time_s`. Without both, the recording is assumed to have the sample rate of the
+        calibration.
+
+        Parameters
+        ----------
+        signal : array_like of shape (samples,)
+            Signal in the unit of the signal that was calibrated. NaN marks a missing sample.
+        rate_hz : float, optional
+            Sample rate of the recording in Hz.
+        time_s : array_like of shape (samples,), optional
+            Increasing time stamps in seconds, or an array of `datetime64` or `timedelta64`.
+        pressure : array_like of shape (samples,), optional
+            Pressure in kPa. Required if the gauge of this calibration depends on the pressure, and otherwise ignored.
+
+        Returns
+        -------
+        Estimate
+            Estimates, their rates and standard deviations, and the faults of the time stamps.
+
+        Raises
+        ------
+        StretchError
+            If a column does not hold one number per sample, if the time stamps do not increase, or if the pressure is missing.
+
+        Warns
+        -----
+        DoubtWarning
+            If the recording does not match the calibration: another sample rate, another unit, a constant signal, or many samples
+            outside the fitted range.
         """
         values = column(signal, "signal")
         if rate_hz is None and time_s is None:
@@ -135,7 +264,9 @@ class Calibration:
         pressures = None
         if self._record.needs_pressure:
             if pressure is None:
-                raise _stretch.StretchError("the gauge of this calibration depends on the pressure: give pressure, in kPa")
+                raise _stretch.StretchError(
+                    "pressure is missing: the gauge of this calibration depends on it; give pressure in kPa"
+                )
             pressures = column(pressure, "pressure")
             same_length(pressures, values.size, "pressure")
         answer = self._record.apply(stamps, values, pressures)
@@ -151,13 +282,55 @@ class Calibration:
         *,
         time_s: Any = None,
     ) -> Evaluation:
-        """Errors on recordings, next to those of the raw signal; `stretch_gap.evaluate` takes several calibrations."""
+        """Compute the errors of this calibration on recordings, and those of the raw signal for comparison.
+
+        `stretch_gap.evaluate` compares several calibrations, and accepts a pressure and names of recordings.
+
+        Parameters
+        ----------
+        signal : array_like, or list of array_like
+            Signal of one recording, shape `(samples,)`, or a list with the signal of each recording.
+        reference : array_like, or list of array_like
+            Reference in the unit of the calibration, in the same form as `signal`.
+        rate_hz : float, optional
+            Sample rate of the recordings in Hz. Give either `rate_hz` or `time_s`.
+        time_s : array_like, or list of array_like, optional
+            Increasing time stamps in seconds: one array for all recordings, or one for each.
+
+        Returns
+        -------
+        Evaluation
+            Errors of the calibration and of the raw signal. The calibration is listed under its model, or as `"calibration"` if
+            the model is not known.
+
+        Raises
+        ------
+        StretchError
+            If the columns or the time stamps are wrong.
+
+        Warns
+        -----
+        DoubtWarning
+            If there are reasons to doubt the errors. `stretch_gap.evaluate` lists them.
+        """
         from .evaluation import evaluate
 
         return evaluate({self.model or "calibration": self}, signal, reference, rate_hz, time_s=time_s)
 
     def receptor(self) -> _stretch.Receptor:
-        """It runs live: `step(time_s, signal)` answers a `Reading`, or None while it warms up."""
+        """Create a receptor that runs the calibration live, one sample at a time.
+
+        Returns
+        -------
+        Receptor
+            Receptor in its initial state. `step(time_s, signal)` returns the `Reading` of a sample, or None if there is none.
+
+        Raises
+        ------
+        StretchError
+            If the calibration cannot run live. A calibration with the rate estimator `central` cannot, because that estimator
+            needs the next sample.
+        """
         return self._record.receptor()
 
     def __eq__(self, other: object) -> bool:
@@ -224,18 +397,95 @@ def calibrate(
     names: list[str] | None = None,
     date: str = "",
 ) -> Calibration:
-    """Fits a calibration to recordings of a signal and its reference.
+    """Fit a calibration to recordings of a signal and its reference.
 
-    `signal` and `reference` are one array each, or lists of arrays, one a recording; with either the samples a second or
-    the time stamps in seconds.
+    Give either `rate_hz` or `time_s`. Samples without a number in every column are left out with a warning.
 
-    `model`: `linear`, `polyIJ` (a surface of degree I in the rate and J in the signal, a branch each way),
-    `history` or `observer`, the last two also with `+rest`; `auto` takes the best on recordings left out of the fit;
-    `diagnosed` builds on the effects that a diagnosis of the gauge names.
+    Parameters
+    ----------
+    signal : array_like, or list of array_like
+        Signal of one recording, shape `(samples,)`, or a list with the signal of each recording.
+    reference : array_like, or list of array_like
+        Reference that the calibration estimates, in the same form as `signal`.
+    rate_hz : float, optional
+        Sample rate of the recordings in Hz.
+    time_s : array_like, or list of array_like, optional
+        Increasing time stamps in seconds, or arrays of `datetime64` or `timedelta64`: one array for all recordings, or one for
+        each.
+    model : str, default "auto"
+        Model to fit:
 
-    `reference_name` carries the unit as its last part (`angle_deg`); a length (`length_mm`) is calibrated as contraction
-    from `rest_length`, by default its greatest value. `rate` spells the rate estimator (`savgol:11,2`), `robust` weighs
-    outliers down (`bisquare`, `lar`), `paper` is the method exactly as published.
+        - `"auto"`: the simplest model that is as good as the best, by errors on recordings that were left out of the fit;
+        - `"linear"`: one straight line;
+        - `"curve"`: one polynomial of the signal, whose degree is chosen by cross-validation;
+        - `"polyIJ"`, for example `"poly13"`: a surface of degree I in the rate and J in the signal for each direction of
+          motion, up to `"poly55"`;
+        - `"history"`: a polynomial of the signal and of its history, that is, the inverse of lag and hysteresis;
+        - `"observer"`: a model of the gauge, inverted by a Kalman filter;
+        - `"diagnosed"`: a model of the gauge built from the effects that `diagnosis` names.
+
+        The last three may end in `+rest`, for example `"history+rest"`. They then track a drifting baseline of the resting
+        signal.
+    signal_name : str, default "signal"
+        Name of the signal. The unit is the last part of the name, as in `"gauge_v"`.
+    reference_name : str, default "reference"
+        Name of the reference. The unit is the last part of the name, as in `"angle_deg"`. A reference whose name begins with
+        `length`, as in `"length_mm"`, is calibrated as a contraction from `rest_length`.
+    rate : str, optional
+        Estimator of the signal's rate of change: `"savgol:WINDOW,DEGREE"` or `"savgol:WINDOW,DEGREE,DELAY"` in samples,
+        `"difference:CUTOFF_HZ"`, `"tracker:INDEX"`, or `"central"`, which cannot run live. By default `"savgol:11,2"`.
+    robust : {"bisquare", "lar"}, optional
+        Weighting that reduces the influence of outliers: bisquare weights or least absolute residuals. By default least squares.
+    signal_zero : float, optional
+        Zero of the signal in the normalised fit, in the unit of the signal. By default the middle of the signal's range; for a
+        signal `bridge_v` with values near 1.24 V it is 1.24 V.
+    rest_length : float, optional
+        Resting length in the unit of the reference. By default the greatest value of a reference whose name begins with
+        `length`. Any other reference is calibrated as a contraction only if this value is given.
+    dead_band : float, optional
+        Rate below which the direction of motion does not change, in units of the signal per second. By default three standard
+        deviations of the rate's noise.
+    paper : bool, default False
+        Whether to use the method exactly as published: central differences, a surface for each direction of motion fitted to
+        whole recordings, and no dead band. `rate` and `dead_band` override these choices.
+    pressure : array_like, or list of array_like, optional
+        Pressure in kPa, in the same form as `signal`. Used by `model="diagnosed"` if the gauge depends on the pressure.
+    diagnosis : Diagnosis or str, optional
+        Diagnosis of the gauge, or its JSON, for `model="diagnosed"`.
+    names : list of str, optional
+        Names of the recordings in notes and warnings. By default they are numbered.
+    date : str, default ""
+        Date of the calibration, as free text for the record.
+
+    Returns
+    -------
+    Calibration
+        The calibration, with the statistics of its fits.
+
+    Raises
+    ------
+    StretchError
+        If the columns, the time stamps or the options are wrong, or if the model cannot be fitted to the recordings.
+
+    Warns
+    -----
+    DoubtWarning
+        If samples are left out because a column has no number there (code `missing_samples`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 20, 0.01)
+    >>> angle_deg = 45 - 45 * np.cos(1.5 * time_s)
+    >>> gauge_v = 0.002 * np.interp(time_s - 0.05, time_s, angle_deg)  # a gauge with a delay of 50 ms
+    >>> gauge_v += 1e-4 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> calibration = stretch_gap.calibrate(
+    ...     gauge_v, angle_deg, rate_hz=100.0, model="poly13", signal_name="gauge_v", reference_name="angle_deg"
+    ... )
+    >>> estimate = calibration.apply(gauge_v)
+    >>> bool(np.nanmax(np.abs(estimate.value - angle_deg)) < 3.0)
+    True
     """
     columns = {signal_name: signal, reference_name: reference}
     if pressure is not None:

@@ -1,4 +1,4 @@
-"""Why a simulator and a recording disagree."""
+"""Diagnosis of the gap between a simulator and recordings."""
 
 from __future__ import annotations
 
@@ -19,11 +19,16 @@ from .recordings import Array
 from .simulator import Asked
 
 SHOWN = 5
-"""Rows of each list that `repr` shows."""
+"""Largest number of rows of each list that `repr` shows."""
 
 
 class Diagnosis:
-    """What is missing in a simulator, how sure that is, where it sits, and how far naming it closes the gap."""
+    """Result of a diagnosis: the missing effects, their probabilities, and the part of the gap that they close.
+
+    `diagnose` returns this class. The *gap* is the mean square error of the simulator beyond the noise of the measurement. A
+    *named* effect is one that the diagnosis reports as missing. *Re-tuned* means that the nominal parameters were fitted within
+    their tolerances. A notebook displays the report of a diagnosis.
+    """
 
     def __init__(
         self,
@@ -45,63 +50,120 @@ class Diagnosis:
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
-        """From what `to_json` or `stretch diagnose --json=FILE` wrote; figures are not in there."""
+        """Create a diagnosis from JSON.
+
+        The JSON contains neither curves nor the report nor the simulator. `curves`, `plot`, `report` and `to_rerun` therefore
+        raise a `StretchError`, and `fix` returns a fix that cannot be run.
+
+        Parameters
+        ----------
+        text : str
+            JSON as returned by `to_json` or written by `stretch diagnose --json=FILE`.
+
+        Returns
+        -------
+        Diagnosis
+            The diagnosis.
+
+        Raises
+        ------
+        json.JSONDecodeError
+            If the text is not JSON.
+        """
         return Diagnosis(json.loads(text))
 
     @property
     def verdict(self) -> str:
-        """`no_gap`, `parameters`, `effect`, `partial`, `record` or `unknown`."""
+        """Kind of the result, str.
+
+        - `"no_gap"`: simulator and recording agree within the noise.
+        - `"parameters"`: they agree after the parameters are re-tuned within their tolerances.
+        - `"effect"`: effects are missing and are named.
+        - `"partial"`: effects are missing and are named, but they leave a part of the gap.
+        - `"record"`: the recording itself is wrong, for example a column.
+        - `"unknown"`: there is a gap that no effect of the list explains.
+        """
         return str(self._answer["verdict"])
 
     @property
     def sentence(self) -> str:
-        """The answer in a sentence."""
+        """Result in plain English, str."""
         return str(self._answer["sentence"])
 
     @property
     def named(self) -> list[str]:
-        """The effects that are missing, the strongest first; empty where none is named."""
+        """Names of the missing effects, list of str, the strongest first. Empty if no effect is named."""
         return list(self._answer["named"])
 
     @property
     def answer(self) -> dict[str, Any]:
-        """The finding as a value: `kind` (`agrees`, `retuned`, `faint`, `missing`, `partly`, `wrong_record`, `unknown`,
-        `at_bounds` or `too_little`) and its numbers."""
+        """Result as a dict, for programs.
+
+        `kind` is one of the following; the other keys depend on it.
+
+        - `"agrees"`: simulator and recording agree within the noise.
+        - `"retuned"`: they agree after re-tuning.
+        - `"faint"`: the gap is larger than noise usually is, but too small to name a cause.
+        - `"missing"`: effects are missing; with them only noise is left.
+        - `"partly"`: effects are missing; with them more than noise is left.
+        - `"wrong_record"`: the recording itself is wrong.
+        - `"unknown"`: no effect of the list explains the gap.
+        - `"at_bounds"`: parameters are at the ends of their tolerances, and beyond them would explain as much as effects do.
+        - `"too_little"`: the recording is not sufficient to name an effect.
+
+        The dict is empty if an older version wrote the diagnosis.
+        """
         return dict(self._answer.get("answer") or {})
 
     @property
     def not_examined(self) -> list[str]:
-        """Effects that were not examined because all of their runs failed, or because the budget of runs was spent."""
+        """Effects that were not examined, list of str, because all of their runs failed or the budget of runs was spent."""
         return [*self._answer.get("not_examined", []), *(self._answer.get("cut_short") or [])]
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Probability of every candidate that was weighed, the most probable set first. After the
-        sets come `nothing` (nothing is missing) and `unknown` (a cause that was not listed)."""
+        """Probabilities of the candidates, dict of str to float.
+
+        A candidate is a set of effects; the name of a set joins its effects by `" + "`. The sets come first, the most probable
+        first. Then follow `"nothing"` (no effect is missing) and `"unknown"` (the cause is not in the list).
+        """
         weighed = self._answer["candidates"]
         return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
 
     @property
     def stability(self) -> dict[str, float]:
-        """Share of resampled records in which the most probable set holds an effect, by effect."""
+        """Share of resampled recordings in which the most probable set contains the effect, dict by effect, 0 to 1."""
         return {s["effect"]: s["stability"] for s in self._answer.get("stabilities", [])}
 
     @property
     def detection_limits(self) -> dict[str, dict[str, Any]]:
-        """How strong each effect would have to be to be named on these data: `parameter`, `strength` (None where no
-        strength in its range would do) and `unit`, by effect; empty where something is named."""
+        """Strength from which each effect would be named on these data, dict of dicts by effect.
+
+        Each dict holds `parameter` (the parameter that is the strength of the effect), `strength` (its value, or None if no
+        value in the range would suffice), `unit`, and `others` (values of the other parameters). The dict is empty if an effect
+        is named, or if the recording is not sufficient to name one.
+        """
         limits = self._answer.get("detection_limits", [])
         return {limit["effect"]: {k: v for k, v in limit.items() if k != "effect"} for limit in limits}
 
     @property
     def where(self) -> dict[str, float]:
-        """Share of the gap in each output."""
+        """Share of the gap whose cause lies in each output, dict by output column, 0 to 1."""
         return {s["channel"]: s["share"] for s in self._answer["where"]["stages"]}
 
     @property
     def how_far(self) -> dict[str, Any]:
-        """How far the named effects close the gap on samples that were not fitted: `closed`, its 95 % interval, and what
-        is left by output, in the output's noise: 1 is noise alone."""
+        """Part of the gap that the named effects close on samples that were not fitted.
+
+        If no effect is named, the numbers are those of the most probable candidate.
+
+        Returns
+        -------
+        dict
+            `closed` is the closed share of the gap, at most 1, and `interval` its 95 % interval, a tuple of two floats.
+            `as_shipped`, `retuned` and `with_effects` are dicts by output column with the root mean square error in multiples
+            of the noise, for the simulator as it is, with re-tuned parameters, and with the effects. Noise alone gives 1.
+        """
         best = self._answer["candidates"][0] if self._answer["candidates"] else {}
 
         def left(key: str) -> dict[str, float]:
@@ -117,12 +179,12 @@ class Diagnosis:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Every nominal parameter as it is with the named effects in."""
+        """Values of all nominal parameters, dict by name, re-tuned together with the named effects."""
         return {p["name"]: p["fitted"] for p in self._answer["parameters"]}
 
     @property
     def effects(self) -> dict[str, dict[str, float]]:
-        """Values of the named effects."""
+        """Fitted values of the named effects, dict by effect of dicts by argument."""
         found: dict[str, dict[str, float]] = {name: {} for name in self.named}
         for value in self._best_values():
             if value["effect"] in found:
@@ -135,87 +197,184 @@ class Diagnosis:
 
     @property
     def rivals(self) -> list[str]:
-        """Further effects that these data cannot rule out."""
+        """Further effects that these data cannot rule out, list of str."""
         return [effect for effect in self._answer["ambiguous"] if effect not in self.named]
 
     @property
     def families(self) -> list[dict[str, Any]]:
-        """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 to 0.14 s"."""
+        """Groups of effects that these data cannot distinguish, list of dicts.
+
+        The effects of a group agree on one quantity, for example the delay at the output. Each dict holds `names` (the effects,
+        the most probable first), `range` and `unit` (least and greatest value of that quantity), and `sentence`.
+        """
         return list(self._answer.get("families", []))
 
     @property
     def next_experiment(self) -> dict[str, Any] | None:
-        """The experiment that would tell rivals apart, where it was looked for: name, why, minutes, and `columns` to command."""
+        """Experiment that would distinguish the effects that these data cannot, or None.
+
+        The experiment is searched only if `diagnose` is called with `experiment=True`. The dict holds among others `name`,
+        `why` (a sentence that describes the experiment), `minutes` (its duration), `separates` (the effects that it
+        distinguishes) and `columns` (a dict of arrays with the commands and `time_s`).
+        """
         found = self._answer.get("next_experiment")
         return {**found, "columns": dict(self._experiment or {})} if found else None
 
     @property
     def proposed(self) -> dict[str, Any] | None:
-        """The equation that is proposed where no effect of the list explains the gap."""
+        """Proposed equation for a gap that the effects of the list do not explain, or None.
+
+        The dict holds among others `equation` (empty if none was found), `sentence`, `channel` (the output to which the
+        equation is added) and `closes_test` (share of the gap that the equation closes on test trials).
+        """
         proposed = self._answer.get("proposed")
         return dict(proposed) if proposed else None
 
     @property
     def identifiability(self) -> list[dict[str, Any]]:
-        """Which nominal parameters these data determine and which not, with what they look like."""
+        """How well these data determine each nominal parameter, list of dicts.
+
+        Each dict holds among others `name`, `unit`, `knowledge` (how well the parameter is determined), `tolerance` and `sd`
+        (standard deviations without and with the data), `like` (parameters that have the same effect on these data) and
+        `at_bound` (whether the value is at the end of its tolerances or of its range).
+        """
         return list(self._answer.get("identifiability", []))
 
     @property
     def notes(self) -> list[str]:
-        """What was done to the recordings, what they cannot say, and what to look at."""
+        """Notes, list of str: changes that were made to the recordings, limits of the data, and columns to check."""
         return list(self._answer["notes"])
 
     @property
     def model_runs(self) -> int:
-        """Models that the simulator was asked for."""
+        """Number of simulator runs, int. One run simulates one set of values."""
         runs = self._answer.get("model_runs")
         return int(runs["count"]) if isinstance(runs, dict) else int(self._answer["simulations"])
 
     def curves(self, output: str | None = None) -> dict[str, Array]:
-        """One output over all trials end to end: `measured`, `as_shipped`, `retuned` and `with_effects`."""
+        """Return the measured and the simulated curves of one output, all trials end to end.
+
+        Parameters
+        ----------
+        output : str, optional
+            Column of the output. By default the output of the first stage.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (samples,)
+            `measured`, `as_shipped` (the simulator as it is), `retuned` (with re-tuned parameters) and `with_effects` (with the
+            best effects as well), in the unit of the output.
+
+        Raises
+        ------
+        StretchError
+            If there is no such output, or if the diagnosis was read from text.
+        """
         if not self._curves:
-            raise StretchError("a diagnosis that was read from text has no curves; diagnose again")
+            raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
         name = output or next(iter(self._curves))
         if name not in self._curves:
-            raise StretchError(f"there is no output {name}; there are {', '.join(self._curves)}")
+            raise StretchError(f"there is no output {name}; the outputs are {', '.join(self._curves)}")
         return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
 
     def plot(self, output: str | None = None) -> Any:
-        """Draws one output with matplotlib: measured, as shipped, re-tuned and with the named effects, and below it measured
-        minus simulated. Returns the two axes."""
+        """Draw the curves of one output, and measured minus simulated below them. Requires matplotlib.
+
+        Parameters
+        ----------
+        output : str, optional
+            Column of the output. By default the output of the first stage.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes
+            The upper and the lower axes.
+
+        Raises
+        ------
+        StretchError
+            If there is no such output, if the diagnosis was read from text, or if matplotlib is not installed.
+        """
         values = self.curves(output)
         name = output or next(iter(self._curves))
         return figures.curves(values, float(self._session.get("dt_s", 1.0)), name, self.sentence)
 
     def fix(self) -> Fix:
-        """The changes to the simulator: parameters re-tuned, and the named effects as Python code. The fix can
-        `predict` new recordings, and `diagnose` the fixed simulator.
+        """Return the changes that the simulator needs.
 
-        A diagnosis that was read from text has equations and values in place of functions, and runs nothing.
+        Returns
+        -------
+        Fix
+            Re-tuned parameters, values of the named effects, and both as Python code. `Fix.predict` predicts new recordings,
+            and `Fix.diagnose` diagnoses the fixed simulator. If the diagnosis was read from text, the code contains equations
+            instead of functions, and the fix cannot be run.
         """
         return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions, self._again)
 
     def apply(self, spec: Any) -> list[str]:
-        """Writes what was found into a MuJoCo specification (`MjSpec`); gives the named effects that have no place in it, for
-        which `fix().code` has functions. For diagnoses of `stretch_gap.mujoco.problem`."""
+        """Write the result into a MuJoCo specification, for a diagnosis of a `stretch_gap.mujoco.problem`.
+
+        Parameters
+        ----------
+        spec : mujoco.MjSpec
+            Specification of the model, usually `problem.spec`. It is changed in place.
+
+        Returns
+        -------
+        list of str
+            Named effects that a specification cannot represent. `fix().code` contains functions for them.
+
+        Raises
+        ------
+        StretchError
+            If the specification does not contain a joint or an actuator of the problem.
+        """
         from . import mujoco
 
         return mujoco.apply(self, spec)
 
     def to_rerun(self, path: str | os.PathLike[str]) -> None:
-        """Writes a recording for Rerun's viewer (`rerun why.rrd`): by trial and output the measured curve, the simulated ones
-        as shipped, re-tuned and with the named effects, and what is left of each, on one time line. Needs rerun-sdk."""
+        """Write the curves and their residuals as a recording for the Rerun viewer. Requires rerun-sdk.
+
+        For each trial and output the recording contains the curves of `curves`, and for each simulated curve the residual, that
+        is, measured minus simulated. All are on the time line `session`, in seconds.
+
+        Parameters
+        ----------
+        path : str or path-like
+            File to write. An existing file is replaced only if its name ends in `.rrd`.
+
+        Raises
+        ------
+        StretchError
+            If the diagnosis was read from text, if rerun-sdk is not installed, or if the file exists under a name with another
+            ending.
+        """
         if not self._curves or not self._session:
-            raise StretchError("a diagnosis that was read from text has no curves; diagnose again")
+            raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
         spans = [(trial["name"], trial["samples"], trial["start_s"]) for trial in self._session["trials"]]
         timeline.write(path, self._curves, spans, self._session["dt_s"], self.sentence)
 
     def to_json(self) -> str:
-        """Everything, as `stretch diagnose --json` writes it and `stretch calibrate --from` reads it."""
+        """Return the diagnosis as JSON, without curves and report.
+
+        Returns
+        -------
+        str
+            JSON as written by `stretch diagnose --json` and read by `Diagnosis.from_json` and `stretch calibrate --from`.
+        """
         return json.dumps(self._answer, indent=2)
 
     def to_frame(self) -> Any:
-        """One row a candidate, as a pandas frame; a dict of columns where there is no pandas."""
+        """Return the candidates as a table with one row for each.
+
+        Returns
+        -------
+        pandas.DataFrame or dict of str to list
+            The table, with the columns `effects`, `probability`, `closed` (closed share of the gap, with its 95 % interval from
+            `closed_low` to `closed_high`), `gap_before` and `gap_after` (gap without and with the effects, in multiples of the
+            noise variance), and `parameters` (values of the effects). A dict of columns if pandas is not installed.
+        """
         rows = [
             {
                 "effects": " + ".join(c["effects"]) or "nothing",
@@ -232,9 +391,25 @@ class Diagnosis:
         return frame(rows)
 
     def report(self, path: str | os.PathLike[str] | None = None) -> str:
-        """The report with all figures, one HTML file that needs no network; written where a path is given."""
+        """Return the report with its figures as one HTML page that needs no network, and optionally write it.
+
+        Parameters
+        ----------
+        path : str or path-like, optional
+            File to write. An existing file is replaced only if its name ends in `.html`. By default no file is written.
+
+        Returns
+        -------
+        str
+            The HTML page.
+
+        Raises
+        ------
+        StretchError
+            If the diagnosis was read from text, or if the file exists under a name with another ending.
+        """
         if not self._page:
-            raise StretchError("a diagnosis that was read from text has no figures; diagnose again")
+            raise StretchError("this diagnosis was read from text, which contains no report; diagnose again")
         if path is not None:
             with open(replaceable(path, ".html"), "w", encoding="utf-8") as file:
                 file.write(self._page)
@@ -253,7 +428,7 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         sentence = f"<p><b>{escape(self.sentence)}</b></p>"
         if self._page:
-            # its own document: the page's style stays in it, and the notebook's out of it
+            # An iframe keeps the styles of the page and of the notebook apart.
             return f'{sentence}<iframe srcdoc="{escape(self._page)}" style="width:100%;height:40em;border:0"></iframe>'
         rows = [[name, f"{p:.3f}"] for name, p in self.probabilities.items()]
         return sentence + html.table(["candidate", "probability"], rows) + html.notes(self.notes)
@@ -285,47 +460,153 @@ def diagnose(
     name: str = "data",
     progress: Callable[[str], Any] | None = None,
 ) -> Diagnosis:
-    """Says why a simulator and a recording disagree: which effect is missing, how sure that is, and where it acts.
+    """Compare a simulator with recordings, and find the effects that the simulator lacks.
 
-    `simulator` is an object with `simulate(params, effects) -> [n, samples]`, asked for n models at once: `params` is an
-    array `[n, p]` in the order of `parameters`, `effects` `[n, e]` in that of theirs; both give a column by its name, too:
-    `effects["delay_s"]`. Or it is a function of one model, `f(params, effects) -> [samples]`, with dicts of floats. With
-    several outputs it returns a dict of arrays by output. It may take more arguments by name: `inputs`, a dict of columns
-    that it is to be driven by (without it nothing is looked for on the input's side), and `first`, the measured first value
-    of each column; with one of these it is called once a recording. With `trials`, the slices of the recordings, it is
-    called once for all of them, end to end; with `stage` it answers for one stage at a time. A method
-    `begin(session)` is called once with everything that stays the same. The same object can be named in a problem.toml. An
-    exception of the simulator comes out as it is; `stretch_gap.Refused` says that values cannot be simulated.
+    The nominal parameters are re-tuned within their tolerances first. An effect is named only if the re-tuned simulator cannot
+    explain the recordings.
 
-    `data`: a dict of arrays by column, a frame, a `Trial`, the path of a recording (as `stretch_gap.read` takes it), or a
-    list of these; with `rate_hz` or a column `time_s`. Or the path of a problem.toml, which says all of the following; without
-    a simulator (None) the file's own is run.
+    Parameters
+    ----------
+    simulator : object, callable or None
+        Simulator in one of two forms:
 
-    `output` is the column that the simulation is compared with, `inputs` those that drive it; `stages` says the same of
-    several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
-    `(value, tolerance)` or an exact number. `effects` that the simulator has itself: an `Effect`, an `Argument`, `(least,
-    greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
-    or all of them; `without` leaves some out, by name or by kind. `units` and `noise` by column. `reference` is the column that
-    the output senses: the diagnosis then reports what a calibration of that output loses by the gap. With `experiment` the
-    experiment is looked for that would tell rivals apart, where the simulator takes `inputs`.
-    `budget` is the most models that may be run.
+        - an object with a method `simulate(params, effects)`, which simulates n models per call. `params` is an array of shape
+          `(n, parameters)` and `effects` of shape `(n, effects)`, in the order of the arguments `parameters` and `effects`.
+          Both also return a column by its name: `effects["delay_s"]` has the shape `(n,)`. The method returns an array of shape
+          `(n, samples)`. The attribute `batch` of the object is the largest n, by default 64.
+        - a function `f(params, effects)` of one model. Both arguments are dicts of floats. It returns an array of shape
+          `(samples,)`.
+
+        With several outputs, the simulator returns a dict of arrays by output column. It may take further arguments by name:
+
+        - `inputs`: dict of arrays by column, with all columns that the problem uses. An effect at an input alters the column of
+          this input; the others are as measured. The arrays have the shape `(n, samples)`, and `(samples,)` for a function. If
+          the simulator does not take this argument, effects at the inputs are not examined.
+        - `first`: dict of floats by column, the first measured value of each column in the recording. Use it as the initial
+          state, unless every recording starts at rest.
+        - `trials`: list with the `name`, `samples` (a slice), `start_s` and `first` of each requested recording.
+        - `stage`: number of the requested stage, from 0. The simulator then returns the output of this stage only.
+
+        A simulator that takes `inputs` or `first`, but not `trials`, is called once per recording. Any other simulator is
+        called once for all recordings end to end. If the simulator has a method `begin(session)`, it is called once, before the
+        first simulation, with everything that stays the same. None runs the simulator that a `problem.toml` names.
+    data : dict of str to array_like, data frame, Trial, str, path-like, or list of these
+        Recordings: arrays or a data frame by column, a `Trial`, the path of a recording (see `read`), or a list of these. Or
+        the path of a `problem.toml`, which defines the problem completely. The arguments `output`, `stages`, `parameters` and
+        `effects` are then errors, and the arguments from `inputs` to `reference` have no effect.
+    output : str, optional
+        Column of the measurement that the simulation is compared with. Give either `output` or `stages`.
+    inputs : sequence of str, default ()
+        Columns that drive the simulator. Ignored if `stages` is given.
+    stages : sequence of Stage, optional
+        Stages of a simulator with several outputs.
+    parameters : dict of str to Parameter, tuple or float, optional
+        Nominal parameters by name: a `Parameter`, a tuple `(value, tolerance)`, or a number that is exact. By default there are
+        none.
+    effects : dict of str to Effect, Argument or tuple, optional
+        Effects that the simulator itself implements, by name: an `Effect`, an `Argument`, a tuple `(least, greatest)` of an
+        effect that does nothing at 0, or a tuple `(least, greatest, off)`. By default there are none.
+    wrap : str, sequence of str, or None, default "all"
+        Effects to examine around the simulator, such as `"input.delay"`, `"output.backlash"` or `"output.all"`. With several
+        stages the name of the stage or of the output column comes first: `"gear.output.curve"`, `"shaft_deg.lag"`. `"all"`
+        examines all usual effects, None or `()` none. `wrappers` lists the kinds.
+    rate_hz : float, optional
+        Sample rate in Hz of recordings that have neither `time_s` nor a rate.
+    units : dict of str to str, optional
+        Units by column. By default the unit is the last part of the column's name.
+    noise : dict of str to float, optional
+        Noise by column, one standard deviation in the unit of the column. By default the noise of outputs is estimated from the
+        recordings, and that of inputs is 0. Noise of inputs is ignored if the simulator does not take the argument `inputs`.
+    velocity : str, optional
+        Column of the velocity at which parts with friction move. Ignored if `stages` is given.
+    position : str, optional
+        Column of the position from which this velocity is computed. Ignored if `stages` is given.
+    beside : sequence of str, default ()
+        Further columns that effects may depend on: channels with possible cross-talk, or loads of a contact.
+    without : sequence of str, default ()
+        Effects that are not examined, by name (`"output.backlash"`), kind (`"backlash"`) or place (`"output.all"`).
+    reference : str, optional
+        Column of the quantity that the output measures, if the output is the signal of a sensor. With `stages` this output is
+        that of the last stage. The diagnosis then reports how much the gap degrades a calibration of the sensor.
+    experiment : bool, default False
+        Whether to search for an experiment that would distinguish the effects that these data cannot. The simulator must take
+        `inputs`.
+    budget : int, optional
+        Largest number of simulator runs. One run simulates one model. By default the number is not limited, or limited by the
+        `problem.toml`.
+    depth : int, default 4
+        Largest number of effects that are named together, at least 1.
+    seed : int, default 1
+        Seed of the random resampling from which intervals and `Diagnosis.stability` are computed.
+    threads : int, default 0
+        Number of threads for the computation, at most one per core. 0 uses the environment variable `RAYON_NUM_THREADS`, or
+        else all cores. The result does not depend on it. The simulator always runs on the calling thread.
+    name : str, default "data"
+        Name of the problem in the report. A `problem.toml` provides the default.
+    progress : callable, optional
+        Function that is called with a short text at each step. An exception that it raises ends the diagnosis. By default a
+        notebook shows a progress bar if tqdm is installed.
+
+    Returns
+    -------
+    Diagnosis
+        Named effects, probabilities, re-tuned parameters, curves and report.
+
+    Raises
+    ------
+    StretchError
+        If the data, the arguments or the arrays that the simulator returns are wrong. The message says what to do.
+    Exception
+        Any exception of the simulator or of `progress`, unchanged. Only `Refused` is handled: it tells the fit that these
+        values cannot be simulated.
+
+    Warns
+    -----
+    DoubtWarning
+        If samples are left out because a column has no number there (code `missing_samples`).
+
+    Examples
+    --------
+    A spring is softer than the simulator assumes, and its length is measured 60 ms late.
+
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 60, 0.01)
+    >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
+    >>> noise = 0.01 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> length = 2.1 * np.interp(time_s - 0.06, time_s, force) + noise
+    >>> def spring(params, effects):
+    ...     return params["compliance"] * force + effects["bend"] * force**2
+    >>> found = stretch_gap.diagnose(
+    ...     spring,
+    ...     {"time_s": time_s, "force_N": force, "length_mm": length},
+    ...     output="length_mm",
+    ...     inputs=["force_N"],
+    ...     parameters={"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")},
+    ...     effects={"bend": (-0.01, 0.01)},
+    ...     wrap=["output.delay", "output.backlash", "output.saturation"],
+    ... )
+    >>> found.named
+    ['output.delay']
+    >>> round(found.effects["output.delay"]["delay_s"], 3), round(found.parameters["compliance"], 2)
+    (0.06, 2.1)
     """
     if depth < 1:
-        raise StretchError(f"depth: {depth} effects cannot be named; give 1 or more")
+        raise StretchError(f"depth is {depth}, the largest number of effects that may be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
     if isinstance(data, (str, os.PathLike)) and os.fspath(data).endswith(".toml"):
         if output is not None or stages is not None or parameters or effects:
-            raise StretchError(
-                f"{os.fspath(data)} says what is diagnosed; give a simulator in addition to it, or None for the file's own"
-            )
+            raise StretchError(f"{os.fspath(data)} defines output, stages, parameters and effects; leave these arguments out")
         checked = _stretch.Problem.read(data, asked is None or asked.takes_inputs)
         name = checked.name if name == "data" else name
     else:
         if asked is None:
-            raise StretchError("there is no simulator; give one, or the path of a problem.toml that names it")
+            raise StretchError(
+                "there is no simulator, because simulator is None; give one, or give the path of a problem.toml as data"
+            )
         if (output is None) == (stages is None):
-            raise StretchError("say what is compared with the measurement: output, a column's name, or stages")
+            raise StretchError("give either output, the name of the measured column, or stages")
         listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
         units, noise = units or {}, noise or {}
         driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
@@ -369,7 +650,7 @@ def run(
     progress: Callable[[str], Any] | None,
     notes: list[str],
 ) -> Diagnosis:
-    """Diagnoses a checked problem; `notes` are put before its own."""
+    """Diagnose a checked problem. `notes` precede the notes of the diagnosis."""
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
@@ -382,21 +663,36 @@ def run(
 
 
 def wrappers() -> Any:
-    """Effects that can be wrapped around a simulator, as a pandas frame (a dict of columns without pandas): `kind`; `wrap`, the
-    sides on which `wrap="all"` looks for it; `words`; and `equation`, in which x becomes y."""
+    """List the kinds of effects that can be wrapped around a simulator.
+
+    Returns
+    -------
+    pandas.DataFrame or dict of str to list
+        Table with one row for each kind and these columns: `kind` (its name, as used in the argument `wrap` of `diagnose`),
+        `wrap` (sides of the simulator, `input` or `output`, at which `wrap="all"` searches for it), `words` (a description) and
+        `equation` (in which x is the signal before and y the signal after the effect). A dict of columns if pandas is not
+        installed.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> kinds = stretch_gap.wrappers()
+    >>> "delay" in list(kinds["kind"])
+    True
+    """
     keys = ("kind", "wrap", "words", "equation")
     return frame([dict(zip(keys, one)) for one in _stretch.wrappers()])
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:
-    """Wrappers that act behind the simulator: it cannot be driven by other inputs than it has."""
+    """Return the wrappers at the outputs, for a simulator that does not take altered inputs. Wrappers at inputs are refused."""
     sides = ("input", *driven)
     for one in wrappers:
         if one.split(".", 1)[0] in sides:
             raise StretchError(
-                f"wrap, {one}: the simulator must take the argument inputs to be driven by altered ones, as simulate(params, "
-                "effects, inputs)"
+                f"wrap: {one} alters an input, so the simulator must take the argument inputs, as in simulate(params, effects, "
+                "inputs); add this argument, or leave the wrapper out"
             )
     if "all" in wrappers and driven:
-        notes.append("nothing was looked for on the input's side: the simulator takes no argument inputs")
+        notes.append("effects at the inputs were not examined, because the simulator does not take the argument inputs")
     return ["output.all" if one == "all" else one for one in wrappers]

@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 
 def curves(values: Mapping[str, Array], dt_s: float, output: str, title: str) -> Any:
-    """Two axes above each other: the measured and the simulated curves, and measured minus simulated."""
+    """Draw two axes above each other: the measured and the simulated curves, and measured minus simulated. Return the axes."""
     try:
         from matplotlib import pyplot  # type: ignore[import-not-found,unused-ignore]
     except ImportError:
-        raise StretchError("the package matplotlib is not installed; pip install matplotlib") from None
+        raise StretchError("the package matplotlib is not installed; run pip install matplotlib") from None
     figure, axes = pyplot.subplots(2, sharex=True, layout="constrained", height_ratios=(2, 1))
     measured = np.asarray(values["measured"])
     time_s = dt_s * np.arange(measured.size)
@@ -39,7 +39,10 @@ def curves(values: Mapping[str, Array], dt_s: float, output: str, title: str) ->
 
 @contextmanager
 def shown(progress: Callable[[str], Any] | None) -> Iterator[Callable[[str], Any] | None]:
-    """The user's function that takes progress; without one, a bar in a notebook if tqdm is installed."""
+    """Yield the function that is called with progress messages.
+
+    Without a function of the user, a notebook shows a progress bar if tqdm is installed.
+    """
     if progress is not None or "ipykernel" not in sys.modules:
         yield progress
         return

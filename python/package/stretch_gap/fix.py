@@ -1,4 +1,4 @@
-"""The changes that a diagnosis asks for: parameters re-tuned, the named effects as code, and the fixed simulator itself."""
+"""Changes that a simulator needs according to a diagnosis, and predictions of the fixed simulator."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .simulator import Asked
 
 @dataclass(frozen=True)
 class Again:
-    """What runs the fixed simulator: the fixed problem, the user's simulator, and the options of the diagnosis."""
+    """Inputs of a run of the fixed simulator: the fixed problem, the user's simulator, and the options of the diagnosis."""
 
     fixed: Fixed
     asked: Asked | None
@@ -26,23 +26,51 @@ class Again:
 
 @dataclass(frozen=True)
 class Fix:
-    """Parameters re-tuned and effects added."""
+    """Changes that the simulator needs: re-tuned parameters and the named effects.
+
+    `Diagnosis.fix` returns this class.
+
+    Attributes
+    ----------
+    parameters : dict of str to float
+        Values of all nominal parameters, re-tuned together with the named effects.
+    effects : dict of str to dict of str to float
+        Values of the named effects, by effect and argument.
+    code : str
+        The same as Python code to paste into the simulator: the parameters, a function for each effect around the simulator,
+        and the values of each effect that the simulator itself implements.
+    """
 
     parameters: dict[str, float]
-    """Every nominal parameter, re-tuned together with the named effects."""
     effects: dict[str, dict[str, float]]
-    """Values of the named effects, by effect."""
     code: str
-    """The same as Python code to paste: the parameters, a function for each effect around the simulator, and the values of
-    effects that the simulator has itself."""
     _again: Again | None = field(default=None, repr=False)
 
     def predict(
         self, data: entries.Data, *, rate_hz: float | None = None, progress: Callable[[str], Any] | None = None
     ) -> Prediction:
-        """Simulates new recordings with the fix and without, and scores both. The new recordings are not fitted.
+        """Simulate new recordings with the fix and without it, and compare the errors. Nothing is fitted to the new recordings.
 
-        `data` are as in `stretch_gap.diagnose`: they hold the inputs and the measured outputs.
+        Parameters
+        ----------
+        data : dict of str to array_like, data frame, Trial, str, path-like, or list of these
+            New recordings, as in `diagnose`. They contain the inputs and the measured outputs.
+        rate_hz : float, optional
+            Sample rate in Hz of recordings that have neither `time_s` nor a rate.
+        progress : callable, optional
+            Function that is called with a short text at each step. By default a notebook shows a progress bar if tqdm is
+            installed.
+
+        Returns
+        -------
+        Prediction
+            Errors and curves with the fix and without it. Without the fix, the parameters are re-tuned without the effects.
+
+        Raises
+        ------
+        StretchError
+            If there is no simulator to run, because the diagnosis was read from text or names no effect, or if the recordings
+            are wrong.
         """
         again = self._runnable()
         fitted, begins_s = again.fixed.fitted
@@ -63,7 +91,29 @@ class Fix:
         rate_hz: float | None = None,
         progress: Callable[[str], Any] | None = None,
     ) -> Any:
-        """Diagnoses the fixed simulator with the same recordings, or with others."""
+        """Diagnose the fixed simulator.
+
+        Parameters
+        ----------
+        data : dict of str to array_like, data frame, Trial, str, path-like, or list of these, optional
+            Recordings, as in `diagnose`. By default the recordings of the first diagnosis.
+        rate_hz : float, optional
+            Sample rate in Hz of recordings that have neither `time_s` nor a rate.
+        progress : callable, optional
+            Function that is called with a short text at each step. By default a notebook shows a progress bar if tqdm is
+            installed.
+
+        Returns
+        -------
+        Diagnosis
+            Diagnosis of the simulator with the re-tuned parameters and the named effects.
+
+        Raises
+        ------
+        StretchError
+            If there is no simulator to run, because the diagnosis was read from text or names no effect, or if the recordings
+            are wrong.
+        """
         from .diagnosis import run
 
         again = self._runnable()
@@ -73,7 +123,7 @@ class Fix:
     def _runnable(self) -> Again:
         if self._again is None:
             raise StretchError(
-                "there is no simulator to run: the diagnosis was read from text, or names no effect; diagnose again"
+                "there is no simulator to run, because the diagnosis was read from text or names no effect; diagnose again"
             )
         return self._again
 
@@ -82,49 +132,104 @@ class Fix:
 
 
 class Prediction:
-    """What the fixed simulator predicts of recordings that were not fitted."""
+    """Predictions of recordings that were not fitted, with a fix of the simulator and without it.
+
+    `Fix.predict` returns this class.
+
+    Attributes
+    ----------
+    sentence : str
+        Result in plain English.
+    """
 
     def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]], dt_s: float) -> None:
         self._answer: dict[str, Any] = json.loads(text)
         self.sentence = sentence
-        """The result in a sentence."""
         self._curves = curves
         self._dt_s = dt_s
 
     @property
     def ratio(self) -> float:
-        """Error with the fix over error without, parameters re-tuned: below 1 the fix helps. Geometric mean of all outputs."""
+        """Error with the fix divided by error without it, float, as geometric mean over all recordings and outputs.
+
+        Below 1 the fix helps. The parameters without the fix are re-tuned without the effects.
+        """
         return float(self._answer["ratio"])
 
     @property
     def times_noise(self) -> float:
-        """The largest error with the fix of any output, in multiples of its noise: 1 is noise alone."""
+        """Largest error with the fix of any output and recording, float, in multiples of the noise. Noise alone gives 1."""
         return float(self._answer["largest_times_noise"])
 
     @property
     def outputs(self) -> list[dict[str, Any]]:
-        """By recording and output: `rmse` and `rmse_without` in the output's unit, `ratio`, and `times_noise`."""
+        """Errors, list of dicts, one for each recording and output.
+
+        Each dict holds `trial` (the recording), `stage`, `column`, `unit`, `noise`, `rmse` and `rmse_without` (root mean square
+        error with the fix and without it, in `unit`), `times_noise` (`rmse` in multiples of the noise) and `ratio` (`rmse`
+        divided by `rmse_without`).
+        """
         return [{"trial": trial["name"], **one} for trial in self._answer["trials"] for one in trial["outputs"]]
 
     @property
     def notes(self) -> list[str]:
-        """Where the new recordings leave the range that was fitted, and what was noticed in them."""
+        """Notes, list of str: columns and rates of the recordings outside the fitted range, and observations in the recordings.
+
+        Do not trust a prediction outside the fitted range.
+        """
         return [words for trial in self._answer["trials"] for words in trial["extrapolated"]] + list(self._answer["notes"])
 
     def curves(self, output: str | None = None) -> dict[str, Array]:
-        """One output over all new recordings end to end: `measured`, `without` the fix, and `with_effects`."""
+        """Return the measured and the predicted curves of one output, all new recordings end to end.
+
+        Parameters
+        ----------
+        output : str, optional
+            Column of the output. By default the output of the first stage.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (samples,)
+            `measured`, `without` (without the fix) and `with_effects` (with the fix), in the unit of the output.
+
+        Raises
+        ------
+        StretchError
+            If there is no such output.
+        """
         name = output or next(iter(self._curves))
         if name not in self._curves:
-            raise StretchError(f"there is no output {name}; there are {', '.join(self._curves)}")
+            raise StretchError(f"there is no output {name}; the outputs are {', '.join(self._curves)}")
         return dict(zip(("measured", "without", "with_effects"), self._curves[name]))
 
     def plot(self, output: str | None = None) -> Any:
-        """Draws one output with matplotlib: measured, without and with the fix, and below it measured minus simulated. Returns
-        the two axes."""
+        """Draw the curves of one output, and measured minus simulated below them. Requires matplotlib.
+
+        Parameters
+        ----------
+        output : str, optional
+            Column of the output. By default the output of the first stage.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes
+            The upper and the lower axes.
+
+        Raises
+        ------
+        StretchError
+            If there is no such output, or if matplotlib is not installed.
+        """
         return figures.curves(self.curves(output), self._dt_s, output or next(iter(self._curves)), self.sentence)
 
     def to_json(self) -> str:
-        """Everything but the curves, as `stretch predict --json` writes it."""
+        """Return the prediction as JSON, without the curves.
+
+        Returns
+        -------
+        str
+            JSON as written by `stretch predict --json`.
+        """
         return json.dumps(self._answer, indent=2)
 
     def __repr__(self) -> str:
@@ -144,7 +249,10 @@ def fix(
     functions: Mapping[str, str],
     again: Again | None,
 ) -> Fix:
-    """The fix from re-tuned parameters, and the values, descriptions and functions of the named effects."""
+    """Return the fix.
+
+    `found` holds the values of the named effects, `implement` their descriptions, and `functions` their code.
+    """
     described = {one["effect"]: one for one in implement}
     lines = ["# parameters, re-tuned together with the named effects", "parameters = {"]
     lines += [f"    {name!r}: {value!r}," for name, value in parameters.items()]

@@ -1,4 +1,4 @@
-"""Tables, with pandas or without."""
+"""Tables, as pandas frames if pandas is installed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def frame(rows: list[dict[str, Any]]) -> Any:
-    """Rows as a pandas frame, or as a dict of columns where there is no pandas."""
+    """Return rows as a pandas frame, or as a dict of lists by column if pandas is not installed."""
     try:
         import pandas  # type: ignore[import-untyped,unused-ignore]
     except ImportError:

@@ -1,4 +1,4 @@
-"""Results as a notebook shows them."""
+"""HTML fragments for the display of results in a notebook."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def number(x: Any) -> str:
-    """A number to four digits; a dash where there is none; other things as they are."""
+    """Return a number with four digits, a dash for None and NaN, and any other value as escaped text."""
     if x is None:
         return "–"
     if isinstance(x, bool) or not isinstance(x, (int, float)):
@@ -19,7 +19,7 @@ def number(x: Any) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    """A table whose first column names its rows."""
+    """Return a table. The first column names the rows."""
     top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{number(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
@@ -27,6 +27,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "")
 
 
 def notes(lines: Sequence[str]) -> str:
-    """Sentences, one a line."""
+    """Return sentences as a list."""
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
     return f"<ul>{items}</ul>" if lines else ""

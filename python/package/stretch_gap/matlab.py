@@ -1,4 +1,4 @@
-"""MATLAB's files of either kind, with what Simulink logs, and HDF5: structures and groups become paths."""
+"""Readers of MATLAB files of all versions, including Simulink logs, and of HDF5. Structures and groups become paths."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from ._stretch import tidy_column
 from .arrays import Arrays, library, with_unit
 
 DEEPEST = 16
-"""Structures in structures that are followed."""
+"""Largest depth of nested structures that is read."""
 MOST_ITEMS = 64
-"""Items of a cell array or of an array of structures that are followed."""
+"""Largest number of items of a cell array or of an array of structures that is read."""
 
 
 class Unread(str):
-    """Something that is left out, with the reason."""
+    """Placeholder of a value that is left out. The text is the reason."""
 
 
 def read_mat(path: Path, found: Arrays) -> None:
-    """Files of version 5, which `save` writes up to `-v7`."""
+    """Read a MAT file of version 5, which MATLAB writes with `save` up to the option `-v7`."""
     io = library("scipy.io", "matlab")
     try:
         variables = io.loadmat(path, simplify_cells=True)
-    # scipy has no specific error for damaged files
+    # SciPy has no specific exception for damaged files.
     except Exception as error:
         raise found.cannot("MAT file", error, "save it again with -v7") from error
     walk({name: value for name, value in variables.items() if not name.startswith("__")}, found, "", ".")
 
 
 def read_hdf5(path: Path, found: Arrays) -> None:
-    """HDF5, and MATLAB's files of version 7.3, which are HDF5 behind a header."""
+    """Read an HDF5 file, or a MAT file of version 7.3, which is HDF5 with a header."""
     h5py = library("h5py", "matlab")
     try:
         with h5py.File(path, "r") as file:
@@ -43,7 +43,7 @@ def read_hdf5(path: Path, found: Arrays) -> None:
 
 
 def walk(value: Any, found: Arrays, path: str, separator: str, depth: int = 0) -> None:
-    """Takes all numbers of a value under its path."""
+    """Store all numbers of a value, and of the values in it, under their paths."""
     if isinstance(value, np.ndarray) and value.dtype == object:
         value = value.ravel(order="F").tolist()
     if isinstance(value, Mapping) and depth < DEEPEST:
@@ -53,21 +53,24 @@ def walk(value: Any, found: Arrays, path: str, separator: str, depth: int = 0) -
         for i, part in enumerate(value):
             walk(part, found, f"{path}{separator}{i}", separator, depth + 1)
     elif isinstance(value, (Mapping, list)):
-        found.leave(path, f"{len(value)} items, or too deep")
+        found.leave(path, f"it has {len(value)} items, or is nested too deeply")
     elif isinstance(value, Unread):
         found.leave(path, value)
     elif isinstance(value, str):
         found.leave(path, "text")
     elif hasattr(value, "toarray"):
-        found.leave(path, "a sparse matrix; save full(x)")
+        found.leave(path, "a sparse matrix; save full(x) instead")
     elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-        found.leave(path, "an object of MATLAB; save its numbers, as [ts.Time ts.Data]")
+        found.leave(path, "an object of MATLAB; save its numbers, for example [ts.Time ts.Data]")
     elif np.size(value):
         found.take(path, value)
 
 
 def _named(fields: dict[Any, Any], own: str) -> dict[Any, Any]:
-    """Fields of a structure, with the signals that Simulink logs ("Structure With Time") and a timeseries under their names."""
+    """Return the fields of a structure, with the signals of a Simulink log and of a timeseries under their own names.
+
+    A Simulink log is a "Structure With Time". `own` is the name of the structure itself.
+    """
     if "signals" in fields and "time" in fields:
         signals = fields.pop("signals")
         for i, signal in enumerate(signals if isinstance(signals, list) else [signals]):
@@ -76,7 +79,7 @@ def _named(fields: dict[Any, Any], own: str) -> dict[Any, Any]:
                 name = tidy_column(label) if isinstance(label, str) and label.strip() else f"signal_{i + 1}"
                 fields[name if name not in fields else f"{name}_{i + 1}"] = signal["values"]
             else:
-                fields[f"signals_{i + 1}"] = Unread("no signal of Simulink")
+                fields[f"signals_{i + 1}"] = Unread("not a signal of a Simulink log")
     elif "Data" in fields and "Time" in fields:
         name = fields.pop("Name", "")
         fields[tidy_column(name) if isinstance(name, str) and name else own or "Data"] = fields.pop("Data")
@@ -84,7 +87,7 @@ def _named(fields: dict[Any, Any], own: str) -> dict[Any, Any]:
 
 
 class Tree:
-    """Groups as dicts, arrays of structures and cells as lists, data sets as arrays."""
+    """Converter of an HDF5 file: groups become dicts, arrays of structures and cells become lists, data sets become arrays."""
 
     def __init__(self, h5py: Any, file: Any) -> None:
         self.h5py = h5py
@@ -92,12 +95,15 @@ class Tree:
         self.seen: set[tuple[int, int]] = set()
 
     def group(self, group: Any) -> Any:
-        """A group, or the array of structures that MATLAB keeps as a group of references."""
+        """Return a group as a dict.
+
+        Return a list if it is an array of structures, which MATLAB stores as a group of references.
+        """
         about = self.h5py.h5o.get_info(group.id)
         if (about.fileno, about.addr) in self.seen:
-            return Unread("it is in another group, too")
+            return Unread("it is a link to a group that was already read")
         self.seen.add((about.fileno, about.addr))
-        # what begins so MATLAB keeps for itself
+        # Names that begin with # are reserved for MATLAB.
         parts = {name: group.get(name) for name in group if not name.startswith("#")}
         fields = [part for part in parts.values() if self.refers(part) and not _class(part)]
         if fields and len(fields) == len(parts):
@@ -107,13 +113,13 @@ class Tree:
         return {with_unit(name, _unit(part)): self.value(part) for name, part in parts.items()}
 
     def value(self, node: Any) -> Any:
-        """What a node holds."""
+        """Return the content of a node."""
         if isinstance(node, self.h5py.Group):
             return self.group(node)
         if not isinstance(node, self.h5py.Dataset):
-            return Unread("a link that leads nowhere")
+            return Unread("a broken link")
         if "MATLAB_object_decode" in node.attrs:
-            return Unread(f"an object of MATLAB's class {_class(node)}; save its numbers, as [ts.Time ts.Data]")
+            return Unread(f"an object of MATLAB's class {_class(node)}; save its numbers, for example [ts.Time ts.Data]")
         if node.attrs.get("MATLAB_empty") or not node.size:
             return []
         if self.refers(node):
@@ -125,7 +131,7 @@ class Tree:
         return node[()]
 
     def refers(self, node: Any) -> bool:
-        """Whether a node holds references to others."""
+        """Return whether a node contains references to other nodes."""
         return isinstance(node, self.h5py.Dataset) and self.h5py.check_ref_dtype(node.dtype) is self.h5py.Reference
 
 

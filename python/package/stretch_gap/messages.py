@@ -1,4 +1,4 @@
-"""Messages of topics, from MCAP files and ROS bags: each topic is a clock, each number of its messages a column."""
+"""Readers of MCAP files and ROS bags. Each topic is a clock, and each number in its messages is a column."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import Array, Arrays, library, listed
 
 LONGEST = 64
-"""Longest array whose numbers become columns; images and scans are longer."""
+"""Length of the longest array whose numbers become columns. Images and scans are longer."""
 STAMPS = (
     ("header.stamp.sec", "header.stamp.nanosec"),
     ("header.stamp.sec", "header.stamp.nsec"),
@@ -24,13 +24,13 @@ STAMPS = (
     ("timestamp.seconds", "timestamp.nanos"),
     ("time.seconds", "time.nanos"),
 )
-"""Where messages say themselves when they were measured: seconds, and the nanoseconds of the same stamp."""
+"""Fields with the time of measurement inside a message: seconds, and nanoseconds of the same stamp."""
 
 Decode = Callable[[], Any]
 
 
 class Topic:
-    """Columns that grow by a message; a message that lacks a number has NaN there."""
+    """Columns of one topic. Each message adds one row; a number that is missing in a message is NaN."""
 
     def __init__(self) -> None:
         self.logged_ns: list[int] = []
@@ -38,6 +38,7 @@ class Topic:
         self.texts: dict[str, str] = {}
 
     def take(self, logged_ns: int, message: Any) -> None:
+        """Add a message that was logged at the given time, in nanoseconds."""
         row = len(self.logged_ns)
         for path, value in leaves(message):
             if isinstance(value, str):
@@ -49,7 +50,10 @@ class Topic:
         self.logged_ns.append(logged_ns)
 
     def arrays(self) -> dict[str, Array]:
-        """The columns, of one length; items of arrays by the names that the first message has for them, as joints have."""
+        """Return the columns, all of the same length.
+
+        Items of arrays are named as in the first message, for example by the joints.
+        """
         rows, named = len(self.logged_ns), {}
         for path, values in self.columns.items():
             array, _, item = path.rpartition(".")
@@ -60,7 +64,7 @@ class Topic:
 
 
 def leaves(value: Any, path: str = "") -> Iterator[tuple[str, float | str]]:
-    """The numbers and texts of a message, each with its path."""
+    """Yield the numbers and texts of a message, each with its path."""
     if isinstance(value, (bool, int, float, np.number, np.bool_)):
         yield path, float(value)
     elif isinstance(value, str):
@@ -76,7 +80,7 @@ def _parts(value: Any) -> Iterator[tuple[Any, Any]]:
     elif isinstance(value, (Sequence, np.ndarray)):
         if len(value) <= LONGEST:
             yield from enumerate(value)
-    elif hasattr(value, "DESCRIPTOR"):  # protobuf; a message that is not there has no numbers
+    elif hasattr(value, "DESCRIPTOR"):  # protobuf; an absent message has no numbers
         for field in value.DESCRIPTOR.fields:
             if not (field.message_type and field.has_presence) or value.HasField(field.name):
                 yield field.name, getattr(value, field.name)
@@ -87,7 +91,7 @@ def _parts(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def read_mcap(path: Path, found: Arrays) -> None:
-    """Messages in JSON, in protobuf, and in ROS 2's CDR with `ros2msg` schemas."""
+    """Read an MCAP file with messages in JSON, in protobuf, or in CDR with `ros2msg` schemas (ROS 2)."""
     reader = library("mcap.reader", "ros")
     factories = [library(f"mcap_{kind}.decoder", "ros").DecoderFactory() for kind in ("ros2", "protobuf")]
     decoders: dict[int, Callable[[bytes], Any]] = {}
@@ -108,7 +112,10 @@ def read_mcap(path: Path, found: Arrays) -> None:
 
 
 def read_bag(path: Path, found: Arrays) -> None:
-    """ROS 2 bags, a file or a folder, and ROS 1 bags. A bag that does not say what its messages are is read as ROS 2 Humble's."""
+    """Read a ROS 2 bag (file or folder) or a ROS 1 bag.
+
+    If a bag does not define its messages, those of ROS 2 Humble are assumed.
+    """
     typesys, reader = library("rosbags.typesys", "ros"), library("rosbags.highlevel", "ros")
 
     def rows() -> Iterator[tuple[str, int, Decode]]:
@@ -120,7 +127,7 @@ def read_bag(path: Path, found: Arrays) -> None:
 
 
 def take(rows: Iterator[tuple[str, int, Decode]], found: Arrays, what: str, todo: str) -> None:
-    """Takes all messages. A topic with a message that cannot be read is left out; a file that breaks off is read up to there."""
+    """Store all messages. A topic with an unreadable message is left out. A truncated file is read up to its end."""
     topics: dict[str, Topic] = {}
     unread: dict[str, str] = {}
     count = 0
@@ -129,11 +136,13 @@ def take(rows: Iterator[tuple[str, int, Decode]], found: Arrays, what: str, todo
             topic, logged_ns, decode = next(rows)
         except StopIteration:
             break
-        # each library has its own errors, and those of the libraries that it uses
+        # The libraries raise exceptions of many classes, including those of their own dependencies.
         except Exception as error:
             if not count:
                 raise found.cannot(what, error or type(error).__name__, todo) from error
-            found.notes.append(f"it breaks off after {count} messages ({error or type(error).__name__}); those are read")
+            found.notes.append(
+                f"the file breaks off after {count} messages ({error or type(error).__name__}); only these are read"
+            )
             break
         count += 1
         if topic in unread:
@@ -147,7 +156,7 @@ def take(rows: Iterator[tuple[str, int, Decode]], found: Arrays, what: str, todo
         found.leave(topic, why)
     if not topics:
         why = listed([f"{topic} ({why})" for topic, why in sorted(unread.items())])
-        raise found.cannot(what, f"no topic can be read: {why}" if why else "there is no message in it", todo)
+        raise found.cannot(what, f"no topic can be read: {why}" if why else "the file contains no messages", todo)
     _as_arrays(topics, found)
 
 
@@ -165,17 +174,17 @@ def _as_arrays(topics: dict[str, Topic], found: Arrays) -> None:
         path = name.strip("/") or "messages"
         found.take_stamps(f"{path}.time_s", rising)
         for column, values in columns.items():
-            # the clock has that name
+            # The name `time_s` is used for the clock.
             column = "time_s.value" if column == "time_s" else column
             found.take(f"{path}.{column}" if column else path, values[first])
     if stamped:
-        found.notes.append(f"time is what the messages' own stamps say: {listed(stamped)}")
+        found.notes.append(f"the time is taken from the stamps in the messages: {listed(stamped)}")
     if doubled:
-        found.notes.append(f"messages with the stamp of another are left out: {listed(doubled)}")
+        found.notes.append(f"messages with the same stamp as an earlier message are left out: {listed(doubled)}")
 
 
 def _own_stamps(columns: dict[str, Array]) -> np.ndarray[Any, np.dtype[np.int64]] | None:
-    """Stamps in the messages, ns, where they go on from message to message; they are then no columns."""
+    """Return the stamps in the messages, ns, if most of them increase, and remove their columns. Otherwise return None."""
     for pair in STAMPS:
         if all(name in columns and np.isfinite(columns[name]).all() for name in pair):
             seconds, nanoseconds = (columns[name].astype(np.int64) for name in pair)

@@ -1,4 +1,4 @@
-"""What joints and actuators of a MuJoCo model have: read, set in a compiled model, and written into a specification."""
+"""Values of joints and actuators of a MuJoCo model: read and set in a compiled model, and written into a specification."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 GAIN = "kp"
 RATE_GAIN = "kv"
 DOF = ("damping", "armature", "frictionloss")
-"""What a joint has: fields of the model are called `dof_...`, those of its specification as here."""
+"""Values of a joint. A compiled model stores them as `dof_NAME`, a specification as `NAME`."""
 UNITS = {"damping": "N m s/rad", "armature": "kg m^2", "frictionloss": "N m", GAIN: "N m/rad", RATE_GAIN: "N m s/rad"}
 
 
 def parts(name: str) -> tuple[str, str]:
-    """Whose a parameter is, and what: `elbow_damping` is the damping of elbow."""
+    """Split the name of a parameter into its owner and the value: `elbow_damping` is the damping of `elbow`."""
     owner, _, what = name.rpartition("_")
     return (owner, what) if what in UNITS else ("", name)
 
 
 def write(model: Any, owner: str, what: str, value: float) -> None:
-    """Sets what a joint or an actuator of a compiled model has."""
+    """Set a value of a joint or of an actuator in a compiled model."""
     if what in DOF:
         getattr(model, f"dof_{what}")[model.jnt_dofadr[model.joint(owner).id]] = value
         return
@@ -37,7 +37,7 @@ def write(model: Any, owner: str, what: str, value: float) -> None:
 
 
 def read(model: Any, owner: str, what: str) -> float:
-    """What `write` sets."""
+    """Return a value of a joint or of an actuator in a compiled model."""
     if what in DOF:
         return float(getattr(model, f"dof_{what}")[model.jnt_dofadr[model.joint(owner).id]])
     actuator = model.actuator(owner).id
@@ -45,17 +45,36 @@ def read(model: Any, owner: str, what: str) -> float:
 
 
 def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
-    """Writes what was found into a specification; gives the effects that have no place in it.
+    """Write the result of a diagnosis into a MuJoCo specification.
 
-    Parameters of joints and actuators, and effects that the model has itself, are written as they are; a delay of a command
-    becomes the delay of its actuator where this MuJoCo has one. For what is left `diagnosis.fix().code` has functions.
+    Parameters and effects of joints and actuators are written as values of the specification. A delay of a command becomes the
+    delay of its actuator if this version of MuJoCo supports it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Diagnosis of a `problem`.
+    spec : mujoco.MjSpec
+        Specification of the model, usually `problem.spec`. It is changed in place.
+
+    Returns
+    -------
+    list of str
+        Named effects that a specification cannot represent. `diagnosis.fix().code` contains functions for them.
+
+    Raises
+    ------
+    StretchError
+        If the specification does not contain a joint or an actuator of the problem.
     """
     known = {joint.name: joint for joint in spec.joints} | {actuator.name: actuator for actuator in spec.actuators}
     own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] in known and values}
     for name, value in {**diagnosis.parameters, **own}.items():
         owner, what = parts(name)
         if owner not in known:
-            raise StretchError(f"{name}: the specification has no joint or actuator {owner}; give the one of the problem")
+            raise StretchError(
+                f"{name}: the specification has no joint or actuator {owner}; give that of the problem (problem.spec)"
+            )
         _write_spec(known[owner], what, value)
     left = [name for name in diagnosis.effects if name not in own]
     return [name for name in left if not _delayed(diagnosis, spec, name)]
@@ -64,7 +83,7 @@ def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
 def _write_spec(owner: Any, what: str, value: float) -> None:
     if what in DOF:
         held = getattr(owner, what)
-        if np.ndim(held):  # damping is a polynomial of the speed in newer versions
+        if np.ndim(held):  # In newer versions of MuJoCo, damping is a polynomial of the speed.
             held[0] = value
         else:
             setattr(owner, what, value)
@@ -75,7 +94,7 @@ def _write_spec(owner: Any, what: str, value: float) -> None:
 
 
 def _delayed(diagnosis: Diagnosis, spec: Any, name: str) -> bool:
-    """Writes a delay in front of a joint as that of its actuator; false where it is none."""
+    """Write the delay of a command as the delay of its actuator. Return False if the effect is not such a delay."""
     place, _, kind = name.rpartition(".")
     joints = {joint.name for joint in spec.joints}
     joint = next((part for part in place.split(".") if part in joints), None)

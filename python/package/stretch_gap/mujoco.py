@@ -1,13 +1,14 @@
-"""A problem from a MuJoCo model and a recording, without glue.
+"""Diagnosis of a MuJoCo model with a recording. Requires the package `mujoco`.
 
->>> import stretch_gap.mujoco
->>> problem = stretch_gap.mujoco.problem("arm.xml", recording)       # doctest: +SKIP
->>> found = problem.diagnose()                                       # doctest: +SKIP
->>> left = found.apply(spec := problem.spec)                         # doctest: +SKIP
+The function `problem` defines the problem from the model and the recording::
 
-Joints are found by their names among the columns. Gains, damping and armature that the model has are parameters with
-tolerances; friction loss, damping and armature that it lacks are candidates, in addition to whatever may be around a simulator
-(delay, backlash, a flexible joint ...).
+    problem = stretch_gap.mujoco.problem("arm.xml", "run.csv")
+    found = problem.diagnose()
+    left = found.apply(problem.spec)
+
+Columns are assigned to joints by name. Gains, damping and armature that the model has become parameters with tolerances.
+Friction loss, damping and armature that the model lacks become candidate effects. Effects around the simulator, such as delay
+and backlash, are examined as well.
 """
 
 from __future__ import annotations
@@ -34,38 +35,71 @@ __all__ = ["Problem", "Simulator", "apply", "problem"]
 Array = NDArray[np.float64]
 
 TOLERANCES = {GAIN: 0.2, RATE_GAIN: 0.5, "damping": 0.5, "armature": 0.5, "frictionloss": 0.5}
-"""One standard deviation, a share of what the model says."""
+"""Tolerances of the values of a model, one standard deviation, as a share of the value."""
 
 
 def library() -> Any:
-    """The package `mujoco`, or the sentence that says how to get it."""
+    """Import the package `mujoco`. If it is not installed, raise a `StretchError` with the command that installs it."""
     try:
         import mujoco  # type: ignore[import-untyped,import-not-found,unused-ignore]
         import mujoco.rollout  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
-        raise StretchError("the package mujoco is not installed; pip install mujoco") from None
+        raise StretchError("the package mujoco is not installed; run pip install mujoco") from None
     return mujoco
 
 
 @dataclass
 class Simulator:
-    """A MuJoCo model that joints' commands drive, several models at once."""
+    """Simulator of a MuJoCo model that is driven by the commands of joints. It simulates several models per call.
+
+    `problem` creates a simulator, and `stretch_gap.diagnose` calls it.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        Compiled model.
+    joints : sequence of stretch_gap.joints.Joint
+        Joints that are diagnosed, with their actuators and columns.
+    names : sequence of str
+        Names of the parameters and effects of the model: the joint or actuator, and the value, as in `elbow_damping`.
+    batch : int, default 32
+        Largest number of models per call.
+    columns : dict of str to ndarray of shape (samples,), optional
+        Columns of the recordings end to end. `begin` sets them.
+    """
 
     model: Any
     joints: Sequence[Joint]
     names: Sequence[str]
-    """Parameters and effects of the model: a joint or an actuator, and what of it."""
     batch: int = 32
     columns: Mapping[str, Array] = field(default_factory=dict)
 
     def begin(self, session: Mapping[str, Any]) -> None:
-        """Notes the recording, and brings the step of the model to a whole part of its sample time."""
+        """Store the recording, and set the time step of the model such that the sample interval is a multiple of it.
+
+        Parameters
+        ----------
+        session : dict
+            Everything that stays the same during a diagnosis. `dt_s` (the sample interval, s) and `columns` (arrays by name)
+            are used.
+        """
         self.dt_s, self.columns = float(session["dt_s"]), session["columns"]
         self.steps = max(1, round(self.dt_s / float(self.model.opt.timestep)))
         self.model.opt.timestep = self.dt_s / self.steps
 
     def varied(self, values: Mapping[str, float]) -> Any:
-        """A copy of the model with these values."""
+        """Return a copy of the model with other values.
+
+        Parameters
+        ----------
+        values : dict of str to float
+            Values by name, as in `names`.
+
+        Returns
+        -------
+        mujoco.MjModel
+            The changed copy.
+        """
         model = copy.copy(self.model)
         for name, value in values.items():
             owner, what = parts(name)
@@ -73,7 +107,26 @@ class Simulator:
         return model
 
     def simulate(self, params: Any, effects: Any, inputs: Mapping[str, Array], trials: Sequence[Any]) -> dict[str, Array]:
-        """Positions of the joints by column, trial by trial from the measured position at rest."""
+        """Simulate n models over the given recordings.
+
+        Each recording starts at rest, at the first measured position of each joint.
+
+        Parameters
+        ----------
+        params : ndarray of shape (n, parameters)
+            Values of the parameters, with columns by name.
+        effects : ndarray of shape (n, effects)
+            Values of the effects, with columns by name.
+        inputs : dict of str to ndarray of shape (n, samples)
+            Columns that drive the joints.
+        trials : sequence
+            Recordings end to end. The attribute `samples` of each is the slice of its samples.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n, samples)
+            Positions by column, in the unit of the column. NaN for a model that diverges.
+        """
         mujoco = library()
         count = params.shape[0]
         values = {name: params[name] for name in params.names} | {name: effects[name] for name in effects.names}
@@ -90,13 +143,13 @@ class Simulator:
                 rest = states[:, self.steps - 1 :: self.steps, at][:, : part.samples.stop - part.samples.start - 1]
                 out[joint.measured][:, part.samples.start + 1 : part.samples.stop] = rest / joint.scale
         broken = [i for i in range(count) if not all(np.isfinite(x[i]).all() for x in out.values())]
-        for i in broken:  # reported as no number, which takes that model out
+        for i in broken:  # NaN excludes the model from the fit.
             for x in out.values():
                 x[i] = np.nan
         return out
 
     def _begun(self, mujoco: Any, count: int, inputs: Mapping[str, Array], span: slice) -> tuple[Array, Array]:
-        """States at the beginning of a trial, and controls at every step of it."""
+        """Return the initial states of a trial, and the controls at each of its steps."""
         start = mujoco.MjData(self.model)
         if self.model.nkey:
             mujoco.mj_resetDataKeyframe(self.model, start, 0)
@@ -115,20 +168,55 @@ class Simulator:
 
 @dataclass
 class Problem:
-    """A model with recordings: what `stretch_gap.diagnose` takes, ready to be changed before it is asked."""
+    """MuJoCo model with recordings: the arguments of `stretch_gap.diagnose`, which may be changed before the diagnosis.
+
+    The function `problem` creates a problem.
+
+    Attributes
+    ----------
+    spec : mujoco.MjSpec
+        Specification of the model.
+    simulator : Simulator
+        Simulator of the model.
+    trials : list of Trial
+        Recordings.
+    stages : list of Stage
+        One stage for each joint.
+    parameters : dict of str to Parameter
+        Values that the model has, with tolerances, such as `motor_kp` and `elbow_armature`.
+    effects : dict of str to Argument
+        Values that the model lacks, with ranges, such as `elbow_frictionloss`.
+    notes : list of str
+        Joints that are not diagnosed, with the reasons.
+    """
 
     spec: Any
-    """The model's specification, as `MjSpec`."""
     simulator: Simulator
     trials: list[entries.Trial]
     stages: list[entries.Stage]
     parameters: dict[str, entries.Parameter]
     effects: dict[str, entries.Argument]
     notes: list[str]
-    """What was left out, and why."""
 
     def diagnose(self, **more: Any) -> Diagnosis:
-        """Says what the model lacks; further arguments are those of `stretch_gap.diagnose`."""
+        """Diagnose the model with `stretch_gap.diagnose`.
+
+        Parameters
+        ----------
+        **more : Any
+            Further arguments of `stretch_gap.diagnose`. They replace `stages`, `parameters` and `effects` of the problem if
+            given.
+
+        Returns
+        -------
+        Diagnosis
+            The diagnosis. Its notes begin with the notes of the problem.
+
+        Raises
+        ------
+        StretchError
+            If an argument or a recording is wrong.
+        """
         from .diagnosis import diagnose
 
         given: dict[str, Any] = {"stages": self.stages, "parameters": self.parameters, "effects": self.effects}
@@ -145,16 +233,38 @@ def problem(
     rate_hz: float | None = None,
     degrees: bool | None = None,
 ) -> Problem:
-    """Makes simulator, parameters with tolerances, and candidates from a model and what was recorded of it.
+    """Define a problem from a MuJoCo model and recordings.
 
-    `model` is the path of an XML file, its text, or an `MjSpec`. `recording` is whatever `stretch_gap.diagnose` takes as
-    data. `joints` says which joints of the model are looked at, by name, or also by which columns: `{"elbow":
-    ("elbow_cmd_rad", "elbow_rad")}`; without it, all whose name is in the columns. Angles are in radians; columns that
-    end with `_deg` are in degrees, and all with `degrees=True`.
+    Gains, damping and armature that the model has become parameters with tolerances. Friction loss, damping and armature that
+    the model lacks become candidate effects, whose ranges follow from the recordings.
 
-    Refused, with what to do: joints that no column is called like, joints that never moved, a command that is the
-    measurement, angles that can only be degrees, joints without a position actuator, balls and free bodies, whose positions
-    are quaternions.
+    Parameters
+    ----------
+    model : str, path-like or mujoco.MjSpec
+        Path of an MJCF file, its text, or a specification. Each diagnosed joint needs a position actuator (`<position>`).
+    recording : dict of str to array_like, data frame, Trial, str, path-like, or list of these
+        Recordings, as in `stretch_gap.diagnose`, with one column for the command and one for the measured position of each joint.
+    joints : sequence of str, or dict of str to tuple of str, optional
+        Joints to diagnose, by name. A dict also gives the columns of command and position: `{"elbow": ("elbow_cmd_rad",
+        "elbow_rad")}`. By default all joints that moved and whose name occurs in the names of both columns.
+    rate_hz : float, optional
+        Sample rate in Hz. Required if a recording has neither `time_s` nor a rate.
+    degrees : bool, optional
+        Whether all columns are in degrees. By default a joint is in degrees if its columns end in `_deg` or `_degrees`, and
+        otherwise in the unit of the model, radians for hinges.
+
+    Returns
+    -------
+    Problem
+        Simulator, stages, parameters and effects. `Problem.diagnose` runs the diagnosis.
+
+    Raises
+    ------
+    StretchError
+        If the package mujoco is not installed, if the model cannot be read, if no joint matches the columns, or if a joint
+        cannot be diagnosed: a joint in `joints` that never moved, a command that is constant or equal to the measurement,
+        columns that can only be in degrees although neither their names nor `degrees` say so, a joint without a position
+        actuator, or a ball or free joint.
     """
     mujoco = library()
     spec = specification(mujoco, model)
@@ -182,8 +292,8 @@ def problem(
             or compiled.actuator_biasprm[compiled.actuator(joint.actuator).id, 1] >= 0.0
         ):
             raise StretchError(
-                f"joint {joint.name}: its actuator {joint.actuator} is no position actuator; give the model <position joint="
-                f"{joint.name!r} kp=.../>, or write a simulator of your own"
+                f"joint {joint.name}: its actuator {joint.actuator} is not a position actuator; add <position joint="
+                f"{joint.name!r} kp=.../> to the model, or write your own simulator for stretch_gap.diagnose"
             )
     parameters, effects = looked_for(compiled, chosen, given)
     stages = [entries.Stage(j.measured, (j.commanded,), name=j.name, unit="rad" if j.scale == 1.0 else "deg") for j in chosen]
@@ -191,7 +301,7 @@ def problem(
 
 
 def specification(mujoco: Any, model: Any) -> Any:
-    """A model's specification from a path, from text, or as it is."""
+    """Return the specification of a model, which is given as a path, as text, or as a specification."""
     if isinstance(model, mujoco.MjSpec):
         return model
     text = os.fspath(model)
@@ -204,7 +314,7 @@ def specification(mujoco: Any, model: Any) -> Any:
 def looked_for(
     model: Any, joints: Sequence[Joint], given: Sequence[entries.Trial]
 ) -> tuple[dict[str, entries.Parameter], dict[str, entries.Argument]]:
-    """What the model has as parameters with tolerances, and what it lacks as candidates up to what the recording can hold."""
+    """Return the values that the model has as parameters, and those that it lacks as effects with ranges from the recordings."""
     parameters: dict[str, entries.Parameter] = {}
     effects: dict[str, entries.Argument] = {}
     for joint in joints:
@@ -219,7 +329,7 @@ def looked_for(
 
 
 def greatest(model: Any, joint: Joint, given: Sequence[entries.Trial]) -> dict[str, float]:
-    """How large what is lacking could be: the torque of the servo over speed and acceleration that were recorded."""
+    """Return the largest plausible value of each effect, from the torque of the servo and the recorded speed and acceleration."""
     gain, torque, speed, acceleration = read(model, joint.actuator, GAIN), 0.0, 0.0, 0.0
     for trial in given:
         measured = joint.scale * np.asarray(trial.columns[joint.measured], dtype=float)

@@ -1,4 +1,4 @@
-"""Files that are written, and what they may replace."""
+"""Check of output paths: a result never replaces a file of another kind."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from ._stretch import StretchError
 
 
 def replaceable(path: str | os.PathLike[str], *endings: str) -> str:
-    """Checks that a result may be written to a path, and returns the path as text.
+    """Check that a result may be written to a path, and return the path as text.
 
-    A file that exists is replaced only if its name has one of these endings. So a result replaces an earlier result, but never a
-    recording, a simulator or a notebook. Any other file is refused with a `StretchError`.
+    An existing file is replaced only if its name has one of the `endings`. A result can therefore replace an earlier result,
+    but never a recording, a simulator or a notebook. For any other existing file a `StretchError` is raised.
     """
     if Path(path).is_file() and Path(path).suffix not in endings:
         wanted = " or ".join(endings)
-        raise StretchError(f"{os.fspath(path)}: it is a file of another kind; name one to write that ends in {wanted}")
+        raise StretchError(
+            f"{os.fspath(path)}: this file is not replaced, because its name does not end in {wanted}; choose another name"
+        )
     return os.fspath(path)

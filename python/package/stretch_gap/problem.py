@@ -1,4 +1,4 @@
-"""The description of a simulator and of its recordings, as a user writes it."""
+"""Descriptions of parameters, effects, stages and recordings, and their conversion for the native module."""
 
 from __future__ import annotations
 
@@ -17,79 +17,153 @@ from .recordings import column, same_length, times, without_missing
 
 @dataclass(frozen=True)
 class Parameter:
-    """A nominal parameter: re-tuned within its tolerance before anything is blamed."""
+    """Nominal parameter of a simulator, which the diagnosis re-tunes within its tolerance.
+
+    The value is exact, and is not re-tuned, if neither `tolerance` nor `relative` is given.
+
+    Parameters
+    ----------
+    value : float
+        Nominal value in the simulator, in `unit`.
+    tolerance : float, optional
+        Uncertainty of the value, one standard deviation in `unit`. The value is re-tuned within three standard deviations. If
+        this is given, `relative` is ignored.
+    relative : float, optional
+        Uncertainty as a share of the value: 0.1 is 10 %.
+    unit : str, default ""
+        Unit of the value. Empty if it has none.
+    least : float, optional
+        Least plausible value. By default the value keeps its sign if its tolerance is relative, or smaller than the value.
+    greatest : float, optional
+        Greatest plausible value. By default it is not limited.
+    stages : sequence of str, default ()
+        Names of the stages in which the parameter acts. `()` means all stages.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N").relative
+    0.1
+    """
 
     value: float
-    """Value that the simulator ships with."""
     tolerance: float | None = None
-    """How far it may be off, one standard deviation in its unit; exact where neither this nor `relative` is given."""
     relative: float | None = None
-    """The same as a share of the value."""
     unit: str = ""
     least: float | None = None
-    """Least value that makes sense. Without one, a value keeps its sign where its tolerance is a share of it, or less than it."""
     greatest: float | None = None
-    """Greatest value that makes sense."""
     stages: Sequence[str] = ()
-    """Stages that it acts in; all where none is named."""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of an effect that the simulator has itself."""
+    """Argument of an effect that the simulator itself implements.
+
+    Parameters
+    ----------
+    min : float
+        Least plausible value, in `unit`.
+    max : float
+        Greatest plausible value, in `unit`.
+    off : float or None, default 0.0
+        Value at which the effect does nothing. None if the argument is only a shape of the effect, such as a time constant, and
+        does not switch the effect off.
+    unit : str, default ""
+        Unit of the argument. Empty if it has none.
+    log : bool, default False
+        Whether the argument is searched on a logarithmic scale. `min` must then be positive.
+    """
 
     min: float
     max: float
     off: float | None = 0.0
-    """Value at which it does nothing; None for a shape (a time constant), which does not say whether the effect is on."""
     unit: str = ""
     log: bool = False
-    """Whether it is searched in equal ratios."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect that the simulator has itself: arguments with values at which they do nothing."""
+    """Effect that the simulator itself implements, with several arguments.
+
+    For an effect with one argument, an `Argument` or a tuple suffices.
+
+    Parameters
+    ----------
+    arguments : dict of str to Argument
+        Arguments by name. At least one has a value at which the effect does nothing (`off`).
+    stages : sequence of str, default ()
+        Names of the stages in which the effect acts. `()` means all stages.
+    twins : sequence of str, default ()
+        Names of effects that are hard to distinguish from this effect. They are fitted together with it.
+    """
 
     arguments: Mapping[str, Argument]
     stages: Sequence[str] = ()
-    """Stages that it acts in; all where none is named."""
     twins: Sequence[str] = ()
-    """Effects that are hard to distinguish from it: they are fitted together with it."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Measured inputs in, one measured output out."""
+    """Part of a simulator that maps measured inputs to one measured output.
+
+    Parameters
+    ----------
+    output : str
+        Column of the measurement that the simulation is compared with.
+    inputs : sequence of str, default ()
+        Columns that drive the stage.
+    name : str, default ""
+        Name of the stage. By default `"simulator"` for the first stage, and `"stage 2"`, `"stage 3"` and so on for the others.
+    unit : str, default ""
+        Unit of the output. By default the last part of the column's name.
+    noise : float, optional
+        Noise of the output, one standard deviation in its unit. By default it is estimated from the recordings.
+    velocity : str, optional
+        Column of the velocity at which parts with friction move. Effects of friction need it or `position`. Without both, the
+        output is used if a force or a torque drives the stage and the output is a speed, a position or an angle.
+    position : str, optional
+        Column of the position from which this velocity is computed.
+    """
 
     output: str
-    """Column that the simulation is compared with."""
     inputs: Sequence[str] = ()
-    """Columns that drive it."""
     name: str = ""
     unit: str = ""
-    """Unit of the output; the last part of the column's name where it is empty."""
     noise: float | None = None
-    """Noise of the output, one standard deviation; from the record where it is not known."""
     velocity: str | None = None
-    """Column of the velocity at which it rubs, for friction."""
     position: str | None = None
-    """Column of the position whose change is that velocity."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A recording: columns of numbers, and when they were taken."""
+    """Recording with its time stamps, a name and a role.
+
+    Give one of `rate_hz`, `time_s`, a column `time_s`, and the argument `rate_hz` of the function that takes the recording.
+
+    Parameters
+    ----------
+    columns : dict of str to array_like of shape (samples,)
+        Columns by name, all of the same length.
+    rate_hz : float, optional
+        Sample rate in Hz.
+    time_s : array_like of shape (samples,), optional
+        Increasing time stamps in seconds, or an array of `datetime64` or `timedelta64`.
+    name : str, default ""
+        Name of the recording in notes and messages. By default recordings are numbered.
+    test : bool, default False
+        Whether the recording is used only to test the result, and is not fitted. If no recording of a problem is a test
+        recording, the last quarter of each recording is held back for the test.
+    start_s : float, optional
+        Start of the recording in the session, s. It matters for effects that drift. By default a pause of 15 s after the previous
+        recording is assumed.
+    """
 
     columns: Mapping[str, ArrayLike]
     rate_hz: float | None = None
-    """Samples a second; or give `time_s`, or a column of that name."""
     time_s: ArrayLike | None = None
     name: str = ""
     test: bool = False
-    """Whether it may only be tested on. Without any such trial the last quarter of each is held back."""
     start_s: float | None = None
-    """When it began in the session, s."""
 
 
 Data = Union[Mapping[str, ArrayLike], Trial, Sequence[Any], "os.PathLike[str]", str, Any]
@@ -98,19 +172,19 @@ EffectLike = Union[Effect, Argument, "tuple[float, float]", "tuple[float, float,
 
 
 def trials(data: Data, rate_hz: float | None) -> list[Trial]:
-    """Recordings from whatever holds them: a dict of arrays, a frame, a `Trial`, or a list of these."""
+    """Return the recordings in `data`: a dict of arrays, a data frame, a `Trial`, the path of a recording, or a list of these."""
     if isinstance(data, Trial):
         return [data]
     if isinstance(data, (str, os.PathLike)):
         data = read(data)
     if isinstance(data, (list, tuple)):
         return [one for part in data for one in trials(part, rate_hz)]
-    if hasattr(data, "columns") and not isinstance(data, Mapping):  # a frame, of whichever library
+    if hasattr(data, "columns") and not isinstance(data, Mapping):  # a data frame of any library
         frame: Any = data
         data = {str(name): np.asarray(frame[name]) for name in frame.columns}
     if not isinstance(data, Mapping):
         raise StretchError(
-            f"data are a {type(data).__name__}; give a dict of arrays by column, a frame, a stretch_gap.Trial, the path of a "
+            f"data is a {type(data).__name__}; give a dict of arrays by column, a data frame, a stretch_gap.Trial, the path of a "
             "recording, or a list of these"
         )
     columns = dict(data)
@@ -120,13 +194,13 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
 
 
 def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[tuple[dict[str, Any], float, bool]]:
-    """Recordings as the native part takes them, with the columns that are wanted alone."""
+    """Return recordings in the form of the native module, with only the columns in `wanted`."""
     wanted = list(dict.fromkeys(wanted))
     made: list[tuple[dict[str, Any], float, bool]] = []
     begins_s = 0.0
     every = trials(data, rate_hz)
     if not every:
-        raise StretchError("there is no recording; give at least one")
+        raise StretchError("data is empty; give at least one recording")
     for i, trial in enumerate(every):
         name = trial.name or (f"recording {i + 1}" if len(every) > 1 else "the recording")
         held = dict(trial.columns)
@@ -150,11 +224,11 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
 
 
 PAUSE_S = 15.0
-"""Pause that is assumed between recordings that do not say when they began, s."""
+"""Pause that is assumed before a recording without a start time, s."""
 
 
 def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
-    """A parameter as the native part takes it; a pair is value and tolerance, a number is exact."""
+    """Return a parameter in the form of the native module. A tuple is `(value, tolerance)`, and a number is exact."""
     if isinstance(given, tuple):
         given = Parameter(*given)
     elif not isinstance(given, Parameter):
@@ -172,7 +246,10 @@ def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
 
 
 def effect(name: str, given: EffectLike) -> dict[str, Any]:
-    """An effect as the native part takes it; a pair is the range of one argument that does nothing at 0."""
+    """Return an effect in the form of the native module.
+
+    A tuple is the range of one argument, with its value `off` if it is not 0.
+    """
     if isinstance(given, tuple):
         given = Argument(*given)
     if isinstance(given, Argument):
@@ -190,7 +267,7 @@ def effect(name: str, given: EffectLike) -> dict[str, Any]:
 
 
 def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str, float]) -> dict[str, Any]:
-    """A stage as the native part takes it."""
+    """Return a stage in the form of the native module."""
     return {
         "name": given.name or (f"stage {index + 1}" if index else "simulator"),
         "output": given.output,
@@ -203,7 +280,7 @@ def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str
 
 
 def wanted(stages: Sequence[Stage], beside: Sequence[str]) -> list[str]:
-    """Columns that a problem needs."""
+    """Return the names of the columns that a problem needs."""
     names: list[str] = []
     for one in stages:
         names += [one.output, *one.inputs, *(c for c in (one.velocity, one.position) if c)]

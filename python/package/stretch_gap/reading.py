@@ -1,8 +1,9 @@
 """Recordings from files.
 
-The program's own reader takes text and gzip. Every other format is read by the library that its owners keep, an extra of this
-package. Whatever was read becomes named arrays; which of them are clocks, and how channels on several clocks come to one, is
-decided by the program's reader of NPZ files. So a file that `convert` wrote gives the program what `read` gives here.
+The native module reads text, also compressed with gzip. Any other format is read by the library of its maintainers, which is an
+extra of this package. The result is a set of named arrays. The reader of NPZ files in the native module then decides which
+arrays are clocks, and resamples the channels to one clock. A file written by `convert` therefore gives the program `stretch`
+the same data as `read` gives here.
 """
 
 from __future__ import annotations
@@ -35,19 +36,29 @@ READERS: tuple[tuple[int, bytes, Callable[[Path, Arrays], None]], ...] = (
     (0, b"\x93NUMPY", tables.read_numpy),
     (0, b"PK\x03\x04", tables.read_numpy),
 )
-"""The layout of a file of a format, and its reader."""
+"""Offset and bytes by which a format is recognised, and the reader of the format."""
 
 
 class Recording(Mapping[str, Array]):
-    """Columns on one clock, `time_s` among them. Every function of the package that takes a dict of columns takes it."""
+    """Recording read from a file: a mapping from column names to arrays on one clock.
+
+    `read` returns this class. All columns, `time_s` among them, have the shape `(samples,)`. A clock is a series of time stamps
+    that columns share. Functions that take a dict of columns also take a `Recording`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    clocks : dict of str to dict of str to ndarray
+        Data before the resampling, by clock: the time stamps `time_s` of the clock, and its columns.
+    notes : list of str
+        Sentences on what was guessed, renamed, resampled or left out.
+    """
 
     def __init__(self, name: str, columns: dict[str, Array], clocks: dict[str, dict[str, Array]], notes: Sequence[str]) -> None:
         self.name = name
-        """Name of the file."""
         self.clocks = clocks
-        """The same before it was brought to one clock: for each clock of the file its instants, `time_s`, and its columns."""
         self.notes = list(notes)
-        """What was guessed, renamed, resampled or left out."""
         self._columns = columns
 
     def __getitem__(self, column: str) -> Array:
@@ -61,16 +72,22 @@ class Recording(Mapping[str, Array]):
 
     @property
     def time_s(self) -> Array:
-        """The instants, s."""
+        """Time stamps of the samples, ndarray of shape `(samples,)`, in seconds."""
         return self._columns["time_s"]
 
     @property
     def units(self) -> dict[str, str]:
-        """The unit of each column, from the last part of its name; empty where the name has none."""
+        """Units by column, dict of str to str, from the last part of each name. Empty if the name has no unit."""
         return {column: _stretch.unit_of(column) for column in self._columns}
 
     def to_frame(self) -> Any:
-        """The columns as a pandas frame; a dict of lists where there is no pandas."""
+        """Return the columns as a table with one row for each sample.
+
+        Returns
+        -------
+        pandas.DataFrame or dict of str to list
+            The table. A dict of columns if pandas is not installed.
+        """
         return frame([dict(zip(self._columns, row)) for row in zip(*self._columns.values())])
 
     def __repr__(self) -> str:
@@ -87,12 +104,53 @@ def read(
     rate_hz: float | None = None,
     grid_hz: float | None = None,
 ) -> Recording:
-    """Reads a recording: text in any dialect, NPY, NPZ, MCAP, ROS bags, MAT, HDF5, Parquet, any of which its first bytes tell.
+    """Read a recording from a file.
 
-    Each topic, group or structure with its own time is a clock. Channels on several clocks are brought to that of the
-    fastest, or to a grid of `grid_hz`, by straight lines and within the time that all of them cover. With `columns` only the
-    clocks of these count; a column is found by the last part of its path where only one ends so. `time` is the column or
-    array of the time where it has an unusual name. `rate_hz` is for recordings without any time.
+    The format is recognised by the first bytes of the file: text in any dialect (also compressed with gzip), NPY, NPZ, MCAP,
+    ROS 1 and ROS 2 bags, MAT, HDF5 or Parquet. Formats other than text and NumPy need an extra, such as `stretch-gap[ros]`.
+
+    Each topic, group or structure with its own time is a clock. Columns on several clocks are resampled by linear interpolation
+    to the fastest of these clocks, or to an even grid, within the time that all of them cover. Nothing is extrapolated.
+
+    Parameters
+    ----------
+    path : str or path-like
+        File to read, or the folder of a ROS 2 bag. `"FILE#3"` reads episode 3 of a LeRobot data set.
+    columns : sequence of str, optional
+        Required columns. Only the clocks of these columns are used. A column can be named by the last part of its path if only
+        one path has this ending. By default all columns and clocks are used.
+    time : str, default "time_s"
+        Column or array of the time. If there is no column `time_s`, usual names for a time are recognised as well.
+    rate_hz : float, optional
+        Sample rate in Hz. It replaces a time column in the file. Required if the file has neither a time nor a rate.
+    grid_hz : float, optional
+        Rate in Hz of an even grid to which all columns are resampled.
+
+    Returns
+    -------
+    Recording
+        Columns on one clock, with their units and notes on what was guessed or left out.
+
+    Raises
+    ------
+    StretchError
+        If the file cannot be read, if a column is missing, if there is no time, or if the library of the format is not installed.
+
+    Examples
+    --------
+    >>> import pathlib
+    >>> import tempfile
+    >>> import stretch_gap
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "run.csv")
+    >>> rows = [f"{i / 100},{165 + i / 8}" for i in range(60)]
+    >>> _ = path.write_text(chr(10).join(["time_s,length_mm", *rows]))
+    >>> recording = stretch_gap.read(path)
+    >>> recording["length_mm"].size
+    60
+    >>> recording.units
+    {'time_s': 's', 'length_mm': 'mm'}
+    >>> folder.cleanup()
     """
     how = {"columns": list(columns or ()), "time": time, "rate_hz": rate_hz, "grid_hz": grid_hz}
     found = contents(path)
@@ -106,7 +164,10 @@ def read(
 
 
 def contents(path: str | os.PathLike[str]) -> Arrays | None:
-    """The named arrays of a file; None of a table of text, which is none of those formats."""
+    """Return the named arrays of a file.
+
+    Return None if the format is not in `READERS`, because the file is then read as text.
+    """
     file = Path(path)
     found = Arrays(os.fspath(path))
     if (file / "metadata.yaml").is_file():
@@ -129,14 +190,53 @@ def _reader(file: Path) -> Callable[[Path, Arrays], None] | None:
 
 
 def convert(path: str | os.PathLike[str], out: str | os.PathLike[str], *, force: bool = False) -> Arrays:
-    """Writes what a file holds as an NPZ file that the program reads, with all its clocks; gives what was written. A file that is
-    there is a recording, which only `force` replaces."""
+    """Convert a recording to an NPZ file that the program `stretch` reads.
+
+    The NPZ file contains all clocks and columns of the recording. Nothing is resampled, except that text with several clocks is
+    read as `read` reads it. If writing fails, no partial file is left.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Recording to read, in any format of `read`.
+    out : str or path-like
+        File to write. Its name must end in `.npz`.
+    force : bool, default False
+        Whether to replace `out` if it exists.
+
+    Returns
+    -------
+    stretch_gap.arrays.Arrays
+        Arrays that were written (`numbers`, a dict by path), and `notes` on what was guessed or left out.
+
+    Raises
+    ------
+    StretchError
+        If the recording cannot be read or contains no numbers, or if `out` does not end in `.npz`, is the recording itself,
+        exists although `force` is False, or cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib
+    >>> import tempfile
+    >>> import stretch_gap
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "run.csv")
+    >>> rows = [f"{i / 100},{165 + i / 8}" for i in range(60)]
+    >>> _ = path.write_text(chr(10).join(["time_s,length_mm", *rows]))
+    >>> written = stretch_gap.convert(path, path.with_suffix(".npz"))
+    >>> list(written.numbers)
+    ['time_s', 'length_mm']
+    >>> folder.cleanup()
+    """
     if Path(out).suffix != ".npz":
-        raise StretchError(f"{os.fspath(out)}: the name of what is written must end in .npz")
+        raise StretchError(f"{os.fspath(out)}: the name of the output file must end in .npz")
     if Path(out).exists() and Path(out).samefile(path):
-        raise StretchError(f"{os.fspath(out)}: it is {os.fspath(path)}, which is read; name another file to write")
+        raise StretchError(f"{os.fspath(out)}: this is the recording {os.fspath(path)} itself; choose another output file")
     if Path(out).is_file() and not force:
-        raise StretchError(f"{os.fspath(out)}: it is a recording that is there; name another file, or replace it with force")
+        raise StretchError(
+            f"{os.fspath(out)}: this file exists; choose another output file, or replace it with force=True (--force)"
+        )
     found = contents(path)
     if found is None:
         recording = read(path)
@@ -144,11 +244,11 @@ def convert(path: str | os.PathLike[str], out: str | os.PathLike[str], *, force:
         found.numbers.update(recording)
         found.notes += recording.notes
     if not found.numbers:
-        raise StretchError(f"{os.fspath(path)}: there are no numbers in it ({'; '.join(found.notes) or 'it is empty'})")
-    # a name that no other file has
+        raise StretchError(f"{os.fspath(path)}: the recording contains no numbers ({'; '.join(found.notes) or 'it is empty'})")
+    # A unique name, so that no other file is overwritten.
     part = Path(f"{os.fspath(out)}.{uuid.uuid4().hex}.part")
     try:
-        # numpy.savez takes no array that is called "file"
+        # numpy.savez does not accept an array with the name "file".
         with zipfile.ZipFile(part, "x") as archive:
             for name, values in found.numbers.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:

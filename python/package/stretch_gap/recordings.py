@@ -1,4 +1,4 @@
-"""Checks arrays in the forms in which users have them."""
+"""Checks of the arrays and time stamps that users pass."""
 
 from __future__ import annotations
 
@@ -15,7 +15,27 @@ Array = NDArray[np.float64]
 
 
 class DoubtWarning(UserWarning):
-    """A doubt about data or estimates; `code` is its name for programs, as `other_rate`, and does not change."""
+    """Warning about a reason to doubt the data or a result.
+
+    Parameters
+    ----------
+    text : str
+        Sentence for the user.
+    code : str
+        Name of the reason for programs. It is stable between releases: `missing_samples`, `other_rate`, `other_unit`,
+        `constant_signal`, `outside_range`, `fitted_trials`, `constant_error`, `worse_than_the_mean` or `constant_reference`.
+
+    Attributes
+    ----------
+    code : str
+        Name of the reason for programs.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> stretch_gap.DoubtWarning("the recording has another sample rate", "other_rate").code
+    'other_rate'
+    """
 
     def __init__(self, text: str, code: str) -> None:
         super().__init__(text)
@@ -23,24 +43,27 @@ class DoubtWarning(UserWarning):
 
 
 def doubt(doubts: Iterable[tuple[str, str]], stacklevel: int = 3) -> None:
-    """Warns of doubts, each a code and a sentence, on the line of the user's call."""
+    """Issue a `DoubtWarning` for each pair of code and sentence. `stacklevel` must point to the line of the user's call."""
     for code, text in doubts:
         warnings.warn(DoubtWarning(text, code), stacklevel=stacklevel)
 
 
 def column(values: ArrayLike, what: str) -> Array:
-    """One column of numbers; a missing value is NaN or infinite."""
+    """Return a column as a one-dimensional array of floats. NaN and infinite values mark missing samples."""
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise StretchError(f"{what} does not hold numbers: {error}") from None
     if array.ndim != 1:
-        raise StretchError(f"{what} has the shape {array.shape}; give one number a sample, in one dimension")
+        raise StretchError(f"{what} has the shape {array.shape}; give an array of one dimension with one number per sample")
     return array
 
 
 def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Array]]) -> tuple[Array, list[tuple[str, Array]]]:
-    """The samples in which every channel has a number, as when a file is read; a `DoubtWarning` says which were left out."""
+    """Return the samples in which every channel has a number, as the reader of files does.
+
+    A `DoubtWarning` lists the other samples.
+    """
     present = np.logical_and.reduce([np.isfinite(values) for _, values in channels], initial=np.True_)
     left_out = np.flatnonzero(~present)
     if not left_out.size:
@@ -56,24 +79,24 @@ def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Arra
 
 
 def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: str) -> Array:
-    """Time stamps, s, from a sample rate or as they were given."""
+    """Return checked time stamps in seconds, computed from the sample rate or taken from `time_s`."""
     if (rate_hz is None) == (time_s is None):
-        raise StretchError(f"{what}: give either rate_hz, the samples a second, or time_s, the time stamps")
+        raise StretchError(f"{what}: give either rate_hz, the sample rate, or time_s, the time stamps")
     if rate_hz is not None:
         if not 0.0 < rate_hz < float("inf"):
-            raise StretchError(f"rate_hz is {rate_hz}; it must be above 0")
+            raise StretchError(f"rate_hz is {rate_hz}; give a finite number above 0")
         stamps: Array = np.arange(samples, dtype=np.float64) / float(rate_hz)
         return stamps
     assert time_s is not None
     given = np.asarray(time_s)
     if given.dtype.kind in "mM" and given.size:
-        # counted in the array's own unit, which is lost on the way to numbers
+        # The difference must be taken before the conversion to numbers, because the unit is lost there.
         time_s = (given - given.flat[0]) / np.timedelta64(1, "s")
     stamps = column(time_s, f"time_s of {what}")
     same_length(stamps, samples, f"time_s of {what}")
     wrong = np.flatnonzero(~np.isfinite(stamps))
     if wrong.size:
-        raise StretchError(f"time_s of {what}, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave that sample out")
+        raise StretchError(f"time_s of {what}, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave this sample out")
     back = np.flatnonzero(np.diff(stamps) <= 0.0)
     if back.size:
         i = int(back[0]) + 1
@@ -85,13 +108,13 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
 
 
 def same_length(array: Array, samples: int, what: str) -> None:
-    """Refuses a column that is not as long as its recording."""
+    """Raise a `StretchError` if a column does not have the given number of samples."""
     if array.size != samples:
-        raise StretchError(f"{what} has {array.size} samples, the signal {samples}; give one value for each sample")
+        raise StretchError(f"{what} has {array.size} samples, but the recording has {samples}; give one value for each sample")
 
 
 def is_many(values: Any) -> bool:
-    """Whether several recordings were given: a list or tuple of arrays, or an array of two dimensions."""
+    """Return whether `values` holds several recordings: a list or tuple of arrays, or an array of two dimensions."""
     if isinstance(values, (list, tuple)):
         return len(values) > 0 and np.ndim(values[0]) > 0
     return bool(np.ndim(values) > 1)
@@ -104,9 +127,10 @@ def recordings(
     names: Sequence[str] | None = None,
     unnamed: str = "recording",
 ) -> list[dict[str, Any]]:
-    """Recordings as the native part takes them; `columns` gives one array each, or one list of arrays each.
+    """Return recordings in the form of the native module.
 
-    Without `names` each is called by `unnamed` and its number.
+    Each value of `columns` is one array, or a list with one array for each recording. Without `names` a recording is named
+    `unnamed` with its number.
     """
     first_name, first = next(iter(columns.items()))
     many = is_many(first)
@@ -114,13 +138,13 @@ def recordings(
     count = len(given[first_name])
     for name, values in given.items():
         if len(values) != count:
-            raise StretchError(f"{name} has {len(values)} recordings, {first_name} {count}; give as many of each")
+            raise StretchError(f"{name} has {len(values)} recordings, but {first_name} has {count}; give as many of each")
     stamps = [None] * count if time_s is None else list(time_s) if is_many(time_s) else [time_s] * count
     if len(stamps) != count:
-        raise StretchError(f"time_s has {len(stamps)} recordings, {first_name} {count}; give as many")
+        raise StretchError(f"time_s has {len(stamps)} recordings, but {first_name} has {count}; give as many of each")
     called = list(names) if names is not None else [f"{unnamed} {i + 1}" if many else f"the {unnamed}" for i in range(count)]
     if len(called) != count:
-        raise StretchError(f"{len(called)} names for {count} recordings; give one each")
+        raise StretchError(f"names has {len(called)} names for {count} recordings; give one name for each")
     made = []
     for i, name in enumerate(called):
         channels = [(key, column(values[i], f"{key} of {name}")) for key, values in given.items()]

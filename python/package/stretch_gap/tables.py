@@ -1,4 +1,4 @@
-"""Tables and archives of arrays: Parquet, LeRobot's data sets among it, and NumPy's own files."""
+"""Readers of Parquet files, LeRobot data sets among them, and of NumPy files."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 from .arrays import Arrays, library, with_unit
 
 EPISODE = "episode_index"
-"""The column of LeRobot's tables that says of which episode a row is."""
+"""Column of LeRobot tables with the number of the episode of each row."""
 
 
 def file_of(path: Path) -> Path:
-    """The file of `FILE#3`, which is episode 3 of it."""
+    """Return the path without the number of an episode: `FILE#3` is episode 3 of `FILE`."""
     return path if path.exists() else Path(re.sub(r"#\d+$", "", str(path)))
 
 
 def read_numpy(path: Path, found: Arrays) -> None:
-    """NPY and NPZ; an array of objects is left out."""
+    """Read an NPY or NPZ file. Arrays of objects are left out."""
     try:
         held = np.load(path, allow_pickle=False)
         if isinstance(held, np.ndarray):
@@ -39,7 +39,10 @@ def read_numpy(path: Path, found: Arrays) -> None:
 
 
 def read_parquet(path: Path, found: Arrays) -> None:
-    """Columns of numbers and stamps, lists of numbers of one length; of a table of several episodes one."""
+    """Read columns of numbers, of time stamps, and of lists of equal length.
+
+    From a table of several episodes, read one episode.
+    """
     pyarrow, parquet = library("pyarrow", "parquet"), library("pyarrow.parquet", "parquet")
     file = file_of(path)
     try:
@@ -63,7 +66,7 @@ def read_parquet(path: Path, found: Arrays) -> None:
 
 
 def _numbers(types: Any, kind: Any, column: Any) -> Any:
-    """The values of a column, NaN where there is none; None of a column without numbers."""
+    """Return the values of a column, with NaN for missing values. Return None if the column does not contain numbers."""
     if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
         lengths = set(column.combine_chunks().value_lengths().to_pylist())
         inner = _numbers(types, kind.value_type, column.combine_chunks().flatten())
@@ -78,7 +81,7 @@ def _numbers(types: Any, kind: Any, column: Any) -> Any:
 
 
 def _episode(table: Any, asked: int | None, found: Arrays) -> Any:
-    """One episode of a table: the one that is asked for, else the first."""
+    """Return the requested episode of a table, or else the first episode."""
     if EPISODE not in table.column_names:
         if asked is not None:
             raise found.cannot("Parquet file", f"there is no column {EPISODE}", "leave the # and what follows out")
@@ -94,12 +97,12 @@ def _episode(table: Any, asked: int | None, found: Arrays) -> Any:
 
 
 def _features(file: Path) -> dict[str, list[str]]:
-    """Names of the items of LeRobot's columns, from `meta/info.json` above `data/chunk-000/file.parquet`."""
+    """Return the names of the items of LeRobot columns, from `meta/info.json` above `data/chunk-000/file.parquet`."""
     try:
         features = json.loads((file.resolve().parents[2] / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
         named = {key: feature.get("names") for key, feature in features.items()}
     except (OSError, ValueError, LookupError, AttributeError, TypeError):
         return {}
-    # a list, or a list under a word such as `motors`
+    # The names are a list, or a dict with one list under a key such as `motors`.
     lists = {key: next(iter(names.values()), None) if isinstance(names, dict) else names for key, names in named.items()}
     return {key: [str(name) for name in names] for key, names in lists.items() if isinstance(names, list)}

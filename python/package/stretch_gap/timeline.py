@@ -1,4 +1,4 @@
-"""The curves of a diagnosis on the time line of Rerun's viewer."""
+"""Export of the curves of a diagnosis to the Rerun viewer."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ def write(
     dt_s: float,
     sentence: str,
 ) -> None:
-    """Writes a recording of Rerun: by trial and output the measured curve, the simulated ones, and what is left of each.
+    """Write a Rerun recording with the measured curve, the simulated curves and their residuals for each trial and output.
 
-    `spans` are name, samples and session time, s, of the trials that follow each other in the curves.
+    The curves hold all trials end to end. `spans` gives the name, the number of samples and the start in the session (s) of
+    each trial.
     """
     try:
         import rerun  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
-        raise StretchError("the package rerun-sdk is not installed; pip install rerun-sdk") from None
+        raise StretchError("the package rerun-sdk is not installed; run pip install rerun-sdk") from None
     stream = rerun.RecordingStream("stretch")
     stream.save(replaceable(path, ".rrd"))
     stream.log("diagnosis", rerun.TextDocument(sentence), static=True)

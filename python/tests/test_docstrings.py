@@ -1,0 +1,130 @@
+"""Public docstrings are complete: every parameter of a public function is described, and the examples run."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import doctest
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import stretch_gap
+import stretch_gap.mujoco  # the package mujoco itself is imported only when it is used
+from stretch_gap import _stretch
+
+PACKAGE = Path(stretch_gap.__file__).parent
+MODULES = sorted(
+    f"stretch_gap.{module.name}" for module in pkgutil.iter_modules([str(PACKAGE)]) if module.name not in ("__main__", "_stretch")
+)
+NATIVE = [
+    name for name in stretch_gap.__all__ if name != "__version__" and getattr(stretch_gap, name) is getattr(_stretch, name, None)
+]
+"""Names whose docstrings for editors and for the reference are in `_stretch.pyi`."""
+
+
+def public() -> Iterator[tuple[str, object]]:
+    """Public classes and functions that are written in Python, with their names."""
+    for module in (stretch_gap, stretch_gap.mujoco):
+        for name in module.__all__:
+            if name not in NATIVE and name != "__version__":
+                yield f"{module.__name__}.{name}", getattr(module, name)
+
+
+def functions() -> Iterator[tuple[str, object]]:
+    """Public functions, and public methods of public classes, with their names."""
+    for name, item in public():
+        if inspect.isfunction(item):
+            yield name, item
+        elif inspect.isclass(item):
+            for member, value in vars(item).items():
+                value = value.__func__ if isinstance(value, (staticmethod, classmethod)) else value
+                if inspect.isfunction(value) and not member.startswith("_"):
+                    yield f"{name}.{member}", value
+
+
+def described(docstring: str, *sections: str) -> dict[str, str]:
+    """Names in sections of a numpydoc docstring, with their descriptions."""
+    lines, found, names, inside = inspect.cleandoc(docstring).splitlines(), {}, [], False
+    for line, below in zip(lines, [*lines[1:], ""]):
+        if re.fullmatch(r"-{3,}", below):
+            names, inside = [], line in sections
+        elif inside and re.fullmatch(r"\*{0,2}\w+(, \*{0,2}\w+)* : \S.*", line):
+            names = [name.lstrip("*") for name in line.split(" : ")[0].split(", ")]
+            found.update(dict.fromkeys(names, ""))
+        elif line.startswith("    "):
+            found.update((name, found[name] + line.strip()) for name in names)
+    return found
+
+
+def missing(docstring: str, signature: list[str], *sections: str) -> list[str]:
+    """Errors in the descriptions of parameters."""
+    found = described(docstring, *sections)
+    errors = [f"{name} is not described" for name in signature if not found.get(name)]
+    return errors + [f"{name} is described, but is not a parameter" for name in found if name not in signature]
+
+
+FUNCTIONS, PUBLIC = dict(functions()), dict(public())
+
+
+def test_the_walk_finds_what_is_public():
+    assert {"stretch_gap.diagnose", "stretch_gap.Diagnosis.plot", "stretch_gap.mujoco.Problem.diagnose"} <= set(FUNCTIONS)
+    assert {"stretch_gap.Calibration.load", "stretch_gap.Calibration.from_json"} <= set(FUNCTIONS)
+    assert set(NATIVE) == {"Reading", "Receptor", "Refused", "StretchError"}
+    docstring = "Do it.\n\nParameters\n----------\na : int\n    One.\nb : int\n\nReturns\n-------\nint\n    A number."
+    assert missing(docstring, ["a", "b", "c"], "Parameters") == ["b is not described", "c is not described"]
+    assert missing(docstring, [], "Parameters")[0] == "a is described, but is not a parameter"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_parameter_of_a_public_function_is_described(name):
+    function = FUNCTIONS[name]
+    assert function.__doc__, f"{name} has no docstring"
+    first = inspect.cleandoc(function.__doc__).splitlines()[0]
+    assert first[0].isupper() and first.endswith("."), f"{name}: the summary is {first!r}"
+    parameters = [parameter for parameter in inspect.signature(function).parameters if parameter != "self"]
+    assert missing(function.__doc__, parameters, "Parameters") == []
+
+
+@pytest.mark.parametrize("name", [name for name, item in PUBLIC.items() if inspect.isclass(item)])
+def test_classes_properties_and_fields_are_described(name):
+    item = PUBLIC[name]
+    # a data class without a docstring gets its signature as one
+    assert item.__doc__ and not item.__doc__.startswith(f"{item.__name__}("), f"{name} has no docstring"
+    for member, value in vars(item).items():
+        if isinstance(value, property):
+            assert value.__doc__, f"{name}.{member} has no docstring"
+    if dataclasses.is_dataclass(item):
+        fields = [field.name for field in dataclasses.fields(item) if not field.name.startswith("_")]
+        assert missing(item.__doc__, fields, "Parameters", "Attributes") == []
+
+
+def test_the_parameters_of_a_warning_are_described():
+    parameters = [name for name in inspect.signature(stretch_gap.DoubtWarning.__init__).parameters if name != "self"]
+    assert missing(stretch_gap.DoubtWarning.__doc__, parameters, "Parameters") == []
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_the_stub_describes_what_is_native(name):
+    assert getattr(stretch_gap, name).__doc__
+    stub = ast.parse((PACKAGE / "_stretch.pyi").read_text(encoding="utf-8"))
+    described_class = next(node for node in stub.body if isinstance(node, ast.ClassDef) and node.name == name)
+    assert ast.get_docstring(described_class)
+    for node in described_class.body:
+        if isinstance(node, ast.FunctionDef):
+            docstring = ast.get_docstring(node)
+            assert docstring, f"{name}.{node.name} has no docstring"
+            parameters = [argument.arg for argument in node.args.args if argument.arg != "self"]
+            assert missing(docstring, parameters, "Parameters") == []
+            # the stub has what the module has
+            assert hasattr(getattr(stretch_gap, name), node.name)
+
+
+@pytest.mark.parametrize("name", ["stretch_gap", *MODULES])
+def test_the_examples_run(name):
+    failed, _ = doctest.testmod(importlib.import_module(name))
+    assert not failed

@@ -1,17 +1,19 @@
-"""How a simulator in Python is called: the wheel calls one that it was handed, a worker one that a problem's file names.
+"""Calls of a simulator that is written in Python.
 
-An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, asked for many models at once (at most its
-attribute `batch`); a function takes two dicts for one model and returns `[samples]`. Both may take by keyword
+The package calls the simulator that the user passes to `diagnose`. A worker process, which is started from the text of this file,
+calls the simulator that a problem.toml names.
 
-- `inputs`: every column by name, those that drive the stage as they were altered,
-- `first`: the measured value of every column in the first sample of the trial, by name,
-- `trials`: name, slice, start_s and `first` of each trial that is asked for,
-- `stage`: the number of the stage that is asked for.
+An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, which simulates up to `batch` models per call. A
+function takes two dicts of one model and returns `[samples]`. Both may take further arguments by name:
 
-A simulator that takes `inputs` or `first` is called once a trial. One that takes `trials` as well is called once for all of
-them, which follow each other; so is one that takes none of these. `**kw` takes all. With several outputs a simulator that does
-not take `stage` returns a dict of arrays by output. A method `begin(session)` is called once with everything that stays the
-same.
+- `inputs`: all columns by name, with the altered values of altered inputs,
+- `first`: the first measured value of each column in the trial, by name,
+- `trials`: `name`, `samples`, `start_s` and `first` of each requested trial,
+- `stage`: the number of the requested stage.
+
+`**kw` takes all of them. A simulator that takes `inputs` or `first`, but not `trials`, is called once per trial. Any other
+simulator is called once for all trials end to end. With several outputs, a simulator that does not take `stage` returns a dict of
+arrays by output. A method `begin(session)` is called once, with everything that stays the same.
 """
 
 from __future__ import annotations
@@ -29,32 +31,32 @@ if TYPE_CHECKING:
 else:
     try:
         from ._stretch import StretchError
-    except ImportError:  # a worker is started from this text alone
+    except ImportError:  # A worker is started from the text of this file alone.
 
         class StretchError(ValueError):
-            """What is wrong with the simulator, in a sentence."""
+            """Error in the simulator. The message is one sentence."""
 
 
 Array = NDArray[np.float64]
 
 BATCH = 64
-"""Models that are asked for at once where the simulator does not say how many (its attribute `batch`)."""
+"""Largest number of models per call if the simulator has no attribute `batch`."""
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):
-    """An array `[n, names]` whose columns go by name, too: `effects["delay_s"]` is one number for each model."""
+    """Array `[n, names]` that also returns a column by its name: `effects["delay_s"]` holds one number for each model."""
 
     names: tuple[str, ...]
 
     @classmethod
     def of(cls, array: Array, names: Sequence[str]) -> Named:
-        """The array with names for its columns."""
+        """Return the array with names for its columns."""
         named = array.view(cls)
         named.names = tuple(names)
         return named
 
     def __array_finalize__(self, other: Any) -> None:
-        # whatever is made of it has its names, but means them only where it is still the whole table
+        # Arrays derived from this one inherit the names. The names are valid only for a whole table.
         self.names = getattr(other, "names", ())
 
     def __getitem__(self, at: Any) -> Any:
@@ -67,18 +69,18 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
 
 @dataclass(frozen=True)
 class TrialSpan:
-    """A trial among the samples of all trials end to end."""
+    """Position of a trial among the samples of all trials end to end."""
 
     name: str
     samples: slice
     start_s: float
     """Session time of its first sample, s."""
     first: Mapping[str, float]
-    """Every column's measured value in its first sample: the position of the machine when the trial begins."""
+    """First measured value of each column, that is, the state of the machine at the start of the trial."""
 
 
 class Asked:
-    """Turns what the diagnosis asks into calls of the user's simulator, and checks what comes back."""
+    """Adapter that converts requests of the diagnosis to calls of the user's simulator, and checks the returned arrays."""
 
     def __init__(self, simulator: Any) -> None:
         method = getattr(simulator, "simulate", None)
@@ -95,7 +97,7 @@ class Asked:
         self.optional = self._optional()
 
     def _optional(self) -> set[str]:
-        """Which of the arguments that may be left out the simulator takes."""
+        """Return the optional arguments that the simulator takes."""
         known = {"inputs", "first", "trials", "stage"}
         try:
             taken = inspect.signature(self.call).parameters
@@ -107,21 +109,24 @@ class Asked:
 
     @property
     def takes_inputs(self) -> bool:
-        """Whether it can be driven by other inputs than those that were measured."""
+        """Whether the simulator accepts altered inputs."""
         return "inputs" in self.optional
 
     @property
     def answers_all(self) -> bool:
-        """Whether it answers with all outputs at once, whichever stage is asked for."""
+        """Whether a call returns all outputs, whichever stage is requested."""
         return "stage" not in self.optional
 
     @property
     def is_called_once_a_trial(self) -> bool:
-        """Whether each trial is a separate call."""
+        """Whether the simulator is called separately for each trial."""
         return "trials" not in self.optional and not self.optional.isdisjoint({"inputs", "first"})
 
     def bind(self, session: Mapping[str, Any]) -> None:
-        """Notes what stays the same from one model to the next: columns on one grid, trials, names."""
+        """Store what is the same for all models: the columns on one grid, the trials and the names.
+
+        Call `begin` of the simulator.
+        """
         self.columns: dict[str, Array] = session["columns"]
         self.inputs: list[list[str]] = [stage["inputs"] for stage in session["stages"]]
         self.outputs: list[str] = [stage["output"] for stage in session["stages"]]
@@ -138,7 +143,7 @@ class Asked:
             begin(session)
 
     def samples(self, trials: int) -> int:
-        """Samples of the first trials."""
+        """Return the number of samples of the first `trials` trials."""
         return int(self.spans[trials - 1].samples.stop) if trials else 0
 
     def __call__(
@@ -150,10 +155,10 @@ class Asked:
         altered: Sequence[Sequence[Array]] | None,
         others: Sequence[tuple[int, int, Sequence[Array]]] = (),
     ) -> Array:
-        """Outputs of some models, `[n, samples]`; with several stages those of all, one after the other.
+        """Return the outputs of n models, `[n, samples]`. If a call returns all outputs, they are concatenated along the samples.
 
-        `altered` holds a row a model for each column that drives the stage, `others` the same with stage and input for columns of
-        other stages.
+        `altered` holds, for each input of the stage, one row per model. `others` holds the same for inputs of other stages,
+        each with the number of the stage and of the input.
         """
         models, samples = params.shape[0], self.samples(trials)
         rows_by_name = dict(zip(self.inputs[stage], altered or ()))
@@ -183,7 +188,7 @@ class Asked:
         samples: int,
         outputs: Sequence[str],
     ) -> list[Array]:
-        """A table `[n, samples]` for each output."""
+        """Return an array `[n, samples]` for each output."""
         models = params.shape[0]
         if self.many:
             given = more if inputs is None else {**more, "inputs": inputs}
@@ -199,14 +204,14 @@ class Asked:
         return [np.concatenate(tables) for tables in zip(*rows)]
 
     def _inputs(self, samples: int, models: int, altered: Mapping[str, Sequence[Array]]) -> dict[str, Array] | None:
-        """Every column by name, `[n, samples]`: those that were altered as they are now, the others as measured."""
+        """Return all columns by name, `[n, samples]`: altered columns as altered, the others as measured."""
         if not self.takes_inputs:
             return None
         given = {name: np.broadcast_to(values[:samples], (models, samples)) for name, values in self.columns.items()}
         return {**given, **{name: np.stack(rows) for name, rows in altered.items()}}
 
     def _tables(self, answer: Any, models: int, samples: int, outputs: Sequence[str]) -> list[Array]:
-        """What came back, checked; a table for each output."""
+        """Check the answer of the simulator, and return an array `[n, samples]` for each output."""
         if len(outputs) == 1 and not isinstance(answer, dict):
             return [self._rows(answer, models, samples, outputs[0])]
         if not isinstance(answer, dict):
@@ -239,14 +244,14 @@ class Asked:
 
 
 def _first_axis(answer: Any) -> Any:
-    """One model's outputs as a batch of one."""
+    """Return the outputs of one model as a batch of one model."""
     if isinstance(answer, dict):
         return {output: _numbers(values, f" for {output}")[np.newaxis] for output, values in answer.items()}
     return _numbers(answer)[np.newaxis]
 
 
 def _numbers(values: Any, what: str = "") -> Array:
-    """An answer as numbers; a masked sample is no number, and complex numbers, times and texts are refused."""
+    """Return an answer as an array of floats. Masked samples become NaN. Complex numbers, times and text are refused."""
     kinds = {"c": "complex numbers", "m": "durations", "M": "times", "U": "text", "S": "text"}
     try:
         if np.ma.isMaskedArray(values):

@@ -30,22 +30,22 @@ use display::Volume;
 ///   stretch evaluate --calibration cal.json another.csv
 ///   stretch apply --calibration cal.json another.csv --out estimate.csv
 ///
-/// and live, a line a sample:  logger | stretch apply --calibration cal.json -
+/// and live, one line per sample:  logger | stretch apply --calibration cal.json -
 ///
 /// No data at hand? `stretch demo` simulates the paper's experiment, calibrates,
-/// judges, says why simulator and rig disagree, and writes one report;
+/// evaluates, finds why simulator and rig disagree, and writes one report;
 /// `stretch demo --data DIR` does the same on measured sessions.
 #[derive(Parser)]
 #[command(name = "stretch", version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
 struct Cli {
-    /// Say nothing but results and errors
+    /// Print only results and errors
     ///
     /// For a diagnosis, print only the verdict.
     #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     quiet: bool,
-    /// Say also what is read and chosen
+    /// Also print what is read and chosen
     ///
-    /// And how long it takes, on standard error; say every detail of a diagnosis, and what simpler methods would have named.
+    /// With times, on standard error. For a diagnosis, print all details and the answers of simpler methods.
     #[arg(short, long, global = true, display_order = 901)]
     verbose: bool,
     #[command(subcommand)]
@@ -54,15 +54,15 @@ struct Cli {
 
 /// The part of the help that applies to all commands.
 const STATUSES: &str = "\
-Where a file is read or written, - is standard input or output.
+For a file that is read or written, - means standard input or output.
 
 Exit status:
   0    done
-  1    not done: standard error says why, and nothing is half-written
+  1    not done: standard error gives the reason, and no output is half-written
   2    the arguments are not understood
   3    done, and the verdict of `stretch diagnose` is one that --fail-on names, or an error of
        `stretch predict` is above --fail-above
-  4    done as far as the budget of a problem's file lasted: what was found until then is the answer
+  4    done, but the budget of the problem file ran out: the result is what was found until then
   130  ended by Ctrl-C";
 
 #[derive(Subcommand)]
@@ -138,8 +138,8 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
         (Ok(()), Some(kind)) if !is_unread => {
-            let files = "what was to be written into files is";
-            display::fail(format!("standard output took not all: {kind}; {files}"));
+            let files = "the output files are complete";
+            display::fail(format!("standard output could not be written completely: {kind}; {files}"));
             ExitCode::FAILURE
         }
         (Ok(()), _) => done,

@@ -67,8 +67,8 @@ pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<(
         ensure!(
             (*replaces_recordings && (is_expected || example.contains(".csv")))
                 || !is_recording(path),
-            "{option} {}: this file is a recording, which is not replaced; name another file{such_as}, or remove this one first (a shell \
-             makes of {option} *.csv the names of all recordings)",
+            "{option} {}: this file is a recording and is not overwritten; name another file{such_as}, or remove this one first (a shell \
+             expands {option} *.csv to the names of all recordings)",
             path.display()
         );
     }

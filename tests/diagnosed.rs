@@ -87,7 +87,7 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     let mut command = stretch();
     command.arg("calibrate").arg(&other).args(["--model", "diagnosed", "--from"]).arg(&d);
     let said = runs(command.arg("--out").arg(scratch.path("other.json")));
-    assert!(said.contains("of bench and these trials are of other"), "{said}");
+    assert!(said.contains("of bench, but these trials are of other"), "{said}");
     let c = scratch.path("c");
     runs(stretch().arg("export").arg("--calibration").arg(&cal).arg("--c").arg(&c));
     let main = scratch.write(

@@ -77,7 +77,7 @@ fn a_named_effect_is_written_agrees_and_replays_the_measurement() {
     fails(with(&fixed).arg("--snippets").arg(&code), &["code", "exists"]);
     let other = scratch.write("other.toml", "mine");
     let said = runs(with(&fixed).arg("--fix").arg(&other));
-    assert!(said.contains("in place of the file that was there"), "{said}");
+    assert!(said.contains("replacing the existing file"), "{said}");
     assert!(fs::read_to_string(&other).unwrap().contains("in the rig file already"));
 }
 

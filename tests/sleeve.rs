@@ -89,7 +89,7 @@ impl Scratch {
         let prior = self.path("prior.json");
         let mut command = self.sleeve(&["sleeve", "learn", "--out", "prior.json"]);
         let said = runs(command.args(self.sessions()));
-        assert!(said.contains("8 sessions of s1, s2") && said.contains("seen before"), "{said}");
+        assert!(said.contains("Prior of 8 sessions with the signals s1, s2") && said.contains("known sensor"), "{said}");
         prior
     }
 
@@ -167,11 +167,11 @@ fn several_references_get_a_record_each() {
         let text = |name: &str| std::fs::read_to_string(scratch.path(name)).unwrap();
         assert_eq!(text("alone.json"), text(&record));
     }
-    fails(&mut scratch.sleeve(&asked), &["name these with --signal"]);
+    fails(&mut scratch.sleeve(&asked), &["name the gauges with --signal"]);
     let model = ["--signal", "all", "--model", "auto"];
     fails(scratch.sleeve(&asked).args(model), &["--model", "--signal auto:s1,s2"]);
     let also = ["--signal", "all", "--session", "s.json"];
-    fails(scratch.sleeve(&asked).args(also), &["of one reference"]);
+    fails(scratch.sleeve(&asked).args(also), &["work with one reference"]);
     let stdout = ["calibrate", "wrist.csv", "--signal", "all", "--out", "-"];
     let both = ["--reference", "bend_deg,turn_deg"];
     fails(scratch.sleeve(&stdout).args(both), &["name a file with --out"]);
@@ -198,7 +198,7 @@ fn a_prior_needs_seconds_of_reference_or_none() {
     scratch.worn("today.csv", new, |row| row[2] = f64::NAN);
     let renew = ["sleeve", "renew", "--prior", "prior.json", "--out"];
     let said = runs(scratch.sleeve(&renew).args(["renewed.json", "today.csv"]));
-    assert!(said.contains("it is assumed") && said.contains("high end"), "{said}");
+    assert!(said.contains("is assumed to be") && said.contains("high end"), "{said}");
     let renewed = scratch.error("renewed.json", "new.csv").0;
     assert!(renewed < 0.6 * alone && renewed > ten, "{renewed} beside {alone}");
     // The calibration of an earlier session of the same wearer, made from the same prior.

@@ -105,7 +105,7 @@ fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
     let path = folder.join("modelDescription.xml");
     let fail = |why: String| FmuError::Description { file: file.to_owned(), why };
     if !path.is_file() {
-        return Err(fail("there is none".into()));
+        return Err(fail("there is no such file in the FMU".into()));
     }
     let refused = |e: ModelDescriptionError| match e {
         ModelDescriptionError::UnsupportedVersion(version)
@@ -124,6 +124,6 @@ fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     match model.identifier.chars().all(is_word) && !model.identifier.is_empty() {
         true => Ok(model),
-        false => Err(fail(format!("{:?} is no model identifier", model.identifier))),
+        false => Err(fail(format!("{:?} is not a model identifier", model.identifier))),
     }
 }

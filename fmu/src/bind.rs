@@ -86,7 +86,7 @@ impl Bound {
             let start = input.start.map_or("its start value".into(), |x| x.to_string());
             let name = &input.name;
             bound.notes.push(format!(
-                "input {name} of the FMU is driven by no column and stays at {start}"
+                "no column drives input {name} of the FMU, so it stays at {start}"
             ));
         }
         bound.notes.extend(step_note(model, session.dt_s));
@@ -100,11 +100,12 @@ fn step_note(model: &Model, dt_s: f64) -> Option<String> {
     let is_whole = (steps - steps.round()).abs() < 1e-6 * steps && steps > 0.5;
     Some(match is_whole {
         true => format!(
-            "the FMU steps by {step_s} s inside, {} of them to a sample of {dt_s} s",
+            "the FMU uses an internal step of {step_s} s, {} steps per sample of {dt_s} s",
             steps.round()
         ),
         false => format!(
-            "the FMU steps by {step_s} s inside, and a sample of {dt_s} s is no whole number of them: what it gives may be up to one of its steps off in time"
+            "the FMU uses an internal step of {step_s} s, and a sample of {dt_s} s is not a multiple of it, so its outputs \
+             may be off in time by up to one step"
         ),
     })
 }
@@ -166,7 +167,7 @@ impl Asked<'_> {
         if let Kind::Other(kind) = variable.kind {
             return Err(fail(
                 kind,
-                "only a single number on a continuous scale does, Real of FMI 2, Float64 or Float32 of FMI 3",
+                "only a scalar floating-point variable can be used: Real of FMI 2, Float64 or Float32 of FMI 3",
             ));
         }
         match variable.unit.as_deref().filter(|unit| !is_same(unit, self.unit)) {
@@ -188,8 +189,8 @@ impl Asked<'_> {
                 what: self.what,
                 name: self.name.into(),
                 variable: variable.name.clone(),
-                found: "set by another name of the problem, too".into(),
-                hint: "let one name set it",
+                found: "already set by another name of the problem".into(),
+                hint: "remove one of the two names",
             });
         }
         set.push(&variable.name);
@@ -225,7 +226,7 @@ impl Asked<'_> {
                 false => format!(" (did you mean {}?)", near.join(" or ")),
             },
             known: match listed.is_empty() {
-                true => "none that would do".into(),
+                true => "no suitable variable".into(),
                 false => listed.join(", ") + &more,
             },
         }

@@ -15,7 +15,7 @@ pub enum FmuError {
         why: String,
     },
     /// The file is not a ZIP archive.
-    #[error("{}: it is no ZIP archive, so it is no FMU ({why}); give the .fmu file itself", file.display())]
+    #[error("{}: it is not a ZIP archive, so it is not an FMU ({why}); give the .fmu file itself", file.display())]
     Archive {
         /// The file.
         file: PathBuf,
@@ -23,7 +23,7 @@ pub enum FmuError {
         why: String,
     },
     /// The model description is missing or invalid.
-    #[error("{}: its modelDescription.xml does not do: {why}", file.display())]
+    #[error("{}: its modelDescription.xml cannot be used: {why}", file.display())]
     Description {
         /// The file.
         file: PathBuf,
@@ -31,7 +31,7 @@ pub enum FmuError {
         why: String,
     },
     /// The FMU is for an unsupported version of the standard.
-    #[error("{}: it is of FMI {version}; FMI 2.0 and FMI 3.0 are run, export it as one of them", file.display())]
+    #[error("{}: it uses FMI {version}; only FMI 2.0 and FMI 3.0 are supported: export it as one of them", file.display())]
     Version {
         /// The file.
         file: PathBuf,
@@ -39,14 +39,14 @@ pub enum FmuError {
         version: String,
     },
     /// The FMU is only for model exchange, so it contains no solver.
-    #[error("{}: it is for model exchange alone and brings no solver; export it for co-simulation", file.display())]
+    #[error("{}: it is for model exchange only and contains no solver; export it for co-simulation", file.display())]
     Exchange {
         /// The file.
         file: PathBuf,
     },
     /// The FMU contains no library for this machine.
     #[error(
-        "{}: it holds no {wanted} and cannot run on this machine; it holds {found}; export it for this platform", file.display()
+        "{}: it contains no {wanted} and cannot run on this machine; it contains {found}; export it for this platform", file.display()
     )]
     Platform {
         /// The file.
@@ -66,7 +66,7 @@ pub enum FmuError {
     },
     /// The library lacks a function of the standard.
     #[error(
-        "{}: its library has no function {name}, which every FMU of FMI {version} has; export it anew", file.display()
+        "{}: its library has no function {name}, which every FMU of FMI {version} has; export it again", file.display()
     )]
     Function {
         /// The file.
@@ -77,7 +77,7 @@ pub enum FmuError {
         version: u8,
     },
     /// The FMU cannot be instantiated.
-    #[error("{}: it gives no instance of itself{said}", file.display())]
+    #[error("{}: it cannot be instantiated{said}", file.display())]
     Instance {
         /// The file.
         file: PathBuf,
@@ -114,7 +114,8 @@ pub enum FmuError {
     },
     /// Different units in the problem and in the FMU.
     #[error(
-        "{what} {name} is in {problem}, variable {variable} of the FMU in {found}; convert the recording or the value, or give it the unit that it has"
+        "{what} {name} is in {problem}, but variable {variable} of the FMU is in {found}; \
+         convert the recording or the value, or correct its unit in the problem"
     )]
     Unit {
         /// Parameter, effect, input or output.

@@ -75,7 +75,7 @@ impl Said {
     /// Returns the message as the end of a sentence, or an empty string if there is none.
     fn text(&self) -> String {
         let said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        said.as_ref().map_or(String::new(), |said| format!("; it says: {said}"))
+        said.as_ref().map_or(String::new(), |said| format!("; its message: {said}"))
     }
 }
 
@@ -198,17 +198,17 @@ impl Instance {
         let said = self.said.text();
         match status {
             Status::Fine => Ok(()),
-            Status::Discard => Err(Stopped::Refused(format!("{call} answers discard{said}"))),
-            Status::Error => Err(Stopped::Refused(format!("{call} answers error{said}"))),
+            Status::Discard => Err(Stopped::Refused(format!("{call} returned the status discard{said}"))),
+            Status::Error => Err(Stopped::Refused(format!("{call} returned the status error{said}"))),
             Status::Pending => Err(Stopped::Refused(format!(
-                "{call} answers pending: it works in the background, which is not done here{said}"
+                "{call} returned the status pending: steps in the background are not supported{said}"
             ))),
             Status::Fatal => {
                 // After a fatal status the instance may not even be freed, so its memory is leaked.
                 if let Some(native) = self.native.take() {
                     mem::forget(native);
                 }
-                Err(Stopped::Fatal(format!("{call} answers fatal{said}")))
+                Err(Stopped::Fatal(format!("{call} returned the status fatal{said}")))
             }
         }
     }
@@ -323,7 +323,7 @@ impl Instance {
             Some(Native::Three(fmu)) => fmu.terminate().into(),
             None => Status::Fine,
         };
-        self.checked("its end", status)
+        self.checked("terminating it", status)
     }
 }
 

@@ -27,25 +27,26 @@ use crate::{
 
 /// Turn the voltages of a trial or of a live stream into lengths
 ///
-/// Writes time_s, the estimate, its rate, the branch and the domain, a line a
-/// sample. Where nothing can be said (the rate estimator warms up, a sample is
-/// missing) the numbers are empty and the domain says why. Inputs outside the
-/// calibrated domain are clamped, and the domain says so. A line and a curve
-/// need no rate: they answer from the first sample, with an empty rate at first.
+/// Writes time_s, the estimate, its rate, the branch and the domain, one line per
+/// sample. If there is no estimate (the rate estimator warms up, a sample is
+/// missing), the numbers are empty and the column domain gives the reason. Inputs
+/// outside the calibrated domain are clamped, and the column domain shows it. The
+/// models linear and curve need no rate: they give estimates from the first sample
+/// on, with an empty rate at first.
 ///
-/// From standard input each line is answered as it comes; a malformed line is
-/// noted on standard error and passed over:
+/// From standard input each line gets its estimate immediately; a malformed line is
+/// reported on standard error and skipped:
 ///
 ///   logger | stretch apply --calibration cal.json -
 ///
-/// With --out, Ctrl-C ends the stream, and what has come is written.
+/// With --out, Ctrl-C ends the stream, and the estimates so far are written.
 ///
-/// Where movements no longer turn at the levels of the calibration, a line on
-/// standard error says since when, and how far the zero is off.
+/// If movements no longer reverse at the levels of the calibration, a message on
+/// standard error states since when, and how far the zero has shifted.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Calibration record, from `stretch calibrate`
+    /// Calibration file from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
     /// Trial, or - for standard input
@@ -54,8 +55,8 @@ pub(crate) struct Args {
     /// Where the estimates go [default: standard output]
     #[arg(long, value_name = "out.csv")]
     out: Option<PathBuf>,
-    /// Follow a slow change of the signal's zero, by the levels at which movements
-    /// turn, no further than the calibration has seen; of one gauge
+    /// Follow a slow drift of the signal's zero, using the levels at which movements
+    /// reverse, up to the drift seen in the calibration; for one gauge only
     #[arg(long)]
     follow_zero: bool,
     #[command(flatten)]
@@ -69,7 +70,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             let options = args.recorded.options();
             anyhow::ensure!(
                 !args.follow_zero,
-                "--follow-zero is for one gauge; several watch each other"
+                "--follow-zero works with one gauge only; remove it, because several gauges are checked against each other"
             );
             return apply_several(&several, &args.trial, args.out.as_deref(), options);
         }
@@ -134,7 +135,7 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
     let Seen { samples, withheld, clamped, .. } = seen;
     warn(format!(
-        "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated; time stamps: {at_least}{} missing, {} early \
+        "{samples} samples: {withheld} without an estimate, {clamped} outside the calibrated domain; time stamps: {at_least}{} missing, {} early \
          or late",
         faults.missing, faults.jittered,
     ));
@@ -326,12 +327,12 @@ impl ZeroWatch {
                 return;
             }
             return warn(
-                "the calibration does not hold where movements turn: whether the gauge was put on again is not reported",
+                "the calibration file lacks the levels at which movements reverse, so a gauge that was put on again cannot be detected",
             );
         };
         if let Some(zero) = self.last.filter(|zero| zero.followed != 0.0) {
             let followed = number(zero.followed * turns.reference_per_signal);
-            warn(format!("the zero was followed, by {followed} {} at the end", self.unit));
+            warn(format!("the zero was corrected, by {followed} {} at the end", self.unit));
         }
     }
 }

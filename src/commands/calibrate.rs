@@ -34,10 +34,10 @@ use super::{
 /// Fit a calibration to logged trials
 ///
 /// Each trial is a recording (CSV in any dialect, NPY, NPZ) with the
-/// time, the signal and the reference, - is standard input; a folder with a
-/// dataset.toml means its fit trials. The record that is written holds all
-/// that `apply` or a board needs: surfaces, ranges, rate estimator, dead band,
-/// domain, and where it comes from.
+/// time, the signal and the reference; - is standard input, and a folder with a
+/// dataset.toml means its fit trials. The calibration file that is written
+/// contains everything that `apply` or a board needs: surfaces, ranges, rate
+/// estimator, dead band, domain, and its origin.
 ///
 /// Examples:
 ///
@@ -55,23 +55,23 @@ pub(crate) struct Args {
     /// Trials to fit, or a folder with a dataset.toml
     #[arg(required_unless_present = "prior", value_name = "TRIAL.csv")]
     pub(super) trials: Vec<PathBuf>,
-    /// Where the record goes
+    /// Calibration file to write
     ///
-    /// It is JSON, or postcard for a board when the name ends in .postcard.
+    /// It is JSON, or, if the name ends in .postcard, postcard for a board.
     #[arg(long, value_name = "cal.json")]
     pub(super) out: PathBuf,
-    /// Where a report with pictures goes
+    /// Report with figures to write
     #[arg(long, value_name = "r.html", conflicts_with_all = SLEEVE)]
     report: Option<PathBuf>,
-    /// Trials that the report judges on [default: those that were fitted]
+    /// Trials on which the report evaluates [default: the fitted ones]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1.., conflicts_with_all = SLEEVE)]
     test: Vec<PathBuf>,
     /// linear, curve, polyIJ, observer, history, diagnosed, or auto [default: poly13]
     ///
-    /// curve is a polynomial of the signal alone, its degree by cross-validation; curve and linear also take a table of weights and
-    /// readings without a time. polyIJ is of degree I in the rate and J in the signal.
-    /// observer, history and diagnosed remember; +rest behind observer or
-    /// history follows a drifting baseline. auto takes the best on trials left out.
+    /// curve is a polynomial of the signal alone, with a degree chosen by cross-validation; curve and linear also accept a table of
+    /// weights and readings without a time. polyIJ is of degree I in the rate and J in the signal. observer, history and diagnosed
+    /// have memory; observer+rest and history+rest also follow a drifting baseline. auto takes the model with the smallest error on
+    /// trials left out of the fit.
     #[arg(
         long,
         conflicts_with_all = SLEEVE,
@@ -81,13 +81,14 @@ pub(crate) struct Args {
     model: Option<Model>,
     /// Column of the reference, whose last part is the unit
     ///
-    /// `Pos (mm)` is pos_mm. Of several gauges several with commas, such as the angles of a wrist: each gets a separate record.
+    /// `Pos (mm)` becomes pos_mm. Several gauges can have several references, separated by commas, such as the angles of a wrist;
+    /// each reference gets its own calibration file.
     #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = columns)]
     pub(super) reference: String,
     /// Column of the signal, or of several gauges with commas [default: bridge_v]
     ///
-    /// auto is the best of all columns by cross-validation, auto:s1,s2 the best of these. s1,s2 are gauges that are calibrated
-    /// together, all takes every column but the references.
+    /// auto takes the best of all columns by cross-validation, auto:s1,s2 the best of these. s1,s2 are gauges that are calibrated
+    /// together; all takes every column except the references.
     #[arg(long, value_name = "COL")]
     signal: Option<Signal>,
     #[command(flatten)]
@@ -95,10 +96,10 @@ pub(crate) struct Args {
     /// Estimator of the signal's rate, or paper: the method as published [default: savgol:11,2]
     ///
     /// savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in samples), difference:CUTOFF_HZ, tracker:INDEX, central. paper:
-    /// central differences, strain rate, a branch a trial, no dead band.
+    /// central differences, strain rate, one branch per trial, no dead band.
     #[arg(long, conflicts_with_all = SLEEVE)]
     rate: Option<Rate>,
-    /// Weigh outliers down
+    /// Down-weight outliers
     #[arg(long, value_enum, conflicts_with_all = SLEEVE)]
     robust: Option<Loss>,
     /// Zero of the signal [default: 1.24 for bridge_v, else 0]
@@ -106,30 +107,30 @@ pub(crate) struct Args {
     /// It is subtracted before the signal is divided by its range.
     #[arg(long, value_name = "X", allow_hyphen_values = true, conflicts_with_all = SLEEVE)]
     signal_zero: Option<f64>,
-    /// Resting length, from which contraction is counted
+    /// Resting length, from which contraction is measured
     ///
-    /// By default it is the greatest value of a reference called length...; any other reference is the target itself.
+    /// By default it is the largest value of a reference called length...; any other reference is estimated directly.
     #[arg(long, value_name = "X", conflicts_with = "prior")]
     pub(super) rest_length: Option<f64>,
-    /// Diagnosis whose effects --model diagnosed and auto build on
+    /// Diagnosis whose effects --model diagnosed and auto use
     ///
     /// `stretch diagnose --json=d.json` writes it. By default the trials are diagnosed as a gauge alone.
     #[arg(long, value_name = "d.json", conflicts_with_all = SLEEVE)]
     from: Option<PathBuf>,
     /// Prior that these trials update
     ///
-    /// `stretch sleeve learn` writes it. Ten seconds to a minute of reference do; without a trial the calibration is the prior.
+    /// `stretch sleeve learn` writes it. Ten seconds to a minute of reference are enough; without a trial the calibration is the prior.
     #[arg(long, value_name = "prior.json")]
     pub(super) prior: Option<PathBuf>,
-    /// Sensor, wearer, what was done: left/anna
+    /// Sensor, wearer, activity: left/anna
     ///
-    /// As many steps as are known.
+    /// As many of these as are known.
     #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
     pub(super) of: String,
-    /// Where the sums for stretch sleeve learn go
+    /// Session file to write, for stretch sleeve learn
     #[arg(long, value_name = "session.json")]
     pub(super) session: Option<PathBuf>,
-    /// Write a calibration that explains nothing, too
+    /// Write the calibration even if it explains nothing
     #[arg(long, conflicts_with_all = SLEEVE)]
     force: bool,
     #[command(flatten)]
@@ -248,8 +249,8 @@ impl Args {
             || self.force;
         ensure!(
             !(is_together && is_of_one),
-            "--signal: several gauges are calibrated together, by one model and without a report: leave --model, --rate, --robust, \
-             --signal-zero, --from, --report, --test and --force out; --signal auto:s1,s2 takes the best of several columns"
+            "--signal: several gauges are calibrated together, with a fixed model and without a report: remove --model, --rate, --robust, \
+             --signal-zero, --from, --report, --test and --force, or use --signal auto:s1,s2 for the best of several columns"
         );
         Ok(is_together || self.prior.is_some() || self.session.is_some())
     }
@@ -285,7 +286,7 @@ impl Args {
     /// Reads the trials. The flag tells whether they are tables without a time, to which only a
     /// line or a curve can be fitted.
     fn read(&self, columns: &mut ReadOptions) -> anyhow::Result<(Vec<Trial>, bool)> {
-        let own = "name the columns of yours with --reference and --signal";
+        let own = "name your columns with --reference and --signal";
         let error = match read_trials(&self.trials, Split::Fit, columns) {
             Ok(trials) => return Ok((trials, false)),
             Err(error) => error,
@@ -296,7 +297,7 @@ impl Args {
         let models = [Model::Auto, Model::One(ModelKind::Linear), Model::One(ModelKind::Curve)];
         ensure!(
             models.contains(&self.model()),
-            "{error}; weights and readings without a time are calibrated with --model curve or --model linear"
+            "{error}; to calibrate weights and readings without a time, give --model curve or --model linear"
         );
         // The time of a table is its row number.
         *columns = columns.clone().untimed_hz(1.0);
@@ -340,7 +341,7 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let name = || path.display().to_string();
     let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
     let schema: Schema = serde_json::from_str(&text).with_context(|| {
-        format!("{}: this is no diagnosis; make one with stretch diagnose --json=d.json", name())
+        format!("{}: this is not a diagnosis; make one with stretch diagnose --json=d.json", name())
     })?;
     ensure!(
         schema.schema <= SCHEMA,
@@ -352,21 +353,21 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let found = causes(&diagnosis);
     if found.is_empty() {
         bail!(
-            "{}: no effect of the gauge or its reference is in this diagnosis, which says: {} Calibrate with --model observer or auto without --from",
+            "{}: this diagnosis names no effect of the gauge or its reference. It says: {} Calibrate with --model observer or auto without --from",
             name(),
             diagnosis.sentence
         );
     }
     let of =
         schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
-    let mut notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
+    let mut notes = vec![format!("the model uses the effects of {}{of}: {}", name(), diagnosis.sentence)];
     // The diagnosis of another rig of the same type may apply, so this is permitted, but a note
     // names both data sets.
     if let ([own], Some(set)) = (trials, &schema.data_set)
         && name_of(own) != *set
     {
         notes.push(format!(
-            "the diagnosis is of {set} and these trials are of {}: where that is another rig, diagnose it, or leave --from out",
+            "the diagnosis is of {set}, but these trials are of {}: if that is another rig, diagnose it, or remove --from",
             name_of(own)
         ));
     }
@@ -381,7 +382,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     ensure!(
         !args.reference.contains(','),
-        "--reference {}: several references are those of several gauges; name these with --signal s1,s2",
+        "--reference {}: several references need several gauges; name the gauges with --signal s1,s2",
         args.reference
     );
     let mut options = args.options();
@@ -410,7 +411,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
-        detail(format!("chose the signal {} of {}", best.signal, ranking.len()));
+        detail(format!("chose the signal {} from {} candidates", best.signal, ranking.len()));
     }
     let causes = match is_table {
         true => Causes::default(),
@@ -429,9 +430,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
     calibrated.notes.splice(0..0, gross_errors);
     match explains_nothing(&calibrated.fits) {
-        Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
+        Some(why) if args.force => calibrated.notes.push(format!("{why}; written because of --force")),
         Some(why) => {
-            let refusal = anyhow!("nothing is written: {why}; --force writes it all the same");
+            let refusal = anyhow!("nothing is written: {why}; give --force to write it anyway");
             return Err(of_files(refusal, &args.trials));
         }
         None => calibrated.notes.extend(explains_little(&calibrated.fits)),

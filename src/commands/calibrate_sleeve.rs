@@ -53,12 +53,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     ensure!(
         references.len() == 1 || args.session.is_none() && prior.is_none(),
-        "--reference {}: --prior and --session are of one reference: name one, and ask for each on its own",
+        "--reference {}: --prior and --session work with one reference; name one, and run the command once for each",
         args.reference
     );
     ensure!(
         references.len() == 1 || !is_standard_output(&args.out),
-        "--reference {}: a record each does not go to standard output; name a file with --out",
+        "--reference {}: each reference gets its own calibration file, and several cannot go to standard output; name a file with --out",
         args.reference
     );
     let named = match (args.signal(), &prior) {
@@ -66,14 +66,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         (Signal::One(name), _) => vec![name],
         (Signal::Together(names), _) => names,
         (Signal::Best(_), _) => {
-            anyhow::bail!("--signal auto: --prior and --session take the signals by their names")
+            anyhow::bail!("--signal auto: --prior and --session need the names of the signals, such as --signal s1,s2")
         }
     };
     // The update itself requires the prior's signals, so only named signals are required here.
     let asked = references.iter().chain(named.iter().filter(|_| args.names_signals()));
     let columns = asked.fold(args.recorded.options(), |columns, name| columns.require(name));
     let trials = read_trials(&args.trials, Split::Fit, &columns);
-    let own = "name the columns of yours with --reference and --signal";
+    let own = "name your columns with --reference and --signal";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     let signals = if named.is_empty() { other_columns(&trials, &references) } else { named };
     let of_trials = |error: SleeveError| of_files(error, &args.trials);
@@ -174,7 +174,7 @@ fn print(made: &Made) -> anyhow::Result<()> {
         let joined = made.signals.join(", ");
         let to = &made.reference;
         say(format!("{to} on {joined}: RMSE {} {unit} on data left out of the fit", number(rmse)))?;
-        let header = ["channel", &format!("alone, RMSE {unit}"), "all others", "takes away"];
+        let header = ["channel", &format!("alone, RMSE {unit}"), "without it", "reduces MSE by"];
         let row = |c: &Carried| {
             let adds = c.adds.map_or("-".to_owned(), |adds| format!("{:.0} %", 100.0 * adds));
             vec![c.signal.clone(), maybe(c.rmse_alone), maybe(c.rmse_without), adds]

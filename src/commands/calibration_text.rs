@@ -12,7 +12,7 @@ use crate::table::{maybe, number, table, table_text};
 
 /// Heading of the column with the excess of a model's mean squared error over that of the best
 /// model.
-const SQUARED_EXCESS: &str = "over the best, squared";
+const SQUARED_EXCESS: &str = "MSE above best";
 
 /// Columns of the kinds of trial.
 const KINDS: RangeInclusive<usize> = 2..=4;
@@ -72,8 +72,8 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     if is_verbose() {
         say(format!("Models: {}.", MODELS_IN_WORDS))?;
         say(
-            "worst: the largest error. coefficients: how many. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
-             over the best, squared: mean squared error minus that of the best model. \u{b1}: one standard error.",
+            "worst: the largest error. coefficients: their number. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
+             MSE above best: mean squared error minus that of the best model. \u{b1}: one standard error.",
         )?;
     }
     Ok(())

@@ -10,7 +10,7 @@ use super::{
     shared::{give_stdout, tell},
 };
 
-/// Bring a foreign log into the format of the other commands
+/// Convert a recording to the format of the other commands
 ///
 /// Reads any recording (CSV in any dialect, NPY, NPZ),
 /// takes the time from a column of seconds, milliseconds, microseconds or
@@ -27,23 +27,23 @@ use super::{
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Log to read, or - for standard input
+    /// Recording to read, or - for standard input
     #[arg(value_name = "LOG.csv")]
     log: PathBuf,
     #[command(flatten)]
     recorded: Recorded,
-    /// Column to write, as NEW=OLD*FACTOR+OFFSET [default: all, as they are]
+    /// Column to write, as NEW=OLD*FACTOR+OFFSET [default: all, unchanged]
     #[arg(long = "column", value_name = "NEW=OLD", value_parser = parse_column)]
     columns: Vec<Column>,
-    /// Bring the recording onto an even grid of so many samples a second [default: as it was recorded]
+    /// Resample to an even grid of this rate [default: as recorded]
     ///
-    /// By default several clocks are brought to the fastest.
+    /// By default, several clocks are resampled to the fastest.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     grid: Option<f64>,
-    /// Let the time begin at zero
+    /// Shift the time so that it begins at zero
     #[arg(long)]
     from_zero: bool,
-    /// Where the trial goes, - for standard output
+    /// Trial to write, or - for standard output
     #[arg(long, value_name = "trial.csv")]
     out: PathBuf,
 }

@@ -31,14 +31,14 @@ use super::{
 use crate::display::{is_quiet, is_verbose};
 use sessions::Sessions;
 
-/// The whole job: calibrate, judge, and say why simulator and rig disagree; one report
+/// Demonstration: calibrate, evaluate, find why simulator and rig disagree; one report
 ///
-/// Simulates the paper's experiment on a rig with effects that the simulator at
-/// hand lacks, and writes it as a data set. Then, as a lab would: the paper's
-/// calibrations on the ramps, and a model chosen by cross-validation, all
-/// judged on arbitrary and pulse trials that no fit has seen; and the diagnosis.
+/// Simulates the paper's experiment on a rig with effects that the simulator lacks,
+/// and writes it as a data set. Then, as in a lab, it fits the paper's calibrations
+/// to the ramps and a model chosen by cross-validation, evaluates all of them on
+/// arbitrary and pulse trials that were not fitted, and diagnoses the simulator.
 ///
-/// On measured sessions, the same:
+/// The same on measured sessions:
 ///
 ///   stretch demo --data bench          a folder with a dataset.toml
 ///   stretch demo --data knit_sleeve    CSV files with time_s, a reference, signals;
@@ -46,24 +46,24 @@ use sessions::Sessions;
 ///   stretch demo --data HC_90/S15_16_HC90
 ///                                      files as their authors published them
 ///
-/// The last are knees in a knitted sleeve with motion capture (MIT licence),
+/// The last example is a knee in a knitted sleeve with motion capture (MIT licence),
 /// github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit
 /// 47369abac95fd43a10ada4156dd22cae91ee7f70, folders of data/Regression: no header,
 /// knee angle in degrees, s1 .. s5, 100 rows a second. A file is cut where all five
 /// sensors are zero, as they are where a session begins; one without such a row, as in
 /// the folder sit, counts as a single session, and is refused.
 ///
-/// The last session of a group is tested on, the others are fitted; the first is
-/// diagnosed, as a gauge alone, where there is no dataset.toml.
+/// The last session of a group is used for testing, the others are fitted. Without a
+/// dataset.toml, the first is diagnosed, as a gauge alone.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Folder for the report, the calibrations, the estimates and the simulated data set
     #[arg(long, default_value = "stretch-demo", value_name = "DIR")]
     out: PathBuf,
-    /// Measured sessions in place of simulated ones: a folder, FOLDER/GROUP, or a file with several
+    /// Measured sessions instead of simulated ones: a folder, FOLDER/GROUP, or a file with several
     ///
-    /// Without a group the first by name is taken.
+    /// Without a group, the first by name is used.
     #[arg(long, value_name = "DIR", conflicts_with = "paper")]
     data: Option<PathBuf>,
     /// Column of the reference [default: length_mm or angle_deg]
@@ -72,10 +72,10 @@ pub(crate) struct Args {
     /// Column of the signal [default: bridge_v, else the best by cross-validation]
     #[arg(long, requires = "data", value_name = "COL", value_parser = column)]
     signal: Option<String>,
-    /// Replace a demo that exists, in one step; files of your own in its folder are kept
+    /// Replace an existing demo; other files in its folder are kept
     #[arg(long)]
     force: bool,
-    /// The paper's tables instead: every figure of its experiment, simulated, next to the published
+    /// Write the paper's tables instead, with simulated next to published values
     #[arg(long)]
     paper: bool,
     #[command(flatten)]
@@ -107,7 +107,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         return Ok(());
     }
     tell(format!(
-        "\n-v says more. Wrote estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}, and the report: open\n{}",
+        "\n-v prints the details. Wrote estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}, and the report: open\n{}",
         if args.data.is_none() { ", bench/ (the data set)" } else { "" },
         args.out.join("report.html").display()
     ))
@@ -265,7 +265,7 @@ impl Calibrations {
         let choice = choose_model(fit, options)?;
         let chosen = calibrate(fit, &Options { model: choice.model, ..options.clone() })?;
         let name = format!("chosen ({})", choice.model);
-        bar.set_message("judging");
+        bar.set_message("evaluating");
         let methods = [
             ("linear", &linear.calibration),
             ("non-linear", &surfaces.calibration),
@@ -308,7 +308,7 @@ fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
         print_calibration(surfaces, &job.ranking)?;
         say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
         print_models(choice, &sessions.reference)?;
-        say("\nTested on trials that no fit has seen:")?;
+        say("\nTested on trials that were not fitted:")?;
         for (kind, methods) in kinds {
             print_errors(kind, methods, &evaluation.unit)?;
         }

@@ -25,48 +25,47 @@ use crate::display::{fail, is_quiet, is_verbose, warn};
 
 /// End of the message if there are competing explanations but no recommended experiment.
 const NOT_FORETOLD: &str =
-    " that the simulator could predict: it takes no altered inputs, or its runs are spent";
+    " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
 /// Exit status if the verdict is listed in `--fail-on`.
 const FAILED_ON: u8 = 3;
 /// Exit status of a diagnosis with fewer simulator runs than requested, because the budget was
 /// exhausted.
 const SPENT: u8 = 4;
 
-/// Say where a simulator and a measurement differ, which effect causes it, and how far the gap closes
+/// Find where simulator and measurement differ, which effect causes it, and how much it explains
 ///
 ///   stretch diagnose bench --report gap.html
 ///
-/// DATASET is a folder with dataset.toml and its trials (inlet, outlet, length_mm, bridge_v and,
-/// where it was recorded, pressure_kpa), or, for a gauge alone, one trial or such a folder without
-/// openings; its columns are length_mm and bridge_v unless they are named:
+/// DATASET is a folder with dataset.toml and its trials (inlet, outlet, length_mm, bridge_v and, if
+/// it was recorded, pressure_kpa), or, for a gauge alone, one trial or such a folder without inlet
+/// and outlet; its columns are length_mm and bridge_v unless they are named:
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
-/// The named effects can be written into a rig file, with which nothing is missing any more, and as
-/// code for a simulator of your own:
+/// The named effects can be written into a rig file, with which the gap is closed, and as code for
+/// your own simulator:
 ///
 ///   stretch diagnose bench --fix fixed.toml --snippets code
 ///   stretch diagnose bench --rig fixed.toml
 ///
-/// A simulator of your own, in any language, is described in a problem.toml with its parameters, the
-/// recordings, and what may wrap it (stretch init FOLDER writes a first one):
+/// Your own simulator, in any language, is described in a problem.toml with its parameters, the
+/// recordings, and the effects that may be added to it (stretch init FOLDER writes a first one):
 ///
 ///   stretch diagnose problem.toml --fix fixed.toml
 ///   stretch diagnose fixed.toml
 ///
-/// A problem file is a program: its simulator runs with your rights. It runs where the file itself is
-/// named, not where its folder is; what runs is said before it runs. The keys jobs and budget of the
-/// file say how many workers run at once, and how many runs there are at most (exit status 4 where
-/// they are spent).
+/// A problem file is a program: its simulator runs with your rights. It runs only if the file itself
+/// is named, not its folder, and the command is printed before it runs. The keys jobs and budget of
+/// the file set how many workers run at once, and how many runs are made at most (exit status 4 if
+/// the budget is used up).
 ///
-/// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it
-/// does not):
+/// For regular checks that a rig still agrees with its simulator (exit status 3 if it does not):
 ///
 ///   stretch diagnose bench --rig fixed.toml --quiet --fail-on gap
 ///
-/// Test trials are read once, at the end. Without --rig the rig file that the data set names is the
-/// simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its effects
-/// are part of it.
+/// Test trials are used once, at the end. Without --rig the simulator is the rig file that the data
+/// set names, else the stock rig. Its parameters may be re-tuned within their tolerances; its effects
+/// are kept.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -75,7 +74,7 @@ pub(crate) struct Args {
     data_set: PathBuf,
     /// Rig file of the simulator
     ///
-    /// Nominal parameters with their tolerances, and effects that it has already.
+    /// Nominal parameters with their tolerances, and the effects that the simulator already has.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -83,9 +82,9 @@ pub(crate) struct Args {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
-    /// Write a rig or problem file with what was found
+    /// Write a corrected rig or problem file
     ///
-    /// Parameters are re-tuned, effects added; a file that exists is replaced.
+    /// Parameters are re-tuned and the found effects are added; an existing file is replaced.
     #[arg(long, value_name = "fixed.toml")]
     fix: Option<PathBuf>,
     /// Write code of each named effect into a new folder
@@ -93,42 +92,42 @@ pub(crate) struct Args {
     /// In C, Python and MATLAB.
     #[arg(long, value_name = "DIR")]
     snippets: Option<PathBuf>,
-    /// Column of the time; COL:ms in ms; 100hz instead of it
+    /// Time column; COL:ms if in ms; 100hz if there is none
     #[arg(long, value_name = "COL")]
     time: Option<TimeColumn>,
-    /// Leave an effect out of the catalogue; several times
+    /// Do not consider this effect; can be repeated
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     #[command(flatten)]
     rows: Rows,
     /// Reference column of a gauge alone
     ///
-    /// Or what an output of your own simulator senses.
+    /// Or the quantity that an output of your own simulator senses.
     #[arg(long, value_name = "COLUMN", requires = "signal", value_parser = column)]
     reference: Option<String>,
     /// Signal column of a gauge alone
     ///
-    /// Several of one recorder with commas, or that output of your own simulator.
+    /// Several signals of one recorder are separated by commas. With your own simulator, this is the output.
     #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = columns)]
     signal: Option<String>,
     /// Write the recommended experiment as a trial file
     #[arg(long, value_name = "next.csv")]
     experiment: Option<PathBuf>,
-    /// Do not look for the experiment that would tell rivals apart
+    /// Do not search for an experiment that would distinguish competing effects
     #[arg(long, hide = true, conflicts_with = "experiment")]
     no_next: bool,
-    /// Fit every run by itself, too, and say which disagree
+    /// Also fit each run separately, and report which disagree
     ///
-    /// A run is a trial, or with the name of a column all samples in which it has one value, such as a load. The output also says in
-    /// what the runs disagree, and which values the data determine.
+    /// A run is a trial or, with the name of a column, all samples in which this column has the same value, such as a load. The
+    /// output also lists in which parameters the runs disagree, and which values the data determine.
     #[arg(long, value_name = "trial|COLUMN", value_parser = NonEmptyStringValueParser::new())]
     by: Option<String>,
     /// Exit with status 3 for these verdicts: gap, any, ...
     ///
-    /// Several with commas: effect (one is named, wholly or in part),
-    /// unknown (a gap, or a part of one, that nothing explains), record (a column or the rig file is wrong), faint (more
-    /// than noise, too little to name), parameters (they agree once re-tuned), gap (effect, unknown or record, or agreement with
-    /// reservations), any (all but plain agreement).
+    /// Several are separated by commas: effect (an effect explains the gap or a part of it), unknown (no effect explains the gap or
+    /// a part of it), record (a column or the rig file is wrong), faint (above the noise, but too small to name a cause),
+    /// parameters (agreement after re-tuning), gap (effect, unknown or record, or agreement with reservations), any (everything
+    /// except plain agreement).
     #[arg(
         long,
         value_name = "VERDICT",
@@ -195,7 +194,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let options =
         Options { baselines: is_verbose(), responses: args.report.is_some(), ..Options::default() };
     let bar = spinner();
-    bar.set_message("reading; a simulator of your own is started");
+    bar.set_message("reading, and starting your own simulator if there is one");
     let shown = || args.data_set.display().to_string();
     let recorded = args.time.as_ref().map(TimeColumn::options);
     let reading = Reading {
@@ -272,7 +271,7 @@ fn conclude(
         }
         // This is an error message, because a script may expect the file.
         (Some(path), None) => missing.push(format!(
-            "{} is not written: no experiment is recommended, there are no rivals to tell apart{}",
+            "{} is not written: no experiment is recommended, because there are no competing effects to distinguish{}",
             path.display(),
             if examined.diagnosis.ambiguous.len() > 1 { NOT_FORETOLD } else { "" }
         )),

@@ -39,7 +39,7 @@ pub(crate) fn text(
         out.push(format!("  {}: {}", named(one, diagnosis), one.words));
     }
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
-        out.push(format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
+        out.push(format!("  proposed effect, on the {}: {}", proposed.acts, proposed.equation));
     }
     for gross in &diagnosis.gross {
         out.push(format!("  {}; {}", gross.sentence, gross.hint));
@@ -47,7 +47,7 @@ pub(crate) fn text(
     let rows = diagnosis.rows_used;
     if rows.used < rows.read {
         let share = percent(rows.share());
-        out.push(format!("It is based on {} of {} rows ({share}).", rows.used, rows.read));
+        out.push(format!("The diagnosis is based on {} of {} rows ({share}).", rows.used, rows.read));
     }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
@@ -65,7 +65,7 @@ pub(crate) fn text(
         ));
     }
     if !diagnosis.notes.is_empty() {
-        out.push("\nNoticed:".to_owned());
+        out.push("\nNotes:".to_owned());
         for note in &diagnosis.notes {
             out.push(format!("- {note}"));
         }
@@ -98,13 +98,13 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     for (row, stage) in report.rows.iter_mut().zip(stages) {
         row.push(percent(stage.share));
     }
-    out.push("\nWhere, stage by stage on its measured input.".to_owned());
-    out.push(format!("{}; its share of the gap:", unbroken(&report.caption)));
+    out.push("\nLocation of the gap: each stage is simulated from its measured input.".to_owned());
+    out.push(format!("{}; share of the gap:", unbroken(&report.caption)));
     out.push(drawn(&report));
     if !end_to_end.is_empty() {
         let shares = end_to_end.iter().map(|e| format!("{} {}", e.stage, percent(e.share)));
         let shares: Vec<String> = shares.collect();
-        out.push(format!("Of the gap at the end, from the commands alone: {}.", listed(&shares)));
+        out.push(format!("Shares of the gap at the last output, simulated from the commands alone: {}.", listed(&shares)));
     }
 }
 
@@ -120,7 +120,7 @@ fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     if loud.is_empty() {
         return;
     }
-    out.push("\nWhere it stands out, in multiples of the noise, re-tuned, all trials:".to_owned());
+    out.push("\nParts of the data with the largest gap, in multiples of the noise (re-tuned, all trials):".to_owned());
     let left = |excess: f64| unbroken(&times(excess));
     let rows = loud.iter().take(SLICES).map(|s| {
         let [low, high] = s.excess_ci;
@@ -131,7 +131,7 @@ fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
             format!("{} .. {}", left(low), left(high)),
         ]
     });
-    out.push(table(&["Slice", "Share of the gap", "Left", "95 % interval"], rows));
+    out.push(table(&["Slice", "Share of the gap", "Remaining", "95 % interval"], rows));
     if loud.len() > SLICES {
         out.push(format!("({} more in the JSON and the report)", loud.len() - SLICES));
     }
@@ -155,7 +155,7 @@ fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     match (named.as_slice(), rivals.as_slice()) {
         (_, []) | ([], [_]) => {}
         ([], rivals) => out.push(format!(
-            "Not told apart by these data, with 95 % probability: {}.",
+            "These data cannot distinguish, with 95 % probability: {}.",
             listed(rivals)
         )),
         (named, rivals) => out.push(format!(
@@ -196,7 +196,7 @@ fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
         return;
     }
     out.push(
-        "\nNominal parameters that moved by more than their tolerance, with the effect or without it:"
+        "\nNominal parameters that changed by more than their tolerance, with the effect or without it:"
             .to_owned(),
     );
     let rows = moved.iter().map(|p| {
@@ -208,7 +208,7 @@ fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
             if diagnosis.named.is_empty() { "-".to_owned() } else { number(p.bent) },
         ]
     });
-    let header = ["parameter", "as shipped", "re-tuned", "moved, tolerances", "without the effect"];
+    let header = ["parameter", "nominal", "re-tuned", "change, tolerances", "without the effect"];
     out.push(table(&header, rows));
 }
 
@@ -224,7 +224,7 @@ fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: boo
     let more = if is_verbose || others.is_empty() {
         ""
     } else {
-        " -v says what is wrong with the others."
+        " -v lists the reasons for the others."
     };
     out.push(format!(
             "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.{more}",
@@ -253,7 +253,7 @@ fn transfer(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Some(next) = &diagnosis.next_experiment else { return };
     out.push(format!(
-            "\nNext experiment: {} ({:.1} min) would tell {} apart: they differ by {} times the noise. {}",
+            "\nNext experiment: {} ({:.1} min) would distinguish {}: their predictions differ by {} times the noise. {}",
             next.name,
             next.minutes,
             listed(&next.separates),
@@ -294,7 +294,7 @@ pub(super) fn write_fix(
         Fixed::Problem(_) => "the problem",
     };
     let with = if fix.effects.is_empty() { "no effect".to_owned() } else { listed(&fix.effects) };
-    let replaced = if is_there { ", in place of the file that was there" } else { "" };
+    let replaced = if is_there { ", replacing the existing file" } else { "" };
     Ok(format!("wrote {shown}: {what} re-tuned, with {with}{replaced}"))
 }
 
@@ -314,7 +314,7 @@ pub(super) fn write_snippets(
     }
     if files.is_empty() {
         let why =
-            if all.is_empty() { "no effect is named" } else { "its code is not written down" };
+            if all.is_empty() { "no effect is named" } else { "no code is available for the named effects" };
         return Ok(format!("{shown} is not written: {why}"));
     }
     outputs.folder(folder, false, |folder| {

@@ -22,36 +22,36 @@ use crate::table::table_text;
 
 /// List the effects that can be added to the simulated rig
 ///
-/// With equation, parameters and plausible ranges, in the order in which several
-/// effects of one stage act. A form is a freedom that measured rigs ask for: it is
-/// neutral when it is not given, and `stretch diagnose` fits it around its usual
-/// value. Use them as
+/// Prints equation, parameters and plausible ranges, in the order in which several
+/// effects of one stage act. A form is an optional parameter that measured rigs need:
+/// it has no influence unless it is given, and `stretch diagnose` fits it around its
+/// usual value. Use effects as
 ///
 ///   stretch simulate --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
 ///
-/// or type them into a simulator of your own:
+/// or print code for your own simulator:
 ///
 ///   stretch effects gauge_hysteresis --code python
 ///
-/// `stretch effects kinds` lists the kinds that they are made of: what `wrap` in a problem file
-/// puts in front of or behind any simulator, with ranges for a channel from 0 to 1.
+/// `stretch effects kinds` lists the underlying kinds, which `wrap` in a problem file adds before
+/// or after any simulator, with ranges for a channel from 0 to 1.
 ///
-/// With --data how strong each effect of a problem would have to be to be named on its data
-/// with probability 0.9, its simulator being right otherwise:
+/// With --data it lists how strong each effect of a problem must be to be named from its data
+/// with probability 0.9, if the simulator is right otherwise:
 ///
 ///   stretch effects --data bench
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Effects to list [default: all]; kinds, for any channel, behind the word kinds
+    /// Effects to list [default: all], or the word kinds and then kinds for any channel
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// List what would be named on these data instead: a folder with dataset.toml, a trial, or problem.toml
+    /// List detection limits for these data instead: a folder with dataset.toml, a trial, or problem.toml
     #[arg(long, value_name = "DATASET", conflicts_with = "code")]
     data: Option<PathBuf>,
     #[command(flatten)]
     json: Json,
-    /// Print code with the typical numbers, for a record at 100 Hz
+    /// Print code with typical values, for a recording at 100 Hz
     #[arg(long, value_name = "c|python|matlab", value_parser = language, conflicts_with = "json",
           requires = "names")]
     code: Option<Language>,
@@ -103,12 +103,12 @@ impl Entry {
             }
             Self::Kind(kind) => {
                 let x = Quantity::new("x", "1", "the channel");
-                let beside = Quantity::new("e", "1", "what is beside it");
+                let beside = Quantity::new("e", "1", "the second signal that the effect reads");
                 let signals = Signals { x, beside, load: Quantity::LOAD, dt_s: grid.dt_s() };
                 kind.sketch.map(|sketch| sketch(values, &CHANNEL, &signals))
             }
         };
-        sketch.context("its code is not written down")
+        sketch.with_context(|| format!("{}: no code is available for this effect", self.columns()[0]))
     }
 }
 
@@ -210,7 +210,7 @@ fn json(entry: &Entry) -> serde_json::Value {
 fn list_limits(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()> {
     ensure!(data.exists(), "{}: there is no such file or folder", data.display());
     let bar = spinner();
-    bar.set_message("reading; a simulator of your own is started");
+    bar.set_message("reading, and starting your own simulator if there is one");
     let problem = open(data, &Reading { announce: Some(announce), ..Reading::default() })?;
     detail(format!("read {}", data.display()));
     let options = Options { detection_limits: true, ..Options::default() };
@@ -220,14 +220,14 @@ fn list_limits(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()>
     let mut limits = diagnosis.detection_limits;
     ensure!(
         !limits.is_empty(),
-        "{}: these data carry no name, whatever the strength: {}",
+        "{}: no effect can be named from these data, whatever its strength: {}",
         data.display(),
         diagnosis.sentence
     );
     for name in names {
         let is_known = limits.iter().any(|limit| limit.effect == *name);
         let all: Vec<&str> = limits.iter().map(|limit| limit.effect.as_str()).collect();
-        ensure!(is_known, "{name}: these data are not asked for it, only for {}", all.join(", "));
+        ensure!(is_known, "{name}: this effect is not considered for these data, only {}", all.join(", "));
     }
     limits.retain(|limit| names.is_empty() || names.contains(&limit.effect));
     json.answer(&limits, || say(table_text(&limit_table(&limits))))

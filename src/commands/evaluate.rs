@@ -14,18 +14,18 @@ use super::{
 use crate::display::warn;
 use crate::table::table_text;
 
-/// Judge calibrations on trials that have a reference
+/// Evaluate calibrations on trials that have a reference
 ///
-/// Prints the paper's measures for the raw signal (its extremes scaled onto the
-/// reference's) and for each calibration: average error, RMSE, R^2, lag; and
-/// paired t tests between them, on samples as the paper did and on means of
-/// half-second blocks, which do not count one motion as a thousand.
+/// Prints the paper's measures for the raw signal (scaled so that its extremes match
+/// those of the reference) and for each calibration: average error, RMSE, R^2, lag.
+/// Paired t tests compare them, on samples as in the paper, and on means of half-second
+/// blocks because the samples of one motion are not independent.
 ///
 ///   stretch evaluate --calibration linear.json --calibration poly13.json walk.csv
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Calibration record; may be given several times
+    /// Calibration file; can be repeated
     #[arg(long, required = true, value_name = "cal.json")]
     calibration: Vec<PathBuf>,
     /// Trials, or a folder with a dataset.toml for its test trials
@@ -51,7 +51,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         columns = columns.require(calibration.spec().reference.as_str());
     }
     let renamed =
-        "a calibration needs the columns that it was fitted on: stretch convert renames columns";
+        "a calibration needs the columns that it was fitted to: rename yours with stretch convert";
     let trials = read_trials(&args.trials, Split::Test, &columns)
         .map_err(|error| with_columns_to_name(error, renamed))?;
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
@@ -87,8 +87,8 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
         print_errors("All trials", &evaluation.pooled, unit)?;
     }
     say(
-        "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Lag: positive when the estimate runs \
-         behind. Outside domain: samples that the calibration had to hold at the ends of its range.",
+        "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Lag: positive if the estimate \
+         is late. Outside domain: samples that were clamped to the ends of the calibrated range.",
     )?;
     if evaluation.comparisons.is_empty() {
         return Ok(());

@@ -15,41 +15,41 @@ use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_rec
 
 use super::shared::{Completed, give_stdout, say, tell};
 
-/// Write a calibration for a board, in C or as a record of integers; check or renew a record's seal
+/// Export a calibration to a board, in C or as a file of integers; check or renew a file's seal
 ///
-/// In C it is one C99 header that C++ takes as well: the record as constants, stretch_init(),
-/// stretch_step() for a sample, stretch_lost() for one that did not come, and stretch_self_test(),
-/// which runs 200 samples and compares the answers with the computer's. No allocation, no library;
-/// the same bits as on the computer.
+/// In C it is one C99 header that also compiles as C++: the calibration as constants, stretch_init(),
+/// stretch_step() for a sample, stretch_lost() for a missing sample, and stretch_self_test(), which
+/// runs 200 samples and compares the estimates with those of the computer. It needs no allocation and
+/// no library, and gives the same bits as the computer.
 ///
 ///   stretch export --calibration cal.json --c Elbow --arduino
 ///
-/// makes a library Elbow for the Arduino IDE, with an example that reads A0. Of several gauges
+/// makes a library Elbow for the Arduino IDE, with an example that reads A0. With several gauges
 /// (`stretch calibrate --signal s1,s2`) a step takes a sample of each, and the example reads A0, A1
 /// and so on.
 ///
-/// For a board with firmware in Rust and without floating point, as a record in postcard:
+/// For a board with firmware in Rust and without floating point, as a postcard file:
 ///
 ///   stretch export --calibration cal.json --fixed cal.postcard --adc 12,0,3.3
 ///
-/// Every record carries a checksum, its seal. Without any other option the command says what a record
-/// is and whether its seal holds. After you edit a record in JSON by hand, renew the seal:
+/// Every calibration file contains a checksum, its seal. Without any other option the command prints
+/// what the file is and whether its seal is valid. After you edit a JSON file by hand, renew the seal:
 ///
 ///   stretch export --calibration cal.json
 ///   stretch export --calibration cal.json --seal
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Calibration record, from `stretch calibrate`
+    /// Calibration file from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Folder for the header; it must not hold anything; - writes the header to standard output
+    /// Folder for the header, new or empty; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
     c: Option<PathBuf>,
     /// Make the folder an Arduino library with the folder's name
     #[arg(long, requires = "c")]
     arduino: bool,
-    /// Write C in this form, fixed or float [default: fixed where the model has such a form]
+    /// Write C in this form, fixed or float [default: fixed if the model has such a form]
     ///
     /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
     /// signal's unit to the reference's.
@@ -61,7 +61,7 @@ pub(crate) struct Args {
         value_parser = Completed { names: &["fixed", "float"], parser: str::parse::<Form> }
     )]
     form: Option<Form>,
-    /// Where the record of integers goes: converter codes in, thousandths of the reference's unit out
+    /// File of integers to write: converter codes in, thousandths of the reference's unit out
     ///
     /// linear, poly13, observer and observer+rest have such a form.
     #[arg(long, value_name = "cal.postcard")]
@@ -70,7 +70,7 @@ pub(crate) struct Args {
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
           value_parser = parse_adc)]
     adc: Adc,
-    /// Renew the seal after a hand edit, or of an earlier release's record, once all else was checked
+    /// Check the file and renew its seal, after a hand edit or from an earlier release
     #[arg(long, conflicts_with_all = ["c", "fixed"])]
     seal: bool,
 }
@@ -85,7 +85,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let mut outputs = Outputs::default();
     let fixed = args.fixed.as_deref().map(|path| {
         let SleeveCalibration::One(one) = &calibration else {
-            bail!("--fixed: a calibration of several gauges has no such record; write it in C");
+            bail!("--fixed: a calibration of several gauges has no form in integers; export it in C with --c");
         };
         let record = fixed_record(one.calibration(), &args.adc)
             .with_context(|| path.display().to_string())?;
@@ -126,8 +126,8 @@ fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
     let RecordSummary { kind, seal, is_sealed } = describe_record(path)?;
     let state = match (is_sealing, is_sealed) {
         (true, _) => "sealed",
-        (false, true) => "its seal holds",
-        (false, false) => "of an earlier release, without a seal: --seal makes one",
+        (false, true) => "its seal is valid",
+        (false, false) => "from an earlier release, without a seal; --seal adds one",
     };
     say(format!("{}: {kind}, {seal:08x}, {state}", path.display()))
 }
@@ -163,7 +163,7 @@ fn stage(
     });
     written.map_err(|error| match error {
         FileError::Exists { path } => {
-            anyhow!("{path}: it exists; name a folder that does not, or an empty one: nothing is overwritten")
+            anyhow!("{path}: it exists and is not empty; name a new or an empty folder, because nothing is overwritten")
         }
         other => other.into(),
     })?;
@@ -180,7 +180,7 @@ fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
         tell(format!("  {path}"))?;
     }
     if *pressure {
-        tell("tell it the pressure with stretch_set_pressure() before each sample")?;
+        tell("set the pressure with stretch_set_pressure() before each sample")?;
     }
     let header =
         files.iter().find_map(|file| file.path.strip_prefix("src/stretch_")?.strip_suffix(".h"));
@@ -188,6 +188,7 @@ fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
         Some(name) => format!(
             "put the folder into the sketchbook's libraries; the IDE then has File > Examples > {name} > Live"
         ),
-        None => "include it in one file of the program; stretch_self_test() is 0 where the board computes as the computer does".to_owned(),
+        None => "include the header in one file of the program; stretch_self_test() returns 0 if the board \
+                 computes the same as this computer".to_owned(),
     })
 }

@@ -11,9 +11,9 @@ use super::shared::{give_stdout, say_as_is, stage_text, tell};
 /// Where JSON goes.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Json {
-    /// Print JSON in place of text; =FILE writes it into a file
+    /// Print JSON instead of text; =FILE writes it into a file
     ///
-    /// With a file text is printed as well.
+    /// With a file, the text is printed as well.
     #[arg(
         long,
         value_name = "FILE",

@@ -31,35 +31,35 @@ use crate::display::warn;
 
 /// Show and record what a board sends over its serial port
 ///
-/// Reads the lines of the live link: a frame a sample, with a counter and a
+/// Reads the lines of the live link: one frame per sample, with a counter and a
 /// checksum. A lost or damaged line is counted and skipped. A terminal shows one
-/// line: the newest estimate and the counts. A port that goes away is opened again
-/// when it comes back. Ctrl-C ends it, and what was recorded stays.
+/// line: the newest estimate and the counts. A port that disconnects is opened again
+/// when it comes back. Ctrl-C ends the command, and what was recorded is kept.
 ///
 ///   stretch listen --port /dev/ttyACM0 --calibration cal.json --out trial.csv
 ///
-/// Samples can be plotted as they come: each is a line of CSV on standard output, if
-/// that is a pipe or a file, or with --out -.
+/// Samples can be plotted live: each is a line of CSV on standard output, if that is a
+/// pipe or a file, or with --out -.
 ///
 ///   stretch listen --port /dev/ttyACM0 --calibration cal.json | your_plotter
 ///
 /// What is recorded does not depend on what is shown: if the reader of standard output is
-/// slow or goes away, --out loses no row. Codes that the converter of --adc cannot give are counted.
+/// slow or ends, --out loses no row. Codes that the converter of --adc cannot produce are counted.
 ///
-/// The board's estimates are compared with those of the calibration here, and
-/// the largest difference is reported: it shows whether the board runs this
-/// calibration. The record may be a calibration of any model, or the record that
-/// `stretch export --fixed` wrote for the board, which holds neither names nor units.
+/// The board's estimates are compared with those that this computer computes from the
+/// calibration file, and the largest difference is reported: it shows whether the board
+/// runs this calibration. The file may be a calibration of any model, or the file that
+/// `stretch export --fixed` wrote for the board, which contains neither names nor units.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Serial port, with its speed behind a colon [default: 115200], or - for standard input
+    /// Serial port, with its speed after a colon [default: 115200], or - for standard input
     #[arg(long, value_name = "PATH:BAUD|-")]
     port: String,
-    /// Record from `stretch calibrate`, or from `stretch export --fixed`
+    /// File from `stretch calibrate`, or from `stretch export --fixed`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Trial to record, a line a sample as it comes; must not exist; - for standard output
+    /// Trial to record, one line per sample; must not exist; - for standard output
     #[arg(long, value_name = "trial.csv|-")]
     out: Option<PathBuf>,
     /// The board's converter: bits, and the signal at code 0 and at the last code
@@ -82,7 +82,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let has_rows = out.is_some_and(is_standard_output) || !io::stdout().is_terminal();
     let mut view = View::open(&header, has_rows, recording.is_none());
     if !twin.answers() {
-        view.note("the calibration's rate looks a sample ahead: estimates are not compared");
+        view.note("the rate estimator of the calibration needs the next sample, so estimates are not compared");
     }
     let mut session = Samples::new(twin, args.adc);
     let mut result = Ok(());
@@ -101,7 +101,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             Ok(Heard::Disconnected(why)) => {
                 let last = session.disconnected();
                 result = keep(last.as_slice(), &mut recording, &mut view);
-                view.note(&format!("{shown_port}: {why}; waiting for it"));
+                view.note(&format!("{shown_port}: {why}; waiting for the port"));
                 false
             }
             Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => {
@@ -125,7 +125,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     warn(session.status.line());
     if unseen > 0 {
         warn(format!(
-            "stretch: {unseen} rows were recorded and not shown: standard output is not read"
+            "stretch: {unseen} rows were recorded but not shown, because the reader of standard output was too slow"
         ));
     }
     result.and(finished).with_context(|| cannot_record(file))
@@ -268,7 +268,7 @@ impl Twin {
         let bits = receptor.adc_bits();
         anyhow::ensure!(
             bits == adc_bits,
-            "{}: this record is for a converter of {bits} bits; name it with --adc {bits},ZERO_V,FULL_SCALE_V",
+            "{}: this calibration file is for a converter of {bits} bits; give --adc {bits},ZERO_V,FULL_SCALE_V",
             path.display()
         );
         Ok(Self {

@@ -29,13 +29,13 @@ const CARRIED: Option<&[u8]> = None;
 ///
 ///   stretch page --out stretch.html
 ///
-/// A program of a release carries the page. One that was built without the feature page takes it
-/// from where STRETCH_PAGE says, or builds it in the source tree that it is in (rustup target
-/// add wasm32-unknown-unknown).
+/// The program of a release contains the page. A program that was built without the feature page
+/// reads it from the path in STRETCH_PAGE, or builds it if the program is in its source tree (first
+/// run rustup target add wasm32-unknown-unknown).
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Where the page goes; a file that exists is replaced
+    /// Page to write; an existing file is replaced
     #[arg(long, default_value = "stretch.html", value_name = "page.html")]
     out: PathBuf,
 }
@@ -64,7 +64,7 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
     };
     let page = read_whole(&from).with_context(|| from.display().to_string())?;
     let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
-    ensure!(is_page, "{}: this is no page of stretch; build it with web/build.sh", from.display());
+    ensure!(is_page, "{}: this is not a page of stretch; build it with web/build.sh", from.display());
     Ok(page.into())
 }
 
@@ -73,11 +73,11 @@ fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
     let Some((target, script)) = program.as_deref().and_then(sources) else {
         bail!(
-            "this program carries no page, and it is not in its source tree: take the program of a release, \
+            "this program does not contain the page, and it is not in its source tree: use the program of a release, \
              or set STRETCH_PAGE to the folder that web/build.sh made (target/page)"
         );
     };
-    warn("stretch: building the page, some minutes the first time");
+    warn("stretch: building the page; this takes some minutes the first time");
     let built = Command::new(&script).env("CARGO_TARGET_DIR", &target).status();
     let built = built.with_context(|| format!("{}: it could not be run", script.display()))?;
     ensure!(built.success(), "{}: it did not build the page", script.display());

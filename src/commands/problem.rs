@@ -21,15 +21,15 @@ use crate::table::table_text;
 ///   stretch init bench
 ///   stretch diagnose bench/problem.toml
 ///
-/// It holds the columns with units and ranges, rates, the trials with a proposed split, and says in
-/// comments what was guessed: what drives the simulator, and what is compared with it.
+/// The file contains the columns with units and ranges, rates, and the trials with a proposed split.
+/// Its comments state what was guessed: the inputs of the simulator, and the outputs that are compared.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct InitArgs {
     /// Folder of recordings
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Replace a problem.toml that is there
+    /// Replace an existing problem.toml
     #[arg(long)]
     force: bool,
 }
@@ -38,7 +38,7 @@ pub(crate) fn init(args: InitArgs) -> anyhow::Result<()> {
     let path = args.folder.join("problem.toml");
     ensure!(
         args.force || !path.exists(),
-        "{}: it is there already; --force replaces it",
+        "{}: the file exists; give --force to replace it",
         path.display()
     );
     write_text(&path, &first_problem(&args.folder)?)?;
@@ -51,7 +51,7 @@ pub(crate) fn init(args: InitArgs) -> anyhow::Result<()> {
 /// Status if the error is above `--fail-above`.
 const FAILED_ABOVE: u8 = 3;
 
-/// Predict recordings that were not fitted, with a fix and without
+/// Predict recordings that were not fitted, with and without a fix
 ///
 ///   stretch diagnose problem.toml --fix fixed.toml
 ///   stretch predict fixed.toml friday.csv saturday.csv --report predicted.html
@@ -69,7 +69,7 @@ const FAILED_ABOVE: u8 = 3;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct PredictArgs {
-    /// The problem's file that stretch diagnose --fix wrote
+    /// Problem file that stretch diagnose --fix wrote
     #[arg(value_name = "fixed.toml")]
     fixed: PathBuf,
     /// New recordings, in any format, at the rate of the old ones
@@ -80,7 +80,7 @@ pub(crate) struct PredictArgs {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "f.html")]
     report: Option<PathBuf>,
-    /// Exit with status 3 if the error of an output is above so many times its noise
+    /// Exit with status 3 if the error of an output is above this multiple of its noise
     #[arg(long, value_name = "X")]
     fail_above: Option<f64>,
 }
@@ -91,7 +91,7 @@ pub(crate) fn predict(args: PredictArgs) -> anyhow::Result<ExitCode> {
     ensure!(is_number, "--fail-above: give a number above 0, in multiples of the noise");
     args.json.share_stdout([args.report.as_deref()])?;
     let bar = spinner();
-    bar.set_message("the new recordings are predicted");
+    bar.set_message("predicting the new recordings");
     let reading = Reading { announce: Some(announce), ..Reading::default() };
     let prediction = predict_new(&args.fixed, &args.new, &reading)?;
     bar.finish_and_clear();

@@ -15,14 +15,14 @@ use crate::display::{detail, warn};
 /// Options for recordings that do not say all of themselves.
 #[derive(clap::Args)]
 pub(crate) struct Recorded {
-    /// Column of the time; COL:ms in ms; 100hz instead of it
+    /// Time column; COL:ms if in ms; 100hz if there is none
     ///
-    /// A unit may follow the column: :s, :ms, :us, :ns, :min, :h or :d; otherwise its name says it, as in t_ms, or its numbers
-    /// do. A rate replaces a column of time, also one that is there. For
-    /// dates such as 05/01/2024 it is :dmy if the day comes first, :mdy if the month does.
+    /// A unit may follow the column: :s, :ms, :us, :ns, :min, :h or :d. Otherwise the unit comes from the name, as in t_ms, or
+    /// from the numbers. A rate such as 100hz replaces the time column, even if there is one. For dates such as 05/01/2024, add
+    /// :dmy if the day comes first, or :mdy if the month comes first.
     #[arg(long, default_value = "time_s", value_name = "COL")]
     time: TimeColumn,
-    /// Names of the columns if it has none: time_s,bridge_v
+    /// Names of the columns if there is no header: time_s,bridge_v
     #[arg(long = "columns", value_name = "NAMES", value_delimiter = ',')]
     named: Option<Vec<String>>,
     #[command(flatten)]
@@ -135,7 +135,7 @@ pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial
         warn(format!("note: {}: {note}", trial.name));
     }
     let names: Vec<&str> = trial.channels.iter().map(|channel| channel.name.as_str()).collect();
-    let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} a second"));
+    let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} per second"));
     detail(format!("read {}: {} samples of {}{rate}", trial.name, trial.len(), names.join(", ")));
     trial
 }

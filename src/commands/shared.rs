@@ -81,7 +81,7 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
 pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref::<FileError>() {
         Some(FileError::Exists { .. }) => anyhow::anyhow!(
-            "{error}, or --force: files of the same name are then replaced, your own are kept"
+            "{error}, or give --force: files with the same names are then replaced, other files are kept"
         ),
         _ => error,
     }

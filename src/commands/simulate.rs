@@ -18,27 +18,27 @@ use super::{
 ///
 ///   stretch simulate --protocol paper --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
 ///
-/// Without --rig it is the stock rig, which --print-rig prints; `stretch effects`
+/// Without --rig the stock rig is simulated, which --print-rig prints; `stretch effects`
 /// lists what can be added to it. The folder gets the trials, dataset.toml, and
-/// rig.toml with every parameter, effect and the seed: from it the run can be
-/// repeated to the bit, on any machine:
+/// rig.toml with every parameter, effect and the seed, from which the run can be
+/// repeated bit by bit on any machine:
 ///
 ///   stretch simulate --protocol paper --rig bench/rig.toml --out again
 ///
-/// --protocol next.csv replays what a recorded or recommended trial does: its openings,
-/// excitation_share, set_length_mm and shunt_share; a column that asks for more is
-/// refused by name. A trial alone begins the session, so that nothing is remembered
-/// of before; a folder is replayed as one session.
+/// --protocol next.csv replays a recorded or recommended trial: its valve openings,
+/// excitation_share, set_length_mm and shunt_share. A column with any other command is
+/// refused, with its name. A single trial begins a new session, without memory of
+/// earlier trials; a folder is replayed as one session.
 ///
-/// dataset.toml does not name rig.toml as its rig: that is the simulator without
-/// the effects (nominal.toml where it is not the stock rig).
+/// dataset.toml does not name rig.toml as its rig, because a diagnosis starts from the
+/// simulator without the effects (nominal.toml if it is not the stock rig).
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Rig file, or `paper`: a rig with effects of the paper's order [default: the stock rig]
+    /// Rig file, or `paper`: a rig with effects as large as in the paper [default: the stock rig]
     #[arg(long, value_name = "rig.toml|paper")]
     rig: Option<PathBuf>,
-    /// What the valves do: paper (17 trials), arbitrary or pulses (a minute each), or what a trial or data set did
+    /// Valve commands: paper (17 trials), arbitrary or pulses (a minute each), or a trial or data set to replay
     ///
     /// paper: six inflations, six deflations, arbitrary, pulses, and three test trials. arbitrary: one minute of random segments.
     /// pulses: one minute of pulse pairs.
@@ -53,10 +53,10 @@ pub(crate) struct Args {
     /// Seed of noise and random commands [default: the rig file's, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=RunSettings::MOST_SEED))]
     seed: Option<u64>,
-    /// Folder that the data set goes to; - for standard output, where one trial alone is simulated
+    /// Folder for the data set; - for standard output, if a single trial is simulated
     #[arg(long, value_name = "DIR", required_unless_present = "print_rig")]
     out: Option<PathBuf>,
-    /// Replace a data set that exists, in one step; files of your own in its folder are kept
+    /// Replace an existing data set; other files in its folder are kept
     #[arg(long)]
     force: bool,
     /// Print the stock rig as a rig file, with units and meanings, and simulate nothing
@@ -147,13 +147,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> anyhow::Result<()> {
     let [plan] = plans else {
         bail!(
-            "-: these are {} trials, and only one can go to standard output; --protocol arbitrary, pulses \
-             or a trial's name gives one",
+            "-: these are {} trials, and only one can go to standard output; give --protocol arbitrary, --protocol pulses \
+             or the name of a trial",
             plans.len()
         );
     };
     let (_, trial) = Session::new(rig, settings)?.run(plan)?;
-    trial.check().context("the simulation gave what no trial can hold")?;
+    trial.check().context("the simulation gave values that a trial file cannot contain")?;
     trial.write(out)?;
     Ok(())
 }
@@ -169,7 +169,7 @@ fn plans(protocol: &str, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>>
     let named = |path: &Path| path.display().to_string();
     ensure!(
         path.exists() || path.as_os_str() == "-",
-        "--protocol {}: it is none of paper, arbitrary, pulses, and there is no such trial or data set",
+        "--protocol {}: it is not paper, arbitrary or pulses, and there is no such trial or data set",
         path.display()
     );
     if !path.is_dir() {
@@ -206,7 +206,7 @@ pub(super) fn write(
         trials: Vec::new(),
     };
     for own in ["dataset.toml", "rig.toml", "nominal.toml"] {
-        ensure!(plans.iter().all(|p| p.file != own), "a trial cannot be called {own}");
+        ensure!(plans.iter().all(|p| p.file != own), "a trial cannot have the name {own}; rename it");
     }
     let bar = progress("simulating", plans.len() as u64);
     detail(format!("simulating {} trials, seed {}", plans.len(), settings.seed));
@@ -214,7 +214,7 @@ pub(super) fn write(
         let mut session = Session::new(rig, settings)?;
         for plan in plans {
             let (entry, trial) = session.run(plan)?;
-            trial.check().context("the simulation gave what no trial can hold")?;
+            trial.check().context("the simulation gave values that a trial file cannot contain")?;
             trial.write(folder.join(&entry.file))?;
             set.trials.push(entry);
             bar.inc(1);

@@ -21,9 +21,9 @@ use crate::{
 
 /// Sensors that are put on again: learn from earlier sessions, renew a calibration
 ///
-/// `stretch calibrate --signal s1,s2` calibrates several gauges, and writes with --session what
-/// `learn` takes. `stretch calibrate --prior` needs ten seconds to a minute of reference more, or
-/// none.
+/// `stretch calibrate --signal s1,s2` calibrates several gauges, and with --session writes the file
+/// that `learn` reads. `stretch calibrate --prior` then needs only ten seconds to a minute of
+/// reference, or none.
 ///
 ///   stretch calibrate monday.csv --reference angle_deg --signal s1,s2 --of left/anna --session s/monday.json --out a.json
 ///   stretch sleeve learn s/*.json --out prior.json
@@ -49,9 +49,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
 }
 
-/// Learn what earlier sessions say of the next one
+/// Learn a prior for the next session from earlier ones
 ///
-/// Each session is a file that `stretch calibrate --session` wrote. The prior holds mean and
+/// Each session is a file that `stretch calibrate --session` wrote. The prior contains mean and
 /// covariance of the coefficients of one model over sessions, sensors and wearers.
 ///
 ///   stretch sleeve learn s/*.json --out prior.json
@@ -61,7 +61,7 @@ struct LearnArgs {
     /// Sessions, at least three
     #[arg(required = true, value_name = "SESSION.json")]
     sessions: Vec<PathBuf>,
-    /// Where the prior goes
+    /// Prior to write
     #[arg(long, value_name = "prior.json")]
     out: PathBuf,
 }
@@ -79,21 +79,21 @@ fn learn(args: LearnArgs) -> anyhow::Result<()> {
 fn print_prior(prior: &Prior) -> anyhow::Result<()> {
     let unit = prior.unit();
     say(format!(
-        "{} sessions of {}. Errors on the end of each of them when it is left out:",
+        "Prior of {} sessions with the signals {}. Errors at the end of each session when it is left out:",
         prior.sessions,
         prior.signals.join(", ")
     ))?;
     let header =
-        ["reference s", &format!("RMSE {unit}, seen before"), &format!("RMSE {unit}, new")];
+        ["reference, s", &format!("RMSE {unit}, known sensor"), &format!("RMSE {unit}, new sensor")];
     let row = |e: &Expected| vec![number(e.seconds), maybe(e.rmse_known), maybe(e.rmse_new)];
     say(table(&header, prior.expected.iter().map(row)))
 }
 
 /// Renew a calibration for a sensor that was put on again, without a reference
 ///
-/// It assumes that the movement has the ends and the rest of earlier sessions, and believes a shift
-/// and a scale as far as earlier sessions differed by: what lies beyond is refused. It prints what it
-/// assumes. Ten seconds of reference say more (`stretch calibrate --prior`).
+/// It assumes that the movement has the same end and rest positions as in earlier sessions, and
+/// corrects shift and scale only as far as earlier sessions differed; a larger difference is refused.
+/// It prints its assumptions. Ten seconds of reference are better (`stretch calibrate --prior`).
 ///
 ///   stretch sleeve renew --prior prior.json --calibration yesterday.json today.csv --out cal.json
 ///   stretch sleeve renew --prior prior.json --of left/anna today.csv --out cal.json
@@ -103,17 +103,17 @@ struct RenewArgs {
     /// Recordings of today, without a reference
     #[arg(required = true, value_name = "TODAY.csv")]
     trials: Vec<PathBuf>,
-    /// The prior (`stretch sleeve learn`), which says by how much sessions differ
+    /// Prior from `stretch sleeve learn`
     #[arg(long, value_name = "prior.json")]
     prior: PathBuf,
-    /// The calibration that is renewed, made by `stretch calibrate --prior` of the same prior [default: what the prior
-    /// knows of --of]
+    /// Calibration to renew, made by `stretch calibrate --prior` with the same prior [default: that of --of in the
+    /// prior]
     #[arg(long, value_name = "cal.json")]
     calibration: Option<PathBuf>,
-    /// Sensor, wearer, what was done: left/anna, as many steps as are known
+    /// Sensor, wearer, activity: left/anna, as many of these as are known
     #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
     of: String,
-    /// Where the record goes
+    /// Calibration file to write
     #[arg(long, value_name = "cal.json")]
     out: PathBuf,
     #[command(flatten)]
@@ -127,7 +127,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let signals = prior.signals.clone();
     let columns = signals.iter().fold(ReadOptions::new(), |all, name| all.require(name));
     let trials = read_trials(&args.trials, Split::Fit, &columns);
-    let own = "they are those of the prior: stretch convert renames yours";
+    let own = "the prior needs these columns: rename yours with stretch convert";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     let options =
         RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };
@@ -145,7 +145,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
 
 fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     let summary = &renewed.summary;
-    say("No reference: it is assumed that the movement is that of earlier sessions, with")?;
+    say("There is no reference, so the movement is assumed to be that of earlier sessions, with")?;
     let header = ["", &format!("assumed {unit}"), "sd", "sessions", "before", "after"];
     let row = |a: &Assumed| {
         let [value, sd, before, after] = [a.reference, a.sd, a.before, a.after].map(number);
@@ -153,7 +153,7 @@ fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     };
     say(table(&header, summary.assumed.iter().map(row)))?;
     say(format!(
-        "the estimate is shifted by {} {unit} and scaled by {:.3}; where the assumption holds, RMSE {} {unit} is expected",
+        "the estimate is shifted by {} {unit} and scaled by {:.3}; if the assumption holds, the expected RMSE is {} {unit}",
         number(summary.shift),
         summary.scale,
         number(summary.expected_rmse)

@@ -27,7 +27,7 @@ use tables::{PUBLISHED, error_tables, fit_table, verdicts};
 pub(crate) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Result<()> {
     let mut done = None;
     let written = write_folder(out, force, |folder| {
-        let bar = progress("simulating, fitting, judging", 1);
+        let bar = progress("simulating, fitting, evaluating", 1);
         let experiment = Experiment::run(&paper_preset()?, seed)?;
         bar.finish_and_clear();
         write_text(&folder.join("paper.html"), &paper_page(&experiment))?;

@@ -32,7 +32,7 @@ pub(super) fn paper_page(experiment: &Experiment) -> String {
     });
     page.section(
         "What the paper asks for next",
-        "How the error depends on the gap between two pulses, and what the sensor makes of sines.",
+        "How the error depends on the gap between two pulses, and how the sensor responds to sines.",
     );
     page.figure(&gap_figure(experiment), "RMSE on trials of pulse pairs with one gap each.");
     page.figures(&[

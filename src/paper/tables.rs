@@ -103,9 +103,9 @@ pub(super) fn fit_table(experiment: &Experiment) -> Table {
     }
     let head = [
         "Fit",
-        "R², published way",
+        "R², published method",
         "R², paper",
-        "RMSE %, published way",
+        "RMSE %, published method",
         "RMSE %, paper",
         "R², ours",
         "RMSE %, ours",
@@ -122,9 +122,9 @@ pub(super) fn fit_table(experiment: &Experiment) -> Table {
 pub(super) fn error_tables(experiment: &Experiment) -> [Table; 2] {
     let head = [
         "Method",
-        "Error %, published way",
+        "Error %, published method",
         "Error %, paper",
-        "RMSE mm, published way",
+        "RMSE mm, published method",
         "RMSE mm, paper",
         "Error %, ours",
         "RMSE mm, ours",

@@ -62,7 +62,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let (evaluate, applied) = (&[EVALUATE], &[APPLY, STREAM]);
     let outside = "samples lie outside the range of the calibration";
     let members: [Member<'_>; 20] = [
-        ("own.csv", own.clone(), &[APPLY], &["outside of what was calibrated"], &[]),
+        ("own.csv", own.clone(), &[APPLY], &["outside the calibrated domain"], &[]),
         ("own.csv", own, files, &[], &["is it the calibrated sensor"]),
         ("other.csv", other.clone(), evaluate, &[], &["cal:"]),
         (
@@ -157,9 +157,9 @@ fn stamps_that_cannot_be_or_come_unevenly_are_told_or_refused() {
     // More missing samples than the count of a gap can hold.
     scratch.write("longer.csv", late.replace("\n100000", "\n999900000"));
     for (line, is_done, parts) in [
-        ("calibrate ps.csv --out c.json", false, &["1.000e12 samples a second"][..]),
+        ("calibrate ps.csv --out c.json", false, &["1.000e12 samples per second"][..]),
         ("calibrate set --out c.json", true, &["rate_hz = 250", "100.00 Hz"]),
-        ("calibrate jitter.csv --out c.json", true, &["resampled to every 0.0100 s"]),
+        ("calibrate jitter.csv --out c.json", true, &["resampled to one every 0.0100 s"]),
         (
             "convert late.csv --grid 100 --out e.csv",
             false,

@@ -31,7 +31,7 @@ fn a_recording_that_was_killed_before_its_first_row_does_not_block_the_next() {
     // Another process is still recording into this file.
     let mut second = stretch();
     second.current_dir(scratch.path("")).args(listen.split(' '));
-    fails(&mut second, &["trial.csv", "another recording goes there"]);
+    fails(&mut second, &["trial.csv", "another program is recording to it; name another file"]);
     first.kill().unwrap();
     first.wait().unwrap();
     assert_eq!(fs::read_to_string(scratch.path("trial.csv")).unwrap(), header, "killed");
@@ -90,7 +90,7 @@ fn folders_that_hold_something_are_refused_and_replaced_when_forced() {
     for line in
         ["demo --out bench", "demo --paper --out bench", "simulate --protocol pulses --out bench"]
     {
-        fails(&mut said(line), &["bench", "it exists", "--force", "your own are kept"]);
+        fails(&mut said(line), &["bench", "it exists", "--force", "other files are kept"]);
     }
     fails(&mut said("export --calibration board.json --c bench"), &["bench", "it exists"]);
     assert!(tree(&scratch.path("")) == before);
@@ -160,7 +160,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
         let begun = Instant::now();
         let mut command = stretch();
         command.current_dir(scratch.path("")).args(line.split(' '));
-        fails(&mut command, &["pipe", "without a reader"]);
+        fails(&mut command, &["pipe", "start the reader first"]);
         assert!(begun.elapsed() < Duration::from_secs(60), "{line}");
         let reader = thread::spawn({
             let pipe = pipe.clone();
@@ -180,7 +180,7 @@ fn pipes_and_devices_are_written_to_or_refused_and_stay_what_they_are() {
     }
     let mut stdin = stretch();
     stdin.current_dir(scratch.path("")).args("convert a.csv --out /dev/stdin".split(' '));
-    fails(&mut stdin, &["/dev/stdin", "which is read"]);
+    fails(&mut stdin, &["/dev/stdin", "cannot be written"]);
     // Output that is redirected into a file is written once, from beginning to end.
     let shell = |script: &str| {
         let mut sh = Command::new("sh");

@@ -24,7 +24,7 @@ fn own_columns_are_asked_for_with_the_options_that_name_them() {
     let log = scratch.write("log.csv", own_trial("t,L,V", 1.0));
     let mut calibrate = stretch();
     calibrate.arg("calibrate").arg(&log).arg("--out").arg(scratch.path("cal.json"));
-    let says = "the columns are t, L, V; name the columns of yours with --reference and --signal";
+    let says = "the columns are t, L, V; name your columns with --reference and --signal";
     fails(&mut calibrate, &["there is no column length_mm", says]);
     runs(calibrate.args(["--reference", "L", "--signal", "V"]));
 }
@@ -65,7 +65,7 @@ fn a_diagnosis_says_as_much_as_is_asked_for() {
     assert!(!quiet.contains('|') && usual.contains('|'));
     // By default one line on the parameters, and one line for each with -v.
     let lines = |text: &str| text.lines().filter(|line| line.starts_with("- ")).count();
-    assert!(one_line(&usual).contains("-v says what is wrong with the others"), "{usual}");
+    assert!(one_line(&usual).contains("-v lists the reasons for the others"), "{usual}");
     assert!(lines(&verbose) > lines(&usual), "{verbose}");
 }
 

@@ -149,7 +149,7 @@ impl DataSet {
         let differs = (stamped_hz / self.rate_hz - 1.0).abs() > 0.05;
         differs.then(|| {
             format!(
-                "dataset.toml says rate_hz = {}, the stamps of {} say {stamped_hz:.2} Hz: the stamps are used; correct \
+                "dataset.toml has rate_hz = {}, but the time stamps of {} give {stamped_hz:.2} Hz: the time stamps are used; correct \
                  whichever is wrong",
                 self.rate_hz, trial.name
             )
@@ -234,14 +234,14 @@ impl DataSet {
         for (i, TrialEntry { file, opening, digest, .. }) in set.trials.iter().enumerate() {
             let key = |key: &str| format!("trial[{i}].{key}");
             if let Some(k) = set.trials[..i].iter().position(|other| other.file == *file) {
-                return fail(&key("file"), format!("{file} is the file of trial[{k}], too"));
+                return fail(&key("file"), format!("{file} is also the file of trial[{k}]; list each file once"));
             }
             if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
                 return fail(&key("opening"), format!("{opening} is not between 0 and 1"));
             }
             if let Some(digest) = digest.as_deref().filter(|digest| !is_digest(digest)) {
                 let form = "write crc32c and eight hexadecimal digits, or leave it out";
-                return fail(&key("digest"), format!("{digest:?} is no digest; {form}"));
+                return fail(&key("digest"), format!("{digest:?} is not a digest; {form}"));
             }
         }
         Ok(set)

@@ -86,7 +86,7 @@ pub enum DataError {
     },
     /// A trial whose sample rate differs from that of the rest of its session.
     #[error(
-        "{trial}, column time_s: {rate_hz:.2} samples a second where {usual_hz:.2} are usual; resample it to that rate or leave it out"
+        "{trial}, column time_s: it has {rate_hz:.2} samples per second, but the session has {usual_hz:.2}; resample it to that rate or leave it out"
     )]
     OtherRate {
         /// The trial.
@@ -108,8 +108,8 @@ pub enum DataError {
     },
     /// More rows than a command holds in memory.
     #[error(
-        "the trials have {rows} rows together, and at most {most} are taken at once; thin them to fewer samples a second \
-         (stretch convert --grid HZ), or give a part of the log"
+        "the trials have {rows} rows in total, and at most {most} can be processed; resample them to a lower rate \
+         (stretch convert --grid HZ), or give a part of the recording"
     )]
     TooLong {
         /// Number of rows of all trials.
@@ -183,8 +183,8 @@ impl DataError {
                     many => format!("{many} CSV files"),
                 };
                 format!(
-                    "it holds {held}: name recordings one by one ({shown}/{first}; {shown}/*.csv where several may be \
-                     named), or write a dataset.toml that says which are fitted and which test"
+                    "it contains {held}: list recordings one by one ({shown}/{first}, or {shown}/*.csv if several may be \
+                     given), or write a dataset.toml that states which are fitted and which are tests"
                 )
             }
         };

@@ -68,7 +68,7 @@ impl Rows {
         (bridged + dropped > 0).then(|| {
             format!(
                 "rows: {} of {read} used, {dropped} left out; {bridged} lost samples bridged, \
-                 measured channels by straight lines and commands held",
+                 measured channels by linear interpolation, commands by their last value",
                 read - dropped
             )
         })
@@ -191,7 +191,7 @@ impl Trial {
             if stretch.len() < spec.shortest {
                 even.rows.dropped += stretch.len();
                 even.notes.push(format!(
-                    "{}: the {} samples from {:.2} s on are too few and left out",
+                    "{}: the {} samples from {:.2} s on are left out because they are too few",
                     self.name,
                     stretch.len(),
                     self.time_s[stretch.start]
@@ -215,7 +215,7 @@ impl Trial {
         }
         if is_uneven {
             even.notes.push(format!(
-                "{}: its samples come unevenly; they are resampled to every {:.4} s by straight lines",
+                "{}: its samples are spaced unevenly; they are resampled to one every {:.4} s by linear interpolation",
                 self.name, clock.period_s
             ));
         }
@@ -236,13 +236,13 @@ impl Even {
         match &gaps[..] {
             [] => {}
             [(_, first_s), ..] if gaps.len() > TOLD => self.notes.push(format!(
-                "{name}: {:.3} s are missing in {} gaps, the first after {first_s:.2} s; each part between them is a trial of its own",
+                "{name}: {:.3} s are missing in {} gaps, the first after {first_s:.2} s; each part between gaps is treated as a separate trial",
                 gaps.iter().map(|(lost_s, _)| lost_s).sum::<f64>(),
                 gaps.len()
             )),
             _ => self.notes.extend(gaps.iter().map(|(lost_s, at_s)| {
                 format!(
-                    "{name}: {lost_s:.3} s are missing after {at_s:.2} s; the part behind the gap is a trial of its own"
+                    "{name}: {lost_s:.3} s are missing after {at_s:.2} s; the part after the gap is treated as a separate trial"
                 )
             })),
         }

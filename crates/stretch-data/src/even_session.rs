@@ -119,7 +119,7 @@ fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataErr
 /// assert_eq!(session.trials()[1].name(), "a.csv (part 2)");
 /// assert_eq!(
 ///     session.notes(),
-///     ["a.csv: 0.800 s are missing after 0.99 s; the part behind the gap is a trial of its own"]
+///     ["a.csv: 0.800 s are missing after 0.99 s; the part after the gap is treated as a separate trial"]
 /// );
 /// # Ok::<(), stretch_data::DataError>(())
 /// ```

@@ -234,7 +234,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
         match self.0 {
             DeValue::String(_) => visitor.visit_seq(SeqDeserializer::new([self].into_iter())),
             DeValue::Table(_) => {
-                Err(Refusal::custom("this is one table; write a table in double brackets for each"))
+                Err(Refusal::custom("this is a single table; write one table in double brackets per entry"))
             }
             _ => self.deserialize_any(visitor),
         }

@@ -35,7 +35,7 @@ fn data_sets() {
         (
             "[[trial]]",
             "[trial]",
-            "d, row 3, key trial: this is one table; write a table in double brackets for each",
+            "d, row 3, key trial: this is a single table; write one table in double brackets per entry",
         ),
         (
             "file = 'a.csv'",
@@ -50,7 +50,7 @@ fn data_sets() {
     let error = DataSet::parse("d", &twice).expect_err("twice");
     assert_eq!(
         error.to_string(),
-        "d, row 9, key trial[1].file: a.csv is the file of trial[0], too"
+        "d, row 9, key trial[1].file: a.csv is also the file of trial[0]; list each file once"
     );
     let none = &SET[..SET.find("[[").expect("there")];
     assert!(DataSet::parse("d", none).expect_err("none").to_string().contains("no [[trial]]"));
@@ -64,7 +64,7 @@ fn data_sets_whose_files_are_missing() {
     let read = || DataSet::read(folder.path()).expect_err("not whole").to_string();
     assert!(read().ends_with("name a data set, or recordings one by one"), "{}", read());
     std::fs::write(folder.path().join("b.csv"), "time_s\n").expect("written");
-    assert!(read().contains("it holds b.csv: name recordings one by one ("), "{}", read());
+    assert!(read().contains("it contains b.csv: list recordings one by one ("), "{}", read());
     std::fs::write(folder.path().join("dataset.toml"), SET).expect("written");
     assert!(read().ends_with("row 4, key trial[0].file: there is no file a.csv in the folder"));
     std::fs::write(folder.path().join("dataset.toml"), b"name = '\xff'").expect("written");

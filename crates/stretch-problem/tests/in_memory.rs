@@ -199,7 +199,7 @@ fn long_recordings_are_shortened_and_a_note_says_so() {
         // beginnings that are too short to diagnose are refused
         let many = vec![of(1000, 0.0); most / 1000 + 1];
         let error = call(&many).map(drop).unwrap_err().to_string();
-        assert!(error.contains("rows together") && error.contains("--grid HZ"), "{what}: {error}");
+        assert!(error.contains("rows in total") && error.contains("--grid HZ"), "{what}: {error}");
     }
 }
 
@@ -224,9 +224,9 @@ fn trials_that_are_too_long_for_a_calibration_are_refused() {
             answer.unwrap_err().to_string()
         };
         let refused = message(most + 1);
-        let expected = format!("{} rows together, and at most {most} are taken at once", most + 1);
+        let expected = format!("{} rows in total, and at most {most} can be processed", most + 1);
         assert!(refused.contains(&expected) && refused.contains("--grid HZ"), "{what}: {refused}");
-        assert!(!message(most).contains("rows together"), "{what}");
+        assert!(!message(most).contains("rows in total"), "{what}");
     }
 }
 

@@ -138,7 +138,7 @@ fn a_text_stands_for_a_list_of_one_and_wrong_values_are_named_with_their_key() {
         (
             "[[trial]]",
             "[trial]",
-            "p, row 16, key trial: this is one table; write a table in double brackets for each",
+            "p, row 16, key trial: this is a single table; write one table in double brackets per entry",
         ),
         (
             "['a']",

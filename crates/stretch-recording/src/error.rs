@@ -159,7 +159,7 @@ pub enum RecordingError {
     },
     /// A date in which it is unclear which number is the day and which the month.
     #[error(
-        "{at}: it is unclear which number of \"{value}\" is the day; say it with --time {}:dmy or {}:mdy", .at.column, .at.column
+        "{at}: it is unclear which number of \"{value}\" is the day; give the order with --time {}:dmy or {}:mdy", .at.column, .at.column
     )]
     DayOrMonth {
         /// Where.
@@ -183,7 +183,8 @@ pub enum RecordingError {
     },
     /// A sample rate outside the accepted range.
     #[error(
-        "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between {least_hz:e} and {most_hz:e}; say what its numbers count with --time {column}:s, :ms, :us, :ns, :min, :h or :d, or the rate with --sample-rate HZ"
+        "{file}, column {column}: its time stamps give {rate_hz:.3e} samples per second, which is not between {least_hz:e} and {most_hz:e}; \
+         give their unit with --time {column}:s, :ms, :us, :ns, :min, :h or :d, or replace them by a rate with --sample-rate HZ"
     )]
     Rate {
         /// The file.
@@ -198,7 +199,7 @@ pub enum RecordingError {
         most_hz: f64,
     },
     /// A time column with invalid time stamps.
-    #[error("{at}: {problem}; the rate with --sample-rate HZ replaces a column of time")]
+    #[error("{at}: {problem}; to replace the time column by a rate, give --sample-rate HZ")]
     Stamps {
         /// Where.
         at: Place,
@@ -297,7 +298,7 @@ pub enum RecordingError {
     },
     /// A line longer than the reader accepts.
     #[error(
-        "{file}, row {row}: the line is longer than {limit} bytes; this is not a table of samples with a line each"
+        "{file}, row {row}: the line is longer than {limit} bytes; write a table with one line per sample"
     )]
     LineTooLong {
         /// The file.

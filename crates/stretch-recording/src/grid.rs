@@ -481,7 +481,7 @@ fn tell(
         ));
     }
     if dropped > 0 {
-        notes.push(format!("{dropped} rows are left out: a clock has a gap there"));
+        notes.push(format!("{dropped} rows are left out because a clock has a gap there"));
     }
 }
 

@@ -98,7 +98,7 @@ pub(crate) fn whole(
         if length > LARGEST {
             let most = LARGEST >> 30;
             return Ok(Err(format!(
-                "it is larger than {most} GB, and is read whole; save it in parts"
+                "it is larger than {most} GB, the limit for a file that is not text; save it in parts"
             )));
         }
         if read == 0 {

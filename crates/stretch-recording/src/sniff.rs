@@ -67,7 +67,7 @@ impl Format {
             }
             _ if is_mat(head) => Self::Python("a MAT file of version 5", "matlab"),
             _ if is_page(head) => {
-                Self::Foreign("HTML", "a server answered in place of the file; download it again")
+                Self::Foreign("HTML", "it is probably the error page of a server; download the file again")
             }
             _ if is_json(head) => Self::Foreign("JSON", "write CSV with one row per sample"),
             _ => match (find(&PYTHON), find(&FOREIGN)) {
@@ -102,7 +102,7 @@ impl Format {
             Self::Parquet => Err(RecordingError::convert(file, "a Parquet file", "parquet")),
             Self::Python(format, extra) => Err(RecordingError::convert(file, format, extra)),
             Self::Foreign(format, todo) => {
-                Err(refused(format, format!("recordings of this kind are not read; {todo}")))
+                Err(refused(format, format!("this format is not supported; {todo}")))
             }
             Self::Text | Self::Gzip => Err(refused("text", "it holds no arrays".to_owned())),
         }

@@ -14,7 +14,7 @@ fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
 #[track_caller]
 fn refuses(text: impl AsRef<[u8]>, message: &str, bad: usize, all: usize) {
     let share =
-        format!("{bad} of {all} rows cannot be read, and no more than one in 5 is left out");
+        format!("{bad} of {all} rows cannot be read, and at most one in 5 may be left out");
     says(text, &format!("{message} ({share})"));
 }
 
@@ -158,18 +158,19 @@ fn rows_and_time() {
     says(
         "time_s,bridge_v\n0,1,7,8\n",
         "t.csv: 1 rows of 4 numbers from line 2 on, and no names for them in the line above \
-         (\"time_s,bridge_v\"), unless they have decimal commas; name the columns with --columns, or put a header line above them, such \
+         (\"time_s,bridge_v\"; if its commas are decimal commas, separate the columns with \
+         semicolons); name the columns with --columns, or put a header line above them, such \
          as time_s,length_mm,bridge_v",
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.25,1\n",
-        "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; the rate with \
-         --sample-rate HZ replaces a column of time",
+        "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; to replace the time \
+         column by a rate, give --sample-rate HZ",
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.5,1\n",
-        "t.csv, row 3, column time_s: time does not advance at 0.5; the rate with --sample-rate HZ \
-         replaces a column of time",
+        "t.csv, row 3, column time_s: time does not advance at 0.5; to replace the time column by \
+         a rate, give --sample-rate HZ",
     );
 }
 
@@ -201,8 +202,8 @@ fn a_line_of_a_gigabyte_is_refused_after_a_piece_of_it() {
         assert_eq!(
             error.to_string(),
             format!(
-                "t.csv, row {row}: the line is longer than 65536 bytes; this is not a table of \
-                 samples with a line each"
+                "t.csv, row {row}: the line is longer than 65536 bytes; write a table with \
+                 one line per sample"
             )
         );
         assert!(stream.left > (1 << 30) - (1 << 20), "it read {} bytes", (1 << 30) - stream.left);

@@ -121,7 +121,7 @@ fn what_is_around_a_table_is_no_row_of_it() {
     lines.insert(0, "3,1.02".to_owned());
     let (times, notes) = read(&lines, &asked()).expect("60 rows");
     assert_eq!((times.len(), live(&lines, &asked()).len()), (60, 60));
-    assert_eq!(notes, ["the first line is no part of the table and is passed over"]);
+    assert_eq!(notes, ["the first line is not part of the table and is skipped"]);
     // Summaries follow the numbers.
     lines.remove(0);
     lines.extend(["", "End of test", "Maximum,105.3", "Mean;1.02"].map(str::to_owned));

@@ -203,15 +203,15 @@ fn repeated_and_coarse_stamps_are_spread() {
         is_at_50_hz(&read(&text), 0, 1e-3, "spread evenly");
     }
     let once = |i: usize, t: f64| format!("{:.3}", if i == 100 { t - 0.02 } else { t });
-    is_at_50_hz(&read(&table("time_s", once)), 0, 1e-9, "row 102 has the stamp of the row before");
+    is_at_50_hz(&read(&table("time_s", once)), 0, 1e-9, "row 102 has the time stamp of the row before");
     let seconds = |_: usize, t: f64| format!("2024-02-17 23:59:{:02.0}", (50.0 + t + 1e-9).floor());
-    is_at_50_hz(&read(&table("time", seconds)), 0, 1e-6, "50 a second");
+    is_at_50_hz(&read(&table("time", seconds)), 0, 1e-6, "50 per second");
     // The recording begins within a second.
     let late = |_: usize, t: f64| format!("{}", (1_714_564_800.4 + t + 1e-9).floor());
-    is_at_50_hz(&read(&table("timestamp", late)), 0, 1e-6, "50 a second");
+    is_at_50_hz(&read(&table("timestamp", late)), 0, 1e-6, "50 per second");
     // The stamps stayed the same while samples continued.
     let stuck = |i: usize, t: f64| format!("{:.2}", if (100..130).contains(&i) { 2.0 } else { t });
-    is_at_50_hz(&read(&table("time_s", stuck)), 0, 1e-9, "29 rows have the stamp");
+    is_at_50_hz(&read(&table("time_s", stuck)), 0, 1e-9, "29 rows have the time stamp");
     // Lost samples are not mistaken for ticks, even at regular intervals.
     for every in [9, 37] {
         let text = table("time_s", |_, t| format!("{t:.2}"));
@@ -249,7 +249,7 @@ fn stale_rows_are_left_out() {
 fn a_rate_replaces_a_column_of_time() {
     let text = table("time_s", |_, t| format!("{:.3}", t / 2.0));
     let options = ReadOptions::new().require("bridge_v").sample_rate_hz(RATE_HZ);
-    let says = "column time_s is not read: samples are counted at 50 Hz";
+    let says = "column time_s is not read: the time is computed from a rate of 50 Hz";
     is_at_50_hz(&read_as(&text, &options).unwrap(), 0, 1e-12, says);
     let still = table("time_s", |_, _| "oops".to_owned());
     is_at_50_hz(&read_as(&still, &options).unwrap(), 0, 1e-12, says);
@@ -325,7 +325,7 @@ fn the_first_step_of_a_stream_shows_its_unit() {
         let (times, notes) = live_as(&text, ReadOptions::new().untimed_hz(RATE_HZ));
         assert_eq!(times.len(), SAMPLES, "{unit}");
         assert!(times.windows(2).all(|t| (t[1] - t[0] - 0.02).abs() < 1e-4), "{unit}");
-        let by_steps = format!("by its steps, the time counts {unit}");
+        let by_steps = format!("the time is taken to be in {unit}, because of its steps");
         assert_eq!(notes.contains(&by_steps), !unit.is_empty(), "{unit}: {notes:?}");
     }
 }
@@ -338,7 +338,7 @@ fn a_stream_with_coarse_stamps_has_the_usual_rate() {
         let ticks = |t: f64| (t / tick_s + 1e-9).floor() * tick_s;
         let (times, notes) = live_as(&table("time_s", |_, t| format!("{:.6}", ticks(t))), usual());
         let [note] = &notes[..] else { panic!("{notes:?}") };
-        assert!(note.contains("ticks of") && note.contains("50 a second"), "{note}");
+        assert!(note.contains("ticks of") && note.contains("50 per second"), "{note}");
         for (i, time_s) in times.iter().enumerate() {
             let late_s = i as f64 / RATE_HZ - time_s;
             assert!((-tick_s..=tick_s).contains(&late_s), "{tick_s}, sample {i}: {late_s}");

@@ -119,7 +119,7 @@ fn a_rate_above_the_table_is_taken_where_there_is_no_time() {
     let (read, notes) = names(&scope, &ReadOptions::new());
     assert_eq!(read, "x ch1_v ch2_v");
     assert!(notes.contains(
-        &"there is no time: samples are counted at 50 Hz, as Increment above it says".to_owned()
+        &"there is no time column: the time is computed from a rate of 50 Hz, as given by Increment above the table".to_owned()
     ));
     // A rate that is given replaces the rate in the file.
     let Recording { trial, .. } =
@@ -229,7 +229,7 @@ fn names_of_one_kind_are_numbered_and_only_what_is_asked_for_must_be_one() {
     let text = format!("time_s,X,X\n{}", rows(",", ""));
     let (read, notes) = names(&text, &ReadOptions::new());
     assert_eq!(read, "X X.1");
-    assert_eq!(notes, ["columns of one name are numbered: X (column 3) -> X.1"]);
+    assert_eq!(notes, ["columns with the same name are numbered: X (column 3) -> X.1"]);
     assert_eq!(names(&text, &ReadOptions::new().require("X.1")).0, "X X.1");
     assert_eq!(names(&text, &ReadOptions::new().require("X.0")).0, "X.0 X.1");
     fails(&text, &ReadOptions::new().require("X"), &["names column X twice", "X.0 or X.1"]);
@@ -265,7 +265,7 @@ fn text_that_is_no_utf_8_is_read_as_windows_1252() {
         Recording::from_reader(&bytes[..], "t.csv", &ReadOptions::new().require("länge_mm"))
             .expect("read");
     assert_eq!(trial.len(), 40);
-    assert_eq!(notes[0], "the names are no UTF-8 and are read as Windows-1252");
+    assert_eq!(notes[0], "the column names are not UTF-8 and are read as Windows-1252");
     assert!(notes[1].contains("€ [°]") || trial.channels[1].name.contains('€'), "{notes:?}");
 }
 

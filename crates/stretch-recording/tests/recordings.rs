@@ -175,7 +175,7 @@ fn an_episode_of_lerobot_goes_by_the_names_of_its_description() {
     }
     let said = notes.join("\n");
     assert!(said.contains("episodes 0 to 1, and 0 is read"), "{said}");
-    assert!(said.contains("uneven.list.element (lists of several lengths)"), "{said}");
+    assert!(said.contains("uneven.list.element (lists of different lengths)"), "{said}");
 
     let other = read(&format!("{file}#1"), &ReadOptions::new()).trial;
     let backwards: Vec<f64> =

@@ -142,7 +142,7 @@ fn data_set(folder: &Path) -> anyhow::Result<Parts> {
             entries.map(|e| Ok((e.kind, load(e)?.trial))).collect::<anyhow::Result<Vec<_>>>()?;
         ensure!(
             !trials.is_empty(),
-            "{}: no trial has split = \"{split}\"; the job needs trials to fit and to test on",
+            "{}: no trial has split = \"{split}\"; the demo needs trials to fit and to test on",
             folder.display()
         );
         Ok(trials)
@@ -169,7 +169,7 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
         })?,
     };
     let Some(files) = groups.get(name) else {
-        bail!("{}: there are no sessions {name}; there are {}", path.display(), names.join(", "));
+        bail!("{}: there is no group of sessions {name}; the groups are {}", path.display(), names.join(", "));
     };
     let mut sessions = Vec::new();
     let mut converted = false;
@@ -186,12 +186,12 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
     let test = fit.pop().into_iter().collect();
     ensure!(
         !fit.is_empty(),
-        "{}: {name} is one session; the job needs one to fit and another to test on",
+        "{}: {name} is a single session; the demo needs one to fit and another to test on",
         path.display()
     );
     let others: Vec<&str> = names.into_iter().filter(|other| *other != name).collect();
     let mut note =
-        format!("Sessions {name}; the last one is tested on, the first alone is diagnosed.");
+        format!("Sessions {name}: the last one is used for testing, and only the first is diagnosed.");
     if converted {
         note += &format!(" Read as the authors published them ({REPOSITORY}, commit {COMMIT}).");
     }

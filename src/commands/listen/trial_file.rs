@@ -71,14 +71,14 @@ impl TrialFile {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => without_a_row(path)?
                 .ok_or_else(|| {
                     io::Error::other(
-                        "it exists, and a recording replaces nothing; name another file",
+                        "it exists, and a recording never overwrites a file; name another file",
                     )
                 })?,
             other => other?,
         };
         // If files cannot be locked, two recordings into one file cannot be detected.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            return Err(io::Error::other("another recording goes there"));
+            return Err(io::Error::other("another program is recording to it; name another file"));
         }
         file.set_len(0)?;
         let line = header.as_bytes().to_vec();

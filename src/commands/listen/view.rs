@@ -192,16 +192,16 @@ impl Status {
             text += &format!(", {other_version} of another version: update stretch or the board");
         }
         match self.rows {
-            Some(0) => text += "; no row was recorded, and no file is left",
+            Some(0) => text += "; no row was recorded, so no file was written",
             Some(rows) => text += &format!("; {rows} rows recorded"),
             None => {}
         }
         if self.missing > 0 {
-            text += &format!("; {} samples that the board did not get", self.missing);
+            text += &format!("; {} samples that the board did not get from its converter", self.missing);
         }
         if self.standing > 0 {
             text += &format!(
-                "; the board's clock stood still at {} frames: they are without a new time and no rows, look at what the board takes \
+                "; the board's clock did not advance at {} frames, which are not recorded; check where the board takes \
                  its milliseconds from",
                 self.standing
             );
@@ -209,14 +209,14 @@ impl Status {
         let Self { beyond, largest, adc_bits, .. } = self;
         if *beyond > 0 {
             text += &format!(
-                "; {beyond} codes up to {largest} are beyond a converter of {adc_bits} bits and no rows: name its bits \
+                "; {beyond} codes up to {largest} exceed a converter of {adc_bits} bits and are not recorded; give its bits \
                  with --adc"
             );
         }
         match self.compared {
             Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
             Some((_, difference)) if frames > 0 => {
-                text += format!("; differs from the calibration by {difference:.4} {}", self.unit)
+                text += format!("; the estimates differ from the calibration by up to {difference:.4} {}", self.unit)
                     .trim_end();
             }
             _ => {}

@@ -37,7 +37,7 @@ pub(super) fn open_stream(
         return Ok(Some(Box::new(Stream { out: io::stdout(), has_gone: false })));
     }
     if is_one_of(path, STDIN) {
-        return Err(io::Error::other("it is standard input, which is read; name a file"));
+        return Err(io::Error::other("it is standard input, which cannot be written; name a file"));
     }
     let is_descriptor = path.starts_with("/dev/fd") || path.starts_with("/proc");
     match meta.filter(|meta| is_descriptor || !meta.is_file()) {
@@ -99,7 +99,7 @@ fn open_device(path: &Path, meta: &Metadata) -> io::Result<File> {
             }
         }
     }
-    Err(io::Error::other("it is a pipe without a reader; begin to read it first"))
+    Err(io::Error::other("no program reads this pipe; start the reader first"))
 }
 
 #[cfg(not(unix))]

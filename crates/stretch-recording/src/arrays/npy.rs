@@ -36,7 +36,7 @@ pub(crate) fn read(
     {
         let shape = &arrays[0].shape;
         return Err(fail(format!(
-            "an array of {shape:?} without names; name its columns with --columns, or save several arrays with numpy.savez"
+            "an array of shape {shape:?} has no column names; name its columns with --columns, or save several arrays with numpy.savez"
         )));
     }
     for (i, array) in arrays.iter_mut().enumerate().filter(|(_, a)| a.name.is_empty()) {
@@ -62,7 +62,7 @@ pub(crate) fn read_archive(
         let mut member = archive.by_index(i).map_err(broken)?;
         let path = member.name().map_err(broken)?.into_owned();
         if path.starts_with("xl/") {
-            let problem = format!("recordings of this kind are not read; {EXCEL}");
+            let problem = format!("this format is not supported; {EXCEL}");
             return Err(RecordingError::Format { file: file.to_owned(), format: "Excel", problem });
         }
         let Some(name) = path.strip_suffix(".npy") else { continue };
@@ -80,8 +80,8 @@ pub(crate) fn read_archive(
     }
     if arrays.is_empty() {
         return Err(fail(match &other[..] {
-            [] => "there is no array in it; give the recording itself, or save arrays with numpy.savez".to_owned(),
-            _ => format!("none of its arrays is of numbers: {}", listed(&other)),
+            [] => "it contains no array; give the recording itself, or save arrays with numpy.savez".to_owned(),
+            _ => format!("none of its arrays contains numbers that can be read: {}", listed(&other)),
         }));
     }
     drop(archive);
@@ -96,7 +96,7 @@ fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     let (rows, columns) = match array.shape[..] {
         [rows] => (rows, 1),
         [rows, columns] => (rows, columns),
-        _ => return Err(format!("an array of {:?} has no columns to name", array.shape)),
+        _ => return Err(format!("an array of shape {:?} has no columns to name; save an array of one or two dimensions", array.shape)),
     };
     let count = names.len();
     let (step, next, samples) = match (columns == count, rows == count) {
@@ -104,7 +104,7 @@ fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
         (_, true) => (1, columns, columns),
         _ => {
             return Err(format!(
-                "an array of {:?} where {count} columns were named; name as many",
+                "an array of shape {:?} does not have the {count} columns that --columns names; give one name per column",
                 array.shape
             ));
         }
@@ -236,7 +236,7 @@ fn head(bytes: &[u8], name: &str) -> Result<Head, String> {
         .collect::<Result<_, _>>()?;
     let (fields, item) = fields(descr, name)?;
     let product = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m));
-    let count = product.ok_or_else(|| format!("no memory holds its shape {shape:?}"))?;
+    let count = product.ok_or_else(|| format!("its shape {shape:?} is too large for any memory; save it again with numpy.save"))?;
     let needed = count.saturating_mul(item);
     if bytes.len() - data < needed {
         return Err(format!(
@@ -263,7 +263,7 @@ fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
     let (mut places, mut at) = (Vec::new(), 0);
     for field in whole.split("),").filter(|f| f.contains('\'')) {
         let [field_name, text] = &quoted(field)[..] else {
-            return Err("fields that hold fields are not read; save plain columns".to_owned());
+            return Err("nested fields are not supported; save plain columns".to_owned());
         };
         if field
             .trim_end()
@@ -273,7 +273,7 @@ fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
             .next()
             .is_some_and(|r| r.contains('('))
         {
-            return Err(format!("field {field_name} holds arrays; save plain columns"));
+            return Err(format!("field {field_name} contains arrays; save plain columns"));
         }
         let kind = Kind::parse(text)?;
         let path =

@@ -93,7 +93,7 @@ impl LiveClock {
             && std::mem::take(&mut self.is_assumed)
             && let Some(other) = self.usual_hz.and_then(|usual_hz| unit::by_step(step, usual_hz))
         {
-            self.notes.push(format!("by its steps, the time counts {}", other.plural()));
+            self.notes.push(format!("the time is taken to be in {}, because of its steps", other.plural()));
             // Keep the time of the first sample, which was already returned.
             self.added = last * (other.per_second() / per_second - 1.0);
             self.first_end = last + self.added;
@@ -117,7 +117,7 @@ impl LiveClock {
         if let Some(tick) = self.tick.or(period).filter(|_| step == 0.0) {
             if self.run == 0 && self.ticks + 1 == sample {
                 self.notes.push(format!(
-                    "stamps repeat, first in row {row}; such samples are spread evenly"
+                    "time stamps repeat, first in row {row}; samples with the same time stamp are spread evenly"
                 ));
             }
             self.run += 1;
@@ -153,7 +153,7 @@ impl LiveClock {
             self.coarse = tick.filter(|tick| spread::is_even(&self.first, period, *tick));
             if let Some(tick) = self.coarse {
                 self.notes.push(format!(
-                    "the clock has ticks of {} ms; from row {row} on the samples are spread evenly within them, {} a second",
+                    "the clock advances in ticks of {} ms; from row {row} on the samples are spread evenly, at {} per second",
                     spread::rounded(1e3 * tick / per_second, 4),
                     spread::rounded(per_second / period, 4)
                 ));

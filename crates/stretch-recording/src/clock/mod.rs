@@ -161,8 +161,8 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
 /// Returns the note that samples are counted and that a time column, if there is one, is not read.
 pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
     let time =
-        column.map_or("there is no time".to_owned(), |name| format!("column {name} is not read"));
-    format!("{time}: samples are counted at {rate_hz} Hz, {by}")
+        column.map_or("there is no time column".to_owned(), |name| format!("column {name} is not read"));
+    format!("{time}: the time is computed from a rate of {rate_hz} Hz, {by}")
 }
 
 /// Returns the note that time is counted from the first sample, because it was recorded as a time of day or counts from
@@ -188,7 +188,7 @@ pub(crate) fn read(
     notes.extend(add_nanoseconds(track));
     let not_finite = |i: &usize| !track.stamps.counts[*i].is_finite();
     let lost: Vec<usize> = (0..track.stamps.counts.len()).filter(not_finite).collect();
-    leave_out(file, track, &lost, "is no number", options, notes)?;
+    leave_out(file, track, &lost, "is not a number", options, notes)?;
     let stamps = &mut track.stamps;
     let Some(mut steps) = Steps::of(&stamps.counts) else {
         return match stamps.counts[..] {
@@ -205,7 +205,7 @@ pub(crate) fn read(
     if steps.back > 0 {
         notes.extend(order::unroll(stamps, steps.tick, per_second));
         let stale = out_of_order(&stamps.counts);
-        leave_out(file, track, &stale, "is not in the order of the others", options, notes)?;
+        leave_out(file, track, &stale, "is not in order", options, notes)?;
     } else {
         let unset = order::before_the_clock_was_set(&stamps.counts, steps.tick);
         let what = "is long before the others";
@@ -233,7 +233,7 @@ fn add_nanoseconds(track: &mut Track) -> Option<String> {
         *count = *count - first + ns / 1e9;
     }
     stamps.per_second = Some(1.0);
-    Some(format!("column {} is added to {}", nanoseconds.name, stamps.name))
+    Some(format!("column {} is added to column {} to give the time", nanoseconds.name, stamps.name))
 }
 
 /// Leaves out rows with impossible stamps, and adds a note.
@@ -251,13 +251,13 @@ fn leave_out(
     let [first, ..] = rows else { return Ok(()) };
     let (stamps, all) = (&track.stamps, track.stamps.counts.len());
     let (at, count) = (stamps.place(file, *first), rows.len());
-    let evidence = format!("its stamp {} {what}", stamps.recorded(*first));
+    let evidence = format!("its time stamp {} {what}", stamps.recorded(*first));
     if options.strict || !BadRows::are_few(count, all) {
         let (at, evidence) = goes_back(file, stamps).unwrap_or((at, evidence));
         let why = match options.strict {
             true => "--strict leaves no row out".to_owned(),
             false => format!(
-                "{count} of {all} rows have bad stamps, and at most one in five may; split the recording where its time begins again"
+                "{count} of {all} rows have bad time stamps, and at most one in five may be left out; split the recording where its time begins again"
             ),
         };
         return Err(RecordingError::Stamps { at, problem: format!("{evidence}: {why}") });

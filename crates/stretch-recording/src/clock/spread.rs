@@ -37,7 +37,7 @@ pub(super) fn spread(
         let most = 1.0 + if is_coarse { JITTERED } else { ROUNDING };
         if let Some(sample) = even_out(&mut stamps.counts, tick, most, per_second) {
             notes.push(format!(
-                "the clock has ticks of {} ms; the samples are spread evenly within them, {} a second",
+                "the clock advances in ticks of {} ms; the samples are spread evenly, at {} per second",
                 rounded(1e3 * tick / per_second, 4),
                 rounded(per_second / sample, 4)
             ));
@@ -53,10 +53,10 @@ pub(super) fn spread(
     match steps.repeated.saturating_sub(left_out.len()) {
         0 => {}
         1 => notes.push(format!(
-            "row {row} has the stamp of the row before ({stamp}); it is spread evenly up to the next stamp"
+            "row {row} has the time stamp of the row before ({stamp}); it is spread evenly up to the next stamp"
         )),
         many => notes.push(format!(
-            "{many} rows have the stamp of the row before, the first of them row {row} ({stamp}); they are spread evenly up to the next stamp"
+            "{many} rows have the time stamp of the row before, the first of them row {row} ({stamp}); they are spread evenly up to the next stamp"
         )),
     }
     left_out

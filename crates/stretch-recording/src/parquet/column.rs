@@ -69,7 +69,7 @@ pub(super) fn read(
         let its_rows = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
         let have = if is_list { values.begins.len() } else { values.numbers.len() };
         if its_rows > rows - have.min(rows) {
-            let why = "its groups hold more rows than the file; write it again";
+            let why = "its row groups contain more rows than the file declares; write it again";
             return Err(Refused::File(why.to_owned()));
         }
         // The pages of a row group are in memory while it is read.
@@ -115,8 +115,8 @@ impl Values {
             && self.numbers.len() == rows * count
             && begins.into_iter().all(|(row, begin)| *begin == row * count);
         match count {
-            _ if !is_even || count == 0 => Err("lists of several lengths".to_owned()),
-            _ if count > LONGEST => Err(format!("lists of {count}")),
+            _ if !is_even || count == 0 => Err("lists of different lengths".to_owned()),
+            _ if count > LONGEST => Err(format!("lists of more than {LONGEST} numbers")),
             _ => Ok((0..count)
                 .map(|item| Channel {
                     name: format!("{name}.{item}"),

@@ -57,7 +57,7 @@ pub(crate) fn episode(
     let Some(of) = track.channels.iter().find(|c| c.name == EPISODE).map(|c| c.values.clone())
     else {
         return match asked {
-            Some(_) => Err(format!("an episode is asked for, and there is no column {EPISODE}")),
+            Some(_) => Err(format!("there is no column {EPISODE}; remove the # and the number from the file's name")),
             None => Ok(track),
         };
     };

@@ -74,7 +74,7 @@ fn on_its_clock(
     let names: Vec<String> = channels.iter().map(|c| c.name.clone()).collect();
     let time = time_among(&names, options);
     if let Some(rate_hz) = options.sample_rate_hz {
-        notes.push(note_on_rate(time.map(|i| &*names[i]), rate_hz, "as the option says"));
+        notes.push(note_on_rate(time.map(|i| &*names[i]), rate_hz, "as given by the option"));
         let time = time.map(|i| channels.remove(i));
         let rows = channels.first().or(time.as_ref()).map_or(0, |c| c.values.len());
         return Ok(Track::new(Stamps::at_rate(rows, rate_hz), channels));

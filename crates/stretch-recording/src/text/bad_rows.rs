@@ -93,7 +93,7 @@ impl BadRows {
         match self.first.take_if(|_| !Self::are_few(bad, all)) {
             None => Ok(()),
             Some((_, first)) => Err(first.refused(format!(
-                "{bad} of {all} rows cannot be read, and no more than one in {ONE_IN} is left out"
+                "{bad} of {all} rows cannot be read, and at most one in {ONE_IN} may be left out"
             ))),
         }
     }

@@ -60,7 +60,7 @@ impl Header {
             names[column] = format!("{cell}.{before}");
             renamed.push(format!("{cell} (column {}) -> {cell}.{before}", column + 1));
         }
-        note(notes, "columns of one name are numbered", &renamed);
+        note(notes, "columns with the same name are numbered", &renamed);
         Ok(names)
     }
 

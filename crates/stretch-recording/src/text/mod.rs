@@ -166,12 +166,12 @@ impl<'a> Table<'a> {
             self.notes.push("numbers have decimal commas".to_owned());
         }
         if self.header.delimiter == BLANKS {
-            self.notes.push("columns are set apart by blanks".to_owned());
+            self.notes.push("columns are separated by blanks".to_owned());
         }
         match self.comments {
             0 => {}
-            1 => self.notes.push("a comment between the rows is passed over".to_owned()),
-            n => self.notes.push(format!("{n} comments between the rows are passed over")),
+            1 => self.notes.push("a comment between the rows is skipped".to_owned()),
+            n => self.notes.push(format!("{n} comments between the rows are skipped")),
         }
         let (stamps, file) = (self.stamps(), self.file);
         let (mut notes, mut bad) = (self.notes, self.bad);

@@ -368,7 +368,7 @@ impl Finder<'_> {
             notes.push(format!("the names of the columns are in a comment, row {}", line.row));
         }
         if [header_line, units].iter().flatten().any(|line| line.is_decoded) {
-            notes.push("the names are no UTF-8 and are read as Windows-1252".to_owned());
+            notes.push("the column names are not UTF-8 and are read as Windows-1252".to_owned());
         }
         let units = units.and_then(|line| name_cells(&line.text, &block)).unwrap_or_default();
         let cells = tidy_names(&cells, &units, self.options, &mut notes);
@@ -442,8 +442,8 @@ impl Finder<'_> {
         let above = above.map_or("no names above them".to_owned(), |line| {
             let shown = shown(&line.text);
             let commas =
-                if block.delimiter == b',' { ", unless they have decimal commas" } else { "" };
-            format!("no names for them in the line above (\"{shown}\"){commas}")
+                if block.delimiter == b',' { "; if its commas are decimal commas, separate the columns with semicolons" } else { "" };
+            format!("no names for them in the line above (\"{shown}\"{commas})")
         });
         RecordingError::NoHeader {
             file: file.to_owned(),
@@ -458,8 +458,8 @@ impl Finder<'_> {
 fn passed_over(count: usize) -> Option<String> {
     match count {
         0 => None,
-        1 => Some("the first line is no part of the table and is passed over".to_owned()),
-        _ => Some(format!("the first {count} lines are no part of the table and are passed over")),
+        1 => Some("the first line is not part of the table and is skipped".to_owned()),
+        _ => Some(format!("the first {count} lines are not part of the table and are skipped")),
     }
 }
 

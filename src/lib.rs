@@ -139,7 +139,9 @@ pub fn run() -> ExitCode {
         }
         (Ok(()), Some(kind)) if !is_unread => {
             let files = "the output files are complete";
-            display::fail(format!("standard output could not be written completely: {kind}; {files}"));
+            display::fail(format!(
+                "standard output could not be written completely: {kind}; {files}"
+            ));
             ExitCode::FAILURE
         }
         (Ok(()), _) => done,

@@ -37,7 +37,10 @@ const OPTIONS: [(&str, &str); 19] = [
     ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
     ("--adc-full-scale-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
-    ("--allow-commands", "name the problem.toml itself instead of its folder, which allows its simulator to run"),
+    (
+        "--allow-commands",
+        "name the problem.toml itself instead of its folder, which allows its simulator to run",
+    ),
     ("--baud", "write the speed after the port: --port PATH:BAUD"),
     ("--branch-by", "--rate paper selects the complete published method"),
     ("--budget", "write budget = N into the problem's file"),

@@ -278,7 +278,10 @@ fn codes_beyond_the_converter_are_counted_and_nothing_is_called_compared() {
     assert!(notes.contains("198 codes up to"), "{notes}");
     assert!(notes.contains("exceed a converter of 12 bits") && notes.contains("--adc"), "{notes}");
     assert!(notes.contains("2 samples that the board did not get"), "{notes}");
-    assert!(notes.contains("no estimate was compared") && !notes.contains("differ from"), "{notes}");
+    assert!(
+        notes.contains("no estimate was compared") && !notes.contains("differ from"),
+        "{notes}"
+    );
     assert!(recorded.is_empty());
     // One such frame among valid ones.
     let mut frames = board(200);

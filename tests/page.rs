@@ -28,7 +28,8 @@ fn what_is_no_page_is_refused_and_nothing_is_left() {
     let scratch = Scratch::new();
     let (built, out) = (scratch.path("other.html"), scratch.path("out.html"));
     fs::write(&built, &PAGE[..20]).unwrap();
-    for (from, says) in [(&built, "not a page of stretch"), (&scratch.path("none"), "no such file")] {
+    for (from, says) in [(&built, "not a page of stretch"), (&scratch.path("none"), "no such file")]
+    {
         let mut command = stretch();
         fails(command.env("STRETCH_PAGE", from).arg("page").arg("--out").arg(&out), &[says]);
         assert!(!out.exists());

@@ -89,7 +89,11 @@ impl Scratch {
         let prior = self.path("prior.json");
         let mut command = self.sleeve(&["sleeve", "learn", "--out", "prior.json"]);
         let said = runs(command.args(self.sessions()));
-        assert!(said.contains("Prior of 8 sessions with the signals s1, s2") && said.contains("known sensor"), "{said}");
+        assert!(
+            said.contains("Prior of 8 sessions with the signals s1, s2")
+                && said.contains("known sensor"),
+            "{said}"
+        );
         prior
     }
 

@@ -85,9 +85,9 @@ impl Bound {
         for input in model.variables.iter().filter(|v| v.role == Role::Input && !is_set(v)) {
             let start = input.start.map_or("its start value".into(), |x| x.to_string());
             let name = &input.name;
-            bound.notes.push(format!(
-                "no column drives input {name} of the FMU, so it stays at {start}"
-            ));
+            bound
+                .notes
+                .push(format!("no column drives input {name} of the FMU, so it stays at {start}"));
         }
         bound.notes.extend(step_note(model, session.dt_s));
         Ok(bound)

@@ -198,8 +198,12 @@ impl Instance {
         let said = self.said.text();
         match status {
             Status::Fine => Ok(()),
-            Status::Discard => Err(Stopped::Refused(format!("{call} returned the status discard{said}"))),
-            Status::Error => Err(Stopped::Refused(format!("{call} returned the status error{said}"))),
+            Status::Discard => {
+                Err(Stopped::Refused(format!("{call} returned the status discard{said}")))
+            }
+            Status::Error => {
+                Err(Stopped::Refused(format!("{call} returned the status error{said}")))
+            }
             Status::Pending => Err(Stopped::Refused(format!(
                 "{call} returned the status pending: steps in the background are not supported{said}"
             ))),

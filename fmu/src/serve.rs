@@ -32,7 +32,9 @@ pub enum ServeError {
 }
 
 fn wrong(what: &str) -> ServeError {
-    ServeError::Protocol(format!("the {what} cannot be read; use stretch and this worker of the same release"))
+    ServeError::Protocol(format!(
+        "the {what} cannot be read; use stretch and this worker of the same release"
+    ))
 }
 
 /// Answers frames until the other side sends `bye` or closes the stream. `begin` makes the

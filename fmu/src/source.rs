@@ -44,8 +44,10 @@ impl FmuSource {
     /// libraries that cannot be loaded.
     pub fn new(fmu: Fmu, session: RecordedSession, names: &Names) -> Result<Self, FmuError> {
         let bound = Bound::new(fmu.model(), &session, names)?;
-        let gone =
-            || FmuError::Instance { file: fmu.file().to_owned(), said: ": its thread failed".into() };
+        let gone = || FmuError::Instance {
+            file: fmu.file().to_owned(),
+            said: ": its thread failed".into(),
+        };
         apart(|| Instance::new(&fmu).map(drop)).unwrap_or_else(|| Err(gone()))?;
         Ok(Self { fmu, session, bound, turn: Mutex::new(()) })
     }
@@ -132,7 +134,8 @@ fn apart<T: Send>(run: impl FnOnce() -> T + Send) -> Option<T> {
 impl Source for FmuSource {
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let gone = || asks.iter().map(|_| Err(SourceError::Gone("the thread of the FMU failed".into())));
+        let gone =
+            || asks.iter().map(|_| Err(SourceError::Gone("the thread of the FMU failed".into())));
         let run = || asks.iter().map(|ask| self.answer(ask)).collect();
         apart(run).unwrap_or_else(|| gone().collect())
     }

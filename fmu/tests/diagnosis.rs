@@ -43,7 +43,11 @@ fn samples_are_those_of_the_equations_and_runs_leave_nothing_behind() {
         let Some(built) = servo(fmi, Wrong::Nothing) else { return };
         let fmu = Fmu::open(&built.file).unwrap();
         let source = FmuSource::new(fmu, session.clone(), &names).unwrap();
-        let step = if fmi == 2 { "internal step of 0.005 s, 2 steps per sample" } else { "is not a multiple of it" };
+        let step = if fmi == 2 {
+            "internal step of 0.005 s, 2 steps per sample"
+        } else {
+            "is not a multiple of it"
+        };
         let notes = source.notes();
         assert!(notes.iter().any(|n| n.contains(step)), "{notes:?}");
         assert!(notes.iter().any(|n| n.contains("no column drives input load of the FMU")));

@@ -24,7 +24,10 @@ fn an_fmu_that_cannot_run_is_refused_at_the_start() {
         (Wrong::Platform, "it holds binaries/win64; export it for this platform"),
         (Wrong::Library, "its library cannot be loaded"),
         (Wrong::Token, "it cannot be instantiated"),
-        (Wrong::Description, "its modelDescription.xml cannot be used: there is no such file in the FMU"),
+        (
+            Wrong::Description,
+            "its modelDescription.xml cannot be used: there is no such file in the FMU",
+        ),
         (Wrong::Version, "it uses FMI 1.0; only FMI 2.0 and FMI 3.0 are supported"),
         (Wrong::Exchange, "brings no solver; export it for co-simulation"),
     ];
@@ -130,7 +133,10 @@ fn a_model_that_fails_is_told_and_takes_nothing_with_it() {
                 4.0,
                 "the step at 1.000000 s returned the status discard; its message: the spring is out of its range",
             ),
-            (5.0, "the step at 1.000000 s returned the status error; its message: the solver does not converge"),
+            (
+                5.0,
+                "the step at 1.000000 s returned the status error; its message: the solver does not converge",
+            ),
         ] {
             let Some((answer, _)) = troubled(fmi, trouble) else { return };
             match answer {

@@ -360,7 +360,8 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     }
     let of =
         schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
-    let mut notes = vec![format!("the model uses the effects of {}{of}: {}", name(), diagnosis.sentence)];
+    let mut notes =
+        vec![format!("the model uses the effects of {}{of}: {}", name(), diagnosis.sentence)];
     // The diagnosis of another rig of the same type may apply, so this is permitted, but a note
     // names both data sets.
     if let ([own], Some(set)) = (trials, &schema.data_set)
@@ -430,7 +431,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
     calibrated.notes.splice(0..0, gross_errors);
     match explains_nothing(&calibrated.fits) {
-        Some(why) if args.force => calibrated.notes.push(format!("{why}; written because of --force")),
+        Some(why) if args.force => {
+            calibrated.notes.push(format!("{why}; written because of --force"))
+        }
         Some(why) => {
             let refusal = anyhow!("nothing is written: {why}; give --force to write it anyway");
             return Err(of_files(refusal, &args.trials));

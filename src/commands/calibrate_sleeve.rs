@@ -66,7 +66,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         (Signal::One(name), _) => vec![name],
         (Signal::Together(names), _) => names,
         (Signal::Best(_), _) => {
-            anyhow::bail!("--signal auto: --prior and --session need the names of the signals, such as --signal s1,s2")
+            anyhow::bail!(
+                "--signal auto: --prior and --session need the names of the signals, such as --signal s1,s2"
+            )
         }
     };
     // The update itself requires the prior's signals, so only named signals are required here.

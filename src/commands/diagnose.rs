@@ -24,8 +24,7 @@ use super::{
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
 /// End of the message if there are competing explanations but no recommended experiment.
-const NOT_FORETOLD: &str =
-    " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
+const NOT_FORETOLD: &str = " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
 /// Exit status if the verdict is listed in `--fail-on`.
 const FAILED_ON: u8 = 3;
 /// Exit status of a diagnosis with fewer simulator runs than requested, because the budget was

@@ -47,7 +47,10 @@ pub(crate) fn text(
     let rows = diagnosis.rows_used;
     if rows.used < rows.read {
         let share = percent(rows.share());
-        out.push(format!("The diagnosis is based on {} of {} rows ({share}).", rows.used, rows.read));
+        out.push(format!(
+            "The diagnosis is based on {} of {} rows ({share}).",
+            rows.used, rows.read
+        ));
     }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
@@ -104,7 +107,10 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     if !end_to_end.is_empty() {
         let shares = end_to_end.iter().map(|e| format!("{} {}", e.stage, percent(e.share)));
         let shares: Vec<String> = shares.collect();
-        out.push(format!("Shares of the gap at the last output, simulated from the commands alone: {}.", listed(&shares)));
+        out.push(format!(
+            "Shares of the gap at the last output, simulated from the commands alone: {}.",
+            listed(&shares)
+        ));
     }
 }
 
@@ -221,11 +227,8 @@ fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: boo
     }
     let known = all.iter().filter(|p| p.knowledge == Knowledge::Determined).count();
     let others: Vec<String> = all.iter().filter_map(stretch_gap::Identified::sentence).collect();
-    let more = if is_verbose || others.is_empty() {
-        ""
-    } else {
-        " -v lists the reasons for the others."
-    };
+    let more =
+        if is_verbose || others.is_empty() { "" } else { " -v lists the reasons for the others." };
     out.push(format!(
             "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.{more}",
             all.len()
@@ -313,8 +316,11 @@ pub(super) fn write_snippets(
         }
     }
     if files.is_empty() {
-        let why =
-            if all.is_empty() { "no effect is named" } else { "no code is available for the named effects" };
+        let why = if all.is_empty() {
+            "no effect is named"
+        } else {
+            "no code is available for the named effects"
+        };
         return Ok(format!("{shown} is not written: {why}"));
     }
     outputs.folder(folder, false, |folder| {

@@ -108,7 +108,8 @@ impl Entry {
                 kind.sketch.map(|sketch| sketch(values, &CHANNEL, &signals))
             }
         };
-        sketch.with_context(|| format!("{}: no code is available for this effect", self.columns()[0]))
+        sketch
+            .with_context(|| format!("{}: no code is available for this effect", self.columns()[0]))
     }
 }
 
@@ -227,7 +228,11 @@ fn list_limits(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()>
     for name in names {
         let is_known = limits.iter().any(|limit| limit.effect == *name);
         let all: Vec<&str> = limits.iter().map(|limit| limit.effect.as_str()).collect();
-        ensure!(is_known, "{name}: this effect is not considered for these data, only {}", all.join(", "));
+        ensure!(
+            is_known,
+            "{name}: this effect is not considered for these data, only {}",
+            all.join(", ")
+        );
     }
     limits.retain(|limit| names.is_empty() || names.contains(&limit.effect));
     json.answer(&limits, || say(table_text(&limit_table(&limits))))

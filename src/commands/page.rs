@@ -64,7 +64,11 @@ fn page() -> anyhow::Result<Cow<'static, [u8]>> {
     };
     let page = read_whole(&from).with_context(|| from.display().to_string())?;
     let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
-    ensure!(is_page, "{}: this is not a page of stretch; build it with web/build.sh", from.display());
+    ensure!(
+        is_page,
+        "{}: this is not a page of stretch; build it with web/build.sh",
+        from.display()
+    );
     Ok(page.into())
 }
 

@@ -206,7 +206,10 @@ pub(super) fn write(
         trials: Vec::new(),
     };
     for own in ["dataset.toml", "rig.toml", "nominal.toml"] {
-        ensure!(plans.iter().all(|p| p.file != own), "a trial cannot have the name {own}; rename it");
+        ensure!(
+            plans.iter().all(|p| p.file != own),
+            "a trial cannot have the name {own}; rename it"
+        );
     }
     let bar = progress("simulating", plans.len() as u64);
     detail(format!("simulating {} trials, seed {}", plans.len(), settings.seed));

@@ -83,8 +83,11 @@ fn print_prior(prior: &Prior) -> anyhow::Result<()> {
         prior.sessions,
         prior.signals.join(", ")
     ))?;
-    let header =
-        ["reference, s", &format!("RMSE {unit}, known sensor"), &format!("RMSE {unit}, new sensor")];
+    let header = [
+        "reference, s",
+        &format!("RMSE {unit}, known sensor"),
+        &format!("RMSE {unit}, new sensor"),
+    ];
     let row = |e: &Expected| vec![number(e.seconds), maybe(e.rmse_known), maybe(e.rmse_new)];
     say(table(&header, prior.expected.iter().map(row)))
 }

@@ -234,7 +234,10 @@ impl DataSet {
         for (i, TrialEntry { file, opening, digest, .. }) in set.trials.iter().enumerate() {
             let key = |key: &str| format!("trial[{i}].{key}");
             if let Some(k) = set.trials[..i].iter().position(|other| other.file == *file) {
-                return fail(&key("file"), format!("{file} is also the file of trial[{k}]; list each file once"));
+                return fail(
+                    &key("file"),
+                    format!("{file} is also the file of trial[{k}]; list each file once"),
+                );
             }
             if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
                 return fail(&key("opening"), format!("{opening} is not between 0 and 1"));

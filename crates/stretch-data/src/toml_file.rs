@@ -233,9 +233,9 @@ impl<'de> Deserializer<'de> for Node<'de> {
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
         match self.0 {
             DeValue::String(_) => visitor.visit_seq(SeqDeserializer::new([self].into_iter())),
-            DeValue::Table(_) => {
-                Err(Refusal::custom("this is a single table; write one table in double brackets per entry"))
-            }
+            DeValue::Table(_) => Err(Refusal::custom(
+                "this is a single table; write one table in double brackets per entry",
+            )),
             _ => self.deserialize_any(visitor),
         }
     }

@@ -200,10 +200,15 @@ impl ReadOptions {
         has_time: bool,
         stated: Option<(f64, String)>,
     ) -> Option<(f64, String)> {
-        let given = self.sample_rate_hz.map(|rate_hz| (rate_hz, "as given by the option".to_owned()));
-        let stated = || stated.map(|(rate_hz, by)| (rate_hz, format!("as given by {by} above the table")));
+        let given =
+            self.sample_rate_hz.map(|rate_hz| (rate_hz, "as given by the option".to_owned()));
+        let stated =
+            || stated.map(|(rate_hz, by)| (rate_hz, format!("as given by {by} above the table")));
         let usual = || {
-            Some((self.untimed_hz?, "because no rate is given; set one with --time RATEhz".to_owned()))
+            Some((
+                self.untimed_hz?,
+                "because no rate is given; set one with --time RATEhz".to_owned(),
+            ))
         };
         given.or_else(|| stated().or_else(usual).filter(|_| !has_time))
     }

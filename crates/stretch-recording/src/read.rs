@@ -89,7 +89,8 @@ impl Recording {
             return Self::unpacked(reader, name, options);
         }
         if options.episode.is_some() && format != Format::Parquet {
-            let problem = "it holds no episodes; remove the # and the number from its name".to_owned();
+            let problem =
+                "it holds no episodes; remove the # and the number from its name".to_owned();
             return Err(RecordingError::Format { file: name.to_owned(), format: "file", problem });
         }
         if format == Format::Text {

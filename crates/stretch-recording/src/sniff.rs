@@ -66,9 +66,10 @@ impl Format {
                 Self::Python("a MAT file of version 7.3", "matlab")
             }
             _ if is_mat(head) => Self::Python("a MAT file of version 5", "matlab"),
-            _ if is_page(head) => {
-                Self::Foreign("HTML", "it is probably the error page of a server; download the file again")
-            }
+            _ if is_page(head) => Self::Foreign(
+                "HTML",
+                "it is probably the error page of a server; download the file again",
+            ),
             _ if is_json(head) => Self::Foreign("JSON", "write CSV with one row per sample"),
             _ => match (find(&PYTHON), find(&FOREIGN)) {
                 (Some((what, extra)), _) => Self::Python(what, extra),

@@ -13,8 +13,7 @@ fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
 /// Checks the error for a file in which `bad` of `all` rows are bad.
 #[track_caller]
 fn refuses(text: impl AsRef<[u8]>, message: &str, bad: usize, all: usize) {
-    let share =
-        format!("{bad} of {all} rows cannot be read, and at most one in 5 may be left out");
+    let share = format!("{bad} of {all} rows cannot be read, and at most one in 5 may be left out");
     says(text, &format!("{message} ({share})"));
 }
 

@@ -203,7 +203,12 @@ fn repeated_and_coarse_stamps_are_spread() {
         is_at_50_hz(&read(&text), 0, 1e-3, "spread evenly");
     }
     let once = |i: usize, t: f64| format!("{:.3}", if i == 100 { t - 0.02 } else { t });
-    is_at_50_hz(&read(&table("time_s", once)), 0, 1e-9, "row 102 has the time stamp of the row before");
+    is_at_50_hz(
+        &read(&table("time_s", once)),
+        0,
+        1e-9,
+        "row 102 has the time stamp of the row before",
+    );
     let seconds = |_: usize, t: f64| format!("2024-02-17 23:59:{:02.0}", (50.0 + t + 1e-9).floor());
     is_at_50_hz(&read(&table("time", seconds)), 0, 1e-6, "50 per second");
     // The recording begins within a second.

@@ -169,7 +169,11 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
         })?,
     };
     let Some(files) = groups.get(name) else {
-        bail!("{}: there is no group of sessions {name}; the groups are {}", path.display(), names.join(", "));
+        bail!(
+            "{}: there is no group of sessions {name}; the groups are {}",
+            path.display(),
+            names.join(", ")
+        );
     };
     let mut sessions = Vec::new();
     let mut converted = false;
@@ -190,8 +194,9 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
         path.display()
     );
     let others: Vec<&str> = names.into_iter().filter(|other| *other != name).collect();
-    let mut note =
-        format!("Sessions {name}: the last one is used for testing, and only the first is diagnosed.");
+    let mut note = format!(
+        "Sessions {name}: the last one is used for testing, and only the first is diagnosed."
+    );
     if converted {
         note += &format!(" Read as the authors published them ({REPOSITORY}, commit {COMMIT}).");
     }

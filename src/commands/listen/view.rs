@@ -197,7 +197,10 @@ impl Status {
             None => {}
         }
         if self.missing > 0 {
-            text += &format!("; {} samples that the board did not get from its converter", self.missing);
+            text += &format!(
+                "; {} samples that the board did not get from its converter",
+                self.missing
+            );
         }
         if self.standing > 0 {
             text += &format!(
@@ -216,8 +219,11 @@ impl Status {
         match self.compared {
             Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
             Some((_, difference)) if frames > 0 => {
-                text += format!("; the estimates differ from the calibration by up to {difference:.4} {}", self.unit)
-                    .trim_end();
+                text += format!(
+                    "; the estimates differ from the calibration by up to {difference:.4} {}",
+                    self.unit
+                )
+                .trim_end();
             }
             _ => {}
         }

@@ -19,12 +19,16 @@ use crate::data_set::unchanged_trials;
 pub(super) fn check(path: &Path, force: bool) -> Result<(), FileError> {
     let fail = |cause| Err(FileError::io(path.display(), "write it", cause));
     if path.as_os_str() == "-" {
-        return fail(io::Error::other("a folder cannot be written to standard output; name a folder"));
+        return fail(io::Error::other(
+            "a folder cannot be written to standard output; name a folder",
+        ));
     }
     let holds = match fs::symlink_metadata(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
         Ok(_) if path.is_dir() => fs::read_dir(path).map(|mut entries| entries.next().is_some()),
-        Ok(_) if force => Err(io::Error::other("it exists and is not a folder; choose another name")),
+        Ok(_) if force => {
+            Err(io::Error::other("it exists and is not a folder; choose another name"))
+        }
         Ok(_) => Ok(true),
         Err(e) => Err(e),
     };
@@ -105,7 +109,10 @@ pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
     carry(new, real, &mut BTreeSet::new(), |_, _| Ok(())).map_err(|why| {
         // The old folder is not removed, because it contains files of the user.
         let left = std::mem::take(&mut draft.temporary);
-        io::Error::other(format!("everything is written, but {why}; the old folder is kept as {}", left.display()))
+        io::Error::other(format!(
+            "everything is written, but {why}; the old folder is kept as {}",
+            left.display()
+        ))
     })
 }
 
@@ -157,7 +164,9 @@ fn carry(
             Ok(meta) if meta.is_dir() != is_folder => {
                 let kind = if is_folder { "folder" } else { "file" };
                 let name = from.display();
-                return Err(io::Error::other(format!("{name} is a {kind}, but its new version is not")));
+                return Err(io::Error::other(format!(
+                    "{name} is a {kind}, but its new version is not"
+                )));
             }
             Ok(_) => check(&from, &entry.metadata()?)?,
             Err(_) if is_folder => {

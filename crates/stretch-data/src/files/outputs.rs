@@ -133,7 +133,9 @@ impl Outputs {
         fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> io::Result<()> {
         let meta = match fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => return Err(io::Error::other("it is a folder; name a file")),
+            Ok(meta) if meta.is_dir() => {
+                return Err(io::Error::other("it is a folder; name a file"));
+            }
             Ok(meta) => Some(meta),
             Err(e) if e.kind() == io::ErrorKind::NotFound => None,
             Err(e) => return Err(e),
@@ -153,7 +155,9 @@ impl Outputs {
         }
         let draft = Draft::file(path)?;
         if self.0.iter().any(|other| other.real == draft.real) {
-            return Err(io::Error::other("this command writes two files with that name; choose another name for one of them"));
+            return Err(io::Error::other(
+                "this command writes two files with that name; choose another name for one of them",
+            ));
         }
         let Some(file) = &draft.file else { return Ok(()) };
         let mut out = BufWriter::with_capacity(1 << 16, file);

@@ -84,7 +84,8 @@ impl Recording {
     ) -> Result<(Self, Vec<Clock>), RecordingError> {
         let unfit = |a: &&Array| a.shape.iter().product::<usize>() != a.values.len();
         if let Some(Array { name: array, shape, .. }) = arrays.iter().find(unfit) {
-            let problem = format!("the number of values of array {array} does not match its shape {shape:?}");
+            let problem =
+                format!("the number of values of array {array} does not match its shape {shape:?}");
             return Err(RecordingError::Format { file: name.to_owned(), format: "array", problem });
         }
         let (tracks, notes) = tracks(name, arrays, notes, options)?;
@@ -224,7 +225,11 @@ pub(crate) fn tracks(
         };
         channels[i].extend(array.into_columns(clocks[i].array.values.len()).into_iter().flatten());
     }
-    note(&mut notes, "left out, because no time array or more than one has their length", &left_out);
+    note(
+        &mut notes,
+        "left out, because no time array or more than one has their length",
+        &left_out,
+    );
     if let Some(rate_hz) = options.sample_rate_hz {
         let [ClockArray { array, .. }] = &clocks[..] else {
             let names: Vec<&str> = clocks.iter().map(|clock| clock.array.name.as_str()).collect();
@@ -359,8 +364,11 @@ fn counted(
         );
         return Err(RecordingError::NoTime { file: file.to_owned(), hint });
     };
-    let said =
-        if options.sample_rate_hz.is_some() { "as given by the option" } else { "as given in the file" };
+    let said = if options.sample_rate_hz.is_some() {
+        "as given by the option"
+    } else {
+        "as given in the file"
+    };
     notes.push(note_on_rate(None, rate_hz, said));
     let channels = others.into_iter().filter(|a| a.values.len() > 1);
     let channels = channels.filter_map(|a| a.into_columns(samples));

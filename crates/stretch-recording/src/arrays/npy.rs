@@ -80,8 +80,13 @@ pub(crate) fn read_archive(
     }
     if arrays.is_empty() {
         return Err(fail(match &other[..] {
-            [] => "it contains no array; give the recording itself, or save arrays with numpy.savez".to_owned(),
-            _ => format!("none of its arrays contains numbers that can be read: {}", listed(&other)),
+            [] => {
+                "it contains no array; give the recording itself, or save arrays with numpy.savez"
+                    .to_owned()
+            }
+            _ => {
+                format!("none of its arrays contains numbers that can be read: {}", listed(&other))
+            }
         }));
     }
     drop(archive);
@@ -96,7 +101,12 @@ fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
     let (rows, columns) = match array.shape[..] {
         [rows] => (rows, 1),
         [rows, columns] => (rows, columns),
-        _ => return Err(format!("an array of shape {:?} has no columns to name; save an array of one or two dimensions", array.shape)),
+        _ => {
+            return Err(format!(
+                "an array of shape {:?} has no columns to name; save an array of one or two dimensions",
+                array.shape
+            ));
+        }
     };
     let count = names.len();
     let (step, next, samples) = match (columns == count, rows == count) {
@@ -236,7 +246,9 @@ fn head(bytes: &[u8], name: &str) -> Result<Head, String> {
         .collect::<Result<_, _>>()?;
     let (fields, item) = fields(descr, name)?;
     let product = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m));
-    let count = product.ok_or_else(|| format!("its shape {shape:?} is too large for any memory; save it again with numpy.save"))?;
+    let count = product.ok_or_else(|| {
+        format!("its shape {shape:?} is too large for any memory; save it again with numpy.save")
+    })?;
     let needed = count.saturating_mul(item);
     if bytes.len() - data < needed {
         return Err(format!(

@@ -93,7 +93,10 @@ impl LiveClock {
             && std::mem::take(&mut self.is_assumed)
             && let Some(other) = self.usual_hz.and_then(|usual_hz| unit::by_step(step, usual_hz))
         {
-            self.notes.push(format!("the time is taken to be in {}, because of its steps", other.plural()));
+            self.notes.push(format!(
+                "the time is taken to be in {}, because of its steps",
+                other.plural()
+            ));
             // Keep the time of the first sample, which was already returned.
             self.added = last * (other.per_second() / per_second - 1.0);
             self.first_end = last + self.added;

@@ -160,8 +160,8 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
 
 /// Returns the note that samples are counted and that a time column, if there is one, is not read.
 pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
-    let time =
-        column.map_or("there is no time column".to_owned(), |name| format!("column {name} is not read"));
+    let time = column
+        .map_or("there is no time column".to_owned(), |name| format!("column {name} is not read"));
     format!("{time}: the time is computed from a rate of {rate_hz} Hz, {by}")
 }
 

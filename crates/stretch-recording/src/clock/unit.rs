@@ -47,7 +47,11 @@ pub(super) fn decide(
     let named = TimeUnit::of(&stamps.name);
     let unit = named.unwrap_or(TimeUnit::Seconds);
     if let Some(other) = by_values(stamps, steps, named) {
-        notes.push(format!("column {} is taken to be in {}, because of its values", stamps.name, other.plural()));
+        notes.push(format!(
+            "column {} is taken to be in {}, because of its values",
+            stamps.name,
+            other.plural()
+        ));
         return Ok(other.per_second());
     }
     let rate_hz = unit.per_second() / steps.sample;

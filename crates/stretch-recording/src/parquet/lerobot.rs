@@ -57,7 +57,9 @@ pub(crate) fn episode(
     let Some(of) = track.channels.iter().find(|c| c.name == EPISODE).map(|c| c.values.clone())
     else {
         return match asked {
-            Some(_) => Err(format!("there is no column {EPISODE}; remove the # and the number from the file's name")),
+            Some(_) => Err(format!(
+                "there is no column {EPISODE}; remove the # and the number from the file's name"
+            )),
             None => Ok(track),
         };
     };

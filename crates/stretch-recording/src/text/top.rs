@@ -441,8 +441,11 @@ impl Finder<'_> {
         let above = self.lines[..block.start].iter().rfind(|l| !l.is_comment && !l.is_row);
         let above = above.map_or("no names above them".to_owned(), |line| {
             let shown = shown(&line.text);
-            let commas =
-                if block.delimiter == b',' { "; if its commas are decimal commas, separate the columns with semicolons" } else { "" };
+            let commas = if block.delimiter == b',' {
+                "; if its commas are decimal commas, separate the columns with semicolons"
+            } else {
+                ""
+            };
             format!("no names for them in the line above (\"{shown}\"{commas})")
         });
         RecordingError::NoHeader {

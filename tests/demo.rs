@@ -107,7 +107,7 @@ fn sessions_that_cannot_be_used_are_refused_with_a_way_out() {
     };
     fails(&mut run(&scratch.path("none")), &["no such folder", "e-Body-Lab", "47369abac95f"]);
     let one = scratch.loops("alone.csv", 20.0, 1.1);
-    fails(&mut run(&one), &["alone is one session", "another to test on"]);
+    fails(&mut run(&one), &["alone.csv: alone is a single session", "another to test on"]);
     fs::create_dir(scratch.path("empty")).unwrap();
     fails(&mut run(&scratch.path("empty")), &["neither a dataset.toml nor a CSV file"]);
     let pair = scratch.path("pair");

@@ -180,7 +180,7 @@ fn named_defects_are_exported_in_float_alone() {
 fn what_has_no_form_in_c_says_so_and_writes_nothing() {
     for (arguments, form, parts) in [
         (["--model", "poly22"], "float", ["poly22", "linear, poly13"]),
-        (["--model", "history"], "fixed", ["remembers", "--model"]),
+        (["--model", "history"], "fixed", ["the history model cannot be exported to C", "--model"]),
         (["--rate", "tracker:0.1"], "fixed", ["Tracker", "savgol:11,2"]),
     ] {
         let scratch = Scratch::new();
@@ -201,7 +201,10 @@ fn integers_that_the_model_or_the_converter_does_not_allow() {
     let out = scratch.path("c");
     fails(export(&calibration, &out).args(["--form", "fixed"]), &["--form float", "window"]);
     let calibration = calibrated(&scratch, &["--model", "poly13"]);
-    fails(export(&calibration, &out).args(["--adc", "12,0,1"]), &["sees 0 to 1", "--adc"]);
+    fails(
+        export(&calibration, &out).args(["--adc", "12,0,1"]),
+        &["the converter measures from 0 to 1", "--adc"],
+    );
     assert_eq!(scratch.names(), before);
     runs(export(&calibration, &out).args(["--adc", "12,0,1", "--form", "float"]));
 }

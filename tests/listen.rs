@@ -187,7 +187,8 @@ fn a_clean_line_is_recorded_sample_by_sample() {
     assert!(recorded.starts_with("time_s,bridge_v,adc_code,estimate_mm,branch,domain\n0,"));
     assert!(recorded.contains("\n2.99,"), "the board's clock");
     assert!(notes.contains("300 frames, 0 lost, 0 damaged, 0 repeated, 0 restarts"), "{notes}");
-    let told = notes.split("calibration by ").nth(1).unwrap().split(' ').next().unwrap();
+    let told =
+        notes.split("from the calibration by up to ").nth(1).unwrap().split(' ').next().unwrap();
     // The final rounding of the board's fixed point, and the effect of bridging missing samples on
     // it.
     assert!((0.0004..=0.0015).contains(&told.parse::<f64>().unwrap()), "{notes}");
@@ -203,7 +204,7 @@ fn difference(record: &[u8], frames: &[Frame], what: &str) -> f64 {
     assert!(status.success(), "{what}: {notes}");
     assert_eq!(without_time(&recorded), rows(frames), "{what}");
     assert!(notes.contains("300 frames, 0 lost"), "{what}: {notes}");
-    let told = notes.split("calibration by ").nth(1).unwrap();
+    let told = notes.split("from the calibration by up to ").nth(1).unwrap();
     told.split_whitespace().next().unwrap().parse().unwrap()
 }
 

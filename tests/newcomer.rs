@@ -87,7 +87,7 @@ fn a_folder_of_csv_files_is_told_what_to_do() {
         "diagnose logs",
         "simulate --protocol logs --out x",
     ] {
-        let says = ["logs: there is no dataset.toml in it", "it holds monday.csv", "logs/*.csv"];
+        let says = ["logs: there is no dataset.toml in it", "it contains monday.csv", "logs/*.csv"];
         fails(&mut with(line), &says);
     }
     std::fs::create_dir(scratch.path("empty")).unwrap();
@@ -196,7 +196,7 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
     };
     // In centimetres, and on a mount that has moved by 10 mm.
     for (name, change, off) in [
-        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148."),
+        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "the estimate is 148."),
         ("moved.csv", |mm| mm + 10.0, "10.0000 mm below the reference on average"),
     ] {
         let told = told(&other(name, change));

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, fs, path::Path};
 
-use crate::support::{json_to, stretch};
+use crate::support::{json_to, one_line, stretch};
 
 /// Writes a recording of a servo with a brake of 2 degrees and a new command every 0.6 s.
 fn recording(path: &Path) {
@@ -268,13 +268,13 @@ fn what_runs_is_said_in_a_line_before() {
     let file = folder.path().join("problem.toml");
     for command in [&["diagnose"][..], &["effects", "--data"]] {
         let out = stretch().args(command).arg(&file).output().unwrap();
-        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        let text = one_line(&String::from_utf8_lossy(&out.stderr));
         // A worker that echoes its input does not send a valid hello.
         assert!(!out.status.success(), "{text}");
         fs::remove_file(&ran).unwrap_or_else(|_| panic!("it did not run: {text}"));
-        let lines: Vec<_> =
-            text.lines().filter(|line| line.contains("problem.toml runs")).collect();
-        assert!(lines.len() == 1 && lines[0].ends_with("sh -c \"touch ran; exec cat\""), "{text}");
+        let runs = format!("runs this program in the folder {}: ", folder.path().display());
+        assert_eq!(text.matches(&runs).count(), 1, "{text}");
+        assert!(text.contains(&format!("{runs}sh -c \"touch ran; exec cat\"")), "{text}");
     }
 }
 

@@ -144,7 +144,10 @@ fn a_folder_that_fails_midway_is_as_it_was() {
     fs::create_dir_all(out.join("sub/b/mine")).expect("made");
     fs::write(out.join("a"), "old a").expect("written");
     let error = write_folder(&out, true, two_files).expect_err("a folder in the way");
-    assert!(error.to_string().ends_with("sub/b is a folder"), "{error}");
+    assert!(
+        error.to_string().ends_with("sub/b is a folder, but its new version is not"),
+        "{error}"
+    );
     assert_eq!(fs::read(out.join("a")).expect("there"), b"old a");
     assert!(out.join("sub/b/mine").is_dir());
     assert_eq!(names(&parent.path().join("deep")), ["set"]);

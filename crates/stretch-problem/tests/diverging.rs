@@ -185,7 +185,10 @@ fn re_tuned_parameters_that_diverge_on_test_trials_end_nothing() {
         assert!(told.gap.retuned > 1.0, "{:?}", told.gap);
         assert_eq!(told.parameters[0].bent, 2.0);
         let said: Vec<String> = told.notes.iter().map(ToString::to_string).collect();
-        assert!(said.iter().any(|n| n.starts_with("re-tuned parameters could not")), "{said:?}");
+        assert!(
+            said.iter().any(|n| n.starts_with("the re-tuned parameters could not")),
+            "{said:?}"
+        );
         let lost = said.iter().find(|n| n.contains(" could not be simulated, "));
         let lost = lost.expect("a note on lost runs");
         assert!(lost.contains(" s of trial t1.csv"), "{lost}");

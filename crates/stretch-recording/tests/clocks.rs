@@ -46,16 +46,16 @@ fn units_come_from_the_name_and_the_values() {
         ("Elapsed Time [ms]", 0.0, 1e3, ""),
         ("time_min", 0.0, 1.0 / 60.0, ""),
         ("Time (hours)", 0.0, 1.0 / 3600.0, ""),
-        ("time", 45_339.5, 1.0 / 86_400.0, "counts days"),
-        ("Timestamp", 739_299.5, 1.0 / 86_400.0, "counts days"),
-        ("time_s", 2_460_357.5, 1.0 / 86_400.0, "counts days"),
+        ("time", 45_339.5, 1.0 / 86_400.0, "in days"),
+        ("Timestamp", 739_299.5, 1.0 / 86_400.0, "in days"),
+        ("time_s", 2_460_357.5, 1.0 / 86_400.0, "in days"),
         ("timestamp", 1_714_564_800.0, 1.0, "2024-05-01T12:00:00Z"),
-        ("timestamp", 1_714_564_800_000.0, 1e3, "counts milliseconds"),
-        ("timestamp", 1_714_564_800_000_000.0, 1e6, "counts microseconds"),
-        ("timestamp", 1_714_564_800_000_000_000.0, 1e9, "counts nanoseconds"),
-        ("time_s", 1_714_564_800_000.0, 1e3, "counts milliseconds"),
-        ("time", 0.0, 1e6, "counts microseconds"),
-        ("time", 7.0, 1e9, "counts nanoseconds"),
+        ("timestamp", 1_714_564_800_000.0, 1e3, "in milliseconds"),
+        ("timestamp", 1_714_564_800_000_000.0, 1e6, "in microseconds"),
+        ("timestamp", 1_714_564_800_000_000_000.0, 1e9, "in nanoseconds"),
+        ("time_s", 1_714_564_800_000.0, 1e3, "in milliseconds"),
+        ("time", 0.0, 1e6, "in microseconds"),
+        ("time", 7.0, 1e9, "in nanoseconds"),
     ];
     for (name, begin, per_second, says) in cases {
         // as many digits as a logger writes
@@ -378,8 +378,8 @@ fn arrays_have_the_same_clock() {
     let clocks: [(&str, Stamp, &str); 5] = [
         ("time_us", |t| (4_291_967_296.0 + t * 1e6).round() % 2_f64.powi(32), "rolls over"),
         ("time_s", |t| (t / 0.03125 + 1e-9).floor() * 0.03125, "spread evenly"),
-        ("time", |t| 45_339.5 + t / 86_400.0, "counts days"),
-        ("t", |t| 1_714_564_800_000.0 + t * 1e3, "counts milliseconds"),
+        ("time", |t| 45_339.5 + t / 86_400.0, "in days"),
+        ("t", |t| 1_714_564_800_000.0 + t * 1e3, "in milliseconds"),
         ("Millis", |t| 0.3 + t * 1e3, ""),
     ];
     for (name, value, says) in clocks {

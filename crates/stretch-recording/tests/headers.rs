@@ -151,7 +151,7 @@ fn without_names_it_is_said_what_was_found() {
     fails(
         &text,
         &ReadOptions::new(),
-        &["t.txt: 40 rows of 3 numbers from line 4 on", "(\"Operator: A\")", "--columns"],
+        &["t.txt: 40 rows of 3 numbers from line 4 on", "(\"Operator: A\";", "--columns"],
     );
     let long = rows(",", "").repeat(10);
     fails(

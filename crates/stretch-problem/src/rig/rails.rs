@@ -83,9 +83,7 @@ mod tests {
         };
         assert!(said(at(9.0, 0.01)).is_empty());
         let clipped = said(at(0.5, 0.01));
-        assert!(
-            clipped.len() == 1 && clipped[0].contains("bridge_v stands at 0.5 V, its greatest")
-        );
+        assert!(clipped.len() == 1 && clipped[0].contains("bridge_v is at 0.5 V, its greatest"));
         // A simulation without noise gives no note.
         assert!(said(at(0.5, 0.0)).is_empty());
     }

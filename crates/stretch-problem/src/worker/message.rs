@@ -49,7 +49,8 @@ pub(super) fn kind(frame: &WorkerFrame, wanted: &str) -> Result<(), Wrong> {
     match text("kind") {
         Some(kind) if kind == wanted => Ok(()),
         Some("error") => Err(format!("it reports: {}", text("message").unwrap_or("no message"))),
-        other => Err(format!("it answers with kind {other:?} instead of {wanted:?}")),
+        Some(other) => Err(format!("it answers with the kind {other:?} instead of {wanted:?}")),
+        None => Err(format!("it answers without a kind instead of with the kind {wanted:?}")),
     }
 }
 

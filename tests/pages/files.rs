@@ -11,7 +11,7 @@ use crate::support::{Scratch, calibrate, prints, runs, stretch};
 const BEGIN: &str = "\
 # Files
 
-The program reads and writes four kinds of files in addition to recordings. The program wrote the examples on this page. In rig files, problems and records an unknown key is an error that names the key.
+In addition to recordings, the program reads and writes the four kinds of files on this page. The examples are output of the program. An unknown key in a rig file, a problem file or a calibration record is an error, and the message names the key.
 
 ";
 
@@ -19,30 +19,30 @@ const DATA_SET: &str = "
 ## A data set: dataset.toml
 
 A folder with `dataset.toml` and its trials is a data set; most commands accept the folder in place of files. A trial has a `kind` (`inflation`,
-`deflation`, `arbitrary`, `pulses` or `other`) and a `split`: `fit` trials are fitted, `test` trials are held back. `start_s` is the time in the session at which a trial begins; drift effects need it. A `digest`, which `stretch simulate` adds, is verified when the file is read. `rig` names the rig file of
-the simulator.
+`deflation`, `arbitrary`, `pulses` or `other`) and a `split`: `fit` trials are fitted, `test` trials are held back. `start_s` is the time in the session at which a trial begins; drift effects need it. `stretch simulate` adds a
+`digest` (checksum) of each trial's file, which is verified when the file is read. `rig` names the rig file of the simulator.
 
 ";
 
 const RIG: &str = "
 ## A rig file
 
-`stretch simulate --print-rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is switched on is a table `[[effect]]` with its name and parameters, as `stretch effects` lists them. `stretch diagnose --fix` writes such a file.
+A rig file describes the built-in simulator: its parameters with their tolerances, and its effects. `stretch simulate --print-rig` prints the stock rig. A tolerance is one standard deviation; a parameter without a tolerance is exact. An effect that is switched on is a table `[[effect]]` with the name and the parameters that `stretch effects` lists. `stretch diagnose --fix` writes a rig file with the re-tuned parameters and the named effects.
 
 ";
 
 const PROBLEM: &str = "
 ## Your own simulator: problem.toml
 
-`stretch init FOLDER` writes a first version into a folder with recordings. [The tutorial](../tutorials/worker.md) shows how to complete it, and [the worker protocol](worker.md) specifies the answers of the command. The command runs with your rights.
+A problem file describes a simulator of your own and its recordings. `stretch init FOLDER` writes a first version of the file into a folder with recordings. [The tutorial](../tutorials/worker.md) shows how to complete it, and [the worker protocol](worker.md) specifies what the simulator's `command` must answer. The command runs with your rights.
 
 ";
 
 const RECORD: &str = "
 ## A calibration record
 
-`stretch calibrate --out cal.json` writes a record as JSON; if the name ends with `.postcard`, it writes the same record in binary form for a board. `stretch export
---calibration cal.json` checks its digest, and `--seal` renews the digest after a change by hand.
+A calibration record is the content of a calibration file. `stretch calibrate --out cal.json` writes it as JSON; if the file name ends with `.postcard`, it writes the same record in binary form for a board. `stretch export
+--calibration cal.json` checks the digest in the file. After a change by hand, the option `--seal` renews the digest.
 
 | key | what |
 | --- | --- |
@@ -53,11 +53,11 @@ const RECORD: &str = "
 | `polarity` | whether the signal rises or falls as the target rises |
 | `signal_range`, `target_range` | least and greatest value in the fitted trials; signal and target are divided by these ranges |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
-| `rate_source` | source of the rate in the fit |
-| `turns` | levels of the turning points of movements in the fitted trials, and limits for later ones; absent if there were too few |
+| `rate_source` | whether the fit used the rate of the signal or, as published, the rate of the reference |
+| `turns` | levels of the turning points of movements in the fitted trials, and limits for the levels of later movements; absent if there were too few movements |
 | `dead_band` | rate below which the direction of motion is not changed, in units of the signal per second |
-| `model` | the model by its name, with its coefficients, time constants and domains |
-| `provenance` | date, number, names and checksums of the fitted trials |
+| `model` | name of the model, with its coefficients, time constants and domains |
+| `provenance` | date of the calibration; number, names and checksums of the fitted trials |
 | `digest` | checksum of all other keys |
 ";
 

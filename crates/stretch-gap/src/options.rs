@@ -12,8 +12,8 @@ pub struct Options {
     pub examines_effects: bool,
     /// Largest number of effects named at once.
     pub depth: NonZeroUsize,
-    /// Number of threads that are asked for; see [`threads`]. 0 uses all cores. The result does not
-    /// depend on this number.
+    /// Requested number of threads; see [`threads`]. 0 uses all cores. The result does not depend
+    /// on this number.
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
@@ -47,11 +47,11 @@ impl Default for Options {
     }
 }
 
-/// Environment variable that sets the number of threads if no number is asked for.
+/// Environment variable that sets the number of threads if the caller requests none.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
 
-/// Returns the number of threads to start if `asked` threads are asked for: at most one per core.
-/// If `asked` is 0, this is the number in `RAYON_NUM_THREADS`, or else one per core.
+/// Returns the number of threads to start if `asked` threads are requested: at most one per core.
+/// If `asked` is 0, the number in `RAYON_NUM_THREADS` is used, or else one per core.
 ///
 /// ```
 /// let cores = std::thread::available_parallelism().map_or(1, usize::from);

@@ -2,8 +2,8 @@
 //!
 //! Let r be the residual (measured minus simulated), A the sensitivities of the output to all
 //! fitted parameters, and D the values of some terms (functions of recorded signals). A sum of
-//! terms with coefficients c, with parameters shifted by d, leaves r - A d - D c. Both are fitted
-//! together by minimising
+//! terms with coefficients c, with parameters shifted by d, leaves r - A d - D c. The coefficients
+//! c and the shifts d are fitted together by minimising
 //!
 //! ```text
 //! J = 0.5/b (r - A d - D c)' V^-1 (r - A d - D c) - ln p(x + d) + 0.5 sum (c_k/s_k)^2
@@ -30,7 +30,8 @@ use crate::{
     },
 };
 
-/// Added to every diagonal element, because a coordinate without any effect has no curvature.
+/// Added to every diagonal element of the normal matrix, because a coordinate that does not change
+/// the output has no curvature.
 const RIDGE: f64 = 1e-12;
 
 /// The residual of a model in a stage.
@@ -47,8 +48,8 @@ pub(crate) struct Residue<'a> {
     columns: Vec<Column>,
 }
 
-/// Inner products among the residual (first), the sensitivities and the terms. Sums of terms are
-/// fitted from these products alone, over the fitted and over the held-out samples.
+/// Inner products among the residual (first row and column), the sensitivities and the terms, over
+/// the fitted and over the held-out samples. A sum of terms is fitted from these products alone.
 #[derive(Clone)]
 pub(crate) struct Products {
     pub(crate) fit: DMatrix<f64>,
@@ -189,8 +190,8 @@ impl<'a> Residue<'a> {
         slope
     }
 
-    /// Minimises J around a model whose residual is contained in the products. The parameters stay
-    /// fixed unless `free` is true.
+    /// Minimises J around `model`; `products` contains the residual of this model. The parameters
+    /// stay fixed unless `free` is true.
     pub(crate) fn solve(&self, products: &Products, model: &Model, free: bool) -> Fit {
         let n = products.fit.nrows() - 1;
         let weight = self.compare.weight();
@@ -201,7 +202,7 @@ impl<'a> Residue<'a> {
         for (i, (c, bounds)) in self.coordinates.iter().enumerate() {
             let x = c.read(model);
             prior += c.prior(x).cost;
-            // A parameter at a bound may only move back inside.
+            // A parameter at a bound may only move away from it, into the allowed range.
             low[i] = if free { (bounds[0] - x).max(-c.stride()).min(0.0) } else { 0.0 };
             high[i] = if free { (bounds[1] - x).min(c.stride()).max(0.0) } else { 0.0 };
         }
@@ -213,8 +214,8 @@ impl<'a> Residue<'a> {
         Fit { held: quadratic(&products.held, &values), cost, values }
     }
 
-    /// Returns one standard deviation of each coefficient, from the inverse curvature. A block
-    /// counts as one observation.
+    /// Returns one standard deviation of each coefficient, from the inverse of the second
+    /// derivative of J. A block of samples counts as one observation.
     pub(crate) fn coefficient_sd(&self, products: &Products, model: &Model) -> Vec<f64> {
         let inverse = Cholesky::of(self.normal(products, model)).inverse();
         let diagonal = inverse.diagonal();
@@ -231,7 +232,8 @@ impl<'a> Residue<'a> {
     }
 }
 
-/// Returns (r - X x)'V^-1 (r - X x), computed from the products of r and X.
+/// Returns (r - X x)'V^-1 (r - X x), computed from the inner products of r and the columns of X;
+/// `values` is x.
 fn quadratic(products: &DMatrix<f64>, values: &[f64]) -> f64 {
     let signed: Vec<f64> = std::iter::once(1.0).chain(values.iter().map(|x| -x)).collect();
     let x = nalgebra::DVector::from_column_slice(&signed);

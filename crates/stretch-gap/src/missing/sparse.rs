@@ -1,4 +1,5 @@
-//! The sparse sum: terms are added one after the other, and each is chosen on held-out samples.
+//! Chooses a sparse sum of terms for a residual: terms are added one after the other, and each is
+//! chosen on held-out samples.
 //!
 //! The method is orthogonal matching pursuit (Pati, Rezaiifar and Krishnaprasad 1993, doi
 //! 10.1109/ACSSC.1993.342465). The gain of a term d is the reduction of the squared residual r
@@ -10,7 +11,8 @@
 //!
 //! A family contains the terms that differ only in a shape (a width or a time). The best term of
 //! each promising family is fitted, and the shapes of the best of these are refined. The term that
-//! leaves the smallest held-out residual is added if it closes a minimum share of the held-out gap.
+//! leaves the smallest held-out residual is added if it closes a minimum share of the held-out gap
+//! (the sum of squares beyond that of the noise).
 
 use std::borrow::Cow;
 
@@ -32,20 +34,22 @@ const MOST: usize = 3;
 /// Number of families that are fitted, and number of those whose shapes are refined.
 const FITTED: usize = 10;
 const REFINED: usize = 5;
-/// Number of families in the prediction by many terms at once.
+/// Number of families in the ridge regression on many terms at once.
 const MANY: usize = 60;
 /// Smallest share of the held-out gap that an added term closes.
 const LEAST: f64 = 0.03;
-/// Smallest number of averages used for screening: neighbouring samples of a longer recording are
-/// averaged.
+/// Smallest number of averages used for screening. In a longer recording, neighbouring samples are
+/// averaged, but no fewer than this many averages remain.
 const SCREENED: usize = 8000;
-/// Share of a term that must be independent of the terms already in the sum.
+/// Share of a term's sum of squares that must be independent of the sensitivities and of the terms
+/// already in the sum.
 const NEW: f64 = 1e-4;
 /// First and last step of the refinement of a shape, as factors.
 const STEPS: (f64, f64) = (1.6, 1.05);
 /// Plausible values of any shape.
 const REACH: std::ops::Range<f64> = 1e-3..1e4;
-/// Smallest ratio of held-out to fitted samples at which terms are chosen on the held-out samples.
+/// Smallest ratio of held-out to fitted samples. Below it, further samples are held out for the
+/// choice of terms.
 const FEW: f64 = 0.1;
 
 /// A sum of terms, with its fit.
@@ -56,12 +60,12 @@ pub(crate) struct Sum {
     pub(crate) fit: Fit,
     /// Number of terms in the library.
     pub(crate) library: usize,
-    /// What remains of the residual (without nuisances) after a ridge regression on many terms at
+    /// Remainder of the residual (without nuisances) after a ridge regression on many terms at
     /// once.
     pub(crate) beside_many: Vec<f64>,
 }
 
-/// Returns roles in which the held-out samples suffice for choosing terms. If too few are held out,
+/// Returns roles with enough held-out samples to choose terms. If too few samples are held out,
 /// every third fitted segment is held out as well, beginning with the second.
 pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
     let mut choice = roles.clone();
@@ -202,8 +206,8 @@ impl Pursuit<'_, '_> {
     /// most promising families together.
     fn beside_many(&self) -> Vec<f64> {
         let (residue, promising) = (self.residue, self.promising(MANY));
-        // The columns are computed twice, because all of them together would need more memory than
-        // everything else.
+        // The columns are computed twice instead of stored, because all of them together would need
+        // more memory than the rest of the program.
         let columns = || {
             let known = residue.columns().iter().map(|c| Cow::Borrowed(&c.values));
             known.chain(promising.iter().map(|term| Cow::Owned(residue.values(term))))
@@ -267,7 +271,8 @@ fn family(term: &Term) -> Term {
     (0..term.shapes().len()).fold(term.clone(), |term, i| term.with_shape(i, 0.0))
 }
 
-/// Ridges that are tried, as shares of each diagonal element of the normal matrix.
+/// Ridges (values added to the diagonal) that are tried, as shares of each diagonal element of the
+/// normal matrix.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// A residual and columns, both as scaled averages in multiples of the noise.
@@ -276,7 +281,8 @@ pub(crate) struct Rows {
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
-/// Returns weights of the columns, fitted with the ridge that best predicts the held-out samples.
+/// Returns the weights of the columns, fitted with the ridge whose weights best predict the
+/// held-out samples.
 ///
 /// A ridge regression on many terms (Hoerl and Kennard 1970, doi 10.1080/00401706.1970.10488634)
 /// predicts more than a sum of a few terms, but yields no equation that could be added to a

@@ -33,11 +33,12 @@ pub enum RateForm {
     Rising,
 }
 
-/// Scale of v within which its sign is uncertain, and scale over which striction decays; v has a
-/// root mean square of 1.
+/// `AT_REST` is the size of v below which its sign is uncertain. `SLIDING` is the scale of v over
+/// which striction decays. v has a root mean square of 1.
 const AT_REST: f64 = 0.1;
 const SLIDING: f64 = 0.3;
-/// Distance moved back that counts as a turn, as a share of the range.
+/// Smallest movement in the opposite direction that counts as a turn, as a share of the signal's
+/// range.
 const TURN: f64 = 0.01;
 
 /// One factor of a term. `signal` is an index into the proposal's signals; x is the scaled signal
@@ -186,7 +187,7 @@ impl RateForm {
 }
 
 impl Factor {
-    /// Multiplies `out`, values over the first trials, by this factor.
+    /// Multiplies `out`, the values of a term over the first `trials` trials, by this factor.
     fn multiply(self, inputs: &TermInputs, trials: usize, out: &mut [f64]) {
         for trial in 0..trials {
             let range = inputs.trials[trial].clone();
@@ -293,7 +294,7 @@ impl Factor {
     }
 }
 
-/// Returns x^power for x >= 0; common powers avoid the logarithm.
+/// Returns x^power for x >= 0; common powers are computed without a logarithm, which is slower.
 fn raised(x: f64, power: f64) -> f64 {
     match power {
         1.0 => x,
@@ -304,7 +305,8 @@ fn raised(x: f64, power: f64) -> f64 {
     }
 }
 
-/// Returns x delayed by `by` samples, linearly interpolated; the first value is held before it.
+/// Returns sample `i` of x delayed by `by` samples, with linear interpolation. Before the start of
+/// x, its first value is used.
 fn late(x: &[f64], i: usize, by: f64) -> f64 {
     let at = (i as f64 - by).max(0.0);
     let (whole, share) = (at as usize, at.fract());
@@ -354,7 +356,7 @@ impl Turns {
     }
 }
 
-/// Distance travelled so far, up and down. Movements within the width of a turn do not count.
+/// Distance travelled so far, up and down. Movements smaller than `TURN` do not count.
 #[derive(Default)]
 struct Travel {
     held: Option<f64>,
@@ -364,7 +366,7 @@ struct Travel {
 impl Travel {
     fn follow(&mut self, x: &[f64], i: usize) -> f64 {
         let held = self.held.unwrap_or(x[0]);
-        // A play with the width of a turn removes noise at rest.
+        // A play (backlash) of half-width `TURN` removes noise at rest.
         let next = stretch_core::arithmetic::play(held, x[i], TURN);
         self.sum += (next - held).abs();
         self.held = Some(next);

@@ -5,9 +5,9 @@
 //! v = (dx/dt)/rate                 of root mean square 1 there
 //! ```
 //!
-//! Scales are computed from fitted samples only. Terms with a memory begin anew in every trial and
-//! are causal. A rate at the border of the test part uses samples of one side only. Therefore no
-//! test sample influences a fit.
+//! No test sample influences a fit: scales are computed from fitted samples only, terms with a
+//! memory are causal and begin anew in every trial, and a rate at the border of the test part uses
+//! samples of one side only.
 
 use std::ops::Range;
 
@@ -39,8 +39,8 @@ pub(crate) struct Signal {
 }
 
 impl Signal {
-    /// Returns the x about which odd and even curves are centred: the signal's zero if the fitted
-    /// range contains it, otherwise the middle of that range.
+    /// Returns the value of x about which odd and even curves are centred: the x of a signal of
+    /// zero if the fitted range contains it, otherwise the middle of that range.
     pub(crate) fn centre(&self) -> f64 {
         let zero = -self.offset / self.scale;
         if (0.0..=1.0).contains(&zero) { zero } else { 0.5 }
@@ -59,11 +59,11 @@ pub(crate) struct TermInputs {
     /// are units of time for terms.
     pub(crate) trial_s: f64,
     pub(crate) session_s: f64,
-    /// Grid of an operator's steps: one step per sample.
+    /// Time grid on which operators (lags, plays) are stepped: one step per sample.
     pub(crate) grid: Grid,
 }
 
-/// Squared correlation above which two signals are redundant.
+/// Squared correlation from which two signals are redundant.
 const SAME: f64 = 0.998;
 
 impl TermInputs {
@@ -135,8 +135,9 @@ impl TermInputs {
 }
 
 /// Returns every signal that a missing term may depend on: the recorded signals that the
-/// description lists. If it lists none, these are the inputs of the stages, each named after the
-/// channel of the previous stage. If there are no such inputs either, it is the motion.
+/// description lists. If it lists none, the signals are the inputs of the stages, each named after
+/// the channel of the previous stage. If there are no such inputs either, the only signal is the
+/// motion.
 fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
     let known = &simulator.record().signals;
     if !known.is_empty() {

@@ -1,5 +1,5 @@
-//! Factor of a symmetric matrix that is tridiagonal except for a few last rows and columns (a chain
-//! of knots, and offsets).
+//! Factor of a symmetric matrix that is tridiagonal except for a few last rows and columns. Such a
+//! matrix couples a chain of knots (T) with a few offsets (D).
 //!
 //! ```text
 //! A = [T B; B' D] = L L',     L = [L_T 0; G' L_D],     L_T G = B,     L_D L_D' = D - G'G

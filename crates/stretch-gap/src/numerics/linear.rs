@@ -20,7 +20,8 @@ impl Cholesky {
     /// Factors `a`, of which only the lower triangle is read.
     pub(crate) fn of(mut a: DMatrix<f64>) -> Self {
         for i in 0..a.nrows() {
-            // A column of zeros, from a parameter that does nothing, still gets a pivot.
+            // The constant gives a positive pivot even to a column of zeros, which belongs to a
+            // parameter without influence.
             a[(i, i)] += JITTER * a[(i, i)].abs() + 1e-300;
         }
         let factor = nalgebra::Cholesky::new_with_substitute(a, f64::MIN_POSITIVE);
@@ -74,8 +75,9 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 ///
 /// While the solution of the free coordinates leaves the box, the coordinate that is farthest
 /// outside is held at its bound and the others are solved again. Once all are inside, a held
-/// coordinate is released if the gradient Ax + g pushes it back inside. The loop ends when the
-/// Karush-Kuhn-Tucker conditions hold, or after 3 n + 3 steps.
+/// coordinate becomes free again if moving it into the box lowers the function, that is, by the
+/// sign of the gradient Ax + g. The loop ends when the Karush-Kuhn-Tucker conditions hold, or after
+/// 3 n + 3 steps.
 pub(crate) fn boxed(a: &DMatrix<f64>, g: &[f64], low: &[f64], high: &[f64]) -> Vec<f64> {
     let n = g.len();
     let mut x = DVector::zeros(n);

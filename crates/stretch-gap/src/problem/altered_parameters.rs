@@ -1,8 +1,8 @@
 //! A simulator whose parameters have other tolerances.
 //!
-//! A tolerance of 0 holds a parameter at its nominal value, which gives the ablation without
-//! re-tuning. A very wide tolerance shows whether the parameter could explain what is attributed to
-//! effects.
+//! A tolerance of 0 holds a parameter at its nominal value; this shows what a diagnosis without
+//! re-tuning would find. A very wide tolerance shows whether the parameter alone could explain the
+//! part of the gap that is attributed to effects.
 
 use crate::problem::{
     column::Distortion,

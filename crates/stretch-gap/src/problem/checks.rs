@@ -1,10 +1,11 @@
-//! Checks of a description, so that later indexing cannot fail.
+//! Checks of a simulator's description, so that later indexing cannot fail.
 
 use stretch_effects::EffectParameter;
 
 use crate::problem::spec::{EffectSpec, ParameterSpec};
 
-/// An error in a description. Each message names the entry, what was found, and what to do.
+/// An error in a simulator's description. Each message names the entry, what was found, and what to
+/// do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
@@ -16,7 +17,7 @@ pub enum DescriptionError {
         /// Kind of the entries that are missing.
         what: &'static str,
     },
-    /// Two entries have the same name, so an answer could not distinguish them.
+    /// Two entries have the same name, so a report could not distinguish them.
     #[error("{owner}: the name is given twice; rename one")]
     NamedTwice {
         /// The entry.
@@ -39,7 +40,7 @@ pub enum DescriptionError {
     Number {
         /// Entry that holds the number.
         owner: String,
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -56,16 +57,17 @@ pub enum DescriptionError {
         /// Its second end.
         max: f64,
     },
-    /// A start that does not give one value for each parameter.
+    /// A start (initial values for the fit of an effect) does not give one value for each parameter
+    /// of the effect.
     #[error("{owner}: start {start} has {found} values, but there are {needed} parameters")]
     Start {
         /// The effect.
         owner: String,
-        /// Which start, from 0.
+        /// Index of the start, from 0.
         start: usize,
-        /// Values that it has.
+        /// Number of values in the start.
         found: usize,
-        /// Parameters of the effect.
+        /// Number of parameters of the effect.
         needed: usize,
     },
 }

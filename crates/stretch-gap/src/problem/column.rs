@@ -30,8 +30,8 @@ impl Default for Distortion {
 }
 
 impl Distortion {
-    /// Returns the values that are recorded of one trial of a true channel, sampled every `dt_s`
-    /// seconds.
+    /// Returns the recorded values of one trial, given the values of the true channel sampled every
+    /// `dt_s` seconds.
     pub fn distorted(&self, channel: &[f64], dt_s: f64) -> Vec<f64> {
         let late = shifted(channel, -self.delay_s / dt_s);
         late.into_iter().map(|x| self.offset + self.scale * x).collect()
@@ -68,18 +68,19 @@ pub struct Column<'a> {
     pub name: Cow<'a, str>,
     /// Unit; `1` if dimensionless.
     pub unit: Cow<'a, str>,
-    /// Values of all trials, concatenated. They are empty for a group of columns (commands) that is
-    /// treated as a whole. They are also empty in the [facts of a record](crate::RecordFacts) for
-    /// the output of a stage, because the simulator has its values.
+    /// Values of all trials, concatenated. They are empty if this entry represents a group of
+    /// commands. In the [facts of a record](crate::RecordFacts) they are also empty for the output
+    /// of a stage, because `Simulator::measured` returns these values.
     pub values: Cow<'a, [f64]>,
-    /// The stage whose output it is.
+    /// The stage whose output this column is; `None` if it is not an output.
     pub output_of: Option<usize>,
-    /// Stages that this column drives, and for which
-    /// [`Simulator::corrected`](crate::Simulator::corrected) can correct it.
+    /// Stages that this column drives. For these stages
+    /// [`Simulator::corrected`](crate::Simulator::corrected) can correct the column.
     pub read_by: Vec<usize>,
-    /// Whether it is a command. The only error considered for a command is a constant factor.
+    /// Whether this column is a command. The only error considered for a command is a constant
+    /// factor.
     pub is_command: bool,
-    /// Range of delays that an effect of the catalogue describes, s. A delay in this range is not
+    /// Range of delays that an effect of the catalogue can explain, s. A delay in this range is not
     /// reported as an error of the recording.
     pub skew_s: [f64; 2],
     /// What to check if the column is wrong, phrased for the end of a sentence.
@@ -124,7 +125,7 @@ mod tests {
         let channel: Vec<f64> = (0..50).map(|i| 0.3 * f64::from(i)).collect();
         let error = Distortion { scale: -1.7, offset: 3.0, delay_s: 0.025 };
         let back = error.undone(&error.distorted(&channel, 0.01), 0.01);
-        // At either end three samples were held, so they cannot be restored.
+        // At either end three samples were replaced by a held value, so they cannot be restored.
         for (a, b) in channel[3..47].iter().zip(&back[3..47]) {
             approx::assert_relative_eq!(*a, *b, max_relative = 1e3 * F64_ROUNDING);
         }

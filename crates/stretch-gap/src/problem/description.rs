@@ -29,8 +29,9 @@ pub struct DescriptionSpec {
 
 /// A checked [`DescriptionSpec`]. It can be read like one, but not changed.
 ///
-/// Indices are in range, numbers are finite, ranges are ordered, and every effect has a start of
-/// the right length. Missing starts are derived as in [`EffectSpec::new`].
+/// Indices are in range, numbers are finite, ranges are ordered, and every effect has at least one
+/// start (initial values for its fit) of the right length. Missing starts are derived as in
+/// [`EffectSpec::new`].
 ///
 /// ```
 /// use stretch_gap::{Description, DescriptionSpec, ParameterSpec, StageSpec, TrialSpec};
@@ -70,8 +71,8 @@ impl Description {
             effect.starts = EffectParameter::starts(&effect.parameters);
         }
         let whole = || "description".to_owned();
-        // Sample rates of 1e-3 to 1e7 Hz, so that any duration used here is a valid number of
-        // samples.
+        // These limits are sample rates of 1e-3 to 1e7 Hz. With them, any duration used in this
+        // crate is a valid number of samples.
         number(&whole, "dt_s", spec.dt_s, "1e-7 .. 1e3", |x| (1e-7..=1e3).contains(&x))?;
         filled(&whole, "stages", &spec.stages)?;
         filled(&whole, "trials", &spec.trials)?;
@@ -110,7 +111,8 @@ impl Description {
         &self.record
     }
 
-    /// Returns the number of rows in the trials and the number of rows that were read.
+    /// Returns the number of rows of the recording that the trials contain, and the number of rows
+    /// that were read.
     pub fn rows_used(&self) -> RowsUsed {
         let used = self.trials.iter().map(|t| t.samples).sum();
         self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
@@ -123,9 +125,9 @@ impl Description {
         out
     }
 
-    /// Returns the description with other stages touched by its effects. `touches` returns the
-    /// stages of each effect; stages that do not exist are ignored. If no stage remains, the effect
-    /// keeps its stages.
+    /// Returns the description with other lists of the stages that effects touch (change the output
+    /// of). `touches` returns the list of each effect; stages that do not exist are ignored. If no
+    /// stage remains, the effect keeps its previous list.
     pub fn with_touches(&self, touches: impl Fn(usize, &EffectSpec) -> Vec<usize>) -> Self {
         let mut out = self.clone();
         let stages = out.spec.stages.len();

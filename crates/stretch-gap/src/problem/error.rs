@@ -23,19 +23,20 @@ pub enum GapError {
         /// Number of samples in all trials.
         needed: usize,
     },
-    /// The simulator failed with these values, or could not be connected to its measurements.
+    /// The simulator failed with the requested values, or could not be connected to its
+    /// measurements.
     #[error(transparent)]
     Simulator(Box<dyn std::error::Error + Send + Sync>),
     /// There are too few data to fit.
     #[error("{what}: {hint}")]
     TooLittle {
-        /// What is missing.
+        /// Description of what is missing.
         what: String,
         /// What to do.
         hint: String,
     },
-    /// The integration step is so coarse that halving it changes the output noticeably against the
-    /// noise.
+    /// The integration step is so long that halving it changes the output by an amount that is not
+    /// small compared with the noise.
     #[error(
         "{stage}: halving the step of integration moves the output by {moved} of its noise, so the step is too long for an accurate \
          result: a number in the rig file makes this stage much faster than a real rig (a volume that is too small, a conductance, \
@@ -57,7 +58,7 @@ pub enum GapError {
         stage: String,
         /// The value.
         value: f64,
-        /// Time of that sample in its trial, s.
+        /// Time of the first such value in its trial, s.
         time_s: f64,
         /// Name of the trial.
         trial: String,
@@ -74,7 +75,7 @@ pub enum GapError {
          noise that is stated; if it is right, this is an error of the program"
     )]
     NoProbability {
-        /// Gap that the re-tuned simulator leaves, in multiples of the noise variance.
+        /// Gap that remains after re-tuning, in multiples of the noise variance.
         retuned: f64,
     },
     /// The budget of model runs is used up.
@@ -175,8 +176,8 @@ impl GapError {
         }
     }
 
-    /// Creates the error that a stage's output is not finite; `at` counts samples from the start of
-    /// the first trial.
+    /// Creates the error for an output of a stage that is not finite. `at` is the index of the
+    /// sample, counted from the start of the first trial.
     pub fn not_finite(simulator: &dyn Simulator, stage: usize, (at, value): (usize, f64)) -> Self {
         let (mut trial, mut sample) = (String::new(), at);
         for spec in simulator.trials() {

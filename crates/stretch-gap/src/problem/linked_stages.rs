@@ -1,9 +1,9 @@
-//! Groups of stages that are linked by fitted parameters that act in several stages.
+//! Groups of stages that share fitted parameters and must therefore be fitted together.
 
 use crate::problem::simulator::Simulator;
 
-/// Divides the stages into groups that share no fitted parameter. Each group is in order, and the
-/// groups are ordered by their first stages.
+/// Divides the stages into groups such that no fitted parameter acts in two groups. The stages of a
+/// group are sorted, and the groups are sorted by their first stages.
 pub(crate) fn groups(simulator: &dyn Simulator) -> Vec<Vec<usize>> {
     let mut left: Vec<usize> = (0..simulator.stages().len()).collect();
     let mut out = Vec::new();
@@ -15,8 +15,8 @@ pub(crate) fn groups(simulator: &dyn Simulator) -> Vec<Vec<usize>> {
     out
 }
 
-/// Returns the given stages and all stages linked to them, directly or through others, by a fitted
-/// parameter, in order.
+/// Returns, sorted, the given stages and all stages that are linked to them by fitted parameters,
+/// directly or through other stages.
 pub(crate) fn linked(simulator: &dyn Simulator, stages: &[usize]) -> Vec<usize> {
     let specs = simulator.stages();
     let is_fitted = |p: &&usize| simulator.parameters()[**p].sd > 0.0;

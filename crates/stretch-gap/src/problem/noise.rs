@@ -1,16 +1,17 @@
 //! Estimation of a channel's noise from the recording: white noise plus a slow (correlated) part.
 //!
-//! A rig file states only the data sheet's noise, without that of the recorder. The estimate uses
-//! windows of W samples in which the rig is at rest, after removal of a parabola. The cosine
-//! transform makes the powers of a stationary noise nearly independent, with means S_k (Whittle
-//! 1953, doi 10.1007/BF02590998):
+//! A rig file states only the data sheet's noise, without that of the recorder. The noise is
+//! estimated from windows of 128 samples in which the rig is at rest; a parabola is removed from
+//! each. The cosine transform of a window of stationary noise has nearly independent powers with
+//! means S_k, which gives the log-likelihood L (Whittle 1953, doi 10.1007/BF02590998):
 //!
 //! ```text
 //! S_k = [D M (w I + s R) M D']_kk,     R_ij = exp(-|i - j|/m),     L = -(n/2) sum_k (ln S_k + P_k/S_k)
 //! ```
 //!
-//! D is the transform, M the projection that removes parabolas, w the variance of the white part, s
-//! that of the slow part, m its correlation time in samples, and P_k the mean power over n windows.
+//! k counts the waves (cosines), D is the transform, M the projection that removes parabolas, w the
+//! variance of the white part, s that of the slow part, m its correlation time in samples, and P_k
+//! the mean power over n windows.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -20,25 +21,26 @@ use crate::numerics::random::RandomGenerator;
 
 /// Samples per window.
 pub const WINDOW: usize = 128;
-/// Smallest number of windows for an estimate; sixteen windows determine the level to a tenth.
+/// Smallest number of windows for an estimate. Twelve windows determine the variance to about 5 %.
 const FEWEST: usize = 12;
-/// Index of the slowest wave that remains after parabolas are removed, in half periods per window.
+/// Number of half periods per window of the slowest wave that remains after parabolas are removed.
 const SLOWEST: usize = 3;
-/// Share of the windows, those with the most power, that each mean omits.
+/// Share of the windows that the mean power of a wave omits: those in which the wave has the most
+/// power.
 const TRIMMED: f64 = 0.1;
-/// Correlation times that are tried, in samples.
+/// Correlation times of the slow part that are tried, in samples.
 const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
-/// Number of shares of the slow part that are tried.
+/// Number of values that are tried for the slow part's share of the variance.
 const SHARES: usize = 19;
 
-/// Size of a gross error in multiples of the median size of differences; this is 8 standard
-/// deviations for normal noise.
+/// Size from which a difference counts as a gross error, in multiples of the median size of
+/// differences. For normal noise this is 8 standard deviations.
 const GROSS: f64 = 12.0;
-/// Largest number of fits of the mains waves in the presence of gross errors; each is fitted to
-/// what the previous fit left.
+/// Largest number of rounds in which mains waves are fitted if there are gross errors. Each round
+/// fits the remainder of the previous round.
 const ROUNDS: usize = 4;
-/// Relative rounding error of a second difference: its four operations, and the rounding of the
-/// values.
+/// Relative rounding error of a second difference, from its four operations and from the rounding
+/// of the values.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Noise of a channel, in its unit: white noise plus an Ornstein-Uhlenbeck process.
@@ -51,9 +53,9 @@ pub struct Noise {
     known_to: f64,
 }
 
-/// Relative standard deviation of a variance that was estimated from second differences. It
-/// corresponds to a tenth of the noise's standard deviation, because second differences also
-/// contain any fast motion.
+/// Relative standard deviation that is assumed for a variance estimated from second differences. It
+/// corresponds to a tenth of the noise's standard deviation, and is this large because second
+/// differences also contain any fast motion.
 const DIFFERENCES_KNOWN_TO: f64 = 0.2;
 
 impl Noise {
@@ -109,10 +111,10 @@ impl Noise {
     }
 
     /// Estimates noise from windows of [`WINDOW`] samples in which the rig is at rest; `stated` is
-    /// the level in the rig file. If something still moves slowly in them (`is_still` is false),
-    /// only the faster half of the waves is used, and slow noise is not estimated. Waves of the
-    /// mains (50 and 60 Hz) are left out; `dt_s` is the sample time, s. Returns `None` if there are
-    /// too few windows or if nothing changes in them.
+    /// the level in the rig file. If the rig still moves slowly in the windows (`is_still` is
+    /// false), only the faster half of the waves is used, and slow noise is not estimated. Waves of
+    /// the mains (50 and 60 Hz) are left out; `dt_s` is the sample time, s. Returns `None` if there
+    /// are too few windows or if all their values are constant.
     ///
     /// ```
     /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
@@ -138,7 +140,8 @@ impl Noise {
         let step = steps.filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         let shapes = Shapes::new(is_still, dt_s);
         let powers = shapes.mean_powers(&whole);
-        // A small noise may not show at all through a coarse converter.
+        // Noise that is much smaller than the step of a converter does not change the recorded
+        // values at all.
         if !step.is_finite() || powers.iter().all(|p| *p <= 0.0) {
             return None;
         }
@@ -154,7 +157,7 @@ impl Noise {
     }
 
     /// Estimates white noise from second differences, that is, from changes from sample to sample.
-    /// Errors that last longer are not included.
+    /// Errors that last for many samples are not included.
     ///
     /// See [`noise_variance`].
     pub fn of_differences<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
@@ -164,9 +167,9 @@ impl Noise {
 
     /// Replaces a level that was estimated from second differences by a smaller one, estimated from
     /// the residuals `left` of a simulator. Second differences of a recording also contain fast
-    /// motion, such as a resonance with a period of a few samples. Those of the residuals contain
-    /// the same noise but less motion, so their level is used if it is clearly smaller. A level
-    /// that is known more accurately is kept.
+    /// motion, such as a resonance with a period of a few samples. Second differences of the
+    /// residuals contain the same noise but less motion, so their level is used if it is clearly
+    /// smaller. A level that is known more accurately is kept.
     pub(crate) fn at_most_left<'a>(self, left: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
         if self.known_to < DIFFERENCES_KNOWN_TO {
             return self;
@@ -183,8 +186,9 @@ impl Noise {
     }
 }
 
-/// Returns the mean of x^2 over the share `kept` of smallest squares of a normal variable x. The
-/// mean is (kept - 2 z phi(z))/kept, with P(|x| < z) = kept and the normal density phi.
+/// Returns the mean of x^2 for a standard normal variable x, over only the smallest squares, whose
+/// share of all is `kept`. This mean is (kept - 2 z phi(z))/kept, with P(|x| < z) = kept and the
+/// normal density phi.
 fn trimmed_mean(kept: f64) -> f64 {
     let (mut low, mut high) = (0.0, 9.0);
     for _ in 0..60 {
@@ -232,8 +236,8 @@ impl Shapes {
         Self { white: of(&DMatrix::identity(n, n)), slow, transform, waves }
     }
 
-    /// Returns the mean power of every wave. Each mean omits the largest tenth, so that a disturbed
-    /// window does not count, and is scaled to be exact for normal noise.
+    /// Returns the mean power of every wave. Each mean omits the largest tenth of the powers, so
+    /// that a disturbed window does not count, and is scaled to be unbiased for normal noise.
     fn mean_powers(&self, windows: &[&Vec<f64>]) -> Vec<f64> {
         let mut powers: Vec<Vec<f64>> = vec![Vec::new(); WINDOW];
         for window in windows {
@@ -253,22 +257,22 @@ impl Shapes {
         powers.into_iter().map(mean).collect()
     }
 
-    /// Returns the most probable hypothesis: the stated level, white noise, or white plus slow
-    /// noise, with 0, 1 and 3 parameters. It has the largest L - (parameters/2) ln(observations)
-    /// (Schwarz 1978, doi 10.1214/aos/1176344136).
+    /// Returns the most probable of three hypotheses: the stated level, white noise, and white plus
+    /// slow noise. They have 0, 1 and 3 parameters. The most probable has the largest L -
+    /// (parameters/2) ln(observations) (Schwarz 1978, doi 10.1214/aos/1176344136).
     fn fit(&self, powers: &[f64], windows: usize, stated: Option<f64>) -> Noise {
         let n = windows as f64;
         let cost = |s: &dyn Fn(usize) -> f64| -> f64 {
             let each = self.waves.iter().map(|&k| s(k).ln() + powers[k] / s(k));
             0.5 * n * each.sum::<f64>()
         };
-        // The best amplitude of a shape S is the mean of P/S.
+        // The best factor on the expected powers S is the mean of P/S.
         let level = |s: &dyn Fn(usize) -> f64| -> f64 {
             self.waves.iter().map(|&k| powers[k] / s(k)).sum::<f64>() / self.waves.len() as f64
         };
         let price = 0.5 * (n * self.waves.len() as f64).ln();
         let white = level(&|k| self.white[k]);
-        // The variance of a mean of N squares is 2/N of its square.
+        // A mean of N squared normal variables has the relative variance 2/N.
         let known_to = (2.0 / (n * self.waves.len() as f64)).sqrt();
         let mut best = Noise::white(white.sqrt(), "noise of the record".into(), known_to);
         let mut least = cost(&|k| white * self.white[k]) + price;
@@ -307,13 +311,13 @@ fn mains(dt_s: f64) -> [f64; 2] {
 /// Estimates the variance of the noise from second differences: a sixth of their median square,
 /// corrected for the median of a normal variable's square.
 ///
-/// The median is robust against motion and gross errors. Mains hum is not noise: waves of 50 and 60
-/// Hz are removed from every second beforehand. Second differences d_i = x_(i-1) - 2 x_i + x_(i+1)
-/// of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared normal
-/// variable is 0.4549 of its mean. Hence sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the sample
-/// time, s; the result has the squared unit of the signal. A coarse converter repeats most values,
-/// which makes the median 0. Then the mean square is used, without differences larger than 12 times
-/// the median of those that are not 0.
+/// The median is robust against motion and gross errors. Mains hum is not noise, so waves of 50 and
+/// 60 Hz are first removed from every second of the signal. Second differences d_i = x_(i-1) - 2
+/// x_i + x_(i+1) of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared
+/// normal variable is 0.4549 of its mean. Hence sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the
+/// sample time, s; the result has the squared unit of the signal. A coarse converter repeats most
+/// values, which makes the median 0. Then the mean square is used instead; it omits differences
+/// larger than 12 times the median of the differences that are not 0.
 ///
 /// ```
 /// use stretch_gap::{RandomGenerator, noise_variance};
@@ -355,21 +359,21 @@ fn bends(stretch: &[f64]) -> Vec<f64> {
     pairs.map(|(bend, x)| if bend.abs() > rounding(x) { bend } else { 0.0 }).collect()
 }
 
-/// Returns the upper median; `None` without values.
+/// Returns the median, the larger of two middle values; `None` if there are no values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Removes mains waves from a stretch of differences, one wave after the other. `order` is the
-/// order of the differences and `power` the sum of their squared weights. `beside` holds the
+/// Removes waves of mains hum from a stretch of differences, one wave after the other. `order` is
+/// the order of the differences and `power` the sum of their squared weights. `beside` holds the
 /// differences before and after the stretch, 0 if there are none. Returns how many samples of white
 /// noise carry as much power as was removed from the noise.
 ///
-/// In the fit of a wave, a gross error is clipped to [`GROSS`] medians, so that it does not affect
-/// the whole stretch. If a gross error remains afterwards, the waves are fitted again to what is
-/// left. A gross error produces adjacent differences of opposite sign, whereas a kink of the motion
-/// produces a single difference.
+/// In the fit of a wave, a gross error is clipped to [`GROSS`] times the median size of the
+/// differences, so that it does not affect the whole stretch. If a gross error remains afterwards,
+/// the waves are fitted again to what is left. A gross error produces adjacent differences of
+/// opposite sign, whereas a kink of the motion produces a single difference.
 pub(crate) fn take_waves_out(
     values: &mut [f64],
     beside: [f64; 2],
@@ -392,14 +396,14 @@ pub(crate) fn take_waves_out(
         taken = 0.0;
         let gross: Vec<usize> = (0..values.len()).filter(|i| is_gross(values, *i, most)).collect();
         for shown in mains(dt_s) {
-            // A slow wave could not be distinguished from motion.
+            // Below this frequency, hum could not be distinguished from motion.
             if shown < 0.15 || values.len() < 20 {
                 continue;
             }
             for phase in [0.0, 0.25] {
                 let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
                 let own: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
-                // At half the sample rate only one of the two phases exists.
+                // At half the sample rate, one of the two phases is zero at every sample.
                 if own < 1e-6 * values.len() as f64 {
                     continue;
                 }
@@ -408,8 +412,9 @@ pub(crate) fn take_waves_out(
                 let clipped = clipped.iter().enumerate();
                 let size = clipped.map(|(i, x)| x * wave(i)).sum::<f64>() / own;
                 values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
-                // In white noise, differences of order n have the power (2 - 2 cos)^n at this
-                // frequency; for second differences the average over all frequencies is 6.
+                // Differences of order n of white noise have the power (2 - 2 cos w)^n at the
+                // angular frequency w. Its average over all frequencies is `power`, 6 for second
+                // differences.
                 taken +=
                     (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(order as i32) / power;
             }
@@ -451,7 +456,7 @@ mod tests {
 
     #[test]
     fn a_trimmed_mean_is_exact() {
-        // P(chi^2_3 < 2.7055)/0.9 at the 0.9 quantile of chi^2_1.
+        // The exact value is P(chi^2_3 < q)/0.9, where q = 2.7055 is the 0.9 quantile of chi^2_1.
         approx::assert_abs_diff_eq!(trimmed_mean(0.9), 0.6230, epsilon = 1e-4);
         approx::assert_abs_diff_eq!(trimmed_mean(1.0), 1.0, epsilon = 1e-12);
     }

@@ -8,9 +8,10 @@
 //! block = min(most, max(half a mean turn of the slowest output, 20 samples))
 //! ```
 //!
-//! A turn ends when an output rises above its middle, after it was below. Both levels must be
-//! passed by at least a tenth of the output's range and six times its noise, so that noise makes no
-//! turns. An output with fewer than [`FEWEST`] turns counts as slow and gives the longest block.
+//! A full turn ends when an output rises above the middle of its range after it was below. So that
+//! noise is not counted as turns, the output must go beyond the middle, on both sides, by at least
+//! a tenth of its range and at least six times its noise. An output with fewer than [`FEWEST`]
+//! turns counts as slow, and the block then has the largest allowed length.
 
 use stretch_data::ends;
 
@@ -18,7 +19,8 @@ use crate::problem::noise::noise_variance;
 
 /// Number of samples in the shortest block.
 const SAMPLES: f64 = 20.0;
-/// Share of the range, and multiple of the noise, by which an output must pass its middle.
+/// Share of the range, and multiple of the noise, by which an output must go beyond the middle of
+/// its range.
 const CROSSED: (f64, f64) = (0.1, 6.0);
 /// Smallest number of turns that determines the speed of an output.
 const FEWEST: usize = 10;

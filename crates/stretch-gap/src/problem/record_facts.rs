@@ -1,4 +1,5 @@
-//! Facts about a recording in addition to stages, parameters, effects and trials.
+//! Facts about a recording that a simulator may state in addition to stages, parameters, effects
+//! and trials.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,10 +10,10 @@ use crate::problem::{
     spec::ParameterSpec,
 };
 
-/// The measured motion by which the gap is divided into slices.
+/// The measured motion. Reports divide the gap by direction, level and rate of this motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<'a> {
-    /// All trials concatenated.
+    /// Values, all trials concatenated.
     pub values: &'a [f64],
     /// Unit.
     pub unit: &'a str,
@@ -26,14 +27,15 @@ pub struct Motion<'a> {
 /// may be a function of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
-    /// Column.
+    /// Name of the column.
     pub name: String,
     /// Unit.
     pub unit: String,
     /// Values, all trials concatenated. A measured signal is smoothed as far as its noise allows,
     /// because terms use its rate.
     pub values: Vec<f64>,
-    /// Whether it is a command: it may jump, and zero means that nothing is done.
+    /// Whether the signal is a command. A command may jump, and zero means that the actuator does
+    /// nothing.
     pub is_command: bool,
 }
 
@@ -98,14 +100,15 @@ pub struct RecordFacts {
     /// Flags of samples that were not measured. These samples are ignored, whatever their value.
     /// Empty if all samples were measured.
     pub is_lost: Vec<bool>,
-    /// Number of rows in the trials, and of rows that were read; `None` if every sample is a row.
+    /// Number of rows of the recording in the trials, and number of rows that were read; `None` if
+    /// every row that was read is a sample of a trial.
     pub rows_used: Option<RowsUsed>,
     /// The motion by which the gap is divided into regimes, levels and rates; `None` if it is the
     /// output of the first stage.
     pub motion: Option<MotionSpec>,
-    /// The signals that a missing term may depend on. If empty, these are the inputs of the stages,
-    /// each named after the channel of the previous stage; if the stages have no inputs, it is the
-    /// motion.
+    /// The signals that a missing term may depend on. If the list is empty, the inputs of the
+    /// stages are used, each named after the channel of the previous stage; if no stage has an
+    /// input, the motion is used.
     pub signals: Vec<Recorded>,
     /// Columns of the recording, without values for the outputs of stages. Empty if the outputs are
     /// the only columns.
@@ -113,13 +116,14 @@ pub struct RecordFacts {
     /// The stage whose output a calibration converts back into the motion; `None` if there is no
     /// such sensor.
     pub sensor: Option<usize>,
-    /// Share of a channel's variance above which a remaining misfit causes a warning.
+    /// Largest remaining misfit that causes no warning, as a share of a channel's variance.
     pub gross_misfit_share: f64,
-    /// Parameters, by index, that are exact if commands switch at rows of the recording, each with
-    /// its specification for commands that switch anywhere between two rows. The diagnosis compares
-    /// both cases. Empty if commands are not held constant from row to row.
+    /// Parameters, by index, that describe when commands switch. They are exact if commands switch
+    /// at rows of the recording. The second element is the specification of the parameter if
+    /// commands switch anywhere between two rows. The diagnosis compares both cases. Empty if
+    /// commands are not held constant from row to row.
     ///
-    /// Differences between single switches are given [per tick](ParameterSpec::per_tick_sd).
+    /// Variation from one switch to the next is described [per tick](ParameterSpec::per_tick_sd).
     pub command_timing: Vec<(usize, ParameterSpec)>,
     /// Parameters, by index, whose slow drift cannot reach the outputs at certain times. Each has a
     /// clock: for every sample, the last sample (counted from the trial's start) at which the drift

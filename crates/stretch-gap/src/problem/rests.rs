@@ -1,17 +1,18 @@
 //! Estimation of an output's noise from rests: spans in which all its inputs are constant.
 //!
-//! A rest shows what the recorder adds. The residual of a model does not, because it includes the
-//! errors of the model. Second differences of the whole recording include every fast motion. Noise
-//! is therefore estimated only from rests, without the first third ([`SETTLES`]) of each, by
-//! differences of sixth order. These pass white noise and almost no oscillation below a fifth of
+//! A rest shows only the noise that the recorder adds. The residual of a model also includes the
+//! errors of the model. Second differences of the whole recording also include fast motion. Noise
+//! is therefore estimated from rests, without the first third ([`SETTLES`]) of each, by differences
+//! of sixth order. These differences pass white noise, but almost no oscillation below a fifth of
 //! the sample rate:
 //!
 //! ```text
 //! sigma^2 = mean over parts of mean (D^6 x)^2 / 924,     gain of D^6 at frequency f: (2 - 2 cos(2 pi f dt))^6
 //! ```
 //!
-//! The constant 924 = 12!/(6! 6!) is the sum of the squared weights. Parts with more than [`MOVES`]
-//! times the median power still contain motion and are ignored.
+//! The constant 924 = 12!/(6! 6!) is the sum of the squared weights. A part is a stretch of
+//! [`PART`] samples of a rest. Parts with more than [`MOVES`] times the median power still contain
+//! motion and are ignored.
 
 use std::ops::Range;
 
@@ -21,20 +22,21 @@ use crate::problem::noise::{Noise, take_waves_out};
 const SETTLES: f64 = 1.0 / 3.0;
 /// Number of samples in a part of a rest.
 const PART: usize = 48;
-/// Smallest number of parts for an estimate; twelve determine the level to a tenth.
+/// Smallest number of parts for an estimate. Six parts determine the variance to 15 %, twelve parts
+/// to 10 %.
 const FEWEST: usize = 6;
-/// A part moves if its power exceeds the median of all parts by this factor.
+/// Factor on the median power of all parts. A part with more power than this contains motion.
 const MOVES: f64 = 3.0;
 /// Order of the differences, and the sum of their squared weights.
 const ORDER: (usize, f64) = (6, 924.0);
-/// Sum of the squared correlations of sixth differences over all lags: 24!/(12! 12!)/924^2. That
-/// many differences carry the information of one independent sample.
+/// Sum of the squared correlations of sixth differences over all lags, 24!/(12! 12!)/924^2 = 3.2.
+/// So many neighbouring differences carry the information of one independent sample.
 const TOGETHER: f64 = 2_704_156.0 / (924.0 * 924.0);
 
 impl Noise {
-    /// Estimates the noise of an output from rests of all its `inputs` within the given `trials`;
-    /// `dt_s` is the sample time, s. Returns `None` if the inputs are hardly ever constant, or if
-    /// the output does not change at all in the rests.
+    /// Estimates the noise of an output from the rests of its `inputs` (spans in which all are
+    /// constant) within the given `trials`; `dt_s` is the sample time, s. Returns `None` if there
+    /// are too few rests, or if the output does not change at all in the rests.
     ///
     /// ```
     /// use stretch_gap::{Noise, RandomGenerator};
@@ -106,8 +108,8 @@ mod tests {
     const DT_S: f64 = 0.01;
     const TRIALS: [Range<usize>; 2] = [0..3000, 3000..6000];
 
-    /// A command with steps held for 1.5 s, and the output of a lag of second order with noise: y''
-    /// = w^2 (x - y) - 2 damping w y'.
+    /// Returns a command x that takes a new value every 1.5 s, and a noisy output of the
+    /// second-order lag y'' = w^2 (x - y) - 2 damping w y'.
     fn stepped(hertz: f64, damping: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut random = RandomGenerator::new(9, 0);
         let (w, h) = (std::f64::consts::TAU * hertz, DT_S / 50.0);
@@ -127,7 +129,8 @@ mod tests {
         (command, output)
     }
 
-    /// Second differences of the same recording give a noise that is more than 20 % too large.
+    /// Estimates from rests are within 20 % of the noise, even if the output rings. Second
+    /// differences of a ringing recording give a noise that is more than 20 % too large.
     #[test]
     fn noise_is_told_beside_what_rings() {
         for (hertz, damping) in [(1.0, 0.05), (3.0, 0.05), (6.0, 0.05), (3.0, 0.5), (10.0, 0.3)] {

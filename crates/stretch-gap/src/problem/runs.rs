@@ -1,5 +1,5 @@
-//! The only access to the simulator: every run is counted, can be stopped before it begins, and
-//! returns finite numbers.
+//! Runs the simulator for the rest of the crate. Every run is counted, is not started once the
+//! caller asks to stop, and returns finite numbers or an error.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,9 +15,9 @@ use crate::problem::{
     spec::{EffectSpec, StageSpec},
 };
 
-/// Size of an output that counts as infinite. If the largest measured value is below 1, the limit
-/// is this size times that value. Beyond the limit, sums of squares in multiples of the noise would
-/// overflow.
+/// Size from which an output counts as infinite. If the largest measured value is below 1, the
+/// limit is this size times that value. Beyond the limit, sums of squared residuals in multiples of
+/// the noise would overflow.
 const MOST: f64 = 1e100;
 
 /// Runs that failed or returned numbers that are not finite.
@@ -28,13 +28,16 @@ struct Lost {
     models: BTreeMap<Vec<String>, BTreeSet<Vec<u64>>>,
     /// Error message of the first of these runs.
     first: Option<String>,
-    /// Effects that could not be screened or fitted somewhere because runs failed.
+    /// Effects that could not be screened or fitted at some point of the search because runs
+    /// failed.
     not_fitted: BTreeSet<String>,
-    /// Effects of fitted sets that could not be judged because runs failed.
+    /// Effects of fitted sets that could not be evaluated on the trials that were not fitted,
+    /// because runs failed.
     not_judged: BTreeSet<String>,
 }
 
-/// A simulator with a count of its runs and a request to stop. Clones share the count.
+/// A simulator with a count of its runs and a function that tells whether to stop. Clones share the
+/// count.
 #[derive(Clone)]
 pub(crate) struct Runs<'a> {
     simulator: &'a dyn Simulator,
@@ -49,7 +52,7 @@ pub(crate) struct Runs<'a> {
 }
 
 impl<'a> Runs<'a> {
-    /// Prepares the runs of a simulator whose measured channels are complete.
+    /// Prepares the runs of a simulator, and checks that its measured channels are complete.
     ///
     /// # Errors
     /// [`GapError::Measured`] if a channel is shorter than the trials or not finite, because later
@@ -73,7 +76,7 @@ impl<'a> Runs<'a> {
         Ok(Self { simulator, stop, count, was_cut, lost, most, step: 1.0 })
     }
 
-    /// Returns the runs of another simulator of the same session. They share this count.
+    /// Prepares runs of another simulator of the same session. They are added to the same count.
     pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Runs<'b>
     where
         'a: 'b,
@@ -92,23 +95,23 @@ impl<'a> Runs<'a> {
         self.simulator
     }
 
-    /// Whether only the runs that the answer itself needs are left in the simulator's budget.
-    /// Optional work is then skipped.
+    /// Whether the simulator's budget of runs is used up except for the runs that a diagnosis must
+    /// have. Optional work is then skipped.
     pub(crate) fn is_spent(&self) -> bool {
         let is_spent = self.simulator.model_runs().is_some_and(|runs| runs.is_spent);
         self.was_cut.fetch_or(is_spent, Ordering::Relaxed);
         is_spent
     }
 
-    /// Returns the runs that the simulator counts, and whether the search was cut short by its
-    /// budget.
+    /// Returns the simulator's own count of its runs, and whether its budget cut the search short;
+    /// `None` if it does not count.
     pub(crate) fn counted(&self) -> Option<ModelRuns> {
         let is_spent = self.was_cut.load(Ordering::Relaxed);
         self.simulator.model_runs().map(|runs| ModelRuns { is_spent, ..runs })
     }
 
     fn lost(&self) -> MutexGuard<'_, Lost> {
-        // A panic elsewhere does not invalidate these notes.
+        // A panic in another thread does not invalidate this list.
         self.lost.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -123,8 +126,7 @@ impl<'a> Runs<'a> {
         self.lost().not_judged.extend(self.names(effects.iter().copied()));
     }
 
-    /// Returns the names of the effects that could not be fitted somewhere, and of those that could
-    /// not be judged.
+    /// Returns the names of the effects in `not_fitted` and in `not_judged`.
     pub(crate) fn lost_effects(&self) -> [BTreeSet<String>; 2] {
         let lost = self.lost();
         [lost.not_fitted.clone(), lost.not_judged.clone()]
@@ -174,7 +176,7 @@ impl<'a> Runs<'a> {
     /// Whether every stage of a model can be simulated over all trials.
     ///
     /// # Errors
-    /// Only errors that end the diagnosis.
+    /// Every error except that the model could not be simulated.
     pub(crate) fn can_run(&self, model: &Model) -> Result<bool, GapError> {
         Ok(unless_lost(self.try_all(model))?.is_some())
     }
@@ -223,7 +225,8 @@ impl<'a> Runs<'a> {
         self.heard(run, done)
     }
 
-    /// Notes a run that failed or exceeded the budget. Its result is missing in the answer.
+    /// Notes that a run failed or exceeded the budget, so that the report can say that its result
+    /// is missing.
     fn heard<T>(&self, run: Run<'_>, done: Result<T, GapError>) -> Result<T, GapError> {
         match done {
             Err(GapError::Spent { .. }) => self.was_cut.store(true, Ordering::Relaxed),

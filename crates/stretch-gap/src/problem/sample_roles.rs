@@ -1,8 +1,9 @@
 //! Decides which samples are fitted, held out and tested.
 //!
-//! Selecting models by the fitted data is optimistic, and information criteria alone mislead if the
-//! models are wrong (Schoniger et al. 2014, doi 10.1002/2014WR016062). Therefore the last part of
-//! long trials is held out to compare fits. Test trials are read only after all decisions.
+//! A model that is selected by the fitted data looks better than it is, and information criteria
+//! alone mislead if all models are wrong (Schoniger et al. 2014, doi 10.1002/2014WR016062).
+//! Therefore the last part of each long trial is held out of the fits and used to compare them.
+//! Test trials are read only after all decisions.
 
 use serde::Serialize;
 
@@ -33,10 +34,11 @@ pub struct Segment {
     pub role: Role,
 }
 
-/// Largest length of a block, s. A block of residuals counts as one observation. If the motion
-/// turns more than once a second, a block is half a turn.
+/// Largest length of a block, s. Because neighbouring residuals are correlated, a block of
+/// residuals counts as one observation. If a period of the motion takes less than a second, a block
+/// is half a period.
 pub const BLOCK_S: f64 = 0.5;
-/// Number of blocks from which the last part of a trial is held out.
+/// Smallest length of a trial, in blocks, whose last part is held out.
 const LONG: f64 = 60.0;
 /// Share of a long trial that is held out.
 const HELD: f64 = 0.3;
@@ -50,7 +52,7 @@ pub struct SampleRoles {
     pub segments: Vec<Segment>,
     /// Samples per block.
     pub block: usize,
-    /// Number of trials up to the last one that contains fitted samples.
+    /// Number of trials up to and including the last one that contains fitted samples.
     pub fit_trials: usize,
     /// Whether there is no test trial, so that the last part of each trial is used for testing.
     pub borrowed_test: bool,
@@ -152,7 +154,7 @@ impl SampleRoles {
         self.count(role) as f64 / self.block as f64
     }
 
-    /// Returns the segments that may be used before the final test: all but test segments.
+    /// Returns the segments that may be used before the final test: all except the test segments.
     pub(crate) fn looked_at(&self) -> impl Iterator<Item = &Segment> {
         self.segments.iter().filter(|s| s.role != Role::Test)
     }

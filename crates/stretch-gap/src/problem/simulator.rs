@@ -128,14 +128,14 @@ pub trait Simulator: Sync {
         on_all_threads(self, runs, outs)
     }
 
-    /// Returns the number of runs so far, if each run is costly enough to be counted and stored. It
-    /// is smaller than the number of simulated stages if stored runs are reused.
+    /// Returns the number of runs so far, if each run is costly enough to be counted and stored. If
+    /// stored runs are reused, this number is smaller than the number of simulated stages.
     fn model_runs(&self) -> Option<ModelRuns> {
         None
     }
 
-    /// Whether each value of an effect needs a separate costly run. Sensitivities to the effect are
-    /// then renewed as rarely as those to the nominal parameters.
+    /// Whether each value of an effect needs a separate costly run. During a fit, sensitivities to
+    /// this effect are then recomputed as rarely as those to the nominal parameters.
     fn is_costly(&self, effect: usize) -> bool {
         let _ = effect;
         false
@@ -170,9 +170,9 @@ pub trait Simulator: Sync {
         Ok(false)
     }
 
-    /// Returns the same simulator driven by a recording in which the error of one column is
-    /// corrected. `None` if that column drives no stage. The measured outputs of the stages may
-    /// stay unchanged.
+    /// Returns the same simulator, with the stages that one column drives run on that column after
+    /// its error is corrected. `None` if that column drives no stage. The measured outputs may stay
+    /// unchanged.
     ///
     /// # Errors
     /// The corrected column cannot drive the simulator.

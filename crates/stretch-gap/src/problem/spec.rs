@@ -80,7 +80,8 @@ pub struct ParameterSpec {
     /// clock](crate::RecordFacts::drift_clocks), in the parameter's unit. It describes differences
     /// from event to event.
     pub per_tick_sd: Option<f64>,
-    /// Whether the re-tuned value is evidence. It is not if other parameters can compensate for it.
+    /// Whether the re-tuned value says something about the rig. It does not if other parameters can
+    /// compensate for a change of this one.
     pub is_evidence: bool,
 }
 
@@ -112,9 +113,9 @@ impl ParameterSpec {
     }
 }
 
-/// Distance from the nominal value, in standard deviations, at which a parameter counts as at its
-/// end. In a stage with about five parameters, two reach it by chance in one of a few thousand
-/// rigs.
+/// Distance from the nominal value, in standard deviations, from which a parameter counts as at the
+/// end of its tolerance. In a stage with about five parameters, two parameters are that far by
+/// chance in one of a few thousand rigs.
 const END: f64 = 2.75;
 
 /// Distance from an end of the range, as a share of the range, within which an effect's parameter
@@ -126,13 +127,14 @@ const AT_END: f64 = 1e-3;
 pub struct EffectSpec {
     /// Name in reports.
     pub name: String,
-    /// Name of the stage that it belongs to, as in reports.
+    /// Name of the stage to which reports assign the effect.
     pub stage: String,
-    /// Indices of the stages whose output it changes.
+    /// Indices of the stages whose output the effect changes.
     pub touches: Vec<usize>,
     /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
-    /// Values for screening, a few per shape and threshold; strengths in between are interpolated.
+    /// Starts: values of the parameters at which the effect is simulated for screening, a few for
+    /// each shape and threshold. The response to strengths in between is interpolated.
     pub starts: Vec<Vec<f64>>,
     /// Whether the effect's course in time can be reconstructed from the recording. Its size then
     /// only controls how far the reconstruction searches.
@@ -140,10 +142,11 @@ pub struct EffectSpec {
     /// Whether the effect depends on session time, so that trials outside the fitted time are
     /// extrapolated.
     pub drifts: bool,
-    /// Names of effects that are hard to distinguish from it.
+    /// Names of effects that are hard to distinguish from this one.
     pub twins: Vec<String>,
     /// Another stage whose measured output the effect reads, including the errors of that output.
-    /// An improvement through these errors shows only an error that two outputs have in common.
+    /// If the effect improves the fit only through these errors, it shows only an error that the
+    /// two outputs have in common.
     pub reads: Option<usize>,
 }
 
@@ -175,8 +178,8 @@ impl EffectSpec {
         }
     }
 
-    /// Whether a size is at an end of its range other than "off". The effect then compensates for
-    /// something else.
+    /// Whether a size of the effect is at an end of its range, other than the value that switches
+    /// the effect off. The effect then compensates for something else.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
         let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted());
         fitted.any(|(p, value)| {
@@ -184,8 +187,8 @@ impl EffectSpec {
                 true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
-            // Only sizes are checked. A time constant beyond its range still belongs to a memory,
-            // but a size beyond its range indicates another cause.
+            // Only sizes are checked. If a time constant wants to leave its range, the effect is
+            // still the right cause. If a size does, the cause is another.
             p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
         }) && !self.is_found
     }

@@ -9,9 +9,9 @@
 //! ```
 //!
 //! Both quadratures are normal with the variance a^2/2. The residual is whitened to V^-1/2 r with
-//! the symmetric root. Nothing is fitted to the residual. After whitening, the mean square is 1 if
-//! the line is as strong as predicted, and larger if it is stronger. Components outside the line do
-//! not change.
+//! the symmetric square root of V. Nothing is fitted to the residual. After whitening, the mean
+//! square is 1 if the line is as strong as predicted, and larger if it is stronger. Components
+//! outside the line do not change.
 
 use std::f64::consts::TAU;
 

@@ -9,17 +9,19 @@ pub struct Thresholds {
     /// Excess, summed over channels, below which there is no gap. The excess of a channel is its
     /// reduced chi-square minus one.
     pub null_excess: f64,
-    /// Smallest rise of the score for an effect that closes a gap, nats.
+    /// Smallest rise of the score that an added effect must achieve, nats.
     pub rise: f64,
-    /// Smallest rise of the score for an effect that closes less than `null_excess`, or no more
-    /// than model discrepancy could explain, nats.
+    /// The same for an effect that closes less than `null_excess`, or no more than model
+    /// discrepancy could explain, nats.
     pub faint_rise: f64,
     /// Smallest share of the remaining gap that an effect must close.
     pub share: f64,
-    /// Share of what a set closes that model discrepancy may leave to a further effect, in each
-    /// stage and in each octave of its residual.
+    /// Model discrepancy: the share of the gap closed by a set that may be left because the forms
+    /// of its effects differ from those of the rig. A further effect must close more. It applies in
+    /// each stage and in each octave of the residual's frequencies.
     pub model_discrepancy: f64,
-    /// Temperature of the probabilities, nats.
+    /// Temperature of the probabilities, nats: this difference of scores changes the ratio of two
+    /// probabilities by a factor e.
     pub temperature: f64,
     /// Growth of the temperature with the share of the gap that the best set leaves, nats.
     pub rho: f64,

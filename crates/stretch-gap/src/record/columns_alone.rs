@@ -25,22 +25,25 @@ const COPY: f64 = 0.5;
 const ALIKE: f64 = 0.9;
 /// Range of s4/s2 in which noise counts as white.
 const WHITE: (f64, f64) = (0.7, 1.4);
-/// Share of its range that another column covers while one is dead or behind a play.
+/// Share of its range that another column must cover during a stretch in which a column seems dead.
+/// The same share proves that a constant column is stuck and not behind a play (backlash).
 const RANGE: f64 = 0.8;
-/// Number of standard deviations of a block's mean within which a dead column stays.
+/// Number of standard deviations of a block's mean by which the block means of a dead column differ
+/// at most from their centre.
 const KEEPS: f64 = 4.0;
-/// Number of samples in such a block.
+/// Number of samples in a block of the check for dead columns.
 const BLOCK: usize = 10;
-/// Size of the autocorrelation, at lags up to a block, that noise does not reach.
+/// Size of the autocorrelation, at lags up to [`BLOCK`] samples, that noise does not exceed.
 const REPEATS: f64 = 0.5;
 /// Smallest share of its range by which another column moves while one is stuck.
 const MOVES: f64 = 0.3;
 /// Smallest jump at the end of a stuck stretch, in multiples of the 99.9 % quantile of all steps.
 const JUMP: f64 = 3.0;
-/// ln of the probability below which repetitions are not attributed to chance.
+/// Natural logarithm of the probability (1e-9) below which repetitions are not attributed to
+/// chance.
 const CHANCE: f64 = -20.7;
 
-/// Returns all errors of the columns of a session that the columns alone show; usually none.
+/// Returns the errors that are visible in the columns of a session alone; usually there are none.
 pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
     let own: Vec<&Column<'_>> = columns.iter().filter(|c| !c.values.is_empty()).collect();
     let mut out = Vec::new();
@@ -137,7 +140,7 @@ pub fn copied(a: &[f64], b: &[f64]) -> Option<f64> {
     (is_copy && is_white(a2, a4) && is_white(b2, b4)).then_some(factor)
 }
 
-/// Returns the size of the correlation of second differences.
+/// Returns the absolute correlation of the second differences of two columns.
 fn alike(a: &[f64], b: &[f64]) -> f64 {
     let bend = |w: &[f64]| w[0] - 2.0 * w[1] + w[2];
     let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
@@ -150,7 +153,7 @@ fn alike(a: &[f64], b: &[f64]) -> f64 {
     ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Whether another column covers at least a share of its range within a stretch.
+/// Whether any other column covers at least the share `share` of its range within a stretch.
 fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> bool {
     others.iter().any(|other| {
         let ((low, high), (a, b)) = (ends(*other), ends(&other[from..to]));
@@ -158,9 +161,9 @@ fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> boo
     })
 }
 
-/// Returns the stretches in which a column stays within its noise while another covers most of its
-/// range. A loose sleeve conceals less than that. A signal that repeats within ten samples is fast
-/// motion rather than noise, except mains hum.
+/// Returns the stretches in which a column stays within its noise while another column covers most
+/// of its range. The slack of a loose sleeve would hide less motion than that. A signal that
+/// repeats within ten samples counts as fast motion rather than noise, unless it is mains hum.
 fn dead(
     values: &[f64],
     others: &[&[f64]],
@@ -182,8 +185,9 @@ fn dead(
             let next = if i < blocks { mean(i) } else { f64::INFINITY };
             if high.max(next) - low.min(next) > reach {
                 let run = (begin + first * BLOCK, begin + i * BLOCK);
-                // A late column is not dead. With only a delay, the other columns would not move
-                // this much within the run shortened by the longest delay.
+                // A late column is not dead. If the column were only late, the other columns would
+                // not move this much within the stretch after it is shortened by the longest delay
+                // at both ends.
                 let inner = (run.0 + late, run.1.saturating_sub(late));
                 let is_seen = inner.1 > inner.0 && others_move(others, inner, RANGE);
                 if is_seen && !repeats_itself(&values[run.0..run.1], dt_s) {
@@ -198,9 +202,9 @@ fn dead(
     out
 }
 
-/// Whether a stretch repeats itself, or its negative, at a lag of at most a block, as motion does:
-/// |r_k| above [`REPEATS`] with r_k = sum x_i x_(i+k) / sum x_i^2 about the mean. Mains hum is
-/// removed first.
+/// Whether a stretch repeats itself, or its negative, at a lag k of at most [`BLOCK`] samples, as
+/// motion does: |r_k| above [`REPEATS`] with r_k = sum x_i x_(i+k) / sum x_i^2 about the mean.
+/// Mains hum is removed first.
 fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let mut apart: Vec<f64> = values.iter().map(|x| x - mean).collect();
@@ -215,8 +219,9 @@ fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
 /// that noise would do so once in a billion recordings, while another column moves.
 ///
 /// A sensor behind a play or a dead band also repeats values. A stretch therefore counts only if
-/// the column has white noise, if it jumps at the end (the output of a play continues from its last
-/// value), or if another column covers more of its range than any play.
+/// the column has white noise, if it jumps at the end of the stretch (the output of a play
+/// continues from its last value), or if another column covers more of its range than any play
+/// could hide.
 fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(usize, usize)> {
     let (low, high) = ends(values);
     let mut runs: Vec<(usize, usize)> = Vec::new();

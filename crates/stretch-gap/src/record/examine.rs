@@ -25,14 +25,14 @@ use crate::{
     search::{screen::Ground, selection::Found},
 };
 
-/// Smallest share of the gap of its stages that an error must promise to close. An error has an
-/// exact form, so its screen is nearly exact.
+/// Smallest share of the gap in its stages that an error must promise to close according to the
+/// screen. The form of an error is exactly known, so the screen is nearly exact.
 const MOST: f64 = 0.5;
-/// Smallest promised gain of a further error, as a share of the largest.
+/// Smallest promised gain of an error that is fitted, as a share of the largest promised gain.
 const NEAR: f64 = 0.5;
 /// Largest number of errors that are fitted.
 const FITTED: usize = 4;
-/// Number of errors that are fitted to convergence after a coarse fit.
+/// Number of the best errors that are fitted to convergence after coarse fits.
 const POLISHED: usize = 2;
 /// Smallest deviation of a scale from 1, and smallest offset as a share of the span, that are
 /// reported. Instruments are no more accurate than that.
@@ -70,7 +70,8 @@ impl Doubts {
         let all: Result<Vec<Option<Promising>>, GapError> =
             (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
         let looked: Vec<Promising> = all?.into_iter().flatten().collect();
-        // A gain is converted to a score by the number of samples per independent observation.
+        // `least` converts the required rise of the score to a sum of squares, by the number of
+        // samples per independent observation.
         let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
         let counts = |p: &&Promising| p.share > MOST && p.fall > least;
         let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
@@ -83,8 +84,8 @@ impl Doubts {
         Ok(Self { looked, errors })
     }
 
-    /// Searches more closely if the best set of effects leaves more than model discrepancy may, or
-    /// if parameters are at their bounds.
+    /// Fits more errors if the best set of effects leaves a gap larger than [`allowed_gap`], or if
+    /// parameters are at the ends of their tolerances.
     pub(crate) fn closer_if(
         mut self,
         problem: &PreparedProblem<'_>,
@@ -147,8 +148,8 @@ fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> 
     found
 }
 
-/// Whether a parameter that is evidence is at an end of its tolerance, or any two parameters of one
-/// stage are.
+/// Whether any stage has two parameters at an end of their tolerances, or one such parameter whose
+/// value says something about the rig (`is_evidence`).
 fn is_strained(problem: &PreparedProblem<'_>, model: &Model) -> bool {
     let specs = problem.simulator().parameters();
     let at_end = |p: &usize| {

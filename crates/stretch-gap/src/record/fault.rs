@@ -1,5 +1,5 @@
-//! Hypotheses about errors: each is one error of the recording or of the rig file, expressed as an
-//! effect with one parameter.
+//! Hypotheses about errors. Each is one error of the recording or of the rig file, expressed as an
+//! effect with one parameter (its size).
 
 use stretch_data::ends;
 use stretch_effects::{EffectParameter, Role};
@@ -15,7 +15,7 @@ const FACTORS: (f64, f64) = (-0.95, 9.0);
 /// Powers of ten around which factors of an output are searched, in addition to 1. Such factors
 /// occur if the simulator uses other units.
 const DECADES: [i32; 8] = [-4, -3, -2, -1, 1, 2, 3, 4];
-/// Range of factors around a power of ten: from a third of it to three times it.
+/// Range of factors around a power of ten, as multiples of it: from 1/sqrt(10) to sqrt(10).
 const NEAREST: (f64, f64) = (0.316, 3.163);
 /// Largest offset that is searched, in spans of the column.
 const SPANS: f64 = 20.0;
@@ -43,7 +43,7 @@ pub(crate) struct Fault {
     pub(crate) kind: Kind,
     /// Index of the column; `None` for a parameter.
     pub(crate) column: Option<usize>,
-    /// Stages whose simulation it changes.
+    /// Stages whose simulation the error changes.
     pub(crate) touches: Vec<usize>,
     name: String,
     unit: String,
@@ -123,7 +123,7 @@ impl Fault {
         is_own.then_some(share - 1.0)
     }
 
-    /// Whether the factors of this fault are larger than any sensor error.
+    /// Whether the factors of this fault differ from 1 by more than any sensor error.
     pub(crate) fn is_beyond(&self) -> bool {
         self.base != 1.0
     }

@@ -93,9 +93,9 @@ pub(crate) fn allowed_gap(problem: &PreparedProblem<'_>, thresholds: &Thresholds
 /// tie for the best, as they are reported, and the search result with the best error instead of the
 /// effects. Returns `None` if the effects win.
 ///
-/// An error has an exact form and one parameter, so that it leaves almost only noise. It wins if
-/// its score is higher than that of the best set of effects and if it leaves no more than a named
-/// set may.
+/// The form of an error is exactly known and has one parameter, so the right error leaves almost
+/// only noise. An error wins if its score is higher than that of the best set of effects and if it
+/// leaves no larger gap than a named set may leave.
 pub(crate) fn weigh_errors(
     doubted: &PreparedProblem<'_>,
     suspect: &Suspect<'_>,

@@ -1,5 +1,5 @@
-//! Errors of the recording and of the rig file. They are hypotheses like the effects, and more
-//! frequent than these.
+//! Errors of the recording and of the rig file. They are treated as hypotheses like effects; in
+//! practice, they occur more often than missing effects.
 //!
 //! Input: the columns of a recording, a prepared problem, and the result of the search for effects.
 //! Output: the [`gross::Gross`] errors, if one is more probable than every set of effects, each

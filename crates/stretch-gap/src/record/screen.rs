@@ -1,4 +1,5 @@
-//! Screens every error cheaply: how large it would be, and how much of the gap it could explain.
+//! Estimates cheaply, for every error, how large it would be and how much of the gap it could
+//! explain.
 //!
 //! The influence of an error on an output is known in closed form. Its size is therefore estimated
 //! by regression on the output as shipped, without a simulation:
@@ -8,10 +9,11 @@
 //! ```
 //!
 //! m is the measured and y the simulated output; the delay is searched with scale and offset left
-//! free. The size of a parameter's error is one Gauss-Newton step without its tolerance. Then one
-//! or two simulations per stage show what remains, from two starting points. One is the rig as
-//! shipped after one step of all parameters within their tolerances, because a large error distorts
-//! the re-tuned parameters. The other is the re-tuned rig, which is better for a small error.
+//! free. The error of a parameter is estimated by one Gauss-Newton step without its tolerance. Then
+//! one or two simulations per stage show what remains, for each of two starting points. One is the
+//! rig as shipped after one step of all parameters within their tolerances, because a large error
+//! distorts the re-tuned parameters. The other is the re-tuned rig, which is better for a small
+//! error.
 
 use rayon::prelude::*;
 
@@ -33,9 +35,11 @@ const COMMANDS: [f64; 4] = [-0.5, -0.2, 0.25, 1.0];
 /// Factors at which a parameter is tried in addition to the Gauss-Newton step, as deviations from
 /// 1: smaller, larger.
 const FACTORS: [[f64; 2]; 2] = [[-0.4, -0.8], [0.5, 4.0]];
-/// Share of the tolerance beyond which a parameter counts as at its end.
+/// Share of the largest allowed deviation (`REACH` standard deviations) beyond which a parameter
+/// counts as at the end of its tolerance.
 pub(crate) const END: f64 = 0.99;
-/// Number of standard deviations within which a parameter is not wrong.
+/// Number of standard deviations from the nominal value within which a parameter does not count as
+/// wrong.
 pub(crate) const REACH: f64 = 3.0;
 
 /// An error that could explain part of the gap.
@@ -44,8 +48,8 @@ pub(crate) struct Promising {
     pub(crate) fault: usize,
     /// Model that a fit may start from.
     pub(crate) start: Model,
-    /// Model from which a fit around the rig as shipped may start. There, a large error has not
-    /// distorted the re-tuned parameters.
+    /// Model near the rig as shipped from which a fit may start. Its parameters have not been
+    /// distorted by re-tuning in the presence of a large error.
     pub(crate) plain: Option<Model>,
     /// Reduction of the sum of squares, in multiples of the noise variance.
     pub(crate) fall: f64,
@@ -84,8 +88,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(bench)
     }
 
-    /// Returns the best size of one error and its promised reduction; `None` if no size can be
-    /// simulated or none is tried.
+    /// Returns the most promising size of one error, with the reduction that it promises. `None` if
+    /// no size is tried or none can be simulated.
     pub(crate) fn look(&self, fault: usize) -> Result<Option<Promising>, GapError> {
         let one = &self.suspect.faults()[fault];
         let mut best: Option<Promising> = None;
@@ -148,8 +152,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(self.promising(fault, model, fall))
     }
 
-    /// Starts from the re-tuned rig: simulates the change by the error, and scales it for the
-    /// largest reduction.
+    /// Starts from the re-tuned rig: simulates the change that the error causes, and scales the
+    /// change so that the reduction is largest.
     fn beside_retuned(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
         let base = &self.problem.nominal.model;
         let one = &self.suspect.faults()[fault];
@@ -264,10 +268,10 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         (best != 0).then_some(best as f64 * dt_s)
     }
 
-    /// Returns the factors of a parameter, as deviations from 1, that are tried. There are none
+    /// Returns the factors of a parameter, as deviations from 1, that are tried. None is tried
     /// unless re-tuning moved the parameter to an end of its tolerance, or would move it beyond
-    /// without the tolerance. Several factors are tried because a linearisation shows the direction
-    /// of a large error, but not its size.
+    /// that end if there were no tolerance. Several factors are tried because a linearisation shows
+    /// the direction of a large error, but not its size.
     fn factors(&self, fault: &Fault, parameter: usize) -> Vec<f64> {
         let spec = &self.problem.simulator().parameters()[parameter];
         let far = |value: f64, reach: f64| (value - spec.nominal).abs() > reach * spec.sd;

@@ -1,9 +1,9 @@
 //! A simulator whose recording or rig file may be wrong.
 //!
 //! An error is treated as an effect, so that it is fitted together with the nominal parameters. The
-//! recorded values do not change. Instead, a simulated output is distorted like its column, and a
-//! stage that a column drives is driven by the corrected column. Every hypothesis is therefore
-//! compared with the same measurements.
+//! recorded values do not change. Instead, the simulated output is distorted in the same way as the
+//! recorded column, and a stage that the column drives is run on the corrected column. Every
+//! hypothesis is therefore compared with the same measurements.
 
 use std::{collections::VecDeque, sync::Mutex};
 
@@ -34,7 +34,7 @@ pub(crate) struct Suspect<'a> {
     columns: Vec<Column<'a>>,
     faults: Vec<Fault>,
     corrected: Mutex<VecDeque<Entry<'a>>>,
-    /// Index of the first error among the effects; those of the catalogue precede it.
+    /// Index of the first error among the effects; the effects of the catalogue precede it.
     first: usize,
 }
 

@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use stretch_data::written_unit;
 
-/// Largest relative deviation of a factor from that of two units.
+/// Largest relative deviation of a ratio from the factor of a pair of units.
 const WITHIN: f64 = 0.01;
 
-/// Pairs of units of one quantity, with the number of first units in one second unit.
+/// Pairs (a, b, factor) of units of the same quantity: one b is `factor` times one a.
 const PAIRS: [(&str, &str, f64); 24] = [
     ("rpm", "rad/s", 60.0 / TAU),
     ("deg/s", "rad/s", 180.0 / PI),
@@ -35,11 +35,11 @@ const PAIRS: [(&str, &str, f64); 24] = [
     ("Pa", "kPa", 1e3),
 ];
 
-/// Returns the units of simulator and recording that explain why the simulator's output is `ratio`
-/// times the recording, for example "rpm for rad/s". The recording is in `unit`, and `sd` is the
-/// relative standard deviation of the ratio. The ratio must match a pair of units within 1 %; if
-/// exactly one pair matches within two standard deviations, that pair is accepted as well.
-/// Otherwise returns `None`.
+/// Returns the two units that explain why the simulator's output is `ratio` times the recording.
+/// For example, "rpm for rad/s" means that the simulator uses rpm and the recording rad/s. The
+/// recording is in `unit`, and `sd` is the relative standard deviation of the ratio. The ratio must
+/// match a pair of units within 1 %; if exactly one pair matches within two standard deviations,
+/// that pair is accepted as well. Otherwise returns `None`.
 pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
     let unit = if unit.is_empty() { "1" } else { written_unit(unit) };
     let all = PAIRS.iter().flat_map(|&(a, b, factor)| [(a, b, factor), (b, a, 1.0 / factor)]);

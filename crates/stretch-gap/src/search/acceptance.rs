@@ -1,15 +1,17 @@
 //! The criteria for adding an effect to a set, with their limits from [`Thresholds`].
 //!
-//! 1. It closes at least `share` of the gap that is left in its stages.
-//! 2. The score and the likelihood by [octaves](crate::fit::octaves) both rise by `rise` nats.
-//! 3. It closes more than *model discrepancy*: an effect in the right place leaves up to the share
-//!    `model_discrepancy` of what it closes, with any number of samples, because its form differs
-//!    from the rig's. Otherwise, the score must rise by `faint_rise`, only noise may be left, and
-//!    the rise by octaves must exceed the discrepancy. `faint_rise` also applies below
-//!    `null_excess`.
+//! 1. The effect closes at least the share `share` of the gap that is left in its stages.
+//! 2. The score, and the likelihood by [octaves](crate::fit::octaves) of frequency, both rise by
+//!    `rise` nats. If the effect closes less than `null_excess`, the score must rise by
+//!    `faint_rise`.
+//! 3. The effect closes more than *model discrepancy*: the effects of the smaller set may leave up
+//!    to the share `model_discrepancy` of what they close, even with infinitely many samples,
+//!    because their forms differ from those of the rig. An effect that closes no more than that is
+//!    added only if the score rises by `faint_rise`, only noise is left, and the rise by octaves
+//!    exceeds the discrepancy.
 //!
-//! The criteria must also hold with [deviations](crate::fit::deviations) of form added to both
-//! sets.
+//! The criteria must also hold if [deviations](crate::fit::deviations) from the usual forms of the
+//! effects are added to both sets.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},

@@ -1,10 +1,11 @@
-//! Answers of simpler methods to the same data, which show what the full search gains.
+//! Applies simpler methods to the same data, for comparison with the full search. Each omits a part
+//! of it:
 //!
 //! | method | leaves out |
 //! | --- | --- |
 //! | largest drop | re-tuning: nominal parameters stay as shipped |
 //! | signature | the fit: one change of the output, correlated with the residual |
-//! | BIC | correlation of samples, held-out data, and sets of several effects |
+//! | Bayesian information criterion (BIC) | correlation of samples, held-out data, and sets of several effects |
 
 use std::collections::BTreeMap;
 
@@ -50,7 +51,7 @@ const FAR: f64 = 4.0;
 /// Number of starts of an effect that are fitted.
 const STARTS: usize = 2;
 
-/// Applies three methods, each of which omits one step of the full search.
+/// Applies the three simpler methods.
 pub(crate) fn baselines(
     problem: &PreparedProblem<'_>,
     tried: &BTreeMap<Vec<usize>, Hypothesis>,
@@ -175,8 +176,8 @@ fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
     above.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Fits an effect on top of a model, from its best starts. Returns for each fit the misfits in the
-/// stages that the effect touches.
+/// Fits an effect, added to the model of `ground`, from its best starts. Returns for each fit the
+/// misfits in the stages that the effect touches.
 fn fits(
     compare: &Comparison<'_>,
     ground: &Ground,

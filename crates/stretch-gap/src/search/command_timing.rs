@@ -1,11 +1,12 @@
 //! Decides whether commands switch at rows of the recording or anywhere between two rows.
 //!
-//! If every second row of a recording was dropped, a switch appears up to a row late. The
-//! [parameter](crate::RecordFacts::command_timing) for the mean advance of a switch before its row
-//! is then re-tuned, and the variation between switches is a marginalised nuisance. A missing
-//! effect (a late valve) also gains from this freedom as long as it is not in the model. Therefore,
-//! if the second hypothesis is likelier at first, both are searched to the end, and the larger
-//! likelihood decides.
+//! If every second row of a recording was dropped, a switch appears up to a row late. Under the
+//! hypothesis that commands switch between rows, the
+//! [parameter](crate::RecordFacts::command_timing) for the mean time from a switch to its row is
+//! re-tuned, and the variation between switches is a marginalised nuisance. If an effect is missing
+//! (such as a late valve), this freedom also improves the fit. Therefore, if this hypothesis is
+//! likelier without effects, effects are searched under both hypotheses, and the larger likelihood
+//! then decides.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -16,7 +17,8 @@ use crate::{
     search::selection::Search,
 };
 
-/// Returns the simulator with commands that switch between rows; `None` if this does not apply.
+/// Returns the simulator with commands that switch between rows; `None` if the facts about the
+/// recording list no parameters for this.
 pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     let timing = &simulator.record().command_timing;
     let altered = |i: usize, p: &ParameterSpec| {
@@ -27,8 +29,8 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
 }
 
 /// Returns the problem with the larger likelihood, and the set of effects to continue from. The
-/// problem with commands between rows is prepared only if it applies and there is a gap in a stage
-/// that depends on the timing.
+/// problem in which commands switch between rows is prepared only if `between_rows` is given and
+/// there is a gap in a stage that depends on the timing.
 pub(crate) fn likelier<'a>(
     at_rows: PreparedProblem<'a>,
     between_rows: Option<&'a Altered<'a>>,

@@ -2,9 +2,9 @@
 //! found.
 //!
 //! A larger nuisance of a stage may explain the same as an effect of that stage. Therefore two
-//! hypotheses are compared by their likelihoods: the best set with the nuisances estimated for it,
-//! and that set without the effects of the drifting stages, with the nuisances estimated for the
-//! smaller set.
+//! hypotheses are compared by their likelihoods. One is the best set of effects, with nuisances
+//! estimated for it. The other is that set without the effects in stages with nuisances, with
+//! nuisances estimated for this smaller set.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Returns the problem with the re-estimated nuisances, and the set to continue from; `None` if the
-/// nuisances stay as described.
+/// nuisances do not change.
 pub(crate) fn re_estimated<'a>(
     problem: &PreparedProblem<'a>,
     sets: &mut Sets<'_>,

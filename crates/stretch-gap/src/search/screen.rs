@@ -1,17 +1,19 @@
 //! Screens every effect with one simulation per start instead of a fit.
 //!
-//! Let d be the change of the output by an effect at a start, in multiples of the noise, r the
-//! residual, and A the sensitivities of the nominal parameters, whose prior precision is 1. What
-//! the parameters can do is projected out:
+//! A start is a set of parameter values of an effect. Let d be the change of the output that an
+//! effect causes at a start, in multiples of the noise, r the residual, and A the sensitivities to
+//! the nominal parameters in units of their tolerances (prior precision 1). The changes that the
+//! parameters can cause are projected out:
 //!
 //! ```text
 //! <x, y> = x'V^-1 y - x'V^-1 A (A'V^-1 A + b I)^-1 A'V^-1 y
 //! ```
 //!
-//! If the effect is a times as strong, the cost changes by (0.5 a^2 <d,d> - a <d,r>)/b, with b
-//! samples per block. The reduction at the minimum a = <d,r>/<d,d> is the *gain*, half the score
-//! statistic of Rao (1948, doi 10.1017/S0305004100023987). A strength is scaled by a; the start of
-//! a threshold is kept. Gains only select what is fitted, because real changes are not linear.
+//! If the change d is multiplied by a factor a, adding it changes the cost by (0.5 a^2 <d,d> - a
+//! <d,r>)/b, with b samples per block. The reduction at the minimum a = <d,r>/<d,d> is the *gain*,
+//! half the score statistic of Rao (1948, doi 10.1017/S0305004100023987). A fit starts with the
+//! strength of the effect scaled by a; a threshold cannot be scaled, so its start is kept. Gains
+//! only select which effects are fitted, because real changes are not linear.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -31,10 +33,11 @@ const SCALED: f64 = 8.0;
 /// Smallest change that counts, as a sum of squares in multiples of the noise variance.
 const NO_CHANGE: f64 = 1e-9;
 
-/// Number of values between a threshold that changes nothing and one that changes too much.
+/// Number of values that are tried between a threshold that changes nothing and one that changes
+/// too much.
 const BETWEEN: usize = 7;
 
-/// Values of an effect, with <d,d> and <d,r> of the change that they cause.
+/// Parameter values of an effect, with <d,d> and <d,r> of the change d that they cause.
 type Tried = (Vec<f64>, (f64, f64));
 
 /// The result of the screen of one effect.
@@ -90,7 +93,7 @@ impl Ground {
 }
 
 impl Comparison<'_> {
-    /// Screens one effect on top of a model.
+    /// Screens one effect that is added to the model of `ground`.
     pub(crate) fn screen(&self, ground: &Ground, effect: usize) -> Result<Screened, GapError> {
         let spec = &self.simulator().effects()[effect];
         let mut starts = Vec::new();
@@ -136,8 +139,8 @@ impl Comparison<'_> {
         Ok(Screened { effect, starts, sizes })
     }
 
-    /// Returns <d,d> and <d,r> of the change d at each of some values of an effect; `None` if there
-    /// is no change or it cannot be simulated.
+    /// Returns <d,d> and <d,r> of the change d that an effect causes at each of the given starts;
+    /// `None` if nothing changes or the start cannot be simulated.
     pub(crate) fn changes(
         &self,
         ground: &Ground,
@@ -153,8 +156,8 @@ impl Comparison<'_> {
         Ok(there.into_iter().map(|own| self.change(ground, touches, own?)).collect())
     }
 
-    /// Returns <d,d> and <d,r> of a change, from the residuals with the effect in the stages that
-    /// it touches.
+    /// Returns <d,d> and <d,r> of a change d; `there` holds the residuals with the effect, for the
+    /// stages that it touches.
     fn change(
         &self,
         ground: &Ground,
@@ -189,7 +192,8 @@ impl Comparison<'_> {
                 normal[(i, j)] = p;
                 normal[(j, i)] = p;
             }
-            // The prior adds 1 for a block, that is, b for the sum over samples.
+            // The prior precision is 1 if a block counts as one observation. This matrix sums over
+            // samples, so the precision is multiplied by the b samples of a block.
             normal[(i, i)] += self.roles.block as f64;
         }
         let factor = Cholesky::of(normal);
@@ -215,14 +219,14 @@ impl Comparison<'_> {
     }
 }
 
-/// Returns values of a threshold between the last start that changes nothing and the first that
-/// changes more than twice too much, with every shape. The best value may lie between two such
-/// starts. Empty if a start changes about as much as the residual requires, or if the starts were
-/// chosen for this effect.
+/// Returns starts with threshold values between the last catalogued start that changes nothing and
+/// the first that changes more than twice too much, combined with every shape. The best value may
+/// lie between these two. Empty if a catalogued start already lowers the cost, or if the starts are
+/// not the automatic ones.
 fn jumped_over(spec: &EffectSpec, tried: &[Tried]) -> Vec<Vec<f64>> {
     let threshold = spec.parameters[0].off().filter(|off| *off != 0.0);
     let Some(off) = threshold else { return Vec::new() };
-    // This start alone lowers the cost.
+    // Such a start lowers the cost without being scaled.
     let is_promising = tried.iter().any(|(_, (own, with_residual))| *with_residual > 0.5 * own);
     if is_promising || spec.starts != EffectParameter::starts(&spec.parameters) {
         return Vec::new();

@@ -1,10 +1,11 @@
-//! The search: forward selection, backward elimination, and alternatives for every effect.
+//! Searches the best set of effects by forward selection, backward elimination, and alternatives
+//! for every effect.
 //!
-//! Greedy selection is too certain of a strong effect that replaces several small ones. The search
-//! therefore revises its choice in three ways. Weak effects are removed, with the rest fitted again
-//! from the larger set. Every effect of the best set is compared with alternatives fitted in its
-//! place. An alternative with a better score replaces the effect, and the search continues from
-//! there.
+//! Greedy forward selection may keep a strong effect that stands for several smaller ones. The
+//! search therefore revises its choice in three ways. Weak effects are removed, with the rest
+//! fitted again from the larger set. Every effect of the best set is compared with alternatives
+//! fitted in its place. An alternative with a better score replaces the effect, and the search
+//! continues from there.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -29,10 +30,10 @@ const KEPT_LATER: usize = 5;
 const LEADERS: usize = 4;
 /// Number of alternatives that are fitted for a single effect, and for an effect in a larger set.
 pub(crate) const RIVALS: (usize, usize) = (6, 3);
-/// Share of the required rise that a screen must promise. It is small because a screen
-/// underestimates a non-linear change.
+/// Share of the required rise of the score that the screen must promise. It is small because a
+/// screen underestimates a non-linear change.
 const PROMISE: f64 = 0.1;
-/// Share of the best gain below which an effect is not fitted.
+/// Smallest gain of an effect that is fitted, as a share of the best gain.
 const FAINT: f64 = 0.03;
 /// Smallest gain of an alternative, as a share of the gain of the effect that it would replace.
 /// Twins are fitted with any gain.
@@ -40,8 +41,8 @@ pub(crate) const RIVALRY: f64 = 0.5;
 /// Largest number of times that an effect of the best set is replaced.
 const EXCHANGES: usize = 2;
 
-/// Number of cached screens, which covers the models between an effect's selection and the search
-/// for its alternatives.
+/// Number of cached screens. The screen that selected an effect is then still cached when
+/// alternatives to that effect are searched.
 const LOOKED: usize = 4;
 
 /// The search over sets of effects.
@@ -54,8 +55,8 @@ pub(crate) struct Search<'a> {
     /// Whether candidates with little promise in the screen are also fitted before a gap is left
     /// unexplained.
     is_thorough: bool,
-    /// Cached screens, the newest first. The alternatives of a single effect come from the screen
-    /// that found it.
+    /// Cached screens, the newest first. If the best set has a single effect, its alternatives come
+    /// from the screen that found it.
     looked: Vec<Arc<Looked>>,
 }
 
@@ -84,8 +85,8 @@ impl<'a> Search<'a> {
         Self { problem, acceptance, sets, depth, is_thorough: true, looked: Vec::new() }
     }
 
-    /// Returns a search that fits only effects that a screen promises, which suffices to estimate
-    /// the noise levels.
+    /// Returns a search that fits only effects that the screen finds promising. This is sufficient
+    /// to estimate the nuisances.
     pub(crate) fn quick(self) -> Self {
         Self { is_thorough: false, ..self }
     }
@@ -100,7 +101,7 @@ impl<'a> Search<'a> {
         Search { sets, ..Search::new(problem, self.acceptance.thresholds, self.depth) }
     }
 
-    /// Extends a set of a quick search by a thorough search.
+    /// Extends the set that a quick search found by a thorough search.
     pub(crate) fn thoroughly(
         &mut self,
         from: Hypothesis,
@@ -110,8 +111,8 @@ impl<'a> Search<'a> {
         self.grow(from, progress)
     }
 
-    /// Finds the best set by extending a set of this or another problem. Effects are added as long
-    /// as they meet the acceptance criteria.
+    /// Finds the best set by extending `from`, a set that was fitted in this or in another problem.
+    /// Effects are added as long as they meet the acceptance criteria.
     pub(crate) fn best(
         &mut self,
         from: &Hypothesis,
@@ -124,8 +125,8 @@ impl<'a> Search<'a> {
     }
 
     /// Compares a set with its alternatives. An alternative with a better score replaces an effect
-    /// of the set, because the strongest effect is chosen first and may have replaced several
-    /// others.
+    /// of the set. This is needed because the strongest effect is chosen first and may have taken
+    /// the place of several others.
     pub(crate) fn rivalled(
         &mut self,
         mut best: Hypothesis,
@@ -177,10 +178,10 @@ impl<'a> Search<'a> {
         self.looked_at(&self.problem.nominal.model)
     }
 
-    /// Returns the better of two sets: the set found, and what grows from the runner-up of the
-    /// first round. A strong effect may replace two others, each of which alone is worse, so
-    /// exchanging single effects would not find the pair. Sets with fewer than two added effects
-    /// are returned unchanged.
+    /// Returns the better of two sets: the set that was found, and the set that grows from the
+    /// runner-up of the first round. A strong effect may take the place of two others, each of
+    /// which alone is worse. Exchanging single effects would not find this pair. Sets with fewer
+    /// than two added effects are returned unchanged.
     fn second_line(
         &mut self,
         begun: usize,
@@ -202,7 +203,8 @@ impl<'a> Search<'a> {
         Ok(if other.score > best.score { other } else { best })
     }
 
-    /// Sorts the effects of a set by the loss of score without each, the largest first.
+    /// Sorts the effects of a set by the score that is lost if the effect is removed, the largest
+    /// loss first.
     fn strongest_first(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
         let mut losses: BTreeMap<usize, f64> = BTreeMap::new();
         for &effect in &set.effects {
@@ -228,8 +230,8 @@ impl<'a> Search<'a> {
             let mut next = self.first_accepted(&best, ground, &list)?;
             let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
             if next.is_none() && is_open && self.is_thorough && !self.problem.is_spent() {
-                // A screen is linear. Before a gap is left unexplained, every effect that could
-                // cause it is fitted.
+                // A screen assumes linear changes. Before a gap is left unexplained, every effect
+                // that could cause it is therefore fitted, whatever its gain in the screen.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
                 let others = self.others(&best, screened, &list);
                 let least = |effect| self.least_gain(&best, effect);
@@ -246,8 +248,9 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// Returns the first extension that meets the acceptance criteria, in order of score. The best
-    /// one may fail them if it only explains what model discrepancy left elsewhere.
+    /// Returns the extension of `base` with the highest score that meets the acceptance criteria.
+    /// The extension with the highest score of all may fail them, if it only explains the model
+    /// discrepancy of other effects.
     fn first_accepted(
         &mut self,
         base: &Hypothesis,
@@ -334,7 +337,7 @@ impl<'a> Search<'a> {
         list
     }
 
-    /// Returns the smallest gain with which an effect on top of `base` is considered.
+    /// Returns the smallest gain with which an effect is considered as an extension of `base`.
     fn least_gain(&self, base: &Hypothesis, effect: usize) -> f64 {
         let rise = self.acceptance.least_rise(self.acceptance.left(base, effect));
         // Gains count a block as one observation, scores use the effective sample size.
@@ -342,7 +345,8 @@ impl<'a> Search<'a> {
     }
 
     /// Returns sets in which one effect of `best` is replaced by another, each with the replaced
-    /// effect. Only replacements that a screen promises, and twins, are fitted.
+    /// effect. Only replacements that the screen finds promising, and twins of the replaced effect,
+    /// are fitted.
     fn rivals(&mut self, best: &Hypothesis) -> Result<Vec<(usize, Hypothesis)>, GapError> {
         let mut out = Vec::new();
         let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };

@@ -1,8 +1,9 @@
 //! Fits sets of effects and stores every result.
 //!
-//! A smaller set is fitted both from below and from the larger set that contains it, and the better
-//! fit counts. The likelihood ratio of nested hypotheses is a ratio of maxima, so a better start of
-//! the larger fit must not count as evidence for the additional effect.
+//! A set may be fitted in two ways: as an extension of a smaller set, and starting from a larger
+//! set of which one effect is removed. The better fit counts. The likelihood ratio of nested
+//! hypotheses compares two maxima, so a better starting point of the larger set must not count as
+//! evidence for the additional effect.
 //!
 //! A fit changes only one component: stages that are linked through effects or fitted parameters.
 //! The other components of the set stay as they are.
@@ -32,13 +33,13 @@ use crate::{
 /// the best.
 const STARTS: usize = 3;
 const PROMISING_START: f64 = 0.3;
-/// Excess from which parameters at the ends of their tolerances are suspicious: more error than
-/// noise.
+/// Excess above which parameters at the ends of their tolerances are suspicious. The residual then
+/// contains more error than noise.
 pub(crate) const LEFT: f64 = 1.0;
 /// Number of values that are tried in the range of a parameter on a logarithmic scale.
 const PLACES: usize = 6;
-/// Share of the best candidate's rise, plus a number of nats, within which a candidate may still
-/// win after a complete fit.
+/// A candidate may still win after a complete fit if its score is less than `NEAR` times the rise
+/// of the best candidate, plus `NEAR_NATS`, below the best score.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
 
@@ -55,7 +56,8 @@ pub(crate) struct Sets<'a> {
     pub(crate) tried: BTreeMap<Vec<usize>, Hypothesis>,
     /// Keys of the sets that were also fitted from a larger set.
     refitted: BTreeSet<Vec<usize>>,
-    /// Final models of the sets that were fitted with other nuisances; new fits start there.
+    /// Final models of the sets that were fitted in the same problem with other nuisances; new fits
+    /// start from these models.
     before: BTreeMap<Vec<usize>, Model>,
 }
 
@@ -100,7 +102,8 @@ impl<'a> Sets<'a> {
         (stages, own)
     }
 
-    /// Fits a set of another problem in this one, starting from its values there.
+    /// Fits a set in this problem, starting from the parameter values of `set`, which may come from
+    /// another problem.
     pub(crate) fn refit(&mut self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
         if set.effects.is_empty() {
             return Ok(self.problem.nominal.clone());
@@ -143,8 +146,8 @@ impl<'a> Sets<'a> {
         }
     }
 
-    /// Returns the stages linked to a new effect of `base`, and the part of a model that acts in
-    /// them.
+    /// Returns the stages that are linked to an effect added to `base`, and the part of `model`
+    /// that acts in these stages.
     fn part(&self, base: &Hypothesis, effect: usize, mut model: Model) -> (Vec<usize>, Model) {
         let effects: Vec<usize> = base.effects.iter().copied().chain([effect]).collect();
         let (stages, own) = self.component(&effects, effect);
@@ -152,7 +155,8 @@ impl<'a> Sets<'a> {
         (stages, model)
     }
 
-    /// Fits `base` with one more effect from a model that contains it, with the given effort.
+    /// Fits `base` with one more effect. The fit starts from a model that contains this effect, and
+    /// has the given effort.
     fn extend(
         &self,
         base: &Hypothesis,
@@ -167,7 +171,8 @@ impl<'a> Sets<'a> {
         Ok(Extended { set: self.join(base, effects, &stages, fitted), is_settled })
     }
 
-    /// Replaces the component of a set that was fitted.
+    /// Returns `base` with the effects `effects`, and with the component in `stages` replaced by
+    /// the fit.
     fn join(
         &self,
         base: &Hypothesis,
@@ -202,11 +207,12 @@ impl<'a> Sets<'a> {
         next
     }
 
-    /// Fits every effect of a list on top of `base`; the best come first.
+    /// Fits `base` with one more effect, for every effect of a list. Returns the fitted sets, the
+    /// best first.
     ///
     /// All effects are fitted coarsely from a few starts. Those whose score comes close to the
-    /// larger of `aim` and the best score, and the twins of the best, are then fitted to
-    /// convergence.
+    /// larger of `aim` and the best score, and the twins of the best (effects that are easily
+    /// confused with it), are then fitted to convergence.
     pub(crate) fn extend_all(
         &mut self,
         base: &Hypothesis,
@@ -234,8 +240,8 @@ impl<'a> Sets<'a> {
     }
 
     /// Fits a set again from the parameters as shipped if parameters are at the ends of their
-    /// tolerances and more than noise is left; the better fit is returned. Such parameters
-    /// compensated for an effect before it was added, and may then hold the effect at wrong values.
+    /// tolerances and the gap exceeds [`LEFT`]. Returns the better fit. Such parameters may have
+    /// compensated for an effect before it was added, and then keep the effect at wrong values.
     pub(crate) fn straightened(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
         for effect in set.effects.clone() {
             let straight = match self.is_bent(&set, effect) {
@@ -250,8 +256,8 @@ impl<'a> Sets<'a> {
         Ok(set)
     }
 
-    /// Whether parameters of an effect's stages are at the ends of their tolerances while more than
-    /// noise is left.
+    /// Whether parameters of an effect's stages are at the ends of their tolerances, the gap
+    /// exceeds [`LEFT`], and runs are left in the budget.
     fn is_bent(&self, set: &Hypothesis, effect: usize) -> bool {
         let simulator = self.problem.simulator();
         let stages = simulator.effects()[effect].touches.iter();
@@ -302,9 +308,9 @@ impl<'a> Sets<'a> {
         Ok(Some(straight).filter(|straight| straight.score > set.score && !is_bound))
     }
 
-    /// Returns the best coarse fit of every effect. With several starts, a very short fit of each
-    /// selects the start. With slightly changed nuisances, a short fit from the previous result
-    /// suffices.
+    /// Returns the best coarse fit of every effect. If an effect has several starts, a very short
+    /// fit from each selects one. If the set was already fitted with other nuisances, a very short
+    /// fit from that result suffices.
     fn coarse(
         &self,
         base: &Hypothesis,
@@ -335,7 +341,7 @@ impl<'a> Sets<'a> {
         Ok(fitted)
     }
 
-    /// Returns the models from which a fit of each effect on top of `base` may start.
+    /// Returns, for each effect, the models from which a fit of `base` with this effect may start.
     fn starts(
         &self,
         base: &Hypothesis,
@@ -351,7 +357,7 @@ impl<'a> Sets<'a> {
         screened.par_iter().map(of_one).collect()
     }
 
-    /// Returns the best of the very short fits from each start, for every effect.
+    /// Returns, for every effect, the best of very short fits from each of its starts.
     fn glanced(
         &self,
         base: &Hypothesis,
@@ -376,14 +382,14 @@ impl<'a> Sets<'a> {
         Ok(best)
     }
 
-    /// Notes the effects for which no fit was possible.
+    /// Notes which of the requested effects could not be fitted.
     fn take_out(&self, asked: &[usize], is_fitted: impl Fn(usize) -> bool) {
         let lost: Vec<usize> = asked.iter().copied().filter(|effect| !is_fitted(*effect)).collect();
         self.problem.compare.runs.not_fitted(&lost);
     }
 
-    /// Selects the effects of which a very short fit lowers the cost by at least `least`, or whose
-    /// last step still lowers it by that much. The screen is ignored.
+    /// Selects the effects for which a very short fit lowers the cost by at least `least`, in total
+    /// or in its last step. The gains of the screen are ignored.
     pub(crate) fn promising(
         &self,
         base: &Hypothesis,
@@ -403,7 +409,8 @@ impl<'a> Sets<'a> {
         Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
-    /// Fits to convergence what may still win; `None` for an effect whose fit cannot be simulated.
+    /// Fits to convergence the effects that may still win; `None` for an effect whose fit cannot be
+    /// simulated.
     fn fine(
         &self,
         base: &Hypothesis,
@@ -450,8 +457,8 @@ impl<'a> Sets<'a> {
             return Ok(self.tried.get(&key).unwrap_or(&self.problem.nominal).clone());
         };
         let refitted = self.join(set, rest, &stages, fitted);
-        // The better fit counts: what the larger set found about the other effects must not count
-        // for the effect that is removed.
+        // The better fit counts: if the fit of the larger set found better values of the other
+        // effects, this must not count as evidence for the removed effect.
         let better = match self.tried.remove(&key) {
             Some(other) if other.score >= refitted.score => other,
             _ => refitted,

@@ -1,5 +1,5 @@
 //! The answer of a diagnosis as a value: what was found, with its numbers.
-//! [`sentence`](super::sentence) describes it in words.
+//! [`sentence`](super::sentence) describes the answer in words.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -177,15 +177,15 @@ impl Closed {
 pub(crate) struct Findings<'a> {
     pub(crate) judged: &'a Judged,
     pub(crate) gap: Excess,
-    /// The most probable candidate, with its probability among all candidates, including an unknown
-    /// cause.
+    /// The most probable candidate. All candidates, including a cause outside the catalogue, share
+    /// the probability 1.
     pub(crate) first: Option<&'a Candidate>,
     pub(crate) shares: &'a [EffectShare],
-    /// What is left if the effects explain only a part.
+    /// The part of the gap that is left, if the effects explain only a part.
     pub(crate) unexplained: Option<&'a Unexplained>,
     /// Errors of the recording or of the rig file.
     pub(crate) gross: &'a [Gross],
-    /// Gap that noise alone may leave in 19 of 20 recordings.
+    /// Gap that noise alone does not exceed in 19 of 20 recordings.
     pub(crate) null_band: f64,
 }
 
@@ -213,7 +213,7 @@ impl Answer {
         }
     }
 
-    /// Returns the answer if no other finding overrides it.
+    /// Returns the answer before a check overrides it.
     fn seen(findings: Findings<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> Self {
         let Findings { judged, gap, gross, shares, null_band, .. } = findings;
         let Naming { faint, .. } = &judged.seen_naming;

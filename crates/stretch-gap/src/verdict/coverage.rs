@@ -2,10 +2,11 @@
 //!
 //! A named effect is a statement about the rig, not about the rows that happened to be usable. At
 //! least the share [`LEAST_SHARE`] of the rows is needed, so that the answer covers most of the
-//! recording. At least [`LEAST_TEST`] blocks are needed for testing, because a bootstrap of fewer
-//! gives no 95 % interval, and twice as many for fitting. With fewer than [`SHORT`] blocks for
-//! fitting, which is a few motions, lags cannot be distinguished. Then every set that closes as
-//! much as the first, within the interval of the first, ties with it, whatever the probabilities.
+//! recording. At least [`LEAST_TEST`] blocks of samples are needed for testing, because a bootstrap
+//! of fewer blocks gives no 95 % interval. Twice as many are needed for fitting. Fewer than
+//! [`SHORT`] blocks for fitting contain only a few motions, so that different lags cannot be
+//! distinguished. Then every set of effects that closes at least the lower end of the most probable
+//! set's 95 % interval is a tie with that set, whatever its probability.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -67,7 +68,7 @@ fn seconds(s: f64) -> String {
     if s < 4.95 { format!("{s:.1}") } else { format!("{s:.0}") }
 }
 
-/// Number of blocks for fitting below which lags cannot be distinguished.
+/// Number of blocks for fitting below which different lags cannot be distinguished.
 const SHORT: f64 = 120.0;
 
 /// Returns the reason why the recording is not sufficient to name an effect; `None` if it is.
@@ -84,7 +85,8 @@ pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Opti
     })
 }
 
-/// Whether so little was fitted that sets that close as much are treated as ties.
+/// Whether so few blocks were fitted that sets that close about the same share of the gap are
+/// treated as ties.
 pub(crate) fn is_short(roles: &SampleRoles) -> bool {
     fitted(roles) < SHORT
 }

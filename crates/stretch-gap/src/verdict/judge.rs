@@ -4,9 +4,9 @@
 //! | --- | --- |
 //! | the columns alone show an error, or an error of recording or rig file is more probable than every set of effects | `record` |
 //! | a cause outside the catalogue is the most probable | `unknown` |
-//! | effects are the most probable and the gap is relevant; only noise and model discrepancy are left | `effect` |
+//! | effects are the most probable, the gap is relevant, and only noise and model discrepancy are left | `effect` |
 //! | the same, but more is left, or the strongest effect is at an end of its range | `partial` |
-//! | no effect is the most probable, or the gap is too small to matter; there is a relevant gap as shipped | `parameters` |
+//! | that nothing is missing is the most probable, or the gap is too small to matter; there is a relevant gap as shipped | `parameters` |
 //! | the same, but there is no relevant gap as shipped | `no_gap` |
 //!
 //! A gap is relevant from `least_gap` on. Noise and discrepancy leave at most [`allowed`]. Two
@@ -41,7 +41,8 @@ pub(crate) struct Case<'a> {
     pub(crate) is_record: bool,
     /// The reason why the recording is not sufficient to name an effect, if it is not.
     pub(crate) too_little: Option<TooLittle>,
-    /// Whether so little was fitted that sets that close as much are treated as ties.
+    /// Whether so few blocks were fitted that sets that close about the same share of the gap are
+    /// treated as ties.
     pub(crate) is_short: bool,
 }
 
@@ -96,7 +97,7 @@ fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming
     let all = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
     match seen {
         VerdictKind::Effect | VerdictKind::Partial => all,
-        // Effects that are certain but small are reported below the headline.
+        // Effects that are probable but small are reported below the headline.
         VerdictKind::Parameters | VerdictKind::NoGap
             if case.posterior.effects() > case.posterior.nothing() =>
         {

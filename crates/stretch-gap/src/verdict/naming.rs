@@ -1,11 +1,12 @@
 //! Decides which effects are named in the headline, which are alternatives to these, and which are
-//! only reported below.
+//! only reported below the headline.
 //!
-//! Significance is not relevance: with 50 000 samples, sixty nats may correspond to a
-//! hundred-thousandth of the gap. What an effect closes in one of its stages, on trials that were
-//! not fitted, must therefore be a relevant gap itself; otherwise the effect is reported as faint.
-//! Alternatives come from the smallest collection of sets that holds 95 % of the probability. A set
-//! of it that differs from the first in one effect makes these two effects a tie.
+//! A significant effect may still be irrelevant: with 50 000 samples, a score of sixty nats may
+//! correspond to a hundred-thousandth of the gap. Therefore the part of the gap that an effect
+//! closes in one of its stages, on fitted or on test trials, must be a relevant gap by itself;
+//! otherwise the effect is reported as faint. Alternatives come from the smallest collection of
+//! sets that holds 95 % of the probability. If one of these sets differs from the most probable set
+//! in a single effect, the two effects in which they differ are a tie.
 
 use crate::{
     evidence::{candidates::Candidate, probability::covering, shares::EffectShare},
@@ -34,15 +35,16 @@ impl Naming {
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let size = |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_excess);
-        // An alternative that ranks first may have no share of its own. It then counts as relevant.
+        // If an alternative became the first candidate, no share was computed for its effect. The
+        // effect then counts as relevant.
         let counts = |name: &&String| size(name).is_none_or(|s| s >= thresholds.least_gap);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
-        // In a short recording, the probabilities separate sets that close the same share of the
-        // held-out gap.
+        // In a short recording, the probabilities of sets that close the same share of the gap may
+        // differ too much.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
         let rivals = candidates.iter().enumerate().skip(1);

@@ -1,17 +1,18 @@
 //! The experiment that distinguishes two hypotheses.
 //!
 //! The method is T-optimality (Atkinson and Fedorov 1975, doi 10.1093/biomet/62.1.57). In the best
-//! experiment, the alternative model stays as far as possible from the true one, although its
-//! parameters are fitted within what is already known. Let A be the tangents (derivatives) of the
-//! alternative's predictions and d the differences between the two predictions, for the data
-//! measured so far (index 0) and for the experiment (index 1):
+//! experiment, the predictions of the alternative model differ as much as possible from those of
+//! the true one, even after the parameters of the alternative are fitted as far as existing data
+//! and tolerances allow. Let x be the shifts of these parameters in a box, b the number of samples
+//! per block, A the derivatives of the alternative's predictions and d the differences between the
+//! two predictions, for the data measured so far (index 0) and for the experiment (index 1):
 //!
 //! ```text
 //! x = argmin of 0.5/b (|d_0 + A_0 x|^2 + |d_1 + A_1 x|^2) + 0.5 |x|^2 in its box,     D^2 = |d_1 + A_1 x|^2/samples
 //! ```
 //!
-//! Because it is unknown which model is true, each is assumed to be in turn, and the smaller D
-//! counts.
+//! Because it is unknown which model is true, each is assumed to be the true one in turn, and the
+//! smaller D counts.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -40,9 +41,9 @@ pub struct Plan {
     pub name: String,
     /// A sentence that says how the experiment is done.
     pub how: String,
-    /// Time to prepare it, minutes.
+    /// Time to prepare the experiment, minutes.
     pub prepare_min: f64,
-    /// What is commanded or imposed from outside, evenly sampled.
+    /// The commands and the quantities imposed from outside, evenly sampled.
     pub trial: Trial,
 }
 
@@ -67,7 +68,7 @@ pub trait Laboratory: Simulator {
     type Setting: Sync;
     /// Experiments to choose from, all with the same sample time.
     fn experiments(&self) -> Vec<(Plan, Self::Setting)>;
-    /// An experiment that represents what has been measured.
+    /// An experiment that represents the data measured so far.
     fn done(&self) -> Self::Setting;
     /// Returns the prediction of a model for an experiment: every recorded channel in units of its
     /// noise.
@@ -82,23 +83,24 @@ pub trait Laboratory: Simulator {
 pub struct Proposal {
     /// The recommendation.
     pub next: NextExperiment,
-    /// The trial: valve openings over time, and what is imposed from outside.
+    /// The trial: valve openings over time, and the quantities imposed from outside.
     pub trial: Trial,
     /// Every candidate experiment with its name, difference in multiples of the noise, and minutes;
     /// the best first.
     pub experiments: Vec<(String, f64, f64)>,
 }
 
-/// Recommends an experiment if the 95 % set of a diagnosis contains an effect that the most
-/// probable set lacks.
+/// Recommends an experiment that distinguishes the leading hypotheses of a diagnosis. Returns
+/// `None` if no effect outside the most probable set is among the effects that the data cannot
+/// distinguish (`Diagnosis::ambiguous`).
 ///
 /// D(x) is the root mean square difference between the predictions of the two leading hypotheses
 /// for the experiment x, in multiples of the noise. It is the difference that remains after the
-/// nominal and effect parameters of one hypothesis were moved (by linearisation) as close to the
-/// other as possible, within their tolerances and without losing the fit to existing data. Both
-/// directions are computed, and the smaller one counts. The experiment with the largest D^2 times
-/// blocks per minute is recommended, because evidence is proportional to D^2. The minutes include
-/// the preparation.
+/// nominal and effect parameters of one hypothesis were changed, in a linearised model, so that its
+/// predictions come as close to the other's as tolerances and the fit to existing data allow. Both
+/// directions are computed, and the smaller one counts. The experiment with the largest evidence
+/// per minute is recommended. Evidence is proportional to D^2 times the number of blocks, and the
+/// minutes include the preparation.
 ///
 /// # Errors
 /// Errors of the simulator.
@@ -171,8 +173,8 @@ fn rate<L: Laboratory>(
         .collect()
 }
 
-/// Returns a sentence on how often the experiment must be repeated to distinguish the hypotheses;
-/// empty if once suffices.
+/// Returns a sentence on how often the experiment must be run to distinguish the hypotheses; empty
+/// if one run suffices.
 fn repeats(d: f64, minutes: f64) -> String {
     let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / nats).ceil() {
@@ -184,8 +186,9 @@ fn repeats(d: f64, minutes: f64) -> String {
     }
 }
 
-/// Returns the first candidate, the most probable other one with an effect of the 95 % set that the
-/// first lacks, and the effects in which they differ.
+/// Returns two models and the effects in which they differ. One is the most probable candidate. The
+/// other is the most probable candidate with an effect that the first lacks and that the data
+/// cannot distinguish (`ambiguous`).
 fn rivals<'a>(
     simulator: &dyn Simulator,
     diagnosis: &Diagnosis,
@@ -210,7 +213,8 @@ fn rivals<'a>(
 struct Tangent {
     values: Vec<f64>,
     slopes: Vec<Vec<f64>>,
-    /// How far each parameter may move down and up, in tolerances or as a share of its range.
+    /// How far each parameter may move down and up: a nominal parameter in tolerances, an effect's
+    /// parameter as a share of its range.
     bounds: Vec<[f64; 2]>,
     channels: usize,
 }
@@ -250,7 +254,8 @@ impl Tangent {
                 let range = p.max - p.min;
                 let x = effect_values[k];
                 let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
-                // If the range is wide, the step is small relative to the value.
+                // If the range is searched on a logarithmic scale, the step is at most a tenth of
+                // the value.
                 let step = if p.is_log() && x > 0.0 {
                     step.signum() * (0.1 * x / range).min(SMALL)
                 } else {
@@ -281,7 +286,7 @@ fn left(
     rival: &Tangent,
 ) -> f64 {
     let n = rival.slopes.len();
-    // The prior: one tolerance is one unit of x.
+    // The prior precision is 1, because one tolerance is one unit of x.
     let mut normal = DMatrix::identity(n, n);
     let mut slope = vec![0.0; n];
     for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
@@ -362,8 +367,8 @@ mod tests {
         assert_relative_eq!(d, s / (scale + 1.0), epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Existing data prevent a re-tuning that would explain the experiment: a parameter that they
-    /// determine cannot move.
+    /// Existing data prevent a re-tuning that would explain the experiment: a parameter that these
+    /// data determine cannot move.
     #[test]
     fn what_is_known_pins_the_rival() {
         let [none, one, much, half] = [0.0, 1.0, 100.0, 0.5].map(|value| vec![value; 200]);
@@ -372,8 +377,8 @@ mod tests {
         // If the data do not determine the parameter, the four blocks of the experiment compete
         // with the prior, and 1/(4 + 1) of 0.5 remains.
         assert_relative_eq!(d(&none), 0.1, epsilon = 0.0, max_relative = 1e-9);
-        // If the data determine it with 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5)
-        // remains.
+        // If the data determine the parameter with 1e4 times as much evidence, 4e4, the difference
+        // remains except for the share 4/(4e4 + 5).
         let kept = 1.0 - 4.0 / 40_005.0;
         assert_relative_eq!(d(&much), 0.5 * kept, epsilon = 0.0, max_relative = 1e-9);
     }
@@ -388,7 +393,7 @@ mod tests {
         assert_relative_eq!(d, 7.0, epsilon = 0.0, max_relative = 1e-9);
     }
 
-    /// Evidence is half the squared difference, times the number of blocks; 3 nats suffice.
+    /// Evidence in nats is half the squared difference times the number of blocks. 3 nats suffice.
     #[test]
     fn runs_are_planned_where_one_will_hardly_do() {
         // A minute contains 120 blocks, so d^2 = 0.05 gives 3 nats.

@@ -13,8 +13,8 @@ use crate::{
     verdict::{answer::Answer, note::Note},
 };
 
-/// Returns notes that complete the answer: how it was tested, a channel that is hardly simulated,
-/// and the answer before it was overridden.
+/// Returns notes that complete the answer: that there is no test trial, that most of a channel is
+/// not simulated, and the answer before a check overrode it.
 pub(crate) fn answer_notes(
     answer: &Answer,
     sanity: &Sanity,
@@ -66,8 +66,8 @@ pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     stages.filter_map(note).collect()
 }
 
-/// Returns a note on how many models could not be simulated, of which sets of effects, and why the
-/// first failed.
+/// Returns a note that says how many models could not be simulated, to which sets of effects they
+/// belong, and why the first failed.
 pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
     let (models, first) = runs.lost_models()?;
     let count: usize = models.values().sum();
@@ -104,13 +104,13 @@ pub(crate) fn implausible_noise_notes(
     sanity.implausible.iter().map(note).collect()
 }
 
-/// Probability from which an oscillation is noted.
+/// Probability above which an oscillation is noted.
 const SWINGS: f64 = 0.95;
 
 /// Returns a note for each parameter of each stage that oscillates instead of drifting.
 ///
 /// An oscillation of a supply is not a modelling error, and the verdict counts it as drift. A user
-/// should know of it nevertheless.
+/// should know of the oscillation nevertheless.
 pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<String> {
     let simulator = problem.simulator();
     let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
@@ -149,13 +149,14 @@ pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     stages.filter_map(note).collect()
 }
 
-/// Share of the fitted time span by which test trials must lie outside of it.
+/// Share of the fitted time span by which test trials must lie outside this span for a note.
 const BEYOND: f64 = 0.1;
 
 /// Returns a note for each named effect that depends on session time and was extrapolated to the
 /// test trials, with both time spans.
 ///
-/// Within the fitted span, many functions of time fit equally well; beyond it they differ.
+/// Within the fitted time span, many functions of time fit equally well; beyond it, these functions
+/// differ.
 pub(crate) fn extrapolation_notes(
     simulator: &dyn Simulator,
     roles: &SampleRoles,
@@ -178,7 +179,8 @@ pub(crate) fn extrapolation_notes(
     named.iter().filter(drifts).filter(|_| is_beyond).map(note).collect()
 }
 
-/// Returns the session time of the first sample and of the end of the last sample in some roles, s.
+/// Returns the session time, s, of the first sample and of the end of the last sample in the roles
+/// that `is_in` selects.
 fn span_s(
     simulator: &dyn Simulator,
     roles: &SampleRoles,
@@ -196,8 +198,8 @@ fn span_s(
 /// Largest number of effects that are listed.
 const LISTED: usize = 6;
 
-/// Returns the effects that would have been named at the smallest share of their range, with their
-/// limits; `None` if there is none.
+/// Returns a note that lists the effects with the smallest detection limits, relative to their
+/// ranges; `None` if no limit is known.
 pub(crate) fn detection_limit_note(
     limits: &[DetectionLimit],
     effects: &[EffectSpec],

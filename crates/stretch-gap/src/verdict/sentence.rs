@@ -8,14 +8,14 @@ use crate::{
     },
 };
 
-/// What is left, in multiples of the noise, above which the text never claims that all of the gap
-/// is closed, or that it is certain.
+/// Size of the residual, in multiples of the noise, above which the text states at most 99 % of the
+/// gap as closed and at most 0.99 as a probability.
 const NOT_ALL: f64 = 1.5;
 
-/// Share of the gap from which effects are said to explain most of it.
+/// Share of the gap from which effects are said to explain the gap mostly, instead of in part.
 const MOST: f64 = 0.5;
 
-/// Smallest share that is given as a number.
+/// Smallest share that is given as a number, and not as "less than 1 %".
 const LEAST_SHARE_IN_WORDS: f64 = 0.01;
 
 /// Largest number of effects that are listed as not examined.
@@ -79,7 +79,8 @@ impl Diagnosis {
         }
     }
 
-    /// Returns the sentences of a diagnosis, with the next step if they do not contain it.
+    /// Returns the sentences of a diagnosis. The next step is added if the sentences do not already
+    /// say what to do.
     pub(crate) fn headline(&self) -> String {
         let finding = self.in_sentences(&two_digits);
         match &self.answer {
@@ -93,8 +94,8 @@ impl Diagnosis {
         }
     }
 
-    /// Returns what was not examined; empty if everything was. The text comes first, because an
-    /// answer from a part of the catalogue says nothing about the rest.
+    /// Returns what was not examined; empty if everything was. A report starts with this text,
+    /// because an answer from a part of the catalogue says nothing about the other effects.
     pub fn preface(&self) -> String {
         let mut out = match &self.cut_short {
             None => String::new(),
@@ -136,7 +137,7 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Answer {
-    /// Whether effects were found but more than noise is left with them.
+    /// Whether effects were found, but clearly more than noise is left after they are added.
     pub fn leaves_more_than_noise(&self) -> bool {
         match self {
             Self::Missing { closes, .. } => closes.left > NOT_ALL,
@@ -246,8 +247,8 @@ impl Answer {
     }
 }
 
-/// Describes the share of the gap that a hypothesis closes, with its interval; never 100 % if more
-/// than noise is left.
+/// Describes the share of the gap that a hypothesis closes, with its interval; at most 99 % if the
+/// residual exceeds [`NOT_ALL`].
 fn closed(closes: &Closed) -> String {
     let most = if closes.left > NOT_ALL { 99.0 } else { 100.0 };
     let percent = |share: f64| (100.0 * share).round().clamp(0.0, most);
@@ -255,9 +256,10 @@ fn closed(closes: &Closed) -> String {
     format!("{:.0} % ({low:.0} to {high:.0} %)", percent(closes.share))
 }
 
-/// Describes what is left with a hypothesis, and its probability, which is never 1 if more than
-/// noise is left. If most of it is left on the fitted trials, the text says so; tables give the
-/// value on the other trials.
+/// Describes the residual that a hypothesis leaves, and its probability, which is at most 0.99 if
+/// the residual exceeds [`NOT_ALL`]. If much more is left on the fitted trials than on the others,
+/// the text says that the number refers to the fitted trials; tables give the value on the other
+/// trials.
 fn left_with(closes: &Closed, probability: &dyn Fn(f64) -> String) -> String {
     let most = if closes.left > NOT_ALL { 0.99 } else { 1.0 };
     format!(
@@ -300,8 +302,8 @@ fn too_small(small: &[String]) -> String {
     }
 }
 
-/// Describes parameters at the ends of their tolerances. What pushes them there may also have
-/// distorted the values of the effects.
+/// Describes parameters at the ends of their tolerances. The cause that pushes them there may also
+/// have distorted the values of the effects.
 fn at_ends(ended: &[(String, f64)]) -> String {
     let all: Vec<String> =
         ended.iter().map(|(name, sigmas)| format!("{name} ({sigmas:+.1} tolerances)")).collect();
@@ -316,7 +318,7 @@ fn at_ends(ended: &[(String, f64)]) -> String {
     }
 }
 
-/// Describes ties and faint effects, for the text after the headline.
+/// Describes ties and faint effects, for the text after the first sentence.
 fn below(effects: &[MissingEffect], faint: &[String]) -> String {
     let mut out = String::new();
     if effects.iter().any(MissingEffect::is_tied) {

@@ -1,4 +1,5 @@
-//! Tests of terms, of the library and of the odds of sums, on signals whose every sample is known.
+//! Tests of terms, of the library of terms, and of the odds of sums of terms against coloured
+//! noise, on synthetic signals.
 
 mod shelf;
 mod terms;

@@ -1,4 +1,4 @@
-//! Tests of the library as a whole.
+//! Tests of the library of terms as a whole.
 
 use super::{inputs, roles, signal, wave};
 use crate::missing::{
@@ -11,7 +11,7 @@ use crate::missing::{
 use crate::problem::sample_roles::Role;
 use std::collections::BTreeSet;
 
-/// A state, a second state that is not a function of the first, and a command.
+/// Three signals: a state, a second state that is not a function of the first, and a command.
 fn three() -> TermInputs {
     let other: Vec<f64> = (0..600).map(|i| 0.5 + 0.4 * (0.031 * f64::from(i)).sin()).collect();
     let command: Vec<f64> = (0..600).map(|i| f64::from(i / 60 % 2)).collect();
@@ -33,8 +33,8 @@ fn no_term_stands_in_it_twice_and_each_has_its_words() {
         assert_eq!(told.len(), terms.len(), "a term twice would be paid for twice");
         let words: BTreeSet<String> = terms.iter().map(|t| words(t, &scales)).collect();
         assert!(words.iter().all(|w| !w.is_empty()));
-        // Shapes are written with three digits, and all shapes in the library differ by more than
-        // that.
+        // The words give shapes (widths, times, knees) with three digits. All shapes in the library
+        // differ in these digits.
         assert_eq!(words.len(), terms.len());
     }
 }
@@ -92,8 +92,8 @@ fn the_usual_causes_are_on_the_shelf() {
     assert!(holds(&[Play { signal: 0, width: 0.1 }]));
 }
 
-/// Quantiles, at which knees are placed, are computed from the fitted samples and not from the test
-/// samples.
+/// Quantiles, at which the kinks of `Above` and `Below` are placed, are computed from the fitted
+/// samples only.
 #[test]
 fn quantiles_are_those_of_fitted_samples() {
     let x: Vec<f64> = (0..100).map(|i| if i < 60 { f64::from(i) / 59.0 } else { 50.0 }).collect();
@@ -105,8 +105,8 @@ fn quantiles_are_those_of_fitted_samples() {
     assert!((middle - 0.5).abs() < 0.02, "{middle}");
 }
 
-/// If too few samples are held out, every third trial is held out. No fitted or held-out sample is
-/// lost.
+/// If too few samples are held out, every third trial is held out as well. The numbers of fitted
+/// and held-out samples still add up to the original number.
 #[test]
 fn terms_are_chosen_by_samples_that_were_not_fitted() {
     let enough = roles(&[400, 400, 400], 100);

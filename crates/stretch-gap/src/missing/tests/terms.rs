@@ -39,8 +39,9 @@ fn curves_are_what_their_equations_say() {
     }
 }
 
-/// A test trial may go below the fitted range, where a power has no real root and an exponential no
-/// bound. All values stay finite.
+/// A signal may go below its fitted range in a test trial. There, a fractional power would not be
+/// real and an exponential could become huge. The factors therefore keep their value at the lower
+/// end of the range.
 #[test]
 fn below_its_range_a_signal_counts_as_its_least() {
     let x = [-0.5, -0.01, 0.0, 0.2];
@@ -72,7 +73,8 @@ fn forms_of_the_rate_are_even_or_odd_as_friction_is() {
     assert!((at(Sign, &x) - 1.0).abs() < 1e-8 && at(Striction, &x) < 0.04);
 }
 
-/// A play of half-width w lags w behind a motion in one direction, and not at all at its start.
+/// For a motion x in one direction from 0, x - play(x, w) equals x until the motion exceeds the
+/// half-width w, and w afterwards.
 #[test]
 fn a_play_follows_its_width_behind() {
     let x: Vec<f64> = (0..200).map(|i| 0.005 * f64::from(i)).collect();
@@ -80,13 +82,13 @@ fn a_play_follows_its_width_behind() {
     assert_like(&held, x.iter().map(|x| x.min(0.1)));
 }
 
-/// A lag follows a ramp of slope r at a distance of r tau, once its start is forgotten.
+/// A lag follows a ramp of slope r at a distance of r tau, once the initial transient has decayed.
 #[test]
 fn a_lag_of_a_ramp_is_its_slope_times_its_time() {
     let x: Vec<f64> = (0..2000).map(|i| 0.0005 * f64::from(i)).collect();
     let behind = of(Lag { signal: 0, tau_s: 0.5 }, &x);
-    // The result may differ by half a sample (10 ms), because the lag may interpolate or hold
-    // between samples.
+    // The result may differ by the rise of the ramp in half a sample time, because the lag may
+    // interpolate or hold the ramp between samples.
     let expected = 0.05 * 0.5;
     assert!((behind[1999] - expected).abs() <= 0.05 * 0.5 * DT_S + LOCAL_VALUE, "{}", behind[1999]);
     assert_eq!(behind[0], 0.0);
@@ -118,7 +120,8 @@ fn peaks_and_turns_remember_what_they_should() {
 fn travel_counts_both_ways_and_no_noise() {
     let x = wave(629); // two ways up, two down: 4 ranges
     let far = of(Travel { signal: 0, power: 1.0 }, &x);
-    // The play of a hundredth loses distance at each of the three turns and at the end.
+    // The play that removes noise, a hundredth of the range wide, loses distance at each of the
+    // three turns and at the end.
     assert!((far[628] - 4.0).abs() < 0.1, "{}", far[628]);
     assert!(far.windows(2).all(|pair| pair[0] <= pair[1]));
     let rest: Vec<f64> = (0..500).map(|i| 0.5 + 0.004 * f64::from(i % 3 - 1)).collect();
@@ -195,8 +198,8 @@ fn a_product_is_that_of_its_factors_and_nothing_is_one() {
     assert_like(&of(&[a, b]), product);
 }
 
-/// A lag and its remainder add up to the whole. For a constant 1, starting from 0, the lag is 1 -
-/// exp(-t/tau).
+/// The passages `Lag` and `Rest` of a product of factors add up to the product itself. For the
+/// constant product 1, the lag starts from 0 and is 1 - exp(-t/tau).
 #[test]
 fn passages_part_what_they_are_given() {
     let inputs = inputs(vec![signal("x", wave(300), false)], &[300]);
@@ -205,14 +208,14 @@ fn passages_part_what_they_are_given() {
     assert_like(&of(Passage::Direct), lag.iter().zip(&rest).map(|(a, b)| a + b));
     let one = Term::new(&[], Passage::Lag { tau_s: 0.3 }).values(&inputs, 1);
     for (i, z) in one.iter().enumerate().skip(1) {
-        // The lag may start at the first sample, or a sample earlier or later.
+        // The test allows the lag to start at the first sample, or one sample earlier or later.
         let at = |i: f64| 1.0 - (-i * DT_S / 0.3).exp();
         assert!((at(i as f64 - 1.0) - 1e-9..=at(i as f64 + 1.0) + 1e-9).contains(z), "{i}: {z}");
     }
 }
 
-/// z' = g/tau - u z/tau. With u = 0, z integrates g. With u > 0 and a constant g, z tends to g/u
-/// with the time constant tau/u.
+/// The leak is z' = g/tau - u z/tau with the opening u. With u = 0, z integrates g. With u > 0 and
+/// a constant g, z tends to g/u with the time constant tau/u.
 #[test]
 fn a_leak_integrates_while_shut_and_forgets_while_open() {
     let with = |opening: f64| {

@@ -24,8 +24,8 @@ fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> 
 fn a_ridge_finds_weights_where_there_is_no_noise() {
     let mut random = RandomGenerator::new(1, 0);
     let weights = ridge(&rows(300, 3, 0.0, &mut random), &rows(100, 3, 0.0, &mut random));
-    // The smallest ridge is 1e-5 of the diagonal and shrinks the weights by this share. The cross
-    // products of 300 draws add a tenth of that.
+    // The smallest ridge is 1e-5 of the diagonal, so it shrinks the weights by this share. Because
+    // 300 random rows are not exactly orthogonal, a tenth of that is added.
     for (weight, expected) in weights.iter().zip([2.0, -1.0, 0.0, 0.0, 0.0]) {
         assert!((weight - expected).abs() < 1e-4, "{weights:?}");
     }
@@ -37,7 +37,7 @@ fn a_ridge_finds_weights_where_there_is_no_noise() {
 fn a_ridge_shrinks_where_columns_are_many() {
     let mut random = RandomGenerator::new(2, 0);
     let (fit, held) = (rows(60, 50, 3.0, &mut random), rows(400, 50, 3.0, &mut random));
-    // If the rows for the choice are the fitted ones, the smallest ridge is chosen.
+    // If the ridge is chosen on the fitted rows themselves, the smallest ridge is chosen.
     let again = Rows { residual: fit.residual.clone(), columns: fit.columns.clone() };
     let (chosen, least) = (ridge(&fit, &held), ridge(&fit, &again));
     let left = |rows: &Rows, weights: &[f64]| -> f64 {
@@ -64,7 +64,7 @@ fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64>
     (0..samples).map(next).collect()
 }
 
-/// A sum that explains nothing gains nothing and costs ln M for each of its terms, where M is the
+/// A sum of terms that explains nothing has log odds of -ln M for each of its terms, where M is the
 /// number of terms in the library.
 #[test]
 fn a_choice_costs_what_there_was_to_choose_from() {
@@ -76,9 +76,9 @@ fn a_choice_costs_what_there_was_to_choose_from() {
     }
 }
 
-/// The residual is a known function plus noise; with the function subtracted, only noise is left.
-/// The odds favour the function over a coloured process in each of 20 recordings. This holds if the
-/// function is not a slow wave, which an autoregression could predict.
+/// The residual is a known function plus noise. If the function is subtracted, only noise is left.
+/// The odds favour the function over a coloured process in each of 20 recordings. The function must
+/// not be a slow wave, because an autoregression could predict that.
 #[test]
 fn a_function_is_told_from_coloured_noise() {
     let mut random = RandomGenerator::new(4, 0);
@@ -102,9 +102,9 @@ fn a_function_is_told_from_coloured_noise() {
     }
 }
 
-/// A random drift is predicted no better after an unrelated term was subtracted with its best
-/// weight. The odds favour such a term in none of 40 recordings, because a chance weight gains half
-/// a nat on average, and ln 500 nats are required.
+/// Subtracting an unrelated term with its best weight does not make a random drift easier to
+/// predict. The odds favour the term in none of 40 recordings: a weight fitted to chance gains half
+/// a nat on average, but ln 500 nats are required.
 #[test]
 fn a_chance_term_is_no_function() {
     let mut random = RandomGenerator::new(5, 0);

@@ -18,7 +18,8 @@ fn is_any_taken(record: &Measured) -> bool {
 }
 
 /// By chance an effect with two parameters rises by 12 nats plus the penalty of 2 ln(60)/2 nats
-/// once in exp(16) cases. It never does in 20 recordings of four toys with seven effects each.
+/// once in exp(16) cases. None is accepted in 20 recordings of each of four toys, with seven
+/// effects each.
 #[test]
 fn pure_noise_is_no_effect() {
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
@@ -30,7 +31,7 @@ fn pure_noise_is_no_effect() {
 }
 
 /// The same test with noise of which half of the variance is correlated over 0.05 s. The stated
-/// noise includes this part, because octaves do not model colour.
+/// noise includes this part, because the likelihood by octaves does not model correlated noise.
 #[test]
 fn coloured_noise_is_no_effect() {
     for seed in 0..20 {
@@ -78,7 +79,7 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     assert!(!worth.is_possible(&play, index(&record, "cubic")));
 }
 
-/// An effect that closes less than `null_excess` needs a larger rise.
+/// An effect that closes less than `null_excess` needs a larger rise of the score.
 #[test]
 fn what_closes_little_has_to_rise_more() {
     let record = Toy::of(&[Law::Line]).measured(1);

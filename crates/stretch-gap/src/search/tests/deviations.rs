@@ -1,4 +1,4 @@
-//! Tests of what another form of an effect may explain.
+//! Tests of how much of a residual deviations of an effect's form may explain.
 
 use crate::{
     fit::{
@@ -21,8 +21,8 @@ fn quadratic(hidden: &[(Effect, &[f64])], share: f64) -> [Hypothesis; 2] {
     [set, deviating]
 }
 
-/// x + c x^2 + b x^3, with b a quarter of c, contains a quadratic of another form: the cubic term
-/// is z times the contribution of the quadratic.
+/// x + c x^2 + b x^3, with b a quarter of c, is a quadratic effect of another form: the cubic term
+/// is the quadratic term times b x/c.
 #[test]
 fn a_curve_that_bends_otherwise_is_the_same_effect() {
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.4]), (Effect::Cubic, &[0.1])];
@@ -33,7 +33,8 @@ fn a_curve_that_bends_otherwise_is_the_same_effect() {
     assert!(deviating.score > set.score);
 }
 
-/// The five coefficients of deviations explain nothing here and cost more than they gain.
+/// If an effect has the right form, the five coefficients of its deviations explain nothing, and
+/// their penalty is larger than their gain. The set is then returned without deviations.
 #[test]
 fn an_effect_of_the_right_form_has_no_deviations() {
     let [set, deviating] = quadratic(&[(Effect::Quadratic, &[0.4])], 0.17);

@@ -34,8 +34,8 @@ fn the_effect_that_is_hidden_promises_most() {
             let problem = prepared(&record);
             let mut all = screened(&problem);
             all.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-            // A delay and a lag with the same time constant differ only in the second order of time
-            // times frequency.
+            // A delay and a lag with the same time constant differ only by terms of second order in
+            // time constant times frequency, so either may come first.
             let mut ranks = all.iter().map(|s| Effect::ALL[s.effect]);
             let first = ranks.find(|e| effect != Effect::Late || *e != Effect::Slow);
             if first != Some(effect) {
@@ -74,8 +74,8 @@ fn the_gain_of_a_linear_effect_is_the_fall_of_a_regression() {
             0.5 * weight * (r - a * &step).norm_squared()
                 + 0.5 * (step.transpose() * prior * &step)[0]
         };
-        // A screen ignores the pull of the priors, a share of at most 1/180 because the data
-        // outweigh the prior by 180; the square doubles it.
+        // A screen ignores the pull of the priors. The data outweigh the priors by at least a
+        // factor of 180, so an amplitude changes by at most 1/180, and its square by twice that.
         approx::assert_relative_eq!(found.gain(), cost(2) - cost(3), max_relative = 0.02);
         // The size agrees with the regression, within three standard deviations of 0.01/sqrt(3000 *
         // 0.02) = 0.0013.
@@ -91,6 +91,7 @@ fn what_parameters_can_do_is_no_gain() {
     let record = toy.measured(3);
     let problem = prepared(&record);
     // A regressor without effect gains half a nat on average if samples are independent. Here fifty
-    // samples count as one, which divides the gain by 50. 12 nats occur by chance 25 times in 10^6.
+    // samples count as one, which divides the gain by 50. A single regressor gains 12 nats by
+    // chance about once in 10^6 cases.
     assert!(screened(&problem).iter().all(|s| s.gain() < 12.0 / 50.0));
 }

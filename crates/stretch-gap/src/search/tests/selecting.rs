@@ -10,8 +10,8 @@ use crate::{
 
 type Hidden = (Effect, &'static [f64]);
 
-/// Pairs of effects with an excess of about six each. The model discrepancy of one is less than a
-/// thirtieth of the other.
+/// Pairs of effects with an excess of about six each. The model discrepancy of one effect is less
+/// than a thirtieth of the other effect's excess.
 const PAIRS: [[Hidden; 2]; 4] = [
     [(Effect::Play, &[0.04]), (Effect::Quadratic, &[0.2])],
     [(Effect::Cubic, &[0.4]), (Effect::Drift, &[0.0005])],

@@ -1,5 +1,5 @@
-//! Tests of the sentences for answers of every kind, each built from values. `sentences.txt`
-//! contains the sentences, and `answers.json` the values.
+//! Tests of the sentences for every kind of answer. The answers are built from values.
+//! `sentences.txt` contains the expected sentences, and `answers.json` the answers as values.
 
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
@@ -45,7 +45,7 @@ struct Case {
     unexplained: Option<Unexplained>,
     gross: Vec<Gross>,
     borrowed_test: bool,
-    /// Whether any effect closes a part of the gap.
+    /// Whether the evidence contains a best effect, which closes a part of the gap.
     has_best: bool,
 }
 
@@ -203,7 +203,8 @@ impl Case {
     }
 }
 
-/// A line followed by a lag, where most of the gap is in the second.
+/// Returns a simulator of a line followed by a lag, with its diagnosis and evidence. Most of the
+/// gap is in the lag.
 fn line_and_lag() -> (Measured, Diagnosis, Evidence) {
     let toy = Toy { trials: vec![(600, false), (400, true)], ..Toy::of(&[Law::Line, Law::Lag]) };
     let measured = toy.may_lack(&[Effect::Quadratic]).measured(1);

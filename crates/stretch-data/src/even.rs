@@ -17,8 +17,8 @@ const CLOCKS: f64 = 1e-3;
 const OTHER_RATE: f64 = 0.05;
 /// If there are more gaps than this, one note summarizes all of them.
 const TOLD: usize = 3;
-/// Change of a valve opening that counts as a switch. Smaller changes may be noise, and a gap over
-/// them is bridged well by either value.
+/// Change of a valve opening that counts as a switch. A smaller change may be noise; a gap at such a change is bridged
+/// well by the value on either side.
 const SWITCH: f64 = 0.05;
 /// Channels whose values a device holds until the next sample: commands of the valves.
 const HELD: [&str; 2] = ["inlet", "outlet"];

@@ -136,12 +136,11 @@ impl EvenSession {
     /// Resamples columns of trials to one uniform grid, as [`Trial::even`]. The first trial's rate
     /// is the session's rate.
     ///
-    /// Trials are sorted by `start_s`. If start times are equal, the given order is kept, and
-    /// pauses of 15 s are assumed. Gaps of up to half a second are bridged if the commands are
-    /// equal on both sides. They are not bridged if a valve switched during the gap, because the
-    /// time of the switch is unknown, and the air of one sample with a wrong flow stays in the
-    /// chamber for seconds. Parts of a trial with gaps start at their true times and inherit the
-    /// trial's kind and split.
+    /// Trials are sorted by `start_s`. If start times are equal, the given order is kept, and pauses of 15 s are
+    /// assumed. Gaps of up to half a second are bridged if the commands are equal on both sides. A gap during which a
+    /// valve switched is not bridged, because the time of the switch is unknown, and an error of the flow during one
+    /// sample changes the air in the chamber for seconds. Parts of a trial with gaps start at their true times and
+    /// inherit the trial's kind and split.
     ///
     /// # Errors
     /// No trial with two samples; a test trial with the same samples as a trial that may be fitted;

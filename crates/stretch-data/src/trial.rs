@@ -209,10 +209,9 @@ const JITTER: f64 = 0.1;
 
 /// Returns the sample rate of increasing time stamps, Hz, or `None` for fewer than two.
 ///
-/// The sample interval is the mean of the steps shorter than 1.5 medians, which skip no sample. If
-/// the jitter of the time stamps exceeds a tenth of the median step, single steps do not show
-/// whether a sample is missing. Then the interval is derived from the median length of stretches of
-/// 50 steps.
+/// The sample interval is the mean of the steps that are shorter than 1.5 times the median step and therefore skip no
+/// sample. If the jitter of the time stamps exceeds a tenth of the median step, single steps do not show whether a
+/// sample is missing. Then the interval is derived from the median length of stretches of 50 steps.
 pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;

@@ -7,10 +7,10 @@ use crate::{
     column::{Quantity, measures_nothing_else, unit, written_unit},
 };
 
-/// Steps of at least this fraction of a turn are not motion between two samples.
+/// A step of at least this fraction of a turn between two samples is not taken for motion.
 const STEP: f64 = 0.25;
-/// A jump may differ from a turn by this many usual steps, because of the motion between the two
-/// samples.
+/// Largest difference between a jump and a turn, in usual steps. The motion between the two samples causes this
+/// difference.
 const USUAL_STEPS: f64 = 3.0;
 /// Fraction of the steps that are not larger than a usual step.
 const USUAL: f64 = 0.99;

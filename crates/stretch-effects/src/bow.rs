@@ -44,11 +44,11 @@ pub fn bow(c: f64, x: f64, skew: f64) -> f64 {
 pub struct Bow {
     /// Height in the middle, in the unit of the signal.
     pub c: f64,
-    /// How far the extremum lies off the middle.
+    /// Shift of the extremum away from the middle; 0 for a symmetric curve.
     pub skew: f64,
     /// Value at which the curve begins.
     pub zero: f64,
-    /// Signed distance from there to the end of the curve.
+    /// Signed distance from `zero` to the end of the curve.
     pub span: f64,
 }
 
@@ -93,7 +93,7 @@ impl Operator for Bow {
 pub struct BowedGain {
     /// Relative increase of the gain in the middle.
     pub c: f64,
-    /// How far the extremum lies off the middle.
+    /// Shift of the extremum away from the middle; 0 for a symmetric curve.
     pub skew: f64,
     /// Strain at which the curve ends.
     pub scale: f64,

@@ -14,7 +14,8 @@ use crate::{
 };
 
 /// Friction of a contact that builds up with the distance moved: y = x + f u. The state u lies between -1 and 1 and
-/// follows the position, which the [`Span`] passes in the field of the strain:
+/// follows z, the position behind a play (backlash) of half-width w. The [`Span`] passes the position in the field of
+/// the strain:
 ///
 /// ```text
 /// du = dz/s (1 - u sign(dz)) where u and dz have one sign, else dz/s (1 - back u sign(dz)),     z = play(position, w)

@@ -84,8 +84,9 @@ pub static DEAD_ZONE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The dead band of a servo's firmware. The output y is held while |x - y| <= w. Otherwise it moves and stops `short` w
-/// before x. A `short` of 0 goes all the way to x; 1 gives a play. The memory is y.
+/// The dead band of a servo's firmware. The output y is held while |x - y| <= w. Otherwise it moves towards x and stops
+/// at the distance `short` w before x. With a `short` of 0 it moves all the way to x; a `short` of 1 gives a play
+/// (backlash). The memory is y.
 ///
 /// ```
 /// use stretch_effects::{Grid, HoldBand, Operator, Span, Start};

@@ -1,4 +1,5 @@
-//! Effects of the rig or of any stretch sensor: a kind at a place, the starts of its search, and its live inverse.
+//! Effects of the rig or of any stretch sensor. An effect is a kind at a place, with the starting points of its search
+//! and with the map by which a calibration inverts it live.
 
 use alloc::{vec, vec::Vec};
 
@@ -46,7 +47,7 @@ pub enum Acts {
         /// Computes the kind's values; `None` if they equal the effect's values.
         values: Option<Values>,
     },
-    /// A separate term that belongs to no kind.
+    /// As an action of its own that belongs to no kind.
     Own {
         /// Place and operation of the effect, for values that do not turn it off.
         action: fn(&[f64], &Surroundings<'_>) -> Action,
@@ -67,7 +68,8 @@ impl Acts {
     }
 }
 
-/// An effect that the nominal rig lacks: a [`Kind`] at a place, with its name there and the starts of its search.
+/// An effect that the nominal rig (the rig model without effects) lacks: a [`Kind`] at a place, with its name there and
+/// the starting points of its search.
 ///
 /// One `static` serves four purposes: the simulator runs the effect, the diagnosis fits it, reports describe it, and a
 /// calibration built on a diagnosis inverts it. The simulator accepts user-defined effects in the same way as those of
@@ -133,7 +135,7 @@ impl Effect {
         live: None,
     };
 
-    /// Returns the kind and place; `None` if the effect is a separate term.
+    /// Returns the kind and the place; `None` if the effect belongs to no kind.
     pub fn at(&self) -> Option<(&'static Kind, Place)> {
         match self.acts {
             Acts::At { kind, place, .. } => Some((kind, place)),
@@ -315,7 +317,8 @@ impl Search {
     }
 }
 
-/// Properties of the target quantity that the live map of an effect needs in addition to the effect's numbers.
+/// Properties of the target quantity that the map of an effect needs in addition to the effect's numbers. A calibration
+/// evaluates this map live.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
     /// Whether the target falls while the strain rises, as with a contraction.

@@ -89,8 +89,8 @@ impl Extent {
 /// Least and greatest number of quantisation steps in a span that are searched, and the number of values that are used.
 const STEPS: [f64; 2] = [10.0, 400.0];
 const LOOKED: usize = 2000;
-/// Distance from zero, in spans, beyond which the phase is counted from the least value. Otherwise the steps in 1/d
-/// would have to become finer with that distance.
+/// Distance of the values from zero, in spans, beyond which the phase is counted from the least value instead of from
+/// zero. Counted from zero, a larger distance would need finer search steps in 1/d.
 const FAR: f64 = 20.0;
 
 /// Finds the step d for which the values are most nearly multiples of d (Rayleigh's test). It maximises the sum of

@@ -42,7 +42,8 @@ impl Times {
     }
 }
 
-/// Relaxation (creep if the share is negative): y = x + share (x - mean of mean_rev(x, tau)).
+/// Relaxation (creep if the share is negative): y = x + share (x - mean of mean_rev(x, tau)). Here mean_rev(x, tau) is
+/// x behind a first-order lag, and the mean is taken over the time constants.
 ///
 /// A step of the input appears in the output as 1 + share and fades to 1.
 ///
@@ -158,7 +159,7 @@ pub(crate) static GAUGE_RELAXATION: Effect = Effect {
     ],
     acts: Acts::at(&RELAXATION, Place::Strain),
     twins: &["amplifier_lowpass"],
-    // Gauges that are not metal foils relax by more of a step, and more slowly.
+    // Gauges that are not metal foils relax more slowly, and by a larger share of a step.
     alone: |_, search| {
         search.reach(0.6);
         search.ranges[1][1] = 20.0;

@@ -15,7 +15,7 @@ use crate::{
 /// F(v) = tanh(v/width) (coulomb + more exp(-(v/slow)^2)) (1 + lopsided sign(v)) + viscous v
 /// ```
 ///
-/// Source of the form: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
+/// Source of the formula: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
 ///
 /// ```
 /// use stretch_effects::{Friction, Grid, Operator, Span};

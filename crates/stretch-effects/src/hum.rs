@@ -84,8 +84,9 @@ pub static HUM: Kind = Kind {
     }),
     find: Some(find),
     line: Some(|values| Line { hertz: values[1], amplitude: values[0] }),
-    // A sample rate fs shows the hum at |f - k fs|. From fs = 1.5 f on that is at least f/2 = 25 Hz, where no muscle
-    // moves. A slower recording shows the hum anywhere, down to a slow wave that resembles motion or drift.
+    // Sampled at the rate fs, a hum of frequency f appears at |f - k fs| for the nearest integer k. From fs = 1.5 f on
+    // this is at least f/2 = 25 Hz, where no muscle moves. At a lower rate the hum may appear at any frequency, down to
+    // a slow wave that resembles motion or drift.
     shown_from_hz: Some(|values| 1.5 * values[1]),
     ..Kind::PLAIN
 };

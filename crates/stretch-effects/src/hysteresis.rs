@@ -24,7 +24,8 @@ pub struct Loops {
     pub spread: f64,
 }
 
-/// Rate-independent hysteresis: y = x - h mean of (x - play(x, r)), r = s {spread^2, spread, 1}.
+/// Rate-independent hysteresis: y = x - h mean of (x - play(x, r)), r = s {spread^2, spread, 1}. Here play(x, r) is x
+/// behind a play (backlash) of half-width r, and the mean is taken over the three half-widths.
 ///
 /// Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
 ///

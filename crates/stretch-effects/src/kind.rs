@@ -70,11 +70,11 @@ pub struct Measured<'a> {
 }
 
 /// Estimates from a recording the numbers that only a recording contains, and applies the effect to the simulated
-/// samples. Arguments: values, recording, simulated samples.
+/// samples. The arguments are the values of the effect's parameters, the recording and the simulated samples.
 pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
 
-/// A spectral line of unknown phase. If the phase must not be estimated (in test data), this is all that is known of
-/// the effect.
+/// A spectral line of unknown phase. In test data the phase must not be estimated; then the frequency and the amplitude
+/// are all that is known of the effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Frequency, Hz.
@@ -83,7 +83,7 @@ pub struct Line {
     pub amplitude: f64,
 }
 
-/// The signals in the code of a kind at a place.
+/// The signals that the generated code of a kind at a place uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signals {
     /// The channel that the kind changes.
@@ -142,7 +142,8 @@ pub struct Kind {
     pub sketch: Option<Sketched>,
     /// Names of kinds that are hard to distinguish from this one on the same channel.
     pub twins: &'static [&'static str],
-    /// The property that data may not distinguish within the family, and its size at given values.
+    /// The family of the kind, and the function that computes the size of the property that the family shares. Data may
+    /// determine this property without distinguishing the kinds of the family.
     pub family: Option<(Family, Measure)>,
     /// Whether the memory accumulates over the whole session.
     pub counts_session: bool,
@@ -154,7 +155,8 @@ pub struct Kind {
     pub needs_fine_steps: bool,
     /// Estimates the [`Role::Found`](crate::Role::Found) numbers from a recording; only hum has this.
     pub find: Option<Find>,
-    /// The spectral line that remains if those numbers must not be estimated; only hum has this.
+    /// The spectral line that remains if the [`Role::Found`](crate::Role::Found) numbers must not be estimated; only
+    /// hum has this.
     pub line: Option<fn(&[f64]) -> Line>,
     /// Lowest sample rate, Hz, at which the kind with these values is recognisable; `None` if any rate will do. At
     /// lower rates the search leaves the kind out.

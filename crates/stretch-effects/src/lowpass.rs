@@ -95,7 +95,8 @@ pub struct Poles {
     pub second: f64,
 }
 
-/// A low-pass with one or two real poles: y = mean_rev(mean_rev(x, tau (1 - second)), tau second).
+/// A low-pass with one or two real poles: y = mean_rev(mean_rev(x, tau (1 - second)), tau second). Here mean_rev(x,
+/// tau) is x behind the first-order lag [`MeanReversion`].
 ///
 /// Every trial begins with a settled state, independent of its `Start`.
 ///

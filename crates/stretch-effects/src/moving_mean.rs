@@ -7,10 +7,10 @@ use crate::{
     operator::{Operator, Span},
 };
 
-/// The moving mean y(t) = (1/T) integral of x from t - T to t, for a signal that is linear between nodes. Drives call
-/// it an S-curve or jerk filter if its input is a trapezoid profile (Biagiotti and Melchiorri, doi
-/// 10.1016/j.conengprac.2012.08.005). It is exact at every node, and a constant signal is unchanged to the last bit.
-/// The memory is the nodes of the last time T.
+/// The moving mean y(t) = (1/T) integral of x from t - T to t, for a signal that is linear between nodes. It is exact
+/// at every node, and a constant signal is unchanged to the last bit. If the input is a trapezoid profile, makers of
+/// drives call the mean an S-curve or jerk filter (Biagiotti and Melchiorri, doi 10.1016/j.conengprac.2012.08.005). The
+/// memory is the input at the nodes of the last time T.
 ///
 /// ```
 /// use stretch_effects::{Grid, MovingMean, Operator, Span, Start};
@@ -121,7 +121,7 @@ mod tests {
     }
 
     proptest! {
-        /// A line is delayed by half of the window on any grid, once the window is full.
+        /// A linear signal is delayed by half of the window on any grid, once the window is full.
         #[test]
         fn a_line_is_half_a_window_late(window_s in 1e-4..0.05_f64, delay_s in 0.0..0.03_f64, slope in -9.0..9.0_f64) {
             let grid = Grid::new(0.01, 0.004, delay_s).unwrap();

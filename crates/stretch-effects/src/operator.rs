@@ -18,15 +18,15 @@ pub enum Start {
         /// Seconds of rest between the trials.
         rest_s: f64,
     },
-    /// With the hysteresis state that an unrecorded motion left. At +1 the input reached its first value from far
-    /// below, at -1 from far above. At 0 the state is settled; values in between scale the state. A memory that
-    /// accumulates over the whole session (the travel of a gauge) continues as in [`Start::Carried`].
+    /// With the hysteresis state that an unrecorded motion before the trial left. At +1 the input reached its first
+    /// value from far below, at -1 from far above. At 0 the state is settled; values in between scale the state. A
+    /// memory that accumulates over the whole session (the travel of a gauge) continues as in [`Start::Carried`].
     Hysteresis(f64),
 }
 
 impl Start {
-    /// Returns the output at which a play of half-width `w` begins a trial at input `first`. `last` is the play's
-    /// previous output.
+    /// Returns the output at which a play (backlash) of half-width `w` begins a trial at input `first`. `last` is the
+    /// play's previous output.
     pub(crate) fn of_play(self, last: f64, first: f64, w: f64) -> f64 {
         match self {
             Self::Settled => first,
@@ -36,7 +36,7 @@ impl Start {
     }
 }
 
-/// The time base of a signal segment that an operator acts on, and other signals at the same nodes.
+/// The time base of the signal segment on which an operator acts, and the other signals at the same nodes.
 #[derive(Debug, Clone, Copy)]
 pub struct Span<'a> {
     /// Grid of integration steps.

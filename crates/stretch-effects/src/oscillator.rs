@@ -24,7 +24,7 @@ pub struct Swing {
     pub dry: f64,
 }
 
-/// A damped second-order oscillator whose foot is moved by the input:
+/// A damped mass on a spring; the input moves the other end of the spring:
 /// m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.5 dry/m)^2).
 ///
 /// Without drag and dry friction the solution is exact for an input that is linear between nodes. Drag and dry friction
@@ -82,7 +82,8 @@ pub(crate) fn turn(m: f64, damping: f64, h: f64) -> [f64; 4] {
 
 /// Sets position, velocity and last input at the beginning of a trial: at rest, or still swinging after a short rest.
 fn begin_swing(m: f64, start: Start, first: f64, cells: &mut [f64]) {
-    // A rest of 20 m leaves less than 1 % of an oscillation with damping 0.25. Trials are further apart than that.
+    // A rest of 20 m leaves less than 1 % of an oscillation with damping 0.25. After a longer rest the mass counts as
+    // at rest.
     if !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * m) {
         cells[..2].copy_from_slice(&[first, 0.0]);
     }
@@ -135,8 +136,8 @@ const PARTS: usize = 2;
 struct Slowed {
     /// k t, where v' = -k |v| v has the solution v/(1 + k |v| t).
     drag: f64,
-    /// f t, where v' = -f v/sqrt(v^2 + slow^2) has the solution v/(1 + f t/sqrt(v^2 + slow^2)), with the square root of
-    /// the start.
+    /// f t, where v' = -f v/sqrt(v^2 + slow^2) has the solution v/(1 + f t/sqrt(v^2 + slow^2)) if the square root keeps
+    /// its value at the start.
     dry: f64,
     slow: f64,
 }
@@ -240,9 +241,9 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
 /// ```
 ///
 /// The solution is exact for an input that is linear between nodes, because the deviation from a ramp is a free
-/// oscillation. In an [`Oscillator`](crate::Oscillator) the damper connects the mass to the ground. In contrast, the
-/// link follows a ramp without a lag and passes more of the high frequencies. The memory is the position, the velocity
-/// and the last input.
+/// oscillation. Unlike an [`Oscillator`](crate::Oscillator), whose damper connects the mass to the ground, the link
+/// follows a ramp without a lag and passes more of the high frequencies. The memory is the position, the velocity and
+/// the last input.
 ///
 /// Source: Spong 1987, doi:10.1115/1.3143860.
 ///

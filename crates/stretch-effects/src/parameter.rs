@@ -31,7 +31,8 @@ pub enum Role {
         /// Value of a usual rig. The diagnosis starts there and penalises deviations from it.
         usual: f64,
     },
-    /// One of a few values (50 or 60 Hz). The diagnosis tries the values of the starts and does not fit between them.
+    /// One of a few values (50 or 60 Hz). The diagnosis tries the values in the starting points of the search and none
+    /// between them.
     Choice,
     /// A number that only a recording contains (the phase of a hum). It is not part of the result of a diagnosis.
     Found {
@@ -78,8 +79,7 @@ pub struct EffectParameter {
     pub min: f64,
     /// Greatest plausible value: the upper end of the search.
     pub max: f64,
-    /// Default value. Of a form made by `form` the neutral value, of one made by `formed`
-    /// the usual value.
+    /// Default value. A form made by `form` has its neutral value here, a form made by `formed` has its usual value.
     pub typical: f64,
     /// Role of the parameter.
     pub role: Role,

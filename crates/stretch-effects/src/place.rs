@@ -19,7 +19,7 @@ pub enum RigStage {
     Pneumatics,
     /// Pressure to length.
     Muscle,
-    /// Valve openings to length: both stages above as one.
+    /// Valve openings to length: pneumatics and muscle as one stage.
     Actuation,
     /// Length (and pressure, for cross-talk) to bridge voltage.
     Sensing,
@@ -72,7 +72,7 @@ pub enum Place {
     Volts,
     /// Sampling times of the bridge: a skew in seconds and its rate.
     Sampling,
-    /// Recorded samples of the bridge, after a skew.
+    /// Recorded samples of the bridge, after the skew has been applied.
     Record,
     /// Length before the reference measures it.
     Length,
@@ -144,10 +144,10 @@ const MOVING: Quantity = Quantity::new("x", "1", "contraction k, behind the lag 
 pub struct Surroundings<'a> {
     /// Grid of integration steps.
     pub grid: &'a Grid,
-    /// Strain that is used as e0: the pre-stretch; 1 for a gauge without its rig.
+    /// Strain that is used as e0. In a rig it is the pre-stretch; for a gauge without its rig it is 1.
     pub strain_scale: f64,
-    /// Stroke of the strain, which scales the state that an unrecorded motion leaves: (1 + e0) k_max; 1 for a gauge
-    /// without its rig.
+    /// Range of the strain over the stroke, (1 + e0) k_max; 1 for a gauge without its rig. It scales the state that an
+    /// unrecorded motion leaves.
     pub strain_stroke: f64,
     /// Stroke of the contraction: k_max.
     pub contraction_stroke: f64,
@@ -159,8 +159,8 @@ pub struct Surroundings<'a> {
     pub length_span: f64,
     /// Reference pressure, kPa.
     pub pressure_scale_kpa: f64,
-    /// One unit of strain of the catalogue, in the unit of the signal: 1 in a rig. For a gauge without its rig, 1 over
-    /// the strain of the stroke.
+    /// One unit of strain of the catalogue, in the unit of the signal. In a rig it is 1; for a gauge without its rig it
+    /// is 1 over the strain of the stroke.
     pub strain_unit: f64,
     /// Conductance of a barely open valve, as a share of the full conductance.
     pub least_opening: f64,
@@ -244,9 +244,9 @@ pub enum Action {
     Commands([Box<dyn Operator>; 2]),
     /// Drop of the supply pressure under flow.
     Droop(Box<dyn Droop>),
-    /// Leak: gauge pressure (Pa) to a mass flow out of the chamber (kg/s).
+    /// Leak: the law that gives the mass flow out of the chamber (kg/s) at a gauge pressure (Pa).
     Leak(Box<dyn Law>),
-    /// Volume of the chamber: k/k_max to V/V0.
+    /// Volume of the chamber: the law that gives V/V0 at k/k_max.
     Volume(Box<dyn Law>),
     /// Operator on the signal at a place. For a resistance, the span holds the strain.
     At(Place, Box<dyn Operator>),

@@ -14,7 +14,8 @@ use crate::{
     sketch::Sketch,
 };
 
-/// Backlash: y = play(x, w), or the mean of play(x, w {1 - spread, 1, 1 + spread}), which has soft reversals.
+/// Backlash: y = play(x, w), or the mean of play(x, w {1 - spread, 1, 1 + spread}), which has soft reversals. Here
+/// play(x, w) follows x only after x has crossed a gap of half-width w.
 ///
 /// [`Operator::undo`] returns an input that would have produced a recorded output. It is exact while the output moves.
 /// While the output dwells, the input is interpolated linearly. A soft backlash is treated as a hard one.

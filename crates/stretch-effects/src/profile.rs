@@ -205,8 +205,8 @@ fn trapezoid(v: &[f64], signals: &Signals) -> Sketch {
     )
 }
 
-/// Writes the code with a second trapezoid that follows the command of a time T ago. The mean over T is then updated by
-/// the value that enters minus the value that leaves.
+/// Writes the code with a second trapezoid that follows the command from a time T earlier. The mean over T then changes
+/// by the value that enters minus the value that leaves.
 fn rounded(v: &[f64], signals: &Signals) -> Sketch {
     let (samples, unit) = (v[2] / signals.dt_s, &signals.x.unit);
     let whole = libm::floor(samples);
@@ -269,8 +269,8 @@ pub static PROFILE: Kind = Kind {
         ]
     },
     starts: Some(|e| {
-        // `takes` is the time of a move over the whole range, without (share 1) and with (share 0.5) a segment at the
-        // greatest rate.
+        // A search start, from two numbers. `takes` is the time of a move over the whole range. With a `share` of 1 the
+        // move has no segment at the greatest rate, with 0.5 it has one.
         let of = |takes: f64, share: f64| {
             let (a, v) = (4.0 * e.span() / (takes * takes), 2.0 * e.span() / takes);
             vec![a / share, v * share, 0.0]

@@ -79,7 +79,7 @@ impl Skew {
     }
 }
 
-/// Expects the samples of a whole trial.
+/// Each call expects the samples of a whole trial.
 impl Operator for Skew {
     fn run(&self, _span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
         let nodes = signal.to_vec();
@@ -191,7 +191,7 @@ fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sket
         .with("DT", signals.dt_s, "s")
 }
 
-/// Writes the code that reads a recording at some time before each of its samples, without constants.
+/// Writes the code, without its constants, that reads a recording at some time before each of its samples.
 pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
     let body = format!(
         "let early = -({late}) / DT
@@ -276,7 +276,7 @@ impl ClockDrift {
     }
 }
 
-/// Expects the samples of a whole trial.
+/// Each call expects the samples of a whole trial.
 impl Operator for ClockDrift {
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
         let skew_s = self.skew_s + self.rate * span.start_s;

@@ -14,8 +14,9 @@ use crate::{
     sketch::Sketch,
 };
 
-/// Softening with travel: y = zero + (x - zero)(1 - m (1 - left)), with left = (1 + tail travel/n)^(-1/tail). At a tail
-/// of 0, left is exp(-travel/n). Travel is the summed absolute change of strain since the session began.
+/// Softening with travel: y = zero + (x - zero)(1 - m (1 - left)). The factor left = (1 + tail travel/n)^(-1/tail)
+/// falls from 1 to 0; at a tail of 0 it is exp(-travel/n). Travel is the summed absolute change of strain since the
+/// session began.
 ///
 /// The memory is the travel, the last counted strain, and the direction: +1, -1, or 0 before the first move. Source of
 /// the long tail: stretched forms of the Mullins effect, Diani 2009, doi:10.1016/j.eurpolymj.2008.11.017.

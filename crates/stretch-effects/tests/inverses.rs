@@ -43,7 +43,7 @@ proptest! {
         prop_assert!((bow(c, x, skew) - bow(c, 1.0 - x, -skew)).abs() <= 1e-14);
         // Within its ends, a bow never exceeds twice its height.
         prop_assert!(bow(c, x, skew).abs() <= 2.0 * c.abs());
-        // A gain bends by as much as a scale of size 1.
+        // The curve of a gain equals that of a scale of size 1.
         let (grid, mut y) = (samples(), [2.0]);
         BowedGain { c, skew, scale: 4.0 }.run(&Span { strain: &[4.0 * x], ..Span::whole(&grid) }, &mut [], &mut y);
         prop_assert!((y[0] - 2.0 * (1.0 + bow(c, x, skew))).abs() <= 1e-14);

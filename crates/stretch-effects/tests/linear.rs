@@ -87,7 +87,7 @@ fn exact() -> impl Strategy<Value = Linear> {
     ]
 }
 
-/// All operators. The others approximate the signal between nodes by a line or a cubic.
+/// All operators. Those that are not exact approximate the signal between nodes by a line or a cubic.
 fn linear() -> impl Strategy<Value = Linear> {
     prop_oneof![
         exact(),

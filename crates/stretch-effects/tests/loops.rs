@@ -159,8 +159,8 @@ proptest! {
         }
     }
 
-    /// From rest, a move over the distance d fills every play up to its half-width. The output is held back by the mean
-    /// of the plays.
+    /// From rest, a move over the distance d moves the state of every play by d, but at most by its half-width. The
+    /// output is held back by the mean of these states.
     #[test]
     fn plays_fill_up_to_their_widths(h in 0.0..1.0_f64, s in 0.05..1.5_f64, spread in 0.15..0.95_f64, d in -2.0..2.0_f64) {
         let mean = |widths: [f64; 3]| widths.iter().map(|w| d.abs().min(*w)).sum::<f64>() / 3.0 * d.signum();

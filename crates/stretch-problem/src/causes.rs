@@ -18,8 +18,8 @@ pub struct Causes {
 }
 
 impl Causes {
-    /// Diagnoses trials as a gauge alone and returns the effects of the gauge. If the trials cannot
-    /// be diagnosed, the result has no effects, and a note.
+    /// Diagnoses trials of a gauge alone (a stretch sensor and its reference, without the rig) and returns the effects
+    /// of the gauge. If the trials cannot be diagnosed, the result has no effects but a note that says why.
     ///
     /// `progress` and `stop` are those of [`diagnose`].
     pub fn of(
@@ -70,10 +70,9 @@ impl Causes {
     }
 }
 
-/// The effects of the gauge and its reference in the first candidate of a diagnosis, with values in
-/// shares of the reference's range: values of the whole rig are divided by its strokes, values of a
-/// gauge alone stay as they are. The list is empty if no effect is missing, or if the recording is
-/// wrong.
+/// The effects of the gauge and its reference in the first candidate of a diagnosis. Values are in shares of the
+/// reference's range. Values of a whole rig are divided by the strokes of the rig for this; values of a gauge alone
+/// already are in these units. The list is empty if no effect is missing, or if the recording is wrong.
 ///
 /// The first candidate is used even if the verdict does not name it, because a calibration tests on
 /// held-out trials whether its effects help.
@@ -86,8 +85,8 @@ pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
     };
     let is_alone = diagnosis.location.stages.len() == 1;
     let cause = |effect: &'static Known| {
-        // A voltage level of a whole rig is left out, because the calibration's fit finds where the
-        // rails lie.
+        // Voltage limits of the amplifier in a whole rig are left out, because the calibration's fit finds these limits
+        // itself.
         let is_level = |p: &EffectParameter| p.unit == "V" && p.off().is_some_and(|off| off != 0.0);
         let value = |p: &EffectParameter| {
             let mut own = first.parameters.iter().filter(|own| own.effect == effect.name);

@@ -28,7 +28,7 @@ pub struct Examined {
     pub name: String,
     /// Seed of the random numbers from which intervals are computed.
     pub seed: u64,
-    /// The diagnosis, with the notes on the recordings before its own.
+    /// The diagnosis. Its notes begin with the notes on the recordings.
     pub diagnosis: Diagnosis,
     /// The evidence for the diagnosis, which a report shows.
     pub evidence: Evidence,

@@ -16,9 +16,9 @@ use crate::black_box::ProblemSpec;
 /// tolerances from the fit, and the effects with every parameter and form. Comments at the entries
 /// say where each entry comes from.
 ///
-/// A tolerance is one standard deviation of the fit, and never wider than the tolerance before. It
-/// is valid only if the model is. If two parameters can replace one another, the interval of each
-/// is computed with the other one free; the two together are narrower.
+/// A tolerance is one standard deviation of the fit, and never wider than the tolerance before the fix. It is valid
+/// only if the model with the named effects is right. If two parameters can replace one another, the interval of each
+/// is computed with the other one free; the two together are known more exactly than the two intervals suggest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The file.
@@ -34,7 +34,7 @@ pub struct Fix {
 pub enum Fixed {
     /// The built-in rig, or a gauge alone.
     Rig(RigFile),
-    /// The problem's file of a user's own simulator: parameters re-tuned, effects around the
+    /// The problem's file of a user's own simulator, with re-tuned parameters, and with the effects around the
     /// simulator under `[[wrapped]]`.
     Problem(Box<ProblemSpec>),
 }
@@ -49,7 +49,7 @@ impl Fix {
     }
 }
 
-/// An effect of a fix in words.
+/// An effect of a fix, described in words.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Meaning<'a> {
     pub(crate) name: &'a str,
@@ -251,7 +251,7 @@ fn of_unit(unit: &str) -> String {
     if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-/// A number to four digits.
+/// Writes a number with four significant digits.
 pub(crate) fn digits(x: f64) -> String {
     let rounded = format!("{x:.3e}").parse().unwrap_or(x);
     if rounded != 0.0 && !(1e-3..1e6).contains(&f64::abs(rounded)) {
@@ -313,10 +313,10 @@ fn found_line(
 /// Time over which the phase of the mains is assumed constant, s.
 const STEADY_S: f64 = 1.0;
 
-/// Amplitude and phase of a sine in pairs of time (s) and value. One sine is fitted to all samples,
-/// and one to each second. If the power of the first is at least half of the mean power of the
-/// others, its amplitude and phase are returned. Otherwise the amplitude is the root of that mean
-/// power, and the phase is that of the fit to all samples.
+/// Amplitude and phase of a sine in pairs of time (s) and value. One sine is fitted to all samples, and one to each
+/// second. If the sine of all samples has at least half of the mean power of the sines of the seconds, its amplitude
+/// and phase are returned. Otherwise the amplitude is the root of that mean power, and the phase is that of the sine of
+/// all samples.
 ///
 /// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
 fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {

@@ -1,4 +1,4 @@
-//! A first problem from a folder of recordings; comments say which entries are guessed.
+//! Writes a first problem file for a folder of recordings. Comments in the file say which entries are guessed.
 
 use std::{
     ops::Range,
@@ -235,9 +235,9 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     }
 }
 
-/// The column that gives the motion of the parts with friction, and its key: the output if it is a
-/// position, an angle or a speed, otherwise another measured column that is. `None` if commands are
-/// known and none of them can be a force or a torque.
+/// The column that gives the motion of the parts with friction, and its key (`velocity` or `position`). It is the
+/// output if that is a position, an angle or a speed, otherwise another measured column of one of these quantities.
+/// `None` if commands are known and none of them can be a force or a torque.
 fn rubbing<'a>(
     output: &'a str,
     commands: &[&str],

@@ -18,7 +18,7 @@ use crate::{
     worker::Workers,
 };
 
-/// Distance beyond a fitted range that is not reported yet, as a share of the range.
+/// Largest distance beyond a fitted range that is not reported, as a share of the range.
 const MARGIN: f64 = 0.025;
 /// Pause that is assumed between recordings without a start, s. It matters for an effect that
 /// drifts.
@@ -41,7 +41,7 @@ pub struct Prediction {
     /// The largest error with the fix of any output of any recording, in multiples of the noise.
     /// `--fail-above` compares it with a limit.
     pub largest_times_noise: f64,
-    /// The new recordings; a recording with a long gap has several parts.
+    /// The new recordings; a recording with a long gap becomes several entries.
     pub trials: Vec<PredictedTrial>,
     /// Notes on the recordings, in sentences.
     pub notes: Vec<String>,
@@ -111,14 +111,12 @@ impl Prediction {
     }
 }
 
-/// Predicts new recordings with a problem's file that holds a fix (written by
-/// `stretch diagnose --fix`). Every stage is simulated on the measured inputs of the new
-/// recordings, once with the effects of the fix and once without any. Without effects, the
-/// parameters have the values that were re-tuned without effects (`alone` in the file).
+/// Predicts new recordings with a problem's file that holds a fix (written by `stretch diagnose --fix`). Every stage is
+/// simulated on the measured inputs of the new recordings, once with the effects of the fix and once without any. In
+/// the run without effects, the parameters have the values that were re-tuned without effects (`alone` in the file).
 ///
-/// The recordings that were fitted are read as well, because the noise and the fitted ranges come
-/// from them. The new recordings follow them in session time, which matters for an effect that
-/// drifts.
+/// The recordings that were fitted are read as well, because the noise and the fitted ranges come from them. The new
+/// recordings follow the fitted ones in session time, which matters for an effect that drifts.
 ///
 /// # Errors
 /// Files that cannot be read, a file without a fix, unknown names, and a simulator that fails.

@@ -17,7 +17,7 @@ use crate::{
 /// Tolerance of offset and gain, in ranges of the signal, so that both are practically free.
 const FREE: f64 = 3.0;
 
-/// A nominal sensor: y = offset + gain e.
+/// A nominal sensor: y = offset + gain e, where e is the reference as a share of its range.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     offset: f64,
@@ -26,13 +26,12 @@ struct Line {
     size: f64,
 }
 
-/// Builds a problem from several sensors that one recorder recorded together with one reference.
-/// The model of each is y = offset + gain e, with e the reference over its range. All kinds of
-/// effects are looked for on each output, and effects of the recorder's clock on all outputs at
-/// once (`record.skew`, `record.clock_drift`).
+/// Builds a problem from several sensors that one recorder recorded together with one reference. The model of each
+/// sensor is y = offset + gain e, where e is the reference as a share of its range. All kinds of effects are looked for
+/// on each output, and effects of the recorder's clock on all outputs at once (`record.skew`, `record.clock_drift`).
 ///
-/// In one signal, a shift cannot be distinguished from other causes of a loop. Several signals with
-/// the same shift have one cause.
+/// In one signal, a shift in time cannot be distinguished from other causes of a loop. If several signals have the same
+/// shift, its cause is the recorder that they share.
 ///
 /// # Errors
 /// Columns that are missing or dead, trials that cannot be brought onto one grid.
@@ -93,7 +92,7 @@ fn reference_of(session: &RecordedSession) -> &str {
     session.stages.first().and_then(|s| s.inputs.first()).map_or("", String::as_str)
 }
 
-/// The straight line of a signal over the reference.
+/// Offset and gain of the straight line that gives a signal from the reference.
 fn line(references: &[&[f64]], signals: &[&[f64]], (low, span): (f64, f64)) -> Line {
     let pairs = || {
         let trials = references.iter().zip(signals);

@@ -1,10 +1,9 @@
-//! Computes the cost of the gap for a calibration that is trained in the simulator and used on the
-//! rig.
+//! Computes the cost of the gap (the difference between simulator and recording) for a calibration that is trained in
+//! the simulator and used on the rig.
 //!
-//! The *transfer gap* is the error on measured test trials of a calibration trained in the
-//! simulator minus that of one trained on measured trials. The transfer gap matters to a user more
-//! than the chi-square: a true effect can close the gap without any change of the calibration's
-//! error.
+//! The *transfer gap* is a difference of two errors on measured test trials: that of a calibration trained in the
+//! simulator minus that of a calibration trained on measured trials. It matters to a user more than the chi-square: a
+//! true effect can close the gap without any change of the calibration's error.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -26,14 +25,13 @@ struct Records {
     signal: Vec<f64>,
 }
 
-/// Errors on the measured test trials of calibrations that were trained on the measured fit trials,
-/// in the re-tuned simulator, and in the simulator with the effects; `None` if the simulator has no
-/// sensor, or the recordings do not determine a calibration.
+/// Errors on the measured test trials of three calibrations. They were trained on the measured fit trials, in the
+/// re-tuned simulator, and in the simulator with the effects. `None` if the simulator has no sensor, or if the
+/// recordings do not determine a calibration.
 ///
-/// In the simulator only the input of the first stage is measured: each other stage runs on the
-/// output of the stage before, and the simulated reference and signal get the known noise of their
-/// channels. If the sensor is the first stage, the reference is the measured motion. Every run of a
-/// stage is added to `simulations`.
+/// In the simulator only the input of the first stage is measured. Each other stage runs on the output of the stage
+/// before, and the simulated reference and signal get the known noise of their channels. If the sensor is the first
+/// stage, the reference is the measured motion. Every run of a stage is added to `simulations`.
 pub(crate) fn transfer(
     simulator: &dyn Simulator,
     evidence: &Evidence,

@@ -31,7 +31,7 @@ fn servo([gain, tau, play]: [f64; 3], u: &[f64]) -> Vec<f64> {
     u.iter().map(one).collect()
 }
 
-/// Runs of servos with these values, one each, with noise of this seed.
+/// Recordings of servos with these values, one recording for each servo, with noise of this seed.
 fn recorded(servos: &[[f64; 3]], seed: u64) -> Vec<SessionTrial> {
     let one = |(run, values): (usize, &[f64; 3])| {
         let mut random = RandomGenerator::new(seed, run as u64);

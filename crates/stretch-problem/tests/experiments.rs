@@ -20,7 +20,7 @@ fn rig() -> RigSimulator {
     RigSimulator::new(RigSetup { session, rig: Default::default(), catalogue }).unwrap()
 }
 
-/// D of every candidate experiment for two effects at given first parameters.
+/// Distance D between the predictions for two effects at given first parameters, for every candidate experiment.
 fn of(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
     let model = |(name, value): (&str, f64)| {
         let at = rig.description().effects.iter().position(|e| e.name == name).unwrap();

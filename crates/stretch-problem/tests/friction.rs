@@ -1,5 +1,5 @@
-//! Friction is looked for if a force or a torque drives a motion, for any usual name of its column.
-//! If that is unknown, a note states it.
+//! Friction is looked for if a force or a torque drives a motion, whatever usual name its column has. If it is unknown
+//! whether a force or a torque drives the motion, a note states it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Workers: the reference ones agree to the bit, and errors of a worker are reported.
+//! Workers: the reference workers agree to the bit, and errors of a worker are reported.
 
 use std::{
     path::{Path, PathBuf},
@@ -167,7 +167,7 @@ fn with_numpy_altered_columns_of_several_stages_reach_a_simulator_in_python() {
     assert!(alone[400..].iter().zip(b).all(|(y, b)| *y == 5.0 - b));
 }
 
-/// The answer to one ask of a worker that is a few lines of Python.
+/// The answer of a worker that is a few lines of Python to one request.
 fn answer(script: &str, jobs: usize) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
     const HEAD: &str = r#"
 import json, struct, sys, os, time

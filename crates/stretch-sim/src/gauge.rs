@@ -1,5 +1,5 @@
-//! A gauge alone: any stretch sensor with a reference, simulated as a rig of one stage without
-//! valves and muscle.
+//! A gauge alone: any stretch sensor with a reference, without valves and muscle. It is simulated as a rig of one
+//! stage.
 
 use std::collections::BTreeMap;
 
@@ -26,17 +26,17 @@ pub struct GaugeSpec {
     pub span: f64,
     /// Signal at e = 0.
     pub offset: f64,
-    /// Change of the signal over the range.
+    /// Change of the signal over the range of the reference.
     pub gain: f64,
-    /// Reference pressure P_ref of `pressure_crosstalk`, in the unit of the given pressure; `None`
-    /// without one.
+    /// Reference pressure P_ref of `pressure_crosstalk`, in the unit of the given pressure; `None` if no pressure was
+    /// recorded.
     pub pressure_scale: Option<f64>,
 }
 
-/// A gauge alone, prepared to run. The effects of `sensing` act on e instead of the strain, on 1 +
-/// (y - offset)/gain instead of the resistance, and on (y - offset)/gain instead of the voltage.
-/// The effects of `reference` act on e as it is measured; they are undone before e drives the
-/// gauge. `amplifier_saturation` is not used; `pressure_crosstalk` is used only with a pressure.
+/// A gauge alone, prepared to run. The effects of `sensing` act on e instead of the strain, on 1 + (y - offset)/gain
+/// instead of the resistance, and on (y - offset)/gain instead of the voltage. The effects of `reference` act on e as
+/// it is measured, so they are undone before e drives the gauge. `amplifier_saturation` is not used;
+/// `pressure_crosstalk` is used only with a pressure.
 #[derive(Debug)]
 pub struct Gauge {
     spec: GaugeSpec,
@@ -58,7 +58,7 @@ impl Gauge {
             }
     }
 
-    /// The catalogue's unit of a parameter, in units of e or of the span of y.
+    /// Size of the catalogue's unit of a parameter, in units of e or of the span of y.
     pub fn unit(parameter: &EffectParameter) -> f64 {
         1.0 / Self::stroke(parameter)
     }

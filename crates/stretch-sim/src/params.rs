@@ -6,8 +6,8 @@ use stretch_data::Parameter;
 
 use stretch_effects::{Grid, RigStage, Surroundings};
 
-/// How far a nominal parameter may be wrong before the deviation counts as an unmodelled effect:
-/// one standard deviation.
+/// Uncertainty of a nominal parameter, as one standard deviation. A diagnosis may re-tune the parameter within three
+/// standard deviations; a larger deviation counts as an effect that the model lacks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Tolerance {
     /// Known exactly: never re-tuned.

@@ -8,7 +8,7 @@ use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
 pub const RATE_HZ: f64 = 100.0;
 /// Openings of the paper's ramps.
 pub const OPENINGS: [f64; 6] = [0.0025, 0.125, 0.25, 0.5, 0.75, 1.0];
-/// Seconds between trials: the clock runs, the excitation is off, the muscle is filled or vented.
+/// Seconds between trials. In the pause the clock runs, the excitation is off, and the muscle is filled or vented.
 pub const PAUSE_S: f64 = 15.0;
 /// Samples of rest at every trial's start, both valves shut.
 const REST: usize = 100;
@@ -108,8 +108,8 @@ impl TrialPlan {
     }
 
     /// Plans 60 s of pairs of pulses. A pulse opens the inlet fully for 0.25 s. In the gap between the two pulses of a
-    /// pair the outlet is open; the gap begins at 1.4 s, falls by 18 % per pair to 0.15 s, and starts over. After a
-    /// pair the outlet stays open for 1 s, then both valves are shut for 0.3 .. 1 s.
+    /// pair the outlet is open. The gap lasts 1.4 s at first, becomes 18 % shorter with each pair down to 0.15 s, and
+    /// then starts over. After a pair the outlet stays open for 1 s, then both valves are shut for 0.3 .. 1 s.
     pub fn pulses(number: usize, seed: u64) -> Self {
         let mut plan = Self::new(format!("pulses_{number}.csv"), TrialKind::Pulses, LONG_S);
         let mut random = Random::new(seed, stream(number, 1));
@@ -134,8 +134,8 @@ impl TrialPlan {
         plan
     }
 
-    /// The paper's session: six inflations, six deflations, an arbitrary and a pulse trial to fit; two arbitrary and
-    /// one pulse trial to test on. 480 s of recordings in 12 min.
+    /// The paper's session: six inflations, six deflations, an arbitrary and a pulse trial for fitting, and two
+    /// arbitrary trials and one pulse trial for testing. The session lasts 12 min and has 480 s of recordings.
     ///
     /// ```
     /// let plans = stretch_sim::TrialPlan::paper(1);
@@ -200,8 +200,8 @@ impl TrialPlan {
         steps.sort_by(f64::total_cmp);
         let expected = steps[steps.len() / 2];
         let even = |step: f64| (step - expected).abs() <= 0.01 * expected;
-        // Times are written with a few decimals: up to a hundredth of a step is rounding, more is a
-        // gap.
+        // Times are written with a few decimals. A deviation of up to a hundredth of a step is rounding, a larger one
+        // is a gap.
         if let Some(i) = time.windows(2).position(|t| !even(t[1] - t[0])) {
             return Err(SimError::NotUniform {
                 sample: i + 1,
@@ -311,7 +311,7 @@ fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
     Ok(Some(shares.to_vec()))
 }
 
-/// `inflation_0_25.csv` for an opening of 0.25 %.
+/// Name of a ramp's file, such as `inflation_0_25.csv` for an opening of 0.25 %.
 fn ramp_file(kind: &str, opening: f64) -> String {
     let percent = (1e4 * opening).round() / 100.0;
     format!("{kind}_{}.csv", percent.to_string().replace('.', "_"))

@@ -170,7 +170,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Gauge strain at the supply pressure, the smallest of the nominal stroke.
+    /// Gauge strain at the supply pressure; it is the smallest strain of the nominal stroke.
     pub fn least_strain(&self) -> f64 {
         let k = StaticLaw::new(&self.params).contraction(1e-3 * self.params[Key::PS]);
         Bridge::new(&self.params).strain(self.params[Key::L0] * (1.0 - k))
@@ -184,9 +184,9 @@ impl Rig {
         ((value - 3.0 * sd).max(0.01 * value), value + 3.0 * sd)
     }
 
-    /// Draws a variant of this rig as it might be built. Every parameter is drawn from its tolerance, a Gaussian cut at
-    /// 2.5 sd and at 0.2 of the value. The rig is redrawn until the sleeve stays stretched and every parameter is
-    /// valid; `None` after 1000 draws.
+    /// Draws a variant of this rig as it might be built. Every parameter is drawn from a Gaussian with its tolerance as
+    /// standard deviation, cut at 2.5 standard deviations and at 0.2 of the value. The rig is redrawn until the sleeve
+    /// stays stretched and every parameter is valid; `None` after 1000 draws.
     pub fn draw(&self, seed: u64) -> Option<Self> {
         let mut random = Random::new(seed, Random::RIG);
         (0..1000).find_map(|_| {
@@ -328,14 +328,14 @@ pub fn default_rig_text() -> String {
 /// | slow ramps | valves of about 0.35e-9 m3/(s Pa) |
 /// | residual floors of 2 to 3 % | noise of 1 % of the voltage's range |
 ///
-/// Models fitted to twelve ramps (seed 3) as published; the paper's figures are in parentheses:
-/// linear 1.04 V + 0.16, r^2 0.964 (0.974 V + 0.176, 0.968); poly13 on inflations RMSE 2.8 % (2.85
-/// %), on deflations 2.2 % (1.82 %). The distance between the two surfaces is not reproduced (0.05
-/// of the stroke at V = 0.65, published 0.20).
+/// Models that are fitted to twelve ramps (seed 3) by the published method give these results, with those of the paper
+/// in parentheses: linear 1.04 V + 0.16, r^2 0.964 (0.974 V + 0.176, 0.968); poly13 on inflations RMSE 2.8 % (2.85 %),
+/// on deflations 2.2 % (1.82 %). The distance between the two surfaces is not reproduced (0.05 of the stroke at V =
+/// 0.65, published 0.20).
 ///
-/// It is *not* the explanation of the paper's rig. Another set, without any trim error, with a
-/// lagging gauge (c = -0.3, tau = 2 s) and three times the hysteresis, fits as well: on ramps the
-/// effects compensate for each other.
+/// This preset is *not* the explanation of the paper's rig. Another set of effects, without any trim error, with a
+/// lagging gauge (c = -0.3, tau = 2 s) and three times the hysteresis, fits as well, because on ramps the effects
+/// compensate for each other.
 ///
 /// # Errors
 /// None.
@@ -355,8 +355,8 @@ pub fn paper_preset() -> Result<Rig, SimError> {
 /// The rig of the demonstration: the rig of [`paper_preset`] with effects that recordings of this rig can distinguish.
 ///
 /// It has no cross-talk, because on ramps cross-talk compensates for the gauge's nonlinearity. The nonlinearity is c =
-/// -0.06, within the catalogue's range. Therefore a diagnosis can be right, and a second diagnosis, of the simulator
-/// with the named effects, finds nothing.
+/// -0.06, within the catalogue's range. Therefore a diagnosis can name the right effects, and a second diagnosis, of
+/// the simulator with the named effects, finds nothing.
 ///
 /// ```
 /// let rig = stretch_sim::demo_preset()?;

@@ -7,8 +7,8 @@ const DENSITY: usize = 128;
 /// Largest number of reference pressures in the table.
 const MOST: f64 = 16.0;
 
-/// Static contraction of the muscle without force, from gauge pressure:
-/// p/P_ref = a0 (1 - exp(-a1 x)) exp(a3 x^2), k_s = k_max x, x = 0 for p <= 0.
+/// Static contraction of the muscle without a load, as a function of the gauge pressure p. The contraction is k_s =
+/// k_max x, and x solves p/P_ref = a0 (1 - exp(-a1 x)) exp(a3 x^2); for p <= 0, x is 0.
 ///
 /// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Contraction
 /// is constant beyond 1.5 times the supply's or the reference pressure.
@@ -46,7 +46,7 @@ impl StaticLaw {
                 let change = (goal - u) / du;
                 next += change;
                 if change.abs() <= 1e-9 * (1.0 + next) {
-                    // Newton squares the error, so this was the last significant change.
+                    // Newton's method squares the relative error, so the next change would be below rounding.
                     rise = law(next).1;
                     break;
                 }

@@ -1,4 +1,4 @@
-//! The code of every effect, compiled and run, against the operator that the simulator runs.
+//! The code of every effect, compiled and run, gives the output of the operator that the simulator runs.
 
 use std::{
     fmt::Write as _,
@@ -305,7 +305,8 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
     let beside: Vec<f64> = course.iter().rev().map(|x| 1.6 * x - 0.7).collect();
     let load: Vec<f64> = course.iter().map(|x| 5.0 * x * x - 2.0).collect();
     let span = Span { strain: &beside, load: &load, ..Span::whole(&grid) };
-    // The state of a travel begins at the second channel, that of a signal at the signal.
+    // The state of an effect that follows a strain or a position begins at the second channel, any other state at the
+    // signal.
     let begins_beside = sketch.state.iter().any(|cell| ["e", "p"].contains(&cell.begins));
     let first = if begins_beside { beside[0] } else { x[0] };
     let expected = run(&*(kind.operator)(values, extent, &grid), &span, first, &x);

@@ -1,5 +1,4 @@
-//! The rig against vectors of an independent implementation: the nominal rig, and every effect
-//! alone.
+//! Compares the rig with test vectors of an independent implementation: the nominal rig, and every effect alone.
 
 use std::{collections::BTreeMap, fs};
 
@@ -10,7 +9,7 @@ use testkit::{tolerance::RIG_CONFORMANCE, vectors::columns};
 
 const SCALES: [(&str, f64); 3] = [("pressure_kpa", 620.0), ("length_mm", 50.0), ("bridge_v", 3.3)];
 
-/// Returns the effects with the values of the vectors.
+/// Returns the effects with the values of the test vectors.
 fn effects() -> BTreeMap<String, EffectSet> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../reference/rig/effects.csv");
     let mut values: BTreeMap<String, Vec<(String, f64)>> = BTreeMap::new();

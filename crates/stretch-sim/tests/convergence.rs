@@ -1,5 +1,5 @@
-//! Halving the step of integration moves no channel by more than 1e-4 of its full scale: the nominal rig, every
-//! effect at its typical and extreme values, rigs at the edge of their tolerances.
+//! Halving the step of integration moves no channel by more than 1e-4 of its full scale. This is tested for the nominal
+//! rig, for every effect at its typical and extreme values, and for rigs at the edge of their tolerances.
 
 use stretch_sim::{
     CATALOGUE, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Role, Scale,
@@ -10,7 +10,8 @@ use testkit::{tolerance::RIG_STEP, vectors::columns};
 const SAMPLES: usize = 2001;
 const SCALES: [f64; 3] = [620.0, 50.0, 3.3];
 
-/// Openings and first pressure: the arbitrary trial of the vectors, full pulses, a full deflation.
+/// Openings and first pressure of three trials: the arbitrary trial of the test vectors, full pulses, and a full
+/// deflation.
 fn trials() -> Vec<(&'static str, Vec<f64>, Vec<f64>, f64)> {
     let commands = columns("rig/commands.csv");
     let at = |column: &str, i: usize| {
@@ -107,7 +108,8 @@ fn every_effect() {
             cases.push(corner(&|i| parameters[i].max));
             cases.push(corner(&|i| {
                 let p = &parameters[i];
-                // The least shape at full strength; a negative strength where there is one.
+                // The least value of a shape with the full strength; for a strength that may be negative, its least
+                // value.
                 if p.scale == Scale::Log || p.min < 0.0 { p.min } else { p.max }
             }));
             cases.push(corner(&|i| {

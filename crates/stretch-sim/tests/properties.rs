@@ -226,7 +226,7 @@ fn limits_of_time_constants_and_widths() {
     let (inlet, outlet) = loop_commands();
     let plain = nominal(&inlet, &outlet);
     let run = |set: &EffectSet| simulate(&RigParams::default(), set, &inlet, &outlet, 0.0);
-    // A mean that follows at once, or a width of zero, leaves the nominal rig unchanged.
+    // With a time constant or a width near zero, an effect leaves the nominal rig unchanged.
     for (name, values) in [
         ("muscle_creep", &[0.3, 1e-9][..]),
         ("gauge_relaxation", &[0.6, 1e-9]),
@@ -247,7 +247,8 @@ fn limits_of_time_constants_and_widths() {
             assert!(share < RIG_STEP, "{name}: channel {c} moved by {share:e}");
         }
     }
-    // A mean that never follows is a gain about the start; so is a hysteresis that never yields.
+    // With an endless time constant, creep only reduces the stroke by a factor, and so does hysteresis with an endless
+    // width.
     let stroke = |x: &Channels| x[1].iter().map(|l| 180.0 - l).collect::<Vec<f64>>();
     let shares = |name: &str, values: &[f64], gain: f64| {
         let moved = stroke(&run(&extreme(name, values)));
@@ -271,7 +272,7 @@ fn symmetries_and_scaling() {
     let run = |name: &str, values: &[(&str, f64)]| {
         simulate(&RigParams::default(), &one(name, values), &inlet, &outlet, 0.0)
     };
-    // Opposite bows of the reference move it by the same; both ends of the stroke stay.
+    // Opposite curvatures of the reference move the length by opposite amounts; both ends of the stroke stay.
     let (up, down) =
         (run("pot_nonlinearity", &[("c", 2.0)]), run("pot_nonlinearity", &[("c", -2.0)]));
     for i in 0..SAMPLES {
@@ -289,9 +290,9 @@ fn symmetries_and_scaling() {
     let size = largest(&hum[2], &plain[2]);
     assert!([0.05, 0.0].iter().any(|a| abs_diff_eq!(size, *a, epsilon = SHIFTED_V)), "{size}");
     let hum = run("mains_hum", &[("a", 0.05), ("f", 55.0)]);
-    // 55/100 is 11/20: every twentieth of a wave is seen, the crest among them.
+    // At 55 Hz and 100 samples a second, the samples show every twentieth of a wave, the crest among them.
     assert_abs_diff_eq!(largest(&hum[2], &plain[2]), 0.05, epsilon = SHIFTED_V);
-    // A drift of d after t is a resistance (1 + d t) larger.
+    // A drift d multiplies the resistance after a time t by 1 + d t.
     let drift = run("thermal_drift", &[("d", 4e-4)]);
     let bridge = stretch_sim::Bridge::new(&RigParams::default());
     for i in [0, 100, 599] {
@@ -303,7 +304,7 @@ fn symmetries_and_scaling() {
             max_relative = F64_ROUNDING
         );
     }
-    // Backlash: half its width behind, on either side.
+    // With backlash the output is behind by the half-width, on either side.
     let lash = run("pot_backlash", &[("w", 1.0)]);
     assert_abs_diff_eq!(lash[1][299] - plain[1][299], 1.0, epsilon = BEHIND_MM);
     assert_abs_diff_eq!(lash[1][599] - plain[1][599], -1.0, epsilon = BEHIND_MM);
@@ -374,8 +375,8 @@ fn a_leak_beside_a_full_inlet_comes_to_rest() {
             0.0,
         );
         let end = &p[500..];
-        // A millionth of full scale: steps a hundred times too long for the smallest leak still end
-        // on the balance.
+        // The limit is a millionth of full scale. Steps that are a hundred times too long for the smallest leak still
+        // end on the balance.
         assert!(largest(end, &vec![end[0]; end.len()]) < 1e-6 * 620.0, "{c}: {:?}", &end[..4]);
         assert!(end[0] < 620.0 && end[0] > 610.0, "{c}: {}", end[0]);
     }

@@ -1,4 +1,4 @@
-//! Sessions repeat to the bit, rig files are read strictly, a gauge alone is a rig.
+//! Sessions repeat to the bit, rig files are read strictly, and a gauge alone can be read as a rig.
 
 use approx::{abs_diff_eq, assert_relative_eq, relative_eq};
 use stretch_data::{RigFile, Split, Trial};
@@ -92,7 +92,7 @@ fn the_papers_session() {
 fn what_lasts_from_trial_to_trial() {
     let quiet = RunSettings { noise: false, ..RunSettings::default() };
     let plans = [TrialPlan::inflation(1.0), TrialPlan::deflation(1.0), TrialPlan::inflation(1.0)];
-    // The nominal rig has no memory: without noise the third trial equals the first.
+    // The nominal rig has no memory, so without noise the third trial equals the first.
     let trials = simulate(&Rig::default(), &quiet, &plans);
     assert_eq!(trials[0].channels, trials[2].channels);
     for (name, values) in [
@@ -108,7 +108,7 @@ fn what_lasts_from_trial_to_trial() {
         assert!((end(&trials[0]) - end(&trials[2])).abs() > 1e-3, "{name} lasts");
         assert_eq!(trials[1].channel("pressure_kpa").unwrap()[0], 620.0);
     }
-    // Heating starts again with the excitation.
+    // The warming starts again when the excitation is switched on.
     let mut rig = Rig::default();
     rig.effects.insert("self_heating", &[("h", 0.05)]).unwrap();
     let trials = simulate(&rig, &quiet, &plans);

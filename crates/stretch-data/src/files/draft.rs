@@ -17,12 +17,11 @@ use super::{
     folder::{lock, replace},
 };
 
-/// Temporary names of this process, with the paths that they will replace. Those of folders are
-/// kept, because messages may contain them.
+/// Temporary names of this process, with the paths that they will replace. Temporary names of folders stay in the list
+/// after the rename, because messages may contain them.
 ///
-/// The lock is held while a temporary name is made or renamed to its target. The handler of Ctrl-C
-/// takes the lock and never releases it. Therefore a target renamed before keeps its name, and none
-/// is renamed afterwards.
+/// The lock is held while a temporary name is made or renamed to its target. The handler of Ctrl-C takes the lock and
+/// never releases it. Therefore targets that were renamed before Ctrl-C stay, and no target is renamed after it.
 static NAMES: Mutex<Vec<(PathBuf, PathBuf)>> = Mutex::new(Vec::new());
 
 fn names() -> MutexGuard<'static, Vec<(PathBuf, PathBuf)>> {
@@ -176,8 +175,7 @@ impl Drop for Draft {
     }
 }
 
-/// Folders that were made for a target, the innermost first. Those that are empty are removed on
-/// drop.
+/// Folders that were made for a target, the innermost first. On drop, those that are empty are removed.
 #[derive(Debug)]
 struct Parents(Vec<PathBuf>);
 

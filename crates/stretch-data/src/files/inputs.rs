@@ -20,7 +20,7 @@ fn guard() -> MutexGuard<'static, Option<Guard>> {
 
 #[derive(Debug, Default)]
 struct Guard {
-    /// The outputs: the option with its path, and the identity of the file that exists there.
+    /// For each output: the option with its path, and the identity of the file that already exists there.
     outputs: Vec<(String, Option<Identity>)>,
     /// The files that were read, with their paths as given.
     inputs: BTreeMap<Identity, PathBuf>,

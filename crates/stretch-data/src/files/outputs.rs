@@ -22,9 +22,9 @@ use super::{
 /// permission, an error of `fill`) the old file is unchanged. If the target is a symbolic link, the
 /// file that it points to is replaced. Output is buffered.
 ///
-/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to
-/// directly. A pipe without a reader is refused after two seconds. Standard input and disks are
-/// refused. It is no error if the reader of a pipe or of standard output closes it early.
+/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to directly. A pipe without
+/// a reader is refused after two seconds. Standard input and disks are refused as targets. It is no error if the reader
+/// of a pipe or of standard output closes it early.
 ///
 /// A file that this process has read as an input is not overwritten
 /// ([`guard_inputs`](super::guard_inputs)).
@@ -93,8 +93,8 @@ pub fn write_folder<E: From<FileError>>(
 /// The outputs of one command. All of them are on the disk under temporary names before any of them
 /// is renamed to its target.
 ///
-/// If one cannot be written, none is. A kill between two renames leaves each file complete, either
-/// the old or the new one.
+/// If one output cannot be written, no target is changed. A kill between two renames leaves each target complete, with
+/// either its old or its new content.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;

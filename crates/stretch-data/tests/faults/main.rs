@@ -1,4 +1,4 @@
-//! A file system that fails at any of its calls, once or from then on, and a program that is killed
+//! Tests with a file system that fails at any of its calls, once or from then on, and with a program that is killed
 //! before any of them. The output must be old or new, never a mixture.
 //!
 //! The failing hook is set once in the life of a process, so all failures are in one test. The

@@ -5,21 +5,21 @@
 //! ```text
 //! d_i = x_i - (-x_(i-2) + 4 x_(i-1) + 4 x_(i+1) - x_(i+2))/6
 //! ```
-//!
-//! The sample is an outlier if |d_i| exceeds two limits: eight standard deviations of d over the
-//! recording plus half of the greater of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1), and
-//! 1.25 times |d| of either neighbour. A kink or a step of the motion therefore is no outlier. An
+//! The sample is an outlier if |d_i| exceeds two limits: eight standard deviations of d over the recording plus half of
+//! the greater of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1), and 1.25 times |d| of either neighbour. Therefore
+//! a step of the motion is no outlier, and neither is a kink from rest. A sharp reversal at nearly equal speeds stays
+//! below the limit only because of the noise. An outlier is replaced by the value of the cubic.
 //! outlier is replaced by the value of the cubic.
 
 use stretch_data::SessionTrial;
 
 /// Standard deviations beyond which a sample is an outlier.
 const OUTLIER: f64 = 8.0;
-/// Share of the motion on either side that is added to the limit, because a kink gives a |d| of a
-/// third of that motion.
+/// Share of the greater of the two steps beside the sample that is added to the limit. A kink from rest gives a |d| of
+/// a third of that step.
 const KINK: f64 = 0.5;
-/// Ratio of |d| to that of a neighbour beyond which a sample is an outlier: a step of the motion
-/// gives 1, a single outlier 3/2.
+/// Least ratio of the |d| of an outlier to the |d| of its neighbours. A step of the motion gives a ratio of 1, a single
+/// outlier a ratio of 3/2.
 const STEP: f64 = 1.25;
 
 /// Measured columns of a rig.

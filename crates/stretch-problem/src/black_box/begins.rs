@@ -1,4 +1,4 @@
-//! Estimates the command from before a trial, at which the operators in front of a stage begin.
+//! Estimates the command from before a trial. The operators in front of a stage begin the trial with this command.
 //!
 //! If the first sample of a trial is already a step of the command, the output still rests at the
 //! command from before the step, which was not recorded. An operator with memory in front of the
@@ -10,10 +10,10 @@
 //! u_before = a + b y_0,     taken where |u_before - u_0| > 5 sqrt(s^2 + (b sigma)^2)
 //! ```
 //!
-//! Here u_0, y_0 is the first sample of a trial, s is the residual standard deviation of the line,
-//! and sigma is the noise of the output. The line is used only if its squared correlation is at
-//! least [`EXPLAINED`]: a servo has such a line, a force that pushes a mass has none. Of a test
-//! trial only y_0 is read, as an initial value.
+//! Here u_0 and y_0 are the input and the output in the first sample of a trial, s is the residual standard deviation
+//! of the line, and sigma is the noise of the output. The line is used only if its squared correlation is at least
+//! [`EXPLAINED`]: a servo has such a line, a force that pushes a mass has none. Of a test trial only y_0 is read, as an
+//! initial value.
 
 use std::ops::Range;
 

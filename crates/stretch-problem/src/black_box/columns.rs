@@ -8,8 +8,8 @@ use stretch_gap::{SampleRoles, TrialSpec};
 use super::spec::StageEntry;
 use crate::error::ProblemError;
 
-/// Bounds of the least number of samples of a part of a trial. The least number is that of five
-/// seconds, within these bounds. Shorter parts are left out.
+/// Bounds of the least number of samples of a part of a trial. The least number is the number of samples in five
+/// seconds, limited to these bounds. Shorter parts are left out.
 const SHORTEST: [usize; 2] = [20, 50];
 const SHORTEST_S: f64 = 5.0;
 
@@ -85,10 +85,9 @@ impl Columns {
         self.turns[self.names.iter().position(|n| n == name)?]
     }
 
-    /// Shifts the columns that wrapped by whole turns in each trial. A column begins as near as
-    /// possible to 0, where simulators begin. The inputs and the position of a stage begin as near
-    /// as possible to its output if both wrap at the same period, because noise decides on which
-    /// side of the seam each of them begins.
+    /// Shifts the columns that wrapped by whole turns in each trial. A column begins as near as possible to 0, where
+    /// simulators begin. If an input or the position of a stage wraps at the same period as its output, it begins as
+    /// near as possible to the output instead, because noise decides on which side of the jump each of them begins.
     pub(crate) fn choose_turns(&mut self, stages: &[StageEntry]) {
         let shift = |values: &mut [f64], to: f64, turn: f64| {
             let turns = turn * values.first().map_or(0.0, |x| ((x - to) / turn).round());

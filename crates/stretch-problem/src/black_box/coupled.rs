@@ -1,11 +1,11 @@
 //! Finds stages that are coupled inside a simulator: which outputs move if the inputs of one stage
 //! are altered.
 //!
-//! A simulator that runs as a whole passes an altered input of one stage on to the outputs of
-//! others. For example, a joint of an arm moves with the joint before it. A wrapper in front of a
-//! stage therefore acts on every output that it moves. Columns that drive only one stage and have
-//! wrappers in front of them are tested. In one run, y', the column is altered by the wrapper that
-//! changes it most. A comparison with the unaltered run, y, shows which stages t move:
+//! A simulator that runs as a whole passes an altered input of one stage on to the outputs of others. For example, a
+//! joint of an arm moves with the joint before it. A wrapper in front of a stage therefore acts on every output that
+//! the altered input moves. Columns that drive only one stage and have wrappers in front of them are tested. In one
+//! run, with outputs y', the column is altered by the wrapper that changes it most. A comparison with the outputs y of
+//! the unaltered run shows which stages t move:
 //!
 //! ```text
 //! sqrt(mean over all samples of (y'_t - y_t)^2) > 0.02 sd_t        sd_t  the noise of the output of stage t
@@ -30,7 +30,7 @@ use crate::wrap::{Placed, Trials};
 const MOVED: f64 = 0.02;
 /// Greatest change of an output that counts as rounding, as a share of its greatest value.
 const ROUNDING: f64 = 1e-9;
-/// Ends of the note on coupled stages.
+/// End of the note on coupled stages.
 const LOOKED_AT: &str = "these outputs are compared as well";
 const LEFT_OUT: &str = "this is left out, because the simulator takes altered inputs of one stage at a time (a worker that can take \
     more sets several = true in its hello)";

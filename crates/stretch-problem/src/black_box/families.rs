@@ -87,8 +87,8 @@ pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
     out
 }
 
-/// The range of a family's quantity from the most probable candidate that contains the effect. The
-/// effect's first value varies by 1.96 standard deviations to either side.
+/// The range of a family's quantity from the most probable candidate that contains the effect. For the range, the
+/// effect's first value is varied by 1.96 standard deviations to either side.
 fn said(diagnosis: &Diagnosis, name: &str, of: fn(&[f64]) -> f64) -> Option<[f64; 2]> {
     let holds = |c: &&Candidate| c.effects.iter().any(|e| e == name);
     let candidate = diagnosis.candidates.iter().find(holds)?;

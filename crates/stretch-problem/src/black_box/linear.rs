@@ -4,9 +4,9 @@
 //! y(p) = y(p_near) + sum over i of J_i (p_i - p_near,i),     J_i = (y(p_0 + d_i) - y(p_0))/d_i
 //! ```
 //!
-//! J is computed at p_0 and kept while fits stay near p_0 (a chord method). The run at p_near is
-//! exact. A trial point of a fit that is a small step from an exact run therefore costs no run. The
-//! values that a diagnosis reports come from exact runs.
+//! J is computed at p_0 and kept while fits stay near p_0 (a chord method). The run at p_near is exact. A trial point
+//! of a fit therefore costs no run if it is a small step from an exact run. The values that a diagnosis reports come
+//! from exact runs.
 
 use std::sync::Arc;
 

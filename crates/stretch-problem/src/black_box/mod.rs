@@ -164,8 +164,8 @@ impl BlackBox {
         self.coupled().about.is_some()
     }
 
-    /// The run from which a run is predicted, with the linearisation and the differences of the
-    /// parameters; or the run itself and `None` if it has to be exact.
+    /// The run from which a run is predicted, with the linearisation and the differences of the parameters. If the run
+    /// has to be exact, the result is the run itself and `None`.
     fn base_of(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
         let inner = self.inner(run);
         let line = run.near.filter(|_| run.input_noise.is_none()).zip(self.line(run.stage));

@@ -1,13 +1,12 @@
 //! Checks that a source gives the same answer to the same request twice, and that a run over more
 //! trials begins with the samples of a run over fewer.
 //!
-//! A diagnosis is based on differences between runs. A simulator that draws random numbers without
-//! a seed, or carries its state from one run to the next, adds differences that would be named as
-//! effects. So the first run that a source answers is requested once more, in a separate call, so
-//! that a worker has made a run in between. If there are several trials, the second request is over
-//! the first trial alone, or over all if the first request was over one. A difference that occurs
-//! only between runs of two lengths is reported as a note, because solvers with variable steps
-//! cause it.
+//! A diagnosis is based on differences between runs. A simulator that draws random numbers without a seed, or carries
+//! its state from one run to the next, adds differences that would be named as effects. So the first run that a source
+//! answers is requested once more. The second request is a separate call, so that a worker has made a run in between.
+//! If there are several trials, the second request is over the first trial alone, or over all if the first request was
+//! over one. A difference that occurs only between runs of two lengths is reported as a note, because solvers with
+//! variable steps cause it.
 
 use std::time::Duration;
 

@@ -345,13 +345,13 @@ impl Runs {
     }
 }
 
-/// The altered stage that an ask names: the run's own stage if it is altered, otherwise the first
-/// altered one; `None` if every input is as measured.
+/// The altered stage that a request names: the run's own stage if it is altered, otherwise the first altered one;
+/// `None` if every input is as measured.
 fn asked_for(run: &Inner) -> Option<&Altered> {
     run.altered.iter().find(|a| a.stage == run.stage).or(run.altered.first())
 }
 
-/// Altered columns of all stages except the one that the ask names.
+/// Altered columns of all stages except the one that the request names.
 fn others(run: &Inner) -> Vec<AlteredColumn<'_>> {
     let own = asked_for(run).map(|a| a.stage);
     let all = run.altered.iter().flat_map(|a| a.which.iter().map(move |&input| (a, input)));

@@ -67,7 +67,7 @@ impl RecordedSession {
     }
 }
 
-/// One run that is asked for.
+/// One run that a source is asked for: a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ask<'a> {
     /// Index of the stage.
@@ -102,8 +102,7 @@ pub struct AlteredColumn<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// These values cannot be simulated, and the fit steps back. The text is the simulator's
-    /// message.
+    /// The simulator cannot simulate these values, so the fit steps back. The text is the simulator's message.
     #[error("{0}")]
     Refused(String),
     /// The simulator is gone for good, and the diagnosis ends.
@@ -174,9 +173,9 @@ fn question([first, second]: &[usize; 2]) -> String {
 
 /// A user's simulator as a black box.
 ///
-/// The same ask must always have the same answer, and a run over more trials must begin with the
-/// samples of a run over fewer. Several threads may call a source at once. No call comes from a
-/// thread of a rayon pool, so that a source may use parallel iterators.
+/// The same request ([`Ask`]) must always have the same answer, and a run over more trials must begin with the samples
+/// of a run over fewer. Several threads may call a source at once. No call comes from a thread of a rayon pool, so that
+/// a source may use parallel iterators.
 ///
 /// A closure is a source:
 ///
@@ -189,15 +188,14 @@ fn question([first, second]: &[usize; 2]) -> String {
 /// assert_eq!(source.simulate_many(&[ask]), [Ok(vec![2.0; 3])]);
 /// ```
 pub trait Source: Send + Sync {
-    /// The output of the stage over the trials of each ask, in the order of the asks.
+    /// The output of the stage over the trials of each request, in the order of the requests.
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>>;
 
-    /// Whether an answer holds the outputs of all stages, one after the other, whichever stage the
-    /// ask names. A simulator that runs as a whole is then run once for all stages. The inputs of
-    /// an ask are those of the stage that it names.
+    /// Whether an answer holds the outputs of all stages, one after the other, whichever stage the request names. A
+    /// simulator that runs as a whole is then run once for all stages. The inputs of a request are those of the stage
+    /// that it names.
     ///
-    /// If the inputs of one stage are altered, the ask names that stage, whichever output is
-    /// needed.
+    /// If the inputs of one stage are altered, the request names that stage, whichever output is needed.
     fn answers_all(&self) -> bool {
         false
     }
@@ -213,8 +211,8 @@ pub trait Source: Send + Sync {
         false
     }
 
-    /// Number of asks per call at which the source is efficient; more than one if a batch costs
-    /// little more than a run.
+    /// Number of requests per call at which the source is efficient. It is more than one if a batch costs little more
+    /// than a single run.
     fn batch(&self) -> usize {
         1
     }
@@ -225,11 +223,11 @@ pub trait Source: Send + Sync {
     }
 }
 
-/// A function as a source; the asks of one batch are answered in parallel.
+/// A function as a source; the requests of one batch are answered in parallel.
 #[derive(Debug, Clone, Copy)]
 pub struct Closure<F>(F);
 
-/// Makes a source of a function that answers one ask.
+/// Makes a source of a function that answers one request.
 pub fn closure<F>(answer: F) -> Closure<F>
 where
     F: Fn(&Ask<'_>) -> Result<Vec<f64>, SourceError> + Send + Sync,

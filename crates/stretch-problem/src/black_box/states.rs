@@ -23,8 +23,7 @@ pub struct State {
 
 /// Prefix of the names of effects on states.
 const PREFIX: &str = "state.";
-/// Range of the time constant of a leak: the least in sample times, the greatest in session
-/// lengths.
+/// Range of the time constant of a leak. The least value is given in sample times, the greatest in session lengths.
 const LEAKS: [f64; 2] = [10.0, 10.0];
 
 impl ProblemSpec {

@@ -1,6 +1,6 @@
 //! Tests whether fitted values are the same in all runs.
 //!
-//! Cochran's Q of the values x_i with variances v_i, weights w_i = 1/v_i:
+//! The test statistic is Cochran's Q of the values x_i with variances v_i and weights w_i = 1/v_i:
 //!
 //! ```text
 //! Q = sum w_i (x_i - m)^2,     m = sum w_i x_i/sum w_i,     chi-square with n - 1 degrees of freedom where all are the same
@@ -43,7 +43,7 @@ pub struct Heterogeneity {
 }
 
 impl Heterogeneity {
-    /// In a sentence.
+    /// Returns the result of the test as a sentence.
     pub fn sentence(&self) -> String {
         let [low, high] = self.range;
         let spread = 100.0 * (high - low) / self.mean.abs().max(f64::MIN_POSITIVE);
@@ -70,7 +70,7 @@ pub struct Apart {
 }
 
 impl Apart {
-    /// In a sentence.
+    /// Returns the deviations of the run as a sentence.
     pub fn sentence(&self) -> String {
         let each = self.values.iter().zip(&self.deviations);
         let each: Vec<String> = each.map(|(name, z)| format!("{name} ({z:+.1} sd)")).collect();
@@ -93,7 +93,7 @@ fn estimates(runs: &[Run], value: usize) -> Vec<Estimate> {
     runs.iter().enumerate().filter_map(one).collect()
 }
 
-/// Returns the fitted quantities, which have the same order in all runs.
+/// Returns the fitted values of the first run; all runs have the same values in the same order.
 fn fitted(runs: &[Run]) -> &[SampleValue] {
     runs.first().map_or(&[], |(_, fit)| &fit.values)
 }

@@ -125,8 +125,8 @@ impl ProblemSpec {
         self.name.as_deref().unwrap_or("problem")
     }
 
-    /// The workers of the problem's simulator, `jobs` at once if the file gives no number; `None`
-    /// for a simulator that is built in.
+    /// The workers (processes) that run the problem's simulator, `jobs` at once if the file gives no number; `None` for
+    /// a simulator that is built in.
     ///
     /// # Errors
     /// The simulator is an FMU, and the program that runs FMUs is missing.

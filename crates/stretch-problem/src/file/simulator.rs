@@ -116,7 +116,7 @@ impl SimulatorEntry {
         }
     }
 
-    /// Its workers, as [`ProblemSpec::workers`].
+    /// The workers of the simulator, as [`ProblemSpec::workers`].
     pub(super) fn workers(
         &self,
         jobs: usize,

@@ -17,13 +17,13 @@ use crate::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     e: Vec<f64>,
-    /// Whether gauge blocks replace the reference.
+    /// Whether blocks of known length (gauge blocks) replace the reference.
     is_known: bool,
     /// Applied pressure as a share of its range; 0 if none is applied.
     pressure: Vec<f64>,
 }
 
-/// A course without pressure; `is_known` states whether gauge blocks replace the reference.
+/// A course without pressure; `is_known` states whether blocks of known length replace the reference.
 fn held(points: &[(f64, f64)], is_known: bool, dt_s: f64) -> Course {
     let e = course(points, dt_s);
     Course { pressure: vec![0.0; e.len()], e, is_known }
@@ -35,8 +35,8 @@ fn held_under_pressure(dt_s: f64) -> Course {
     Course { e: vec![0.5; pressure.len()], is_known: true, pressure }
 }
 
-/// Experiments in which the gauge is held at known lengths with blocks, or left alone: name, how,
-/// minutes to prepare, points, and whether blocks hold the gauge.
+/// Experiments in which the gauge is held at known lengths with blocks, or left alone. Each has a name, instructions,
+/// the minutes to prepare it, the points of its course, and whether blocks hold the gauge.
 fn still() -> [(&'static str, &'static str, f64, Points, bool); 2] {
     let block = |e: f64| [(e, 3.0), (e, 10.0)];
     [
@@ -93,7 +93,7 @@ impl GaugeSimulator {
         course.pressure.iter().map(|share| share * scale).collect()
     }
 
-    /// The trial that sets a course: the reference, and the pressure if one is applied.
+    /// The trial that prescribes a course: the reference, and the pressure if one is applied.
     fn trial(&self, name: &str, course: &Course) -> Trial {
         let channel = |name: String, values| Channel { name, values };
         let reference = format!("set_{}", self.reference);
@@ -136,7 +136,7 @@ impl Laboratory for GaugeSimulator {
         candidates
     }
 
-    /// The first minute of the recording.
+    /// The first minute of the recording, as a course.
     fn done(&self) -> Course {
         let samples = ((60.0 / self.session.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];

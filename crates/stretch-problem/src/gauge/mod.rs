@@ -1,4 +1,4 @@
-//! A gauge alone with a reference: a rig of one stage.
+//! A gauge alone: a stretch sensor with a reference, without the rest of the rig. It is a simulator of one stage.
 
 mod experiments;
 mod facts;
@@ -31,8 +31,8 @@ use crate::{
 const OFFSET: usize = 0;
 /// Index of the gain.
 const GAIN: usize = 1;
-/// Index of the initial hysteresis state: how the memories of the gauge begin the session, after a
-/// motion from below (1), from above (-1), or settled (0).
+/// Index of the initial hysteresis state. It says how the memories of the gauge begin the session: after a motion from
+/// below (1), after a motion from above (-1), or settled (0).
 const INITIAL_STATE: usize = 2;
 
 /// The data from which a [`GaugeSimulator`] is built.
@@ -51,14 +51,15 @@ pub struct GaugeSetup<'a> {
     pub catalogue: &'a Catalogue,
 }
 
-/// Any stretch sensor with a reference: y = offset + gain e, where e is the reference over its range in the fit trials.
+/// Any stretch sensor with a reference: y = offset + gain e. Here e is the reference as a share of its range in the fit
+/// trials.
 ///
-/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; the rig file's effects
-/// act in every run. Effects of the catalogue act on e in place of the strain and on (y -
-/// offset)/gain in place of resistance and voltage. The reference is smoothed according to its
-/// noise. The part of that noise that reaches the signal counts as noise of the signal. Noise is
-/// estimated from second differences, so that only changes from sample to sample count as noise.
-/// Errors that last longer count as gap.
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; the rig file's effects act in every run.
+/// Effects of the catalogue act on e in place of the strain, on 1 + (y - offset)/gain in place of the resistance, and
+/// on (y - offset)/gain in place of the voltage. The reference is smoothed according to its noise. The part of that
+/// noise that reaches the signal counts as noise of the signal. Noise is estimated from second differences, so that
+/// only changes from sample to sample count as noise. Errors that last longer count as a gap between simulator and
+/// recording.
 ///
 /// ```
 /// use stretch_data::{Channel, SessionTrial, Trial};
@@ -237,8 +238,8 @@ fn parts<'a>(
     })
 }
 
-/// The gauge of a rig file; without a rig file a gauge that is estimated from the recording, with
-/// offset and gain free.
+/// The gauge of a rig file. Without a rig file it is a gauge that is estimated from the recording, with offset and gain
+/// free.
 fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
     let (low, high) = session.range(&session.reference);
     let (least, greatest) = session.range(&session.signal);

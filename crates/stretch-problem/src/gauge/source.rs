@@ -13,10 +13,9 @@ use crate::{bench::rig_file, error::ProblemError};
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
 
 impl GaugeSimulator {
-    /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and
-    /// signal; without them `length_mm` and `bridge_v` are taken. `None` if the path holds no gauge
-    /// alone: neither columns nor a rig file identify it as one, and the trials have valve openings
-    /// (a column `inlet` or `outlet`).
+    /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and signal; without them
+    /// `length_mm` and `bridge_v` are taken. `None` if the path holds a whole rig: neither columns nor a rig file
+    /// identify a gauge alone, and the trials have valve openings (a column `inlet` or `outlet`).
     ///
     /// A gauge alone is recognised by its columns, by a rig file of `kind = "gauge"` (given, or
     /// named by the data set), or by trials without openings.

@@ -41,7 +41,8 @@ impl RigCache {
     }
 }
 
-/// Everything that the outputs of some stages depend on; `others` are the numbers of a run in addition to parameters and effects.
+/// Everything that the outputs of some stages depend on. `others` are the numbers of a run in addition to parameters
+/// and effects.
 pub(super) fn causes(
     stages: &[RigStage],
     params: &RigParams,

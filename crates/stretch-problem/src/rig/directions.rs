@@ -82,7 +82,7 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
 enum Wrong {
     Exchanged,
     Reversed,
-    /// The commands come so many seconds late.
+    /// The commands are recorded so many seconds late.
     Shifted(f64),
 }
 

@@ -31,7 +31,7 @@ enum Drive {
         length_mm: Vec<f64>,
         /// Pressure, kPa.
         pressure_kpa: Vec<f64>,
-        /// Share by which a shunt lowers the bridge's trim; empty without a shunt.
+        /// Share by which a shunt lowers the bridge's trim, by sample; empty without a shunt.
         shunt: Vec<f64>,
     },
 }
@@ -244,7 +244,7 @@ impl Experiment {
 }
 
 impl RigSimulator {
-    /// Rig and effects of a model.
+    /// The rig and the effects that a model describes.
     fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
         let params = TunedRig::of(&self.base, &self.tuned, model).params;
         Ok((params, unrecorded(&self.effects, &self.rows, model)?))

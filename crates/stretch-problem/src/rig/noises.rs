@@ -5,8 +5,8 @@ use stretch_sim::{Key, RigParams};
 
 use super::session::{RigSession, RigTrial};
 
-/// Share of the quiet windows that the noise is estimated from, taken from the end of the longest
-/// rests, and the least number of such windows.
+/// The noise is estimated from the windows without a command that begin longest after a command: from this share of all
+/// such windows, but from at least this number of them.
 const USED: (f64, usize) = (0.5, 24);
 
 /// Time after a command from which a parabola describes the remaining motion of the muscle, s: a
@@ -16,10 +16,10 @@ const SETTLED_S: f64 = 2.0;
 /// Slow noise of a recorder (1 sd), in multiples of its noise: amplifiers have flicker noise, and
 /// references drift with the room temperature.
 const DRIFT: f64 = 0.3;
-/// Correlation time of that drift, s.
+/// Correlation time of the slow noise of a recorder, s.
 const DRIFT_CORRELATION_S: f64 = 2.0;
-/// Greatest noise of a recorder, in multiples of the noise that the rig file states. Noise beyond
-/// it does not come from the recorder.
+/// Greatest noise of a recorder, in multiples of the noise that the rig file states. Noise beyond this limit does not
+/// come from the recorder.
 const MOST_NOISE: f64 = 2.0;
 
 /// Noise of every channel, with the quantisation noise of the converters.

@@ -11,8 +11,8 @@ use super::{
 /// Usual slow drift of a laboratory's supply (Ornstein-Uhlenbeck), as a share of the supply (1 sd).
 /// Regulators hold the supply to a tenth of a per cent to half a per cent.
 const SUPPLY_DRIFT: f64 = 0.0025;
-/// Correlation time of that drift, s: between the cycle of a compressor, which is slower, and the
-/// oscillation of a regulator, which is faster.
+/// Correlation time of the supply's drift, s: between the cycle of a compressor, which is slower, and the oscillation
+/// of a regulator, which is faster.
 const SUPPLY_CORRELATION_S: f64 = 4.0;
 
 /// What a parameter of the diagnosis sets.
@@ -25,8 +25,8 @@ pub(super) enum TunedParameter {
     /// How far ahead of its row every second switch of the commands acts: the even switches (0) or
     /// the odd switches (1).
     CommandLead(usize),
-    /// The initial hysteresis state of a stage: between that after a motion from the other end of
-    /// the stroke and a settled one.
+    /// The initial hysteresis state of a stage, between the state after a motion from the other end of the stroke and a
+    /// settled state.
     InitialState(RigStage),
 }
 
@@ -68,8 +68,8 @@ pub(super) fn parameters(
         .unzip()
 }
 
-/// Prior of the share of the settled state in the initial state: one standard deviation around 0. A
-/// rig that had settled before the session (share 1) is not implausible.
+/// Standard deviation, around 0, of the prior of the settled share in the initial state. A rig that had settled before
+/// the session (share 1) is not implausible.
 const INITIAL_STATE: f64 = 0.4;
 
 /// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the

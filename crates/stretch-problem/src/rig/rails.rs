@@ -5,10 +5,10 @@ use stretch_sim::{Key, RigParams};
 
 use super::{RigSession, RigSimulator, RigTrial};
 
-/// Share of the samples at one value that chance does not explain.
+/// Share of the samples at one value above which chance does not explain the repeated value.
 const SHARE: f64 = 0.002;
-/// Least noise of a recording that is judged, as a share of the stated noise, because a channel
-/// without noise repeats its value at rest.
+/// Least noise of a recording that is judged, as a share of the stated noise. A channel with less noise repeats its
+/// value at rest.
 const NOISY: f64 = 0.3;
 
 impl RigSimulator {

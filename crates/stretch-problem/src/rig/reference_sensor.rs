@@ -25,7 +25,8 @@ impl ReferenceSensor {
         Ok(Self { stage, memory, acts, work: Vec::new() })
     }
 
-    /// Sets the initial state of the reference: a share of the way towards one that has settled at a length.
+    /// Sets the initial state of the reference: moves it by a share towards the state of a reference that has settled
+    /// at a length.
     pub(super) fn set_initial_state(
         &mut self,
         share: f64,

@@ -16,8 +16,8 @@ use crate::{bench::acting::Acting, error::ProblemError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
-/// Number of steps for each sample if an effect needs fine steps, because the length is not linear
-/// between samples.
+/// Number of steps for each sample if an effect needs fine steps. Such an effect needs them because the length is not
+/// linear between samples.
 const PIECES: f64 = 4.0;
 /// Pressure of a vented chamber, kPa (mean, 1 sd): as a rule a little above the atmosphere.
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
@@ -26,7 +26,7 @@ const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
 
 /// Error of the pressure at a trial's start that is derived from a length at rest, kPa (1 sd).
 const LENGTH_KPA: f64 = 3.0;
-/// Error of that pressure during a motion, kPa (1 sd).
+/// Error of the pressure at a trial's start that is derived from a length during a motion, kPa (1 sd).
 const MOVING_KPA: f64 = 10.0;
 
 /// Everything that a run needs in addition to the rig.
@@ -416,9 +416,9 @@ impl Setting<'_> {
 /// cells = moved + share (settled - moved)
 /// ```
 ///
-/// Moves a memory that was left at the other end of the stroke towards the memory of a stage that
-/// settled where the session begins. `begin` runs a stage with a memory at the session's first
-/// sample, so that the first trial follows without a pause.
+/// The function moves a memory that was left at the other end of the stroke towards the memory of a stage that settled
+/// where the session begins. `begin` runs a stage with a memory at the session's first sample, so that the first trial
+/// follows without a pause.
 pub(super) fn set_initial_state(
     share: f64,
     after_pause: Start,

@@ -53,8 +53,8 @@ pub struct RigTrial {
 }
 
 impl RigTrial {
-    /// The trial of a session whose columns are [`NEEDED`] and then, if there is one, the pressure;
-    /// `before` is the trial before it.
+    /// The trial of a session whose columns are [`NEEDED`], followed by the pressure if there is one; `before` is the
+    /// trial before it.
     fn of(trial: &EvenTrial, before: Option<&EvenTrial>, excitation: f64, dt_s: f64) -> Self {
         let goes_on = before.is_some_and(|before| before.source() == trial.source());
         let column = |i: usize| trial.columns().get(i).cloned();
@@ -278,8 +278,8 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     })
 }
 
-/// Least motion against the valves for which a recording is refused, in strokes at the widest
-/// opening.
+/// Limit of the motion against the valves: a recording is refused if the muscle lengthens while the inlet is open, or
+/// shortens while the outlet is open, by more than this many strokes at the widest opening.
 const AGAINST: f64 = 0.5;
 
 impl RigSession {

@@ -6,13 +6,12 @@ use stretch_gap::{Noise, RandomGenerator};
 
 use super::cache::LastResults;
 
-/// Widest half-width, in samples.
+/// Greatest half-width of a smoothing window, in samples.
 const WIDEST: usize = 15;
-/// Narrowest half-width, in samples.
+/// Least half-width of a smoothing window, in samples.
 const NARROWEST: usize = 2;
-/// Longest time of the widest and of the narrowest half-width, s. At a low rate they have fewer
-/// samples, because a valve acts just as fast there. A window of less than [`NARROWEST`] samples on
-/// either side is not smoothed.
+/// Longest time that the greatest and the least half-width may last, s. At a low rate the windows have fewer samples,
+/// because a valve acts just as fast there. A window of less than [`NARROWEST`] samples on either side is not smoothed.
 const LONGEST_S: [f64; 2] = [0.15, 0.02];
 /// Greatest half-width of a window, as a share of the time since the last command minus [`WAKE_S`].
 const SHARE: f64 = 0.125;
@@ -22,8 +21,8 @@ const WAKE_S: f64 = 0.1;
 /// noise alone hardly ever exceeds it.
 const PATIENCE: f64 = 4.0;
 
-/// A measured input, smoothed for a stage: for every sample the half-width of the least-squares
-/// parabola that replaces the sample; 0 leaves the sample as it is.
+/// A measured input, smoothed for a stage. A least-squares parabola over a window replaces each sample; every sample
+/// has its own half-width, and a half-width of 0 leaves the sample as it is.
 ///
 /// Windows are chosen by the commands and not by the recording: a choice by the recording would
 /// favour noise that happens to look smooth, and the noise that is left would look like a gap. A
@@ -79,9 +78,9 @@ fn left_by_parabola(record: &[f64], i: usize, h: usize) -> f64 {
     (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0)
 }
 
-/// Half-widths that the commands allow: narrow after a change of the commands, wider with the time
-/// since that change, and never beyond the next change. A signal with corners (`sharp`) is not
-/// smoothed across a change at all.
+/// Half-widths that the commands allow. They are small after a change of the commands, grow with the time since that
+/// change, and never reach beyond the next change. A signal with corners (`sharp`) is not smoothed across a change at
+/// all.
 pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
     // Rounding must not reduce a whole number of samples by one.
     let [widest, narrowest] = LONGEST_S.map(|time_s| (time_s / dt_s + 1e-6) as usize);
@@ -145,10 +144,10 @@ impl Smoothed {
     /// A random draw of the noise, smoothed like the recording, and of the corners between two
     /// rows.
     ///
-    /// A corner a share a of a sample before row i, at which the slope changes by d a sample, lies
-    /// a (1 - a) d below the straight line from row i - 1 to row i. A stage that is slow compared
-    /// with a row responds only to the area under the input. A quarter of that distance is
-    /// subtracted from both rows, which removes the same area.
+    /// Let the slope change by d a sample at a corner that lies a share a of a sample before row i. The corner then
+    /// lies a (1 - a) d below the straight line from row i - 1 to row i. A stage that is slow compared with a row
+    /// responds only to the area under the input. A quarter of that distance is subtracted from both rows, which
+    /// removes the same area.
     fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {
         let mut drawn = smoothed(&noise.samples(self.values.len(), random), &self.halves);
         for &(i, change) in &self.corners {

@@ -38,8 +38,8 @@ impl Setting<'_> {
         })
     }
 
-    /// The part of the length that play in the reference hides. The simulated motion shows which
-    /// side of the play is in contact; the recording gives the length of the muscle.
+    /// The part of the length that play in the reference hides. The simulated motion shows which side of the play is in
+    /// contact; the recorded length then gives the length of the muscle.
     pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
         let alone = self.effects.only(|e| e.hides_input());
         if alone.acting_in(RigStage::Reference).next().is_none() {
@@ -78,8 +78,7 @@ impl Setting<'_> {
             }
             Ok(all)
         };
-        // A length with a draw of the noise, or on a given input, is needed only once and not
-        // cached.
+        // A length that depends on a draw of the noise, or on a given input, is needed only once, so it is not cached.
         if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }

@@ -1,20 +1,18 @@
 //! The times at which commands switch: at the rows of the log, or anywhere between two rows.
 //!
-//! A log as fast as the controller shows every switch in the row where the switch acts. A slower
-//! log, or a log with dropped rows, shows a switch up to one row late. In the row before, the new
-//! opening then acts for a share of the sample, and the flow of that sample is the flow of the mean
-//! opening:
+//! A log as fast as the controller shows every switch in the row where the switch acts. A slower log, or a log with
+//! dropped rows, shows a switch up to one row late. In the sample before that row, the new opening then acts for a
+//! share of the sample, called the lead. The flow of this sample is the flow of the mean opening:
 //!
 //! ```text
 //! u_i -> u_i + lead (u_(i+1) - u_i),     0 <= lead <= 1
 //! ```
 //!
-//! The mean lead is a parameter, which is 0 if commands switch at rows. The lead of each switch
-//! differs from the mean lead by an independent error. The error of the pressure that this leaves
-//! decays or stays like any error of the pressure, and the next switch adds its own error. There
-//! are two such parameters, one for the odd and one for the even switches, because an inlet that
-//! opens and shuts equally early lets the same air in. A lead common to all switches therefore has
-//! almost no effect, although the lead of a single switch has a large one.
+//! The mean lead is a parameter, which is 0 if commands switch at rows. The lead of each switch differs from the mean
+//! lead by an independent error. This error changes the pressure; the error of the pressure decays or stays like any
+//! other error of the pressure, and the next switch adds its own. There are two such parameters, one for the odd and
+//! one for the even switches, because an inlet that opens and shuts equally early lets the same air in. A lead common
+//! to all switches therefore has almost no effect, although the lead of a single switch has a large one.
 
 use std::borrow::Cow;
 

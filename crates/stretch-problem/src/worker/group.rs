@@ -1,10 +1,9 @@
 //! A process and all processes that it starts, which end when this program ends, even if it is
 //! killed.
 //!
-//! On Unix the processes form a group. The group's leader is a shell that waits for the end of a
-//! pipe which this program alone holds open, and then kills the group. The kernel closes the pipe
-//! when this program ends, after SIGKILL too. A parent-death signal would reach the first process
-//! only, and needs unsafe code between fork and exec.
+//! On Unix the processes form a group. The group's leader is a shell that waits for the end of a pipe and then kills
+//! the group. Only this program holds the pipe open, so the kernel closes it when this program ends, after SIGKILL too.
+//! A parent-death signal would reach the first process only, and would need unsafe code between fork and exec.
 
 use std::{
     io,

@@ -92,7 +92,7 @@ impl WorkersSpec {
     }
 }
 
-/// Workers that answer asks.
+/// Workers (processes that run a simulator) that answer requests for runs.
 ///
 /// A worker that dies, hangs or does not keep to the protocol is started anew, and its batch is
 /// repeated once. If the batch fails again, the source is [gone](SourceError::Gone), and the error

@@ -23,9 +23,9 @@ use super::{
 const LINES: usize = 12;
 /// Number of bytes that are kept of each line.
 const LINE_BYTES: usize = 400;
-/// Longest body of an answer that needs none, bytes.
+/// Longest body, in bytes, of an answer that needs no body.
 pub(super) const NO_BODY: u64 = 1 << 16;
-/// Longest time that a worker may take to end.
+/// Longest time for which a worker is awaited to end.
 const LEAVES: Duration = Duration::from_millis(500);
 
 type Last = Arc<Mutex<VecDeque<String>>>;

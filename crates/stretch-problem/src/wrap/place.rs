@@ -54,7 +54,7 @@ pub(crate) struct Placed {
 /// Columns, stages and kinds among which wrappers are placed.
 pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
-    /// By stage, the commands at which the operators in front of it begin.
+    /// By stage, the commands with which the operators in front of it begin each trial.
     pub(crate) before: &'a [Before],
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
@@ -294,15 +294,15 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
     }
 }
 
-/// Whether `all` contains a kind on a channel. Viscous friction by the speed of the output acts
-/// like a lag of the output. It is included only if the stage names the motion of its parts with
-/// friction.
+/// Whether the pattern `all` includes a kind on a channel. Viscous friction by the speed of the output acts like a lag
+/// of the output. It is included only if the stage names the motion of its parts with friction.
 fn is_usual(kind: &Kind, site: &Site, among: &Among<'_>) -> bool {
     let is_lag = kind.name == VISCOUS_FRICTION.name && !among.names_motion[site.stage];
     kind.usual.contains(&site.side) && !is_lag
 }
 
-/// All names by which a user may request a wrapper of a kind; `all` only for a usual one.
+/// All names by which a user may request a wrapper of a kind. The pattern `all` is one of them only if the kind is
+/// usual on the channel.
 fn aliases(
     (kind, is_usual): (&Kind, bool),
     site: &Site,

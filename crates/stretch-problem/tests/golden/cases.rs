@@ -1,5 +1,5 @@
-//! Answers on generated rigs and on measured machines. These tests are ignored, because the
-//! generators are separate programs.
+//! Compares the answers on generated rigs and on measured machines with golden files. These tests are ignored, because
+//! the generators are separate programs.
 //!
 //! ```sh
 //! cargo run --release -p stretch-challenge -- make --cases 30 --seed 5252 --out CASES/own

@@ -108,8 +108,8 @@ pub(super) static VALVE_DEADBAND: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Returns start values of a fit: hard and gradual bands, different valves, and a gate that lets the slowest ramp
-/// through as pulses.
+/// Returns start values of a fit: abrupt and gradual dead bands, different bands of the two valves, and a gate that
+/// lets the slowest ramp through as pulses.
 fn dead_band_starts() -> Vec<Vec<f64>> {
     let mut all = each([0.001, 0.01, 0.04]);
     all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
@@ -118,8 +118,8 @@ fn dead_band_starts() -> Vec<Vec<f64>> {
     all
 }
 
-/// Returns the dead bands of inlet and outlet. The outlet's band is `outlet` times the effect's, the inlet's 2 -
-/// `outlet` times.
+/// Returns the dead bands of inlet and outlet. The band of the outlet is the effect's band times `outlet`; the band of
+/// the inlet is the effect's band times 2 - `outlet`.
 fn valves(values: &[f64], least: f64) -> [DeadBand; 2] {
     let [u_db, softness, gate, outlet] = [0, 1, 2, 3].map(|i| values[i]);
     [2.0 - outlet, outlet].map(|share| DeadBand { u_db: share * u_db, softness, gate, least })
@@ -197,13 +197,13 @@ pub(super) static LEAK: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Pressure at which a leak of any power has the flow of a linear one, Pa.
+/// Pressure at which a leak with any exponent has the same flow as a linear leak, Pa.
 const AT_PA: f64 = 620e3;
 
 #[derive(Debug)]
 struct Leak {
     c: f64,
-    /// Power minus one.
+    /// Exponent of the leak minus one.
     excess: f64,
 }
 

@@ -86,9 +86,8 @@ impl EffectSet {
         self.push(effect, &values)
     }
 
-    /// Like [`insert`](Self::insert), with values in other units. `unit` gives the catalogue's unit
-    /// of each parameter in the other unit and converts the defaults. Ranges are not enforced,
-    /// because they belong to the rig.
+    /// Like [`insert`](Self::insert), with values in other units. `unit` gives the size of the catalogue's unit of each
+    /// parameter in the other unit, and converts the defaults. Ranges are not enforced, because they belong to the rig.
     pub(crate) fn insert_in(
         &mut self,
         entry: &EffectEntry,
@@ -250,7 +249,7 @@ fn resolve(
         let nearest = nearest(name, parameters.iter().map(|p| &*p.name));
         return Err(SimError::unknown_parameter(effect.name, name, nearest));
     }
-    // One strength is enough if there are several (the rails of an amplifier): the others stay off.
+    // If an effect has several strengths (the two limits of an amplifier), one is enough: the others stay off.
     let strengths = |p: &&EffectParameter| p.off().is_some();
     let any =
         parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));

@@ -10,8 +10,8 @@ use crate::{
     static_law::StaticLaw,
 };
 
-/// The muscle, prepared to run: static contraction, effects on it, first-order lag, effects after the lag, L = L0 (1 -
-/// k).
+/// The muscle, prepared to run. Its parts act in this order: static contraction, effects on it, first-order lag,
+/// effects after the lag, and the length L = L0 (1 - k).
 #[derive(Debug)]
 pub struct Muscle {
     grid: Grid,

@@ -17,10 +17,10 @@ const MOST_DROOPS: usize = 2;
 
 /// Valves and chamber, prepared to run: ISO 6358 flow into and out of an isothermal chamber.
 ///
-/// The classical Runge-Kutta rule advances the mass in the chamber. A step that would overshoot its equilibrium ends on
-/// the equilibrium; the real state never overshoots, because a valve's flow ends like a square root. With
-/// `chamber_volume` on, the pressure depends on the contraction: run [`Actuation`](crate::Actuation), or pass the
-/// measured length to [`run_with_length`](Self::run_with_length).
+/// The classical Runge-Kutta rule advances the mass in the chamber. A step that would overshoot the equilibrium ends on
+/// the equilibrium. The real state never overshoots, because the flow through a valve vanishes like the square root of
+/// the pressure difference. With `chamber_volume` on, the pressure depends on the contraction: run
+/// [`Actuation`](crate::Actuation), or pass the measured length to [`run_with_length`](Self::run_with_length).
 #[derive(Debug)]
 pub struct Pneumatics {
     grid: Grid,
@@ -441,7 +441,8 @@ impl Pneumatics {
     ) -> f64 {
         let before = chamber.droops;
         let mut next = guess;
-        // The iteration contracts by r/(R T/V0)/tau per round, a quarter at the catalogue's strongest.
+        // Each round multiplies the error by about r/(R T/V0)/tau, which is a quarter for the strongest effect of the
+        // catalogue.
         for _ in 0..24 {
             let droop: f64 = chamber.droops[..D].iter().sum();
             let supply = (self.supply_pa - droop).max(0.0);

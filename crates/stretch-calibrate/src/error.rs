@@ -89,7 +89,7 @@ pub enum CalibrateError {
          its result with --from, or fit --model observer"
     )]
     NotDiagnosed,
-    /// A cause is no effect of the gauge or of its reference.
+    /// A given cause (an effect that a diagnosis named) is not an effect of the gauge or of its reference.
     #[error(
         "{effect} is not an effect of the gauge or its reference; a calibration can use {known}"
     )]
@@ -111,7 +111,7 @@ pub enum CalibrateError {
         /// The missing column.
         column: String,
     },
-    /// The signal is an angle that wraps. A calibration reads it sample by sample and therefore cannot know the turn.
+    /// The signal is an angle that wraps. A calibration reads it sample by sample and therefore cannot count its turns.
     #[error(
         "{trial}: the signal {column} jumps by {turn} between neighbouring samples, because it is an angle that wraps; unwrap it before \
          you calibrate and before you apply the calibration, or move its zero so that the motion stays within one turn"
@@ -121,7 +121,7 @@ pub enum CalibrateError {
         trial: String,
         /// The column.
         column: String,
-        /// The turn, in the unit of the column.
+        /// One full turn, in the unit of the column.
         turn: f64,
     },
     /// An estimator cannot be designed.
@@ -161,7 +161,8 @@ pub enum CalibrateError {
         /// The windows that are compiled in.
         windows: String,
     },
-    /// The steps of an integer estimate would be larger than the calibration's error, or coarse for its range.
+    /// The steps of an integer estimate would be too large, compared with the error of the fit or with the range of the
+    /// target.
     #[error(
         "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a \
          calibration with an error of {error:.2e}: convert {reference} to a smaller unit, such as mm instead of m, and calibrate again"
@@ -218,8 +219,8 @@ pub enum CalibrateError {
     },
 }
 
-/// Largest relative difference between the median sample interval of a log and that of the calibration that counts as
-/// equal.
+/// Largest relative difference between the median sample interval of a log and the sample interval of the calibration
+/// for which both count as equal.
 pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 
 /// Returns the advice to fit a line, except for the models of `stretch-sleeve`, which replace `--model`.

@@ -279,7 +279,7 @@ impl Options {
     /// Returns the zero of a signal with the range `seen`.
     pub(crate) fn zero(&self, seen: Interval) -> f64 {
         let span = seen.max - seen.min;
-        // Near means no further from the range than the width of the range.
+        // A zero is near if its distance from the range is at most the width of the range.
         let is_near = (seen.min - span..=seen.max + span).contains(&BRIDGE_ZERO_V);
         let usual = match self.signal == "bridge_v" && is_near {
             true => BRIDGE_ZERO_V,

@@ -11,14 +11,14 @@ use testkit::tolerance as tol;
 
 const DIAGNOSED: ModelKind = ModelKind::Remembering { kind: Memory::Diagnosed, rest: false };
 
-/// A gauge on a muscle of 180 mm that shortens by 30.
+/// A gauge on a muscle of 180 mm that shortens by 30 mm.
 #[derive(Clone, Copy)]
 struct Gauge {
-    /// Overshoot with a time constant of 0.25 s.
+    /// Relative overshoot, with a time constant of 0.25 s.
     overshoot: f64,
     /// Half-width of the sleeve's slip, in strokes.
     slip: f64,
-    /// Share of a stroke at 600 kPa.
+    /// Change of the gauge's drive by a pressure of 600 kPa, as a share of a stroke.
     crosstalk: f64,
 }
 
@@ -142,7 +142,8 @@ fn without_a_diagnosis_it_is_no_candidate() {
     assert!(error.contains("wander_0") && error.contains("pressure_kpa"), "{error}");
 }
 
-/// A non-linearity is part of the curve, and a drift of the baseline. Neither has a separate number.
+/// A non-linearity becomes part of the curve, and a drift becomes part of the baseline. Neither has a parameter of its
+/// own.
 #[test]
 fn causes_without_numbers_are_calibrated() {
     for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {

@@ -107,7 +107,8 @@ fn times_of_milliseconds_are_asked_about() {
 
 #[test]
 fn trials_of_one_gauge_are_not_doubted() {
-    // Other ends, a shift of the zero, coarse digits, a small movement after drift, a rest.
+    // None of these is a mistake: another range of motion, a shift of the zero, coarse digits, a small movement after
+    // drift, a rest.
     let members: [Spoil; 5] = [
         |t| {
             change(t, LENGTH, |x| x + 12.0);

@@ -74,7 +74,8 @@ fn an_offset_of_the_signal_changes_nothing() {
             assert!((rmse / least - 1.0).abs() < 1e-3, "{model} {offset}: {least} {rmse}");
             let furthest = estimates.iter().zip(&found).map(|(a, b)| (a - b).abs());
             let furthest = furthest.filter(|d| !d.is_nan()).fold(0.0, f64::max);
-            // The last digit of a reading of 4200, relative to a range of 1, in a rate over a hundredth of a second.
+            // The limit is the effect of the last digit of a reading of 4200, with a range of 1, on a rate over a
+            // hundredth of a second.
             assert!(model == "observer" || furthest < 1e-6, "{model} {offset}: {furthest:e}");
             // An `f32` has 24 bits, of which 4200 takes 12.
             let (rmse, _) = in_32_bits(&calibrated.calibration, &there);
@@ -129,8 +130,8 @@ fn a_table_gives_a_line_or_a_curve_of_the_right_degree() {
             .map(|k| degree_of(&weights(bent, k.wrapping_mul(2_654_435_769)), 0.1))
             .collect();
         assert!(found.iter().all(|&found| found >= degree), "{degree}: {found:?}");
-        // One standard error accepts a higher degree in one table of six: 10 of 60, plus two standard deviations of
-        // 2.9.
+        // The criterion of one standard error accepts a higher degree in one table of six: 10 of 60, with a standard
+        // deviation of 2.9, of which two are allowed.
         let higher = found.iter().filter(|&&found| found > degree).count();
         assert!(higher <= 16, "{degree}: {found:?}");
     }

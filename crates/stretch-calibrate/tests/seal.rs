@@ -148,7 +148,7 @@ fn records_of_schema_1_are_read() {
         fs::write(&path, [&bytes[..], b"x"].concat()).unwrap();
         assert!(read_calibration(&path).is_err());
     }
-    // The same for the file of a board.
+    // The same applies to the file for a board.
     let adc = parse_adc("12,0,3.3").unwrap();
     let mut bytes = fixed_record(&example_calibration(), &adc).unwrap().bytes;
     bytes.truncate(bytes.len() - 4);
@@ -178,7 +178,7 @@ fn a_hand_edit_is_told_and_read_where_its_digest_is_not_checked() {
     assert!(message.contains("dead_band"), "{message}");
 }
 
-/// The objects in a value, as JSON pointers.
+/// Lists the objects in a value, as JSON pointers.
 fn objects(value: &Value, pointer: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(fields) => {

@@ -15,10 +15,10 @@ pub struct File {
 /// the IDE highlights. The example reads pin A0 (for several gauges, A0 and the pins after it) at the calibration's
 /// sample rate.
 ///
-/// The header is called `stretch_` and the library's name. It therefore hides no header of another library, and
-/// libraries of several calibrations can be installed together; a sketch includes one of them. Characters that a name
-/// may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook. Source: Arduino library
-/// specification, revision 2.2 (format 1.5).
+/// The file name of the header is `stretch_` followed by the library's name. It therefore differs from the headers of
+/// other libraries, and libraries of several calibrations can be installed together. A sketch includes one of them.
+/// Characters that a name may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook.
+/// Source: Arduino library specification, revision 2.2 (format 1.5).
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;

@@ -4,9 +4,9 @@ use std::fmt::{Display, Write};
 
 use stretch_core::is_hidden;
 
-/// A number that has a spelling in C99 and in C++11.
+/// A number that can be written as a literal in C99 and in C++11.
 pub(crate) trait Literal {
-    /// The spelling.
+    /// Returns the literal.
     fn c(&self) -> String;
 }
 
@@ -35,7 +35,7 @@ impl Literal for i64 {
     }
 }
 
-/// The spelling has the fewest digits that give the same bits back.
+/// The literal has the fewest digits that give the same bits when they are read back.
 impl Literal for f32 {
     fn c(&self) -> String {
         format!("{self:?}f")
@@ -94,8 +94,8 @@ impl Constants {
         ))
     }
 
-    /// Writes the surfaces with their ranges: one for a line, otherwise one per branch. They are a macro because their
-    /// type is declared later in the header.
+    /// Writes the surfaces with their ranges as a macro: one surface for a line, otherwise one for each branch
+    /// (direction of motion). A macro is needed because the type of a surface is declared later in the header.
     pub(crate) fn surfaces(&mut self, surfaces: &[String]) -> &mut Self {
         let rows = surfaces.join(", \\\n        ");
         self.line(&format!("#define STRETCH_SURFACES \\\n    {{ \\\n        {rows} \\\n    }}"))

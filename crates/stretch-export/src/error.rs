@@ -26,7 +26,7 @@ pub enum ExportError {
         "several gauges cannot be exported in integers: leave out --form, or give --form float"
     )]
     FixedArray,
-    /// A rate estimator that has no C code in any arithmetic.
+    /// A rate estimator that has C code neither in integers nor in `float`.
     #[error(
         "the rate estimator {rate} cannot be exported to C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"
     )]

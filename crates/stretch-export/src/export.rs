@@ -26,12 +26,12 @@ pub const HEADER: &str = "stretch.h";
 /// Number of samples of the self-test.
 pub const SELF_TEST_SAMPLES: usize = self_test::SAMPLES;
 
-/// The arithmetic of a step.
+/// The arithmetic of a step, which is the C function that processes one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// Integers alone: converter codes in, thousandths of the reference's unit out.
+    /// Integers only. The input is a converter code, the output is in thousandths of the reference's unit.
     Fixed,
-    /// `float`: the signal's unit in, the reference's unit out.
+    /// `float`. The input is in the signal's unit, the output in the reference's unit.
     Float,
 }
 
@@ -65,7 +65,7 @@ pub struct Options {
     pub adc: Adc,
 }
 
-/// A calibration in C.
+/// A calibration as a C header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
     /// The text of [`HEADER`].
@@ -78,18 +78,19 @@ pub struct Header {
     pub pressure: bool,
     /// Number of gauges of an array, which are sampled together; `None` for a calibration of a single gauge.
     pub array: Option<usize>,
-    /// In integers, the resolution of an estimate, with its unit.
+    /// The resolution of an estimate in integers, with its unit; `None` for `float`.
     pub step: Option<String>,
-    /// Names of the branches: rising or inflation, falling or deflation.
+    /// Names of the two directions of motion: `inflation` and `deflation` for a contraction, otherwise `rising` and
+    /// `falling`.
     pub branches: [&'static str; 2],
 }
 
 /// Writes a calibration as a C99 header that also compiles as C++11.
 ///
 /// # Errors
-/// [`ExportError`] for a model or a rate that has no form in C, integers requested for a model that has no integer
-/// form, floats that change the estimate by more than a tenth of the fit's error, and a converter that [`fixed_record`]
-/// refuses.
+/// [`ExportError`] if the model or the rate estimator has no form in C, if integers are requested for a model that has
+/// no integer form, if `float` changes the estimate by more than a tenth of the fit's error, or if [`fixed_record`]
+/// refuses the converter.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;
@@ -104,8 +105,8 @@ pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, Ex
     one(calibration, None, options)
 }
 
-/// Writes a calibration like [`header`]. In `float`, it adds a monitor of the gauge's zero if the calibration contains
-/// the levels at which movements turn.
+/// Writes a calibration as [`header`] does. A header in `float` also monitors the gauge's zero if the calibration
+/// contains the levels at which movements turn.
 ///
 /// # Errors
 /// As [`header`].
@@ -122,7 +123,7 @@ fn one(
         return float(calibration, turns, options);
     }
     match fixed(calibration, options) {
-        // a form that is missing in integers may exist in floats; a converter that does not fit remains an error
+        // a model without an integer form may have one in floats; a converter that does not fit remains an error
         Err(
             none @ ExportError::NoFixedForm(
                 CalibrateError::NoFixedForm { .. }
@@ -323,7 +324,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
         .replace("@LIBM@", libm)
 }
 
-/// Returns the constants that a program around the step needs.
+/// Returns the constants that a program needs to call the step.
 fn frame(source: &Source<'_>, options: &Options) -> String {
     let spec = options.adc.spec();
     let unit = comment_safe(source.reference.unit());

@@ -5,22 +5,22 @@ use stretch_sleeve::{Turns, ZeroWatch};
 
 use crate::constants::Constants;
 
-/// A model in C: its calibration as constants, and the step that uses them.
+/// A model in C: its calibration as constants, and the step (the code for one sample) that uses them.
 #[derive(Debug)]
 pub(crate) struct Part {
     /// Name of the model, such as `linear` or `observer+rest`.
     pub(crate) model: String,
     /// The calibration as constants.
     pub(crate) constants: Constants,
-    /// The text of the step, in the order of the file, without the beginning and the end that all steps of its form
-    /// share.
+    /// The pieces of the step's text, in order. The beginning and the end are left out, because they are the same for
+    /// all steps in the same arithmetic.
     pub(crate) step: Vec<&'static str>,
-    /// The words for which `@if` keeps a block of the step.
+    /// Words that select code: a block of the step is kept if its `@if` names one of them.
     pub(crate) has: Vec<&'static str>,
 }
 
 impl Part {
-    /// Adds the monitor of the gauge's zero behind the step, in `float`.
+    /// Appends code in `float` that monitors the gauge's zero to the step.
     pub(crate) fn with_zero(mut self, polarity: Polarity, turns: &Turns) -> Self {
         let watch = ZeroWatch::<f32>::new(polarity, turns);
         let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;

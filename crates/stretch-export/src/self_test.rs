@@ -16,13 +16,13 @@ use crate::{ExportError, Form, part::kept};
 pub(crate) const SAMPLES: usize = 200;
 /// The value of a missing sample (`STRETCH_NO_VOLTS`), larger than any real sample.
 const NO_VOLTS: f32 = 2e18;
-/// C expression of the flags without the status.
+/// C expression for the flags of a reading, except its status.
 const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Number of samples in one cycle up and down.
 const PERIOD: usize = 70;
 
-/// Returns signals that go up and down, a tenth beyond both ends of the calibrated range, with one, three and five
-/// samples lost. They cover every case of a step.
+/// Returns signals that go up and down and exceed both ends of the calibrated range by a tenth of it. In three places,
+/// one, three and five consecutive samples are lost. The signals cover every case of a step.
 fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     let (min, max) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
     (0..SAMPLES).map(move |n| {
@@ -31,9 +31,9 @@ fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     })
 }
 
-/// Position of a sample in the calibrated range: from -0.1 to 1.1 and back.
+/// Returns the position of sample `n` as a share of the calibrated range. It goes from -0.1 to 1.1 and back.
 fn share(n: usize) -> f64 {
-    // smooth at both ends, and only products, so that every computer gives the same numbers
+    // a cubic that is smooth at both ends; it needs no library function, so every computer gives the same numbers
     let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
     let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
     1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1
@@ -66,7 +66,8 @@ impl Rounding {
     }
 }
 
-/// Packs status, branch and domain like the C code. For a sample without a reading, the branch is the last one.
+/// Packs status, branch and domain into one number as the C code does. For a sample without a reading, the branch is
+/// the last one.
 fn flags<E>(answer: &Result<(E, Branch, u8), Withheld>, branch: &mut Branch) -> u8 {
     let (status, domain) = match answer {
         Ok((_, now, domain)) => {
@@ -79,7 +80,7 @@ fn flags<E>(answer: &Result<(E, Branch, u8), Withheld>, branch: &mut Branch) -> 
     status | (*branch as u8) << 2 | domain << 3
 }
 
-/// The self-test of a form in integers.
+/// Returns the self-test of a header in integers.
 pub(crate) fn fixed(
     calibration: &Calibration,
     adc: &Adc,
@@ -98,7 +99,7 @@ pub(crate) fn fixed(
     Ok(kept(&rows.text(fields, "code", BRANCH, "reading.estimate != sample->estimate"), &[]))
 }
 
-/// The self-test of a form in `float`.
+/// Returns the self-test of a header in `float`.
 pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     let (receptor, exact) =
         (Receptor::<f32>::new(calibration)?, Receptor::<f64>::new(calibration)?);
@@ -113,7 +114,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     for (n, signal) in signals(calibration).enumerate() {
         let mut row = Vec::new();
         if let Some(Crosstalk { scale, .. }) = crosstalk {
-            // from zero to the scale of the pressure, with another period than the signal
+            // the pressure rises from zero to its scale, with another period than the signal
             let pressure = (scale * (n % 90) as f64 / 90.0) as f32;
             memory.set_pressure(pressure);
             exact_memory.set_pressure(pressure.into());
@@ -121,7 +122,8 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         }
         let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
         let answer = receptor.step(&mut memory, Volts(volts));
-        // at the edge of the dead band the two may choose different branches, which is not an error
+        // at the edge of the dead band, the computations in 32 and in 64 bits may choose different branches, which is
+        // not an error
         match (answer, exact.step(&mut exact_memory, Volts(signal.unwrap_or(f64::NAN)))) {
             (Ok(single), Ok(double)) if single.branch == double.branch => {
                 rounding.add(single.estimate, double.estimate);
@@ -171,7 +173,7 @@ fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) ->
     out
 }
 
-/// The self-test of several gauges: their samples, every kind of loss, and the computer's answers.
+/// Returns the self-test of several gauges: their samples with every kind of loss, and the computer's answers.
 pub(crate) fn array<const N: usize>(
     calibration: &ArrayCalibration<N>,
 ) -> Result<String, ExportError> {
@@ -213,12 +215,12 @@ pub(crate) fn array<const N: usize>(
     Ok(kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[]))
 }
 
-/// Returns the C condition that a number of a reading differs from that of a row.
+/// Returns a C condition, which is true if a number of a reading differs from the number in the table's row.
 fn differs(number: &str) -> String {
     format!("reading.{number} < sample->{number} || reading.{number} > sample->{number}")
 }
 
-/// Rows of the table, as many on a line as fit.
+/// Rows of the self-test's table, with as many rows on a line as fit.
 #[derive(Default)]
 struct Rows {
     done: String,
@@ -261,7 +263,7 @@ mod tests {
 
     use super::*;
 
-    /// A line over a signal of range 1 on an offset.
+    /// Returns a linear calibration for a signal from `offset` to `offset + 1`.
     fn line(offset: f64) -> Calibration {
         let mut spec = example_calibration().into_spec();
         let (min, max) = (offset, offset + 1.0);

@@ -103,7 +103,7 @@ fn drawn(
     .unwrap()
 }
 
-/// One input of the harness.
+/// One input of the harness, which is the C program that runs the header.
 #[derive(Debug, Clone)]
 enum Row {
     /// A sample of each gauge, as a share of its range; NaN for a missing sample.
@@ -147,7 +147,7 @@ fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
     out
 }
 
-/// Returns the input of the harness and its expected output.
+/// Returns the input of the harness (the C program that runs the header) and its expected output.
 fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (String, String) {
     let receptor = ArrayReceptor::<f32, N>::new(calibration);
     let mut memory = receptor.memory();

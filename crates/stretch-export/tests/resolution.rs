@@ -1,4 +1,4 @@
-//! The resolution of estimates in integers, and of sample periods.
+//! Tests of the resolution of estimates in integers, and of sample periods.
 
 use stretch_calibrate::{CalibrateError, fixed_record, parse_adc, read_calibration};
 use stretch_core::{Calibration, CalibrationSpec, Label, SampleRate, Target};

@@ -82,7 +82,7 @@ fn takes_pressure(calibration: &Calibration) -> bool {
     matches!(&calibration.spec().model, Model::Diagnosed(map) if map.crosstalk.is_some())
 }
 
-/// Returns the expected output of the harness.
+/// Returns the expected output of the harness, which is the C program that runs the header.
 fn expected(calibration: &Calibration, turns: Option<&Turns>, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
     match form {
@@ -124,7 +124,7 @@ fn expected(calibration: &Calibration, turns: Option<&Turns>, form: Form, codes:
     text
 }
 
-/// Returns the line of the harness for an answer.
+/// Returns the line that the harness prints for an answer.
 fn answer(answer: Result<(u8, u8, [u32; 3]), Withheld>) -> String {
     match answer {
         Ok((branch, domain, [estimate, rate, sd])) => {
@@ -134,7 +134,7 @@ fn answer(answer: Result<(u8, u8, [u32; 3]), Withheld>) -> String {
     }
 }
 
-/// Returns the line of the harness for a zero.
+/// Returns the line that the harness prints for a result about the gauge's zero.
 fn told(zero: Zero<f32>) -> String {
     let [off, reference, followed] =
         [zero.off, zero.off_reference, zero.followed].map(f32::to_bits);
@@ -395,8 +395,8 @@ fn shapes_and_signs_give_the_same_bits() {
     holds("a curve of degree 5", &curve, Form::Float, &compilers);
 }
 
-/// A zero that is reported and followed, with a narrow limit, within which the levels stay now and then, and with a
-/// wide limit, which they reach.
+/// Tests the monitor of the gauge's zero, which reports and follows it. The levels of movements lie within the narrow
+/// limit now and then, and reach the wide limit.
 #[test]
 fn a_zero_gives_the_same_bits() {
     zeros(&strict_c());

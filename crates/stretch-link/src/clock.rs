@@ -29,7 +29,7 @@ pub struct TimeLine {
     last: Option<Last>,
 }
 
-/// The last frame that came.
+/// The last frame to which a time was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Last {
     board_ms: u32,
@@ -37,12 +37,13 @@ struct Last {
     heard_s: f64,
 }
 
-/// Samples this far apart never share a millisecond, however their clock jitters, s.
+/// Sample period, s, from which on two samples never have the same millisecond, even if the board's
+/// clock jitters.
 const APART_S: f64 = 2e-3;
 
 impl TimeLine {
-    /// Creates a time line for samples that are `period_s` seconds apart. This is also the minimum
-    /// step when the board restarts.
+    /// Creates a time line for samples that are `period_s` seconds apart. When the board restarts,
+    /// the time advances by at least this period.
     pub fn new(period_s: f64) -> Self {
         Self { period_s, last: None }
     }

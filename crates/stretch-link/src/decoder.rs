@@ -53,13 +53,14 @@ pub struct Counts {
     pub other_version: u64,
 }
 
-/// A streaming decoder.
+/// A decoder that takes the bytes of a stream one at a time.
 ///
-/// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a new one. A counter
-/// that steps ahead gives the number of lost frames. A frame whose fields all equal those of one of
-/// the last [`REPLAYED`](Self::REPLAYED) frames is a repetition, whether it arrives alone or in a
-/// block that was received twice. Any other step back of the counter or of the board's clock means
-/// that the board restarted, and so does any step back to the counter 0.
+/// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a new one. If the
+/// counter increases by more than one, the frames in between are lost. A frame whose fields all
+/// equal those of one of the last [`REPLAYED`](Self::REPLAYED) frames is a repetition, whether it
+/// arrives alone or in a block that was received twice. In any other case, a counter that stays the
+/// same or goes back, or a clock that goes back, means that the board restarted. A step back to the
+/// counter 0 is a restart unless the frame equals the last one.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     line: [u8; Frame::LONGEST],
@@ -70,12 +71,13 @@ pub struct Decoder {
     counts: Counts,
 }
 
-/// A step of a wrapping number that is larger than this is a step back.
+/// The difference of two wrapping numbers from which on the second number counts as earlier than
+/// the first.
 const HALF: u32 = u32::MAX / 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// Between frames, without unknown bytes.
+    /// Between frames; no byte has come since the last line end.
     Idle,
     /// Among bytes that belong to no frame.
     Noise,
@@ -140,8 +142,8 @@ impl Decoder {
         }
     }
 
-    /// Ends the stream (for example when a cable was pulled), so that no byte completes the current
-    /// frame.
+    /// Ends the stream, for example when a cable was pulled. Bytes that come later do not complete
+    /// the current frame.
     ///
     /// A frame that lacks only its newline is complete, because the checksum is its last field.
     pub fn disconnected(&mut self) -> Option<Event> {

@@ -29,9 +29,9 @@ pub struct Frame {
 pub enum Answer {
     /// An estimate.
     Reading {
-        /// In thousandths of the reference's unit: micrometres for millimetres.
+        /// The estimate, in thousandths of the reference's unit (micrometres if that unit is millimetres).
         thousandths: i32,
-        /// The branch that was evaluated.
+        /// The branch (direction of motion) for which the estimate was computed.
         branch: Branch,
         /// Whether the inputs lay in the calibrated domain.
         domain: Domain,
@@ -85,7 +85,7 @@ impl Frame {
     /// Size of a buffer that holds the longest line, including its newline.
     pub const LONGEST: usize = 64;
 
-    /// The version that this release writes and reads.
+    /// The version of the format that this release writes and reads.
     pub const VERSION: u8 = 1;
 
     /// Writes the frame as one line, with `$` first and newline last. Returns the bytes of the line.
@@ -127,7 +127,7 @@ impl Frame {
         }
     }
 
-    /// Reads a line without its `$` and newline.
+    /// Decodes a line from which `$` and newline were removed.
     pub(crate) fn decode(line: &[u8]) -> Result<Self, Refused> {
         let star = line.len().checked_sub(9).filter(|&at| line[at] == b'*');
         let (body, crc) = star.map(|at| (&line[..at], &line[at + 1..])).ok_or(Refused::Damaged)?;

@@ -11,9 +11,9 @@ pub(crate) struct Recent {
 }
 
 impl Recent {
-    /// Frames in 4096 bytes, the block that a host reads at once, at 24 bytes per frame. Only a
-    /// frame in which all numbers have one digit is shorter (`$S1,0,0,0,,W,*00000000` and the
-    /// newline).
+    /// Number of stored frames: as many frames of 24 bytes as fit in 4096 bytes, the block that a
+    /// host reads at once. Only a frame in which all numbers have one digit is shorter than 24
+    /// bytes (`$S1,0,0,0,,W,*00000000` and the newline).
     pub(crate) const MOST: usize = 4096 / 24;
 
     pub(crate) const fn new() -> Self {

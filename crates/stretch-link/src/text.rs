@@ -1,5 +1,5 @@
-//! Decimal and hexadecimal numbers without `core::fmt`, which would be most of the code of a small
-//! firmware.
+//! Writes and parses decimal and hexadecimal numbers without `core::fmt`, which would be the
+//! largest part of a small firmware.
 
 /// A line that is being written. Bytes that do not fit are dropped; a buffer of
 /// [`Frame::LONGEST`](crate::Frame::LONGEST) bytes is always long enough.

@@ -1,4 +1,4 @@
-//! The link under faults: every frame that is decoded was sent.
+//! Tests of the link with transmission faults: every frame that is decoded was sent.
 
 use proptest::{collection::vec, prelude::*};
 use stretch_core::Branch;
@@ -21,7 +21,7 @@ fn answer() -> impl Strategy<Value = Answer> {
     ]
 }
 
-/// Frames of one board in order, from any counter and any time.
+/// Generates the frames of one board in order, with any first counter and any first time.
 fn frames() -> impl Strategy<Value = Vec<Frame>> {
     (any::<u32>(), any::<u32>(), vec((any::<i32>(), answer()), 1..60)).prop_map(
         |(first, start, parts)| {
@@ -112,19 +112,19 @@ proptest! {
             frames.iter().zip(&faults).flat_map(|(frame, fault)| spoil(line(frame), fault)).collect();
         let (events, counts) = decode(&bytes);
         let out: Vec<Frame> = events.iter().filter_map(|event| event.frame()).collect();
-        // a subsequence of what was sent
+        // the decoded frames are a subsequence of the frames that were sent
         let mut sent = frames.iter();
         for frame in &out {
             prop_assert!(sent.any(|other| other == frame), "{frame:?} was not sent, or not then");
         }
-        // and all of it is accounted for
+        // every frame between the first and the last decoded one counts as received or as lost
         if let (Some(first), Some(last)) = (out.first(), out.last()) {
             let span = u64::from(last.counter.wrapping_sub(first.counter)) + 1;
             prop_assert_eq!(counts.frames + counts.lost, span);
         }
         prop_assert_eq!(counts.restarts, 0);
         prop_assert_eq!(counts.frames, out.len() as u64);
-        // every frame whose line was left alone comes out, unless a cut-off one before runs into it
+        // every frame whose line was sent unchanged, once or twice, is decoded
         for (n, frame) in frames.iter().enumerate() {
             if matches!(faults[n], Fault::None | Fault::Doubled) {
                 prop_assert!(out.contains(frame), "{frame:?} was sent and is not there");
@@ -153,7 +153,7 @@ fn after_reset(counter: u32) -> Frame {
 
 #[test]
 fn a_block_that_comes_twice_counts_once() {
-    // repeated blocks from one frame to all the frames that are remembered
+    // repeated blocks of one frame up to as many frames as the decoder stores
     for block in [1, 2, 3, 64, Decoder::REPLAYED as u32] {
         let sent: Vec<Frame> =
             (1..=200).chain(201 - block..=200).chain(201..203).map(after_reset).collect();

@@ -191,7 +191,7 @@ pub enum RecordingError {
         file: String,
         /// The time column.
         column: String,
-        /// The rate as it was read.
+        /// The rate that the time stamps give.
         rate_hz: f64,
         /// The lowest accepted rate.
         least_hz: f64,
@@ -263,13 +263,13 @@ pub enum RecordingError {
     NoOverlap {
         /// The file.
         file: String,
-        /// One clock.
+        /// Name of one clock.
         first: String,
-        /// Its span, `from .. to`.
+        /// Time that this clock covers, `from .. to`.
         first_s: String,
-        /// The other.
+        /// Name of the other clock.
         second: String,
-        /// Its span.
+        /// Time that the other clock covers.
         second_s: String,
     },
     /// A format that only the Python package reads.
@@ -329,7 +329,7 @@ impl RecordingError {
         Self::MissingTime { missing: DataError::missing_column(file, column, present) }
     }
 
-    /// Marks the error as that of a row that may not be left out.
+    /// Returns the error of a row that may not be left out for this `reason`.
     pub(crate) fn refused(self, reason: String) -> Self {
         Self::Refused { first: Box::new(self), reason }
     }

@@ -188,7 +188,7 @@ pub(crate) fn time_rank(name: &str) -> Option<usize> {
         .or_else(|| (name == LABVIEW_TIME || is_word()).then_some(2 * TIMES.len()))
 }
 
-/// Whether two columns make up a stamp, such as `header.stamp.secs` and `header.stamp.nsecs`.
+/// Returns whether two columns together are a time stamp, such as `header.stamp.secs` and `header.stamp.nsecs`.
 pub(crate) fn are_a_stamp(seconds: &str, nanoseconds: &str) -> bool {
     let of = |name: &str, ends: &[&str]| {
         let name = plain(name);
@@ -198,7 +198,7 @@ pub(crate) fn are_a_stamp(seconds: &str, nanoseconds: &str) -> bool {
     of(seconds, &WHOLE_SECONDS).is_some_and(|stamp| of(nanoseconds, &NANOSECONDS) == Some(stamp))
 }
 
-/// Whether a name has a word for the time in it.
+/// Returns whether a name contains a word for time.
 pub(crate) fn may_be_time(name: &str) -> bool {
     words(name).split('_').any(|word| TIME_WORDS.contains(&word) || word.ends_with("zeit"))
 }

@@ -192,8 +192,8 @@ impl ReadOptions {
         self
     }
 
-    /// Returns the sample rate if samples are counted, and the words for a note on its source. The option
-    /// `sample_rate_hz` replaces a time column. Without a time, the rate `stated` above the table applies, then
+    /// Returns the sample rate if the time is the sample count, and the words for a note on the source of the rate. The
+    /// option `sample_rate_hz` replaces a time column. Without a time, the rate `stated` above the table applies, then
     /// `untimed_hz`.
     pub(crate) fn counted(
         &self,
@@ -242,7 +242,7 @@ impl ReadOptions {
         self.required.iter().chain([&self.time]).collect()
     }
 
-    /// The columns asked for by [`require`](Self::require), in order.
+    /// Returns the columns that were requested with [`require`](Self::require), in this order.
     pub fn required(&self) -> &[String] {
         &self.required
     }

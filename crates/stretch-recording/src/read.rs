@@ -26,7 +26,8 @@ impl Recording {
     /// - A table of text: separated by commas, semicolons, tabs or runs of blanks; with decimal points or, if commas do
     ///   not separate columns, decimal commas; with comment lines (`#`, `%`, `//`), lines above the header, a row of
     ///   units, or units in brackets (`Pos (mm)` becomes `pos_mm`). The time can be in seconds, `ms`, `us` or `ns`,
-    ///   count from 1970, or be in ISO 8601. There can be no header line if [`ReadOptions::columns`] names the columns.
+    ///   count from 1970, or be in ISO 8601. The header line can be missing if [`ReadOptions::columns`] names the
+    ///   columns.
     /// - NumPy's NPY and NPZ.
     /// - Any of these in gzip.
     /// - Parquet (feature `parquet`). `FILE#3` reads episode 3 of a LeRobot file with several episodes.
@@ -34,10 +35,11 @@ impl Recording {
     /// MCAP, ROS bags, MAT and HDF5 are refused. The error names the command of the Python package that converts them.
     ///
     /// Channels on several clocks are resampled to the fastest clock, or to [`ReadOptions::grid_hz`], within the time
-    /// that all of them cover. Values are interpolated linearly; the commands `inlet` and `outlet` are held.
+    /// that all of them cover. Values are interpolated linearly, except that the commands `inlet` and `outlet` keep
+    /// their previous value.
     ///
     /// # Errors
-    /// - The file cannot be opened or read, or its format is not read.
+    /// - The file cannot be opened or read, or its format is not supported.
     /// - The content is invalid for its format. The error gives row and column, if there are any.
     /// - A column that [`ReadOptions::require`] asks for is missing.
     /// - The sample rate is outside 1e-3 .. 1e6 Hz, or 1e-3 .. 1e7 Hz if an option gives the unit or the rate.

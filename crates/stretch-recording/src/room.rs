@@ -16,7 +16,7 @@ const TIMES: u64 = 3;
 const LARGEST: u64 = 4 << 30;
 /// Size to which any packed file may unpack, bytes.
 const UNPACKED: u64 = 64 << 20;
-/// Largest compression ratio. Recordings reach 20; a ratio of a thousand is an attack.
+/// Largest compression ratio. Ratios of recordings are at most about 20; a ratio of a thousand is an attack.
 const RATIO: u64 = 100;
 /// Number of bytes that are read at once.
 const PIECE: u64 = 1 << 20;

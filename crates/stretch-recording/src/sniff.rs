@@ -21,10 +21,10 @@ pub(crate) enum Format {
     Npy,
     Npz,
     Parquet,
-    /// A format that is read in Python, because its owners maintain a library there: its name, and the extra of the
-    /// Python package.
+    /// A format that only the Python package reads, with the library of the format's owners. The fields are the name of
+    /// the format and the extra of the Python package.
     Python(&'static str, &'static str),
-    /// A known format that is not read: its name, and what to do.
+    /// A known format that is not read. The fields are its name and what to do.
     Foreign(&'static str, &'static str),
 }
 

@@ -42,7 +42,7 @@ fn live(lines: &[String], options: &ReadOptions) -> Vec<u32> {
     times
 }
 
-/// Ways to damage one line, with the line below it, and the number of rows that are lost.
+/// Ways to damage a table at one line, with the number of rows that are then lost.
 const HARMS: [(&str, usize); 11] = [
     ("cut", 1),
     ("glued", 2),
@@ -187,7 +187,8 @@ fn a_column_that_nobody_asks_for_keeps_its_numbers() {
     );
 }
 
-/// If columns are required, a hole in any other column costs no row, in a file as in a stream.
+/// If columns are required, a hole (a field without a number) in any other column does not lose a row, neither in a
+/// file nor in a stream.
 #[test]
 fn a_hole_beside_what_is_asked_for_costs_no_row() {
     let mut lines = good_rows(30);
@@ -200,7 +201,7 @@ fn a_hole_beside_what_is_asked_for_costs_no_row() {
     assert_eq!(read(&lines, &ReadOptions::new()).expect("29 rows").0.len(), 29);
 }
 
-/// A lost row takes time if samples are counted.
+/// If samples are counted, a lost row counts as a sample.
 #[test]
 fn a_lost_sample_takes_time() {
     let mut lines = vec!["bridge_v,x".to_owned()];

@@ -1,4 +1,4 @@
-//! Readings without a time and without a name, one number per line.
+//! Tests of readings without a time and without a name, one number per line.
 
 use stretch_recording::{ReadOptions, Recording, RowReader};
 

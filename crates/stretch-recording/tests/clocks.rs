@@ -312,7 +312,7 @@ fn a_stream_has_the_same_clock() {
     assert!((times[1] - times[0] - 0.02).abs() < 1e-6);
 }
 
-/// Returns the stamp at a time in seconds.
+/// A function that returns the stamp for a time in seconds.
 type Stamp = fn(f64) -> f64;
 
 #[test]
@@ -335,7 +335,7 @@ fn the_first_step_of_a_stream_shows_its_unit() {
     }
 }
 
-/// A clock with ticks of 15.6 ms, on which no stamp of 50 samples a second repeats.
+/// Tests a clock with ticks of 15.6 ms. At 50 samples a second, none of its stamps repeats.
 #[test]
 fn a_stream_with_coarse_stamps_has_the_usual_rate() {
     let usual = || ReadOptions::new().untimed_hz(RATE_HZ);
@@ -417,18 +417,18 @@ fn columns_of_a_sparse_table_have_the_clocks_of_their_own_rows() {
             assert!((bridge - 1.0 - (t - 0.003)).abs() < 1e-9, "at {t}");
         }
     }
-    // Words that other programs write in place of a blank
+    // Other programs write these words in place of a blank.
     for missing in ["nan", "NA", "N/A", "null", "None"] {
         let filled = text.replace(",\n", &format!(",{missing}\n"));
         let filled = filled.replace(",,", &format!(",{missing},"));
         assert_ne!(filled, text);
         assert_eq!(read_as(&filled, &on_grid).unwrap().trial, grid.trial, "{missing}");
     }
-    // One topic alone
+    // Only one topic is required.
     let one = read_as(&text, &ReadOptions::new().require("/cmd/data")).unwrap();
     assert_eq!(one.trial.len(), 300);
     assert!((one.trial.rate_hz().unwrap() - RATE_HZ).abs() < 1e-6);
-    // A slow column and a fast one
+    // One column is sampled more slowly than the other.
     let slow = table("time_s,length_mm", |i, t| {
         if i % 5 == 0 { format!("{t:.2},{}", 100.0 + t) } else { format!("{t:.2},") }
     });

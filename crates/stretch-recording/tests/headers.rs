@@ -39,7 +39,7 @@ fn the_header_is_directly_above_the_numbers() {
     let semicolons = rows(";", "");
     let commas = rows(",", "");
     for (text, expected) in [
-        // names, then units, with or without a separator after each
+        // names, then units, with or without a separator at the end of each line
         (format!("Time;Pos;U;\ns;mm;V;\n{semicolons}"), "pos_mm u_v"),
         (format!("Time;Pos;U\n(s);(mm);(V)\n{}", rows(";", ";")), "pos_mm u_v"),
         (format!("\"sep=;\"\nTime;Pos;U\ns;mm;V\n{semicolons}"), "pos_mm u_v"),

@@ -88,7 +88,7 @@ fn parquet() {
     }
 }
 
-/// Declarations of Parquet integer columns, and the value that they give a number with all bits set.
+/// Declarations of Parquet integer columns, and the value of a number in which all bits are set.
 #[cfg(feature = "parquet")]
 const ONES: [(&str, f64); 7] = [
     ("INT32 c", -1.0),

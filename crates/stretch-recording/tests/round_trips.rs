@@ -31,7 +31,7 @@ proptest! {
             prop_assert_eq!(&a.name, &b.name);
             prop_assert_eq!(bits(&a.values), bits(&b.values));
         }
-        // The same rows, one at a time.
+        // Read the same rows one at a time.
         let mut rows = RowReader::new(&text[..], "t.csv", &options)?;
         for (i, time_s) in trial.time_s.iter().enumerate() {
             let row = rows.next_row().expect("as many rows")?;

@@ -50,7 +50,7 @@ pub struct ArrayGains<const N: usize> {
 }
 
 /// The usual deviation of each channel from the prediction of the other channels, in the calibration's own recordings.
-/// A shifted gauge is detected against these values.
+/// A shifted gauge is detected by comparison with these values.
 ///
 /// The difference of a channel is the estimate from this channel alone minus the estimate from all others. The
 /// criterion is the mean of this difference over blocks of `block_s`. The calibration has `n` blocks with mean `m` and
@@ -72,7 +72,7 @@ pub struct ArrayShifts<const N: usize> {
     pub limits: Values<N>,
 }
 
-/// The parts of an [`ArrayCalibration`], all public; [`ArrayCalibration::new`] checks them.
+/// The parts of an [`ArrayCalibration`]. All are public, and [`ArrayCalibration::new`] checks them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArraySpec<const N: usize> {
@@ -219,7 +219,7 @@ impl<const N: usize> ArrayCalibration<N> {
         Ok(Self(spec))
     }
 
-    /// The parts.
+    /// Returns the parts.
     pub fn spec(&self) -> &ArraySpec<N> {
         &self.0
     }

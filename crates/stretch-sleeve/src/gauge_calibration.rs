@@ -38,12 +38,12 @@ impl GaugeCalibration {
         Ok(Self(calibration, turns))
     }
 
-    /// The calibration.
+    /// Returns the calibration.
     pub fn calibration(&self) -> &Calibration {
         &self.0
     }
 
-    /// Turning points of movements.
+    /// Returns the turning points of movements, if the calibration has them.
     pub fn turns(&self) -> Option<&Turns> {
         self.1.as_ref()
     }

@@ -7,7 +7,7 @@ use stretch_sleeve::{
 
 const CHANNELS: usize = 4;
 const HZ: f64 = 100.0;
-/// Sample at which a channel is lost.
+/// Index of the sample at which a channel is lost.
 const AT: usize = 700;
 /// Number of samples within which a loss must be found.
 const SOON: usize = 10;
@@ -62,7 +62,8 @@ fn calibration() -> ArrayCalibration<CHANNELS> {
     .unwrap()
 }
 
-/// The motion, 0 to 1, which never rests for as long as a window.
+/// Returns the position at sample `n`, between 0 and 1. The motion rests only for an instant, at
+/// each end.
 fn motion(n: usize) -> f64 {
     0.5 + 0.4 * (2.0 * n as f64 / HZ).sin()
 }
@@ -72,8 +73,8 @@ fn samples(n: usize) -> [f64; CHANNELS] {
     std::array::from_fn(|k| (1.0 + k as f64) * (motion(n) + 1e-3 * ((n * (7 + k)) as f64).sin()))
 }
 
-/// The function from a sample and the sample at the beginning of the fault to the faulty sample,
-/// and the expected reason.
+/// A fault: a function, and the reason that the receptor should give. The function returns the
+/// faulty sample from the present sample and the one at the beginning of the fault.
 type Fault = (fn(f64, f64) -> f64, ArrayLoss);
 
 const FAULTS: [(&str, Fault); 5] = [

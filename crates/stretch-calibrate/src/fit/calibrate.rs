@@ -27,9 +27,9 @@ pub struct Calibrated {
 
 /// Fits a calibration to logged trials.
 ///
-/// Ranges are pooled over all trials (those of rates over each branch) and stored. [`Trial::even`] resamples trials to
-/// an even time grid: a few lost samples are interpolated, and long gaps cut a trial. [`Calibrated::notes`] lists the
-/// changes.
+/// The ranges of signal and target over all trials are stored, and those of the rates over each branch. [`Trial::even`]
+/// resamples trials to an even time grid: a few lost samples are interpolated, and long gaps cut a trial.
+/// [`Calibrated::notes`] lists the changes.
 ///
 /// # Errors
 /// [`CalibrateError`], which names the trial and column, or the branch and term.
@@ -58,7 +58,7 @@ pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, Cali
     calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
 }
 
-/// Fits a calibration, with an earlier choice if one is given. Also returns the choice that was made.
+/// Fits a calibration. If an earlier `choice` is given, it is kept. Also returns the choice that was made.
 pub(crate) fn calibrate_with(
     trials: &[Trial],
     options: &Options,
@@ -91,7 +91,8 @@ pub(crate) fn calibrate_with(
     Ok((Calibrated { calibration, fits, notes }, made))
 }
 
-/// Choices within a model with memory. They are kept if the model is fitted to parts of the same data.
+/// Choices within a model with memory, such as its time constants. They are kept when the model is fitted again to
+/// parts of the same data.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     History(HistoryChoice),

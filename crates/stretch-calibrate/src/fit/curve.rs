@@ -50,8 +50,8 @@ impl Place {
     }
 }
 
-/// Least-squares rows of the knots and of further terms. A sample involves two knots only, so samples between the same
-/// two knots are first folded into a small triangle.
+/// Accumulates least-squares rows for the knots and for further terms. A sample involves two knots only, so samples
+/// between the same two knots are first folded into a small triangle.
 pub(crate) struct CurveRows {
     between: Vec<RowAccumulator>,
     samples: usize,
@@ -60,7 +60,7 @@ pub(crate) struct CurveRows {
 }
 
 impl CurveRows {
-    /// An accumulator for the knots and `more` further terms, without rows.
+    /// Creates an empty accumulator for the knots and `more` further terms.
     pub(crate) fn new(more: usize) -> Self {
         let between = vec![RowAccumulator::new(2 + more); KNOTS - 1];
         Self { between, samples: 0, more, row: Vec::new() }
@@ -75,7 +75,8 @@ impl CurveRows {
         self.samples += 1;
     }
 
-    /// Returns the factor of all rows and of the penalty on the curve's bending. The knots are the first terms.
+    /// Returns the triangular factor of all rows and of the penalty on the curve's bending. The knots are the first
+    /// terms.
     pub(crate) fn factor(self) -> LinearFactor {
         let mut rows = RowAccumulator::new(KNOTS + self.more);
         for (below, part) in self.between.into_iter().enumerate() {

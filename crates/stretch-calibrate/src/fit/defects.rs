@@ -1,4 +1,5 @@
-//! Parameters of named defects: initial values and ranges for a fit, and the map that the parameters give.
+//! Parameters of named defects: initial values and ranges for a fit, and the model (`DiagnosedMap`) that the parameters
+//! give.
 
 use stretch_core::{DiagnosedMap, FitSummary, Interval, Target as Polarity, Values};
 use stretch_effects::{
@@ -40,8 +41,8 @@ impl Moved {
         if self.parameter.is_log() { 0.01 } else { 0.002 * self.range() }
     }
 
-    /// Returns the expected distance of the coordinate from its initial value. It is smaller for a form parameter than
-    /// for other parameters.
+    /// Returns the expected distance of the coordinate from its initial value. It is smaller for a parameter of an
+    /// effect's form than for other parameters.
     fn likely(&self) -> f64 {
         match (self.parameter.is_log(), self.parameter.is_form()) {
             (true, true) => 0.3,
@@ -117,7 +118,7 @@ impl Defects {
         Ok(())
     }
 
-    /// Whether any of the defects makes the resting signal drift.
+    /// Returns whether any of the defects makes the resting signal drift.
     pub(crate) fn drifts(&self) -> bool {
         self.named.iter().any(|(_, live)| live.drifts)
     }

@@ -29,7 +29,7 @@ const BLOCK_S: f64 = 2.0;
 const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
 /// Correlation times of the rate that are tried, in seconds.
 const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
-/// Acceptance criterion: a more complex alternative is kept if it lowers the error below this share.
+/// Acceptance criterion: a more complex alternative is kept if its error is below this share of the simpler one's.
 const ACCEPTED: f64 = 0.97;
 
 /// Choices of a fit. A fit with earlier choices starts from them.
@@ -84,8 +84,9 @@ pub(crate) fn diagnosed(
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), Choice::Diagnosed(choice)))
 }
 
-/// Fits the forward model first to the signal, then to the error of the target, which weights the samples by the slope
-/// of the curve. Keeps the fit with the smaller live error.
+/// Fits the forward model so that the errors of the signal are small, then so that the errors of the target are small.
+/// The second fit divides each error by the slope of the curve. Keeps the fit with which the live receptor has the
+/// smaller error.
 fn refined(
     prepared: &Prepared,
     rest: Option<RestTracker>,
@@ -162,7 +163,7 @@ struct Simulated {
     pairs: Vec<(f64, f64)>,
     /// Mean hysteresis state of the plays at the start of a trial, at the lower and upper end of the range.
     initial_hysteresis: [f64; 2],
-    /// Travel of the gauge at the end of the trials.
+    /// Distance that the gauge has travelled by the end of the trials.
     travelled: f64,
 }
 
@@ -255,7 +256,7 @@ impl<'a> Record<'a> {
         Some(Seen { simulated, curve, domain, residuals, square, volts })
     }
 
-    /// Fits the parameters of the defects by Levenberg-Marquardt. The curve is solved for at each step.
+    /// Fits the parameters of the defects by Levenberg-Marquardt. The curve is fitted anew at each step.
     fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
         let mut defects = begin.clone();
@@ -322,7 +323,7 @@ impl<'a> Record<'a> {
         seen.square / seen.residuals.len() as f64
     }
 
-    /// Derivatives of the residuals with respect to each parameter.
+    /// Returns the derivatives of the residuals with respect to each parameter.
     fn sensitivities(&self, defects: &Defects, seen: &Seen) -> Vec<Vec<f64>> {
         use rayon::prelude::*;
         let one = |i: usize| {
@@ -358,7 +359,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Returns the map whose filter has the least live error.
+    /// Returns the map with whose filter the live receptor has the least error.
     fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         use rayon::prelude::*;
         let maps: Result<Vec<DiagnosedMap>, CalibrateError> = STEADY_S
@@ -387,7 +388,7 @@ impl<'a> Record<'a> {
         Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }
 
-    /// Returns the map without these statistics.
+    /// Returns the map without the statistics of its estimates.
     fn map(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         let Seen { simulated, curve, domain, .. } = &forward.seen;
         let sign = self.prepared.polarity.sign();

@@ -1,5 +1,5 @@
-//! Fits a polynomial of the signal's history by least squares. Cross-validation chooses its time constants, radii and
-//! ridge.
+//! Fits a polynomial of the signal's history by least squares. Cross-validation chooses its time constants, the radii
+//! of its plays (hysteresis elements) and its ridge penalty.
 
 use stretch_core::{
     FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Values,
@@ -21,11 +21,12 @@ use super::{
 
 /// Name of the model in reports and messages.
 const NAME: &str = "history";
-/// Samples at the start of a piece that are not fitted, because the low-passes still depend on their initial values.
+/// Samples at the start of a piece (a part without gaps) that are not fitted, because the low-passes still depend on
+/// their initial values.
 pub const SETTLE: usize = 10;
 /// Length of the blocks within which errors may be correlated, in seconds.
 const BLOCK_S: f64 = 0.5;
-/// Ridges that are tried, as shares of each term's power.
+/// Ridge penalties that are tried, as shares of each term's sum of squares.
 const RIDGES: [f64; 3] = [1e-6, 1e-4, 1e-2];
 /// Designs that are tried, the smallest first.
 const DESIGNS: [StateDesign; 5] = [
@@ -41,11 +42,11 @@ const DESIGNS: [StateDesign; 5] = [
 pub struct StateDesign {
     /// Time constants, in seconds.
     pub relaxations_s: &'static [f64],
-    /// Radii of plays, in normalised signal.
+    /// Radii of plays (hysteresis elements), in normalised signal.
     pub radii: &'static [f64],
-    /// Greatest sum of powers.
+    /// Greatest sum of the powers of all states in a term.
     pub degree: u8,
-    /// Greatest sum of the powers of the memory states.
+    /// Greatest sum of the powers of the memory states in a term.
     pub memory_degree: u8,
 }
 
@@ -144,7 +145,7 @@ impl StateDesign {
     }
 }
 
-/// Computes rows of terms: scales the states and multiplies them.
+/// Computes the terms of a sample: scales the states and multiplies them.
 #[derive(Debug, Clone)]
 pub struct TermRows {
     products: Vec<(usize, usize)>,
@@ -153,7 +154,7 @@ pub struct TermRows {
 }
 
 impl TermRows {
-    /// Rows of a shape, over the ranges of its states.
+    /// Creates rows of terms of this shape. The states are scaled by their ranges in `domain`.
     pub fn new(shape: HistoryShape, domain: &[Interval]) -> Self {
         let mut products = Vec::new();
         shape.each_product(|parent, state| products.push((parent, state)));
@@ -336,7 +337,7 @@ fn train(
     Ok(Trained { choice, domain, estimate, rows, samples, whole, cross_validated })
 }
 
-/// Returns the triangular factor of each fold.
+/// Returns the triangular factor of each fold (part of the data for cross-validation).
 fn factors(pieces: &[Piece], rows: &TermRows, terms: usize) -> Vec<LinearFactor> {
     let last = pieces.iter().flat_map(|p| p.fold.iter()).max().copied().unwrap_or(0);
     let mut folds = vec![RowAccumulator::new(terms); last + 1];
@@ -361,7 +362,7 @@ fn dof(samples: usize, terms: usize) -> f64 {
     (samples as f64 - terms as f64).max(1.0)
 }
 
-/// Returns the root mean square error over all folds, each predicted by a fit to the others.
+/// Returns the root mean square error over all folds. Each fold is predicted by a fit to the others.
 fn held_out(
     pieces: &[Piece],
     rows: &TermRows,

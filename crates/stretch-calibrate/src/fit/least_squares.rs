@@ -6,12 +6,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows per column that are collected before they are folded. The rows of the triangle then add a quarter to the cost.
+/// Rows per column that are collected before they are folded. The triangle has one row per column, so it then adds a
+/// quarter to the cost.
 const WAITING: usize = 4;
 /// Least number of rows that are collected before they are folded.
 const LEAST_WAITING: usize = 64;
 
-/// An accumulator of rows that keeps only their triangle.
+/// An accumulator of rows that keeps only their triangular factor.
 #[derive(Debug, Clone)]
 pub struct RowAccumulator {
     /// The triangle of `[X y]` so far. Below it are the rows that are not folded yet, then zeros.
@@ -20,7 +21,7 @@ pub struct RowAccumulator {
 }
 
 impl RowAccumulator {
-    /// An accumulator for rows with this number of terms.
+    /// Creates an accumulator for rows with this number of terms.
     pub fn new(terms: usize) -> Self {
         let columns = terms + 1;
         let rows = columns + (WAITING * columns).max(LEAST_WAITING);
@@ -201,8 +202,8 @@ mod tests {
 
     type Row = ([f64; TERMS], f64);
 
-    /// Rows of a known solution with an error of a tenth. If the values were only error, the solution would be near
-    /// zero and the relative rounding error large.
+    /// Generates rows of a known solution, with errors of a tenth in the values. If the values were only error, the
+    /// solution would be near zero and the relative rounding error large.
     fn rows(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Row>> {
         let row = (prop::array::uniform5(-1.0..1.0), -0.1..0.1f64).prop_map(|(row, error)| {
             (row, error + row.iter().zip(TRUTH).map(|(x, c)| x * c).sum::<f64>())
@@ -287,7 +288,7 @@ mod tests {
         }
     }
 
-    /// Powers of a number between 1.23 and 1.25; `X'X` would have no correct digit.
+    /// The terms are powers of a number between 1.23 and 1.25. A solution from `X'X` would have no correct digit.
     #[test]
     fn a_condition_of_1e8_keeps_its_digits_and_says_so() {
         let truth = [0.058, 0.774, 2.30, -2.26];

@@ -17,22 +17,22 @@ use super::{
     report::{Coefficient, FitReport, Fitted},
 };
 
-/// Ridge on the dynamic parameters, as a share of each parameter's power.
+/// Ridge penalty on the dynamic parameters, as a share of the sum of squares of each parameter's column.
 const RIDGE: f64 = 1e-4;
 const ITERATIONS: usize = 12;
 /// Spectral densities of the rate's random walk that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
 /// Time constants of the first search, in seconds.
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
-/// Acceptance criterion: a more complex alternative is kept if it lowers the error below this share.
+/// Acceptance criterion: a more complex alternative is kept if its error is below this share of the simpler one's.
 const ACCEPTED: f64 = 0.97;
-/// Time over which model errors are assumed to be correlated, s. It is the time of the slowest relevant part of the
-/// model.
+/// Time over which model errors are assumed to be correlated, s. It is about the time scale of the slowest relevant
+/// process in the model.
 const BLOCK_S: f64 = 2.0;
 /// Relative step of a time constant for the derivative of the drive.
 const NUDGE: f64 = 0.01;
-/// Ridge that avoids a division by zero if no data determine a parameter, as a share of its column's power. It is far
-/// below the share of any data that determine the parameter.
+/// Ridge penalty that avoids a division by zero if no data determine a parameter, as a share of the sum of squares of
+/// its column. It is so small that it has no effect if any data determine the parameter.
 const BOUNDS_RIDGE: f64 = 1e-9;
 
 /// Fits an observer. If `rest` is true, the baseline is tracked. An earlier `choice`, made on more data, is kept.
@@ -143,7 +143,8 @@ fn second_relaxation(
     Ok(best.1)
 }
 
-/// Returns a forward model, and the map whose agility gives the least live error.
+/// Returns a forward model, and the map whose agility (density of the rate's random walk) gives the live receptor the
+/// least error.
 fn tuned(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -295,8 +296,8 @@ fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, Calibra
 /// Returns the uncertainty of a forward model, on the pieces to which it was fitted.
 ///
 /// The first result contains standard errors of lead, amplitudes and play weights, then of the time constants. They are
-/// NaN if the data do not determine them. The second result is the condition number of the rows behind the standard
-/// errors.
+/// NaN if the data do not determine them. The second result is the condition number of the rows from which the standard
+/// errors are computed.
 ///
 /// The errors are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
 /// together. Correlations of an effect with the curve or with a time constant therefore enlarge its error. The
@@ -341,7 +342,7 @@ fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> (Vec<f64>, f64)
             }
         }
     }
-    // The smallest constant avoids a division by zero for a column of zeros.
+    // The constant 1e-300 avoids a division by zero for a column of zeros.
     match rows.factor().solve(|_, power| BOUNDS_RIDGE * power + 1e-300) {
         Some(solution) => (solution.block_errors(&blocks).split_off(KNOTS), solution.condition()),
         None => (vec![f64::NAN; more], f64::INFINITY),

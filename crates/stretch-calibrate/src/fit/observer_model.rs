@@ -16,7 +16,8 @@ use crate::{
 use super::{curve::Place, history::SETTLE};
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// Least slope of the drive with respect to the target while plays are engaged, as a share of the slope without plays.
+/// Least slope of the drive with respect to the target while plays (hysteresis elements) stand still, as a share of the
+/// slope without plays.
 const LEAST_ANSWER: f64 = 0.1;
 /// Window of the quadratic filter that smooths the reference, in samples.
 const SMOOTH: usize = 7;
@@ -162,8 +163,8 @@ pub(crate) struct Forward {
 }
 
 impl Forward {
-    /// Whether the drive rises with the target for any engaged plays. A drive that falls cannot be inverted. The widest
-    /// plays are engaged first.
+    /// Returns whether the drive rises with the target, whichever plays stand still. A drive that falls cannot be
+    /// inverted. After a reversal all plays stand still, and the widest ones do so for the longest time.
     pub(crate) fn answers(&self) -> bool {
         let plays = self.choice.radii().len();
         let (instant, weights) = self.dynamics[1..].split_at(self.dynamics.len() - 1 - plays);
@@ -187,7 +188,7 @@ impl Forward {
 pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
 /// Time in which a baseline follows a signal below rest, s.
 const CATCH_UP_S: f64 = 0.5;
-/// Leaks that are tried, as shares of the signal's range per second.
+/// Leaks (rates at which the baseline rises by itself) that are tried, as shares of the signal's range per second.
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
 /// Margin below the resting level for the noise of a signal at rest, in standard deviations.
 const MARGIN: f64 = 1.0;

@@ -39,9 +39,9 @@ pub struct FitReport {
     pub rejected: Option<u64>,
     /// Coefficients with 95 % bounds.
     pub coefficients: Vec<Coefficient>,
-    /// Fits of neighbouring degrees.
+    /// Statistics of fits with neighbouring degrees.
     pub orders: Vec<Order>,
-    /// The lowest order that satisfies the acceptance criterion of `stretch_fit::OrderTable`.
+    /// The lowest degree that satisfies the acceptance criterion of `stretch_fit::OrderTable`.
     pub recommended: Option<String>,
     /// Samples for a plot, `[rate, signal, target]`, at most a few thousand.
     #[serde(skip)]
@@ -86,7 +86,7 @@ pub struct Order {
 }
 
 impl Coefficient {
-    /// Coefficients that are not powers of rate and signal, from their standard errors.
+    /// Returns coefficients of terms that are not powers of rate and signal, with bounds from their standard errors.
     pub(crate) fn named(names: Vec<String>, estimates: &[f64], errors: &[f64]) -> Vec<Self> {
         let all = names.into_iter().zip(estimates).zip(errors);
         all.map(|((name, &estimate), error)| {
@@ -98,7 +98,7 @@ impl Coefficient {
 }
 
 impl FitReport {
-    /// The report of a model that is not a surface.
+    /// Returns the report of a model that is not a surface.
     pub(crate) fn of_model(
         name: String,
         fit: &FitSummary,

@@ -181,7 +181,7 @@ fn surface(
     Ok((fitted, report))
 }
 
-/// Triangular factors of the folds.
+/// Triangular factors of the folds (parts of the data for cross-validation).
 type Factors = Vec<Factor<f64>>;
 
 /// Fits a polynomial of the given degree to samples.
@@ -193,7 +193,7 @@ fn fit(
     robust: Robust,
 ) -> Result<FitReport, CalibrateError> {
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
-    // The order table around a surface needs higher degrees; a line has no table.
+    // The order table of a surface compares it with higher degrees. A line has no order table.
     let wide = if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree };
     let folds = factors(samples, wide).map_err(failed)?;
     let whole = merged(&folds).map_err(failed)?;
@@ -291,7 +291,7 @@ fn merged(folds: &Factors) -> Result<Factor<f64>, FitError> {
     Ok(whole)
 }
 
-/// Returns the rows of a table, with the names of their degrees.
+/// Returns the rows of an order table, with the names of their degrees.
 fn orders(table: &OrderTable<f64>, named: impl Fn(Degree) -> String) -> Vec<Order> {
     table
         .rows()

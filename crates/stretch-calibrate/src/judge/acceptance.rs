@@ -18,8 +18,9 @@ const LEFT: f64 = 0.95;
 /// sqrt(1 - R^2) > 0.95,  R^2 < 0.0975
 /// ```
 ///
-/// Returns `None` for a fit that explains more. Such fits come from an error of the reference itself (a placeholder
-/// that the recorder writes for a missing value), a sensor that is not connected, or a column with another quantity.
+/// Returns `None` for a fit that explains more. Typical causes of a fit that explains nothing are an error of the
+/// reference itself (a placeholder that the recorder writes for a missing value), a sensor that is not connected, or a
+/// column with another quantity.
 pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     let left = (1.0 - worst.r_squared).max(0.0).sqrt();

@@ -138,7 +138,7 @@ pub struct Applied {
 
 /// Applies a calibration to a logged trial, sample by sample, as it would run live.
 ///
-/// A calibration that needs the signal only computes its rates at the trial's sample rate: see [`at_rate`].
+/// If a calibration needs only the signal, its rates are computed at the trial's sample rate: see [`at_rate`].
 ///
 /// A calibration with the paper's central difference is applied as published: the rates are computed over the whole log
 /// and use the next sample.
@@ -181,7 +181,7 @@ pub(crate) fn each_reading(
     Ok(live.faults())
 }
 
-/// Returns a calibration that [needs the signal only](Model::needs_signal_only) at another sample rate. Any other
+/// Returns the calibration for another sample rate, if it [needs only the signal](Model::needs_signal_only). Any other
 /// calibration is returned unchanged, because it is valid only at its own sample rate.
 ///
 /// # Errors

@@ -159,7 +159,7 @@ pub fn evaluation_doubts(
     all
 }
 
-/// Number of intervals that determine the pace.
+/// Number of intervals from which the usual sample interval is computed.
 const INTERVALS: usize = 51;
 
 /// The usual sample interval of a stream compared with that of the calibration.
@@ -192,7 +192,7 @@ impl Pace {
         }
         self.is_told = true;
         let mut stamps_s = std::mem::take(&mut self.stamps_s);
-        // A row that goes back in time is also left out of a file.
+        // Rows that go back in time are left out here, as they are when a file is read.
         for at in out_of_order(&stamps_s).into_iter().rev() {
             stamps_s.remove(at);
         }

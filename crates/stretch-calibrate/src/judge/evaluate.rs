@@ -34,11 +34,14 @@ pub struct MethodErrors {
     pub rmse: f64,
     /// Root mean square error in percent of the reference's range.
     pub rmse_percent: f64,
-    /// The paper's average error: `100 mean|d_p - d_s|/range of d_s`.
+    /// The paper's average error: `100 mean|d_p - d_s|/range of d_s`, where `d_p` is the reference and `d_s` the
+    /// estimate.
     pub average_error_percent: f64,
-    /// `100 mean|d_p - d_s|/range of the reference`.
+    /// The average error in percent of the reference's range: `100 mean|d_p - d_s|/range of d_p`, where `d_p` is the
+    /// reference and `d_s` the estimate.
     pub average_error_percent_of_reference: f64,
-    /// `100 mean(d_p - d_s)/range of d_s`.
+    /// The average error with its sign: `100 mean(d_p - d_s)/range of d_s`, where `d_p` is the reference and `d_s` the
+    /// estimate.
     pub signed_error_percent: f64,
     /// Mean of estimate minus reference.
     pub bias: f64,
@@ -222,7 +225,7 @@ fn estimates(calibration: &Calibration, trial: &Trial) -> Result<Estimates, Cali
     Ok(Estimates { values: read(|r| r.estimate), rates: read(|r| r.rate), clamped })
 }
 
-/// Sums behind one [`MethodErrors`], which can be merged over trials.
+/// Sums from which one [`MethodErrors`] is computed. The sums of several trials can be merged.
 #[derive(Debug, Clone, Default)]
 struct Tally {
     agreement: Agreement<f64>,

@@ -16,19 +16,19 @@ use crate::{
 
 use super::apply::each_reading;
 
-/// Margin on either side of a part left out that is not fitted either, because neighbouring samples are correlated, s.
+/// Time on either side of a left-out part that is not fitted either, because neighbouring samples are correlated, s.
 const GAP_S: f64 = 2.0;
 /// Number of warm-up samples that are not evaluated.
 const SETTLE: usize = 20;
 /// Number of parts into which each trial is divided if there are few trials.
 pub(crate) const PARTS: usize = 6;
-/// Return of the reference that counts as a reversal, as a share of its range.
+/// Smallest movement of the reference in the opposite direction that counts as a reversal, as a share of its range.
 const TURN: f64 = 0.1;
 /// Number of reversals from which a trial counts as reversing.
 const LEAST_TURNS: usize = 3;
 const MAX_LAG_S: f64 = 0.5;
 
-/// Whether a trial can distinguish memory from position, because it reverses at least three times.
+/// Returns whether a trial can distinguish memory from position, because it reverses at least three times.
 fn reverses(reference: &[f64]) -> bool {
     let range = extent(reference.iter().copied());
     let turn = TURN * (range.max - range.min);
@@ -173,7 +173,7 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
 }
 
 /// Returns a line or a curve that is not clamped to the signals of its fit. If a table is fitted without its largest
-/// weight, the estimate of that weight is an extrapolation, whose error shows how good the form is.
+/// weight, the estimate of that weight is an extrapolation. Its error shows how good the form of the model is.
 fn beyond_its_ends(
     calibration: Calibration,
     signals: &[f64],

@@ -1,4 +1,5 @@
-//! Applies and evaluates calibrations, and chooses a model or a signal by cross-validation.
+//! Applies calibrations, computes their errors, and chooses a model or a signal by
+//! cross-validation.
 
 mod acceptance;
 mod apply;

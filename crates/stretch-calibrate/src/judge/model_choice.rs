@@ -18,8 +18,8 @@ use super::{
 
 /// A root mean square error of at most this multiple of the best one counts as equally good.
 const AS_GOOD: f64 = 1.05;
-/// Greatest cost of tracking the baseline, as a ratio of cross-validated root mean square errors. A tracked baseline
-/// reduces the effect of a drift of 5 % in a minute by a quarter.
+/// Greatest acceptable ratio of the cross-validated root mean square error with a tracked baseline to that without. A
+/// tracked baseline reduces the effect of a drift of 5 % in a minute by a quarter.
 const PREMIUM: f64 = 1.05;
 /// Greatest number of rows that candidates evaluated in parallel hold in memory together. Each candidate needs some
 /// 200 bytes a row.
@@ -31,9 +31,9 @@ pub struct ModelRow {
     pub model: String,
     /// Number of parameters of the fit.
     pub parameters: usize,
-    /// Measured number of instructions a sample on a Cortex-M3, from volts in `f32`.
+    /// Measured number of instructions per sample on a Cortex-M3 that computes in `f32` from volts.
     pub m3_instructions: Option<f64>,
-    /// Number of instructions a sample in fixed point, if the model has a fixed-point form.
+    /// Number of instructions per sample in fixed point, if the model has a fixed-point form.
     pub m3_instructions_fixed: Option<f64>,
     /// Root mean square error on trials left out, in the reference's unit.
     pub rmse: Option<f64>,
@@ -74,11 +74,11 @@ pub struct ModelChoice {
 /// trial, or several trials if there are more than sixteen. If there are fewer than three trials, each fold is a part
 /// of a trial. Time constants, radii and ridge are chosen once, on all trials.
 ///
-/// The chosen model is the simplest one that is as good as the best. It is as good if its mean squared error over the
-/// parts exceeds that of the best by at most one standard error (Breiman et al. 1984, section 3.4.3), or if its root
-/// mean square error is within 5 % of that of the best. A length cannot exceed its resting length. For a length, the
-/// chosen model is therefore replaced by its form with a tracked baseline if this costs at most 5 %, because short
-/// recordings rarely show drift.
+/// The chosen model is the simplest one that is as good as the best. A model is as good if its mean squared error over
+/// the parts exceeds that of the best by at most one standard error (Breiman et al. 1984, section 3.4.3), or if its
+/// root mean square error is within 5 % of that of the best. A length cannot exceed its resting length. For a length,
+/// the chosen model is therefore replaced by its form with a tracked baseline if this increases the error by at most 5
+/// %, because short recordings rarely show drift.
 ///
 /// If every trial moves one way, models with memory are not chosen, because such data cannot distinguish memory from
 /// rate. [`ModelChoice::notes`] then recommends what to record.
@@ -265,10 +265,10 @@ fn row(found: &Found, excess: Option<(f64, f64)>) -> ModelRow {
 /// Figures that `firmware/gate.sh --write` measures and `firmware/gate.sh` compares with a new measurement.
 const BUDGET: &str = include_str!("../budget.txt");
 
-/// Returns the number of instructions a sample on a Cortex-M3, from volts in `f32`, without a floating-point unit;
-/// `None` for a model that was not measured.
+/// Returns the number of instructions per sample on a Cortex-M3, which has no floating-point unit and computes in `f32`
+/// from volts. Returns `None` for a model that was not measured.
 ///
-/// The number applies to the largest shape that a fit of that name may choose, with one relaxation in an observer.
+/// The number applies to the largest model that a fit of that name may choose, but to one relaxation in an observer.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
@@ -288,8 +288,8 @@ pub fn m3_instructions(model: ModelKind) -> Option<f64> {
     }
 }
 
-/// Returns the number of instructions a sample on a Cortex-M3, from a converter's codes in fixed point; `None` for a
-/// model without a fixed-point form.
+/// Returns the number of instructions per sample on a Cortex-M3 that computes in fixed point from a converter's codes.
+/// Returns `None` for a model without a fixed-point form.
 pub fn m3_instructions_fixed(model: ModelKind) -> Option<f64> {
     mean(&format!("{model}-fixed"))
 }

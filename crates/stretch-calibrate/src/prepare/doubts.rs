@@ -8,8 +8,8 @@ use crate::Options;
 
 use super::{series::extent, trials::Piece};
 
-/// Least squared correlation at which the line of a trial can be compared with another: the line explains at least half
-/// of the variance.
+/// Least squared correlation of signal and reference at which the line of a trial can be compared with another: the
+/// line then explains at least half of the variance.
 const HAS_LINE: f64 = 0.5;
 /// Ratios of two trials' slopes that hysteresis, another rate or another range can cause.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
@@ -29,8 +29,9 @@ const OTHERS: usize = 32;
 /// Number of neighbours, in the order of the mean reference, with which each trial is compared to find copies.
 const NEXT: usize = 8;
 
-/// A possible mistake in one trial. The function computes from the trial's line and that of another trial the trial's
-/// line as recorded and the line without the mistake. The text is the message.
+/// A possible mistake in one trial, as a function and a message. The function takes the line of this trial and the line
+/// of another one. It returns the line of this trial as recorded, and the line that the trial would have without the
+/// mistake.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
 const MISTAKES: [Mistake; 4] = [
@@ -176,7 +177,8 @@ impl Held<'_> {
                     let began = at;
                     at += run.len();
                     let moves = |x: &f64| way * (x - reference[began]) > enough;
-                    // A run at the first sample is ignored, because a play may hold the signal there.
+                    // A run of equal readings from the first sample on is ignored, because hysteresis may hold the
+                    // signal there.
                     let is_run = began > 0 && run.len() >= STANDS && run[0] == end;
                     is_run && reference[began..at].iter().any(moves)
                 })

@@ -6,8 +6,8 @@ use stretch_data::{Channel, Trial};
 use super::series::extent;
 
 /// Greatest share of the rows that can be gross errors. With a larger share, two true levels of a channel (a muscle
-/// held at two lengths) could be mistaken for values and outliers. The simplest robust location estimate, the decile
-/// mean, tolerates a tenth as well.
+/// held at two lengths) could be mistaken for values and outliers. The decile mean, a simple robust estimate of
+/// location, tolerates the same share.
 const MOST_SHARE: f64 = 0.1;
 
 /// Removes the rows in which one of `columns` has a gross error. Also returns a sentence for each column with such

@@ -113,7 +113,7 @@ pub(crate) fn series(
     Ok(Series { trial, signal, target, pressure, signal_rate, target_rate })
 }
 
-/// Dead bands of the two rates, each in its own unit per second.
+/// Dead bands of the rates of signal and target, each in its own unit per second.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeadBands {
     pub signal: f64,

@@ -1,4 +1,4 @@
-//! Prepares trials for a fit: an even time grid and pooled ranges.
+//! Prepares trials for a fit: puts them on one even time grid and computes the ranges over all trials.
 
 use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
@@ -35,7 +35,7 @@ pub(crate) fn fold_of(trial: usize) -> usize {
     trial % MOST_FOLDS
 }
 
-/// All trials on an even time grid, with pooled ranges.
+/// All trials on an even time grid, with the ranges over all of them.
 pub(crate) struct Prepared {
     pub series: Vec<Series>,
     pub sample_rate: SampleRate,
@@ -206,8 +206,8 @@ impl Evened {
     }
 }
 
-/// Shifts the reference of each part by whole turns to the line reference = a + b signal through the part with the
-/// widest signal.
+/// Shifts the reference of each part by whole turns, so that its mean is nearest to the line
+/// `reference = a + b signal`. The line is fitted to the part with the widest range of the signal.
 ///
 /// The turn of an angle that wraps is unknown, so a trial may begin on the other side of the seam. Returns the number
 /// of shifted parts, or `None` if there are none.
@@ -332,7 +332,7 @@ fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError>
     })
 }
 
-/// Returns the range of a column from its extent.
+/// Returns the range of a column from its least and greatest value.
 ///
 /// # Errors
 /// [`CalibrateError::Constant`] for a column that never changes.

@@ -10,7 +10,7 @@ use crate::CalibrateError;
 
 use super::digest;
 
-/// Room for the largest calibration in postcard: two poly55 surfaces and sixteen trials.
+/// Buffer size for the largest calibration in postcard, which has two poly55 surfaces and the names of sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
 
 /// Treatment of the seal of a calibration file.

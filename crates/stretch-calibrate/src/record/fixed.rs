@@ -14,7 +14,7 @@ use stretch_receptor::{
 
 use crate::{CalibrateError, SpellingError};
 
-/// Room for the largest record: an observer in which every number has its greatest length.
+/// Buffer size for the largest record, an observer in which every number has its greatest length.
 const BYTES: usize = 1024;
 
 /// Step of an integer estimate, in the unit of the reference.
@@ -48,7 +48,7 @@ pub struct FixedRecord {
 ///
 /// # Errors
 /// [`CalibrateError::FixedBits`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
-/// model, [`CalibrateError::FixedRate`] for a rate for which no type was compiled (an observer needs none),
+/// model, [`CalibrateError::FixedRate`] for a rate estimator for which no type was compiled (an observer needs none),
 /// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter,
 /// [`CalibrateError::FixedStep`] if a step of an estimate ([`FIXED_STEP`]) exceeds the fit's error,
 /// [`CalibrateError::Fixed`] if a number does not fit its format.
@@ -168,7 +168,8 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
     let fixed =
         fixed.map_err(|error| match error {
-            // The step exceeds the permitted error of the arithmetic. If it does not, the converter is too coarse.
+            // The error of the arithmetic is too large. If the step of the estimate is coarse for the range, the step
+            // is the cause; otherwise it is the converter.
             ReceptorError::Calibration(DesignError::OutOfRange {
                 field: "fixed.error", ..
             }) if FIXED_STEP > 1e-4 * span(calibration) => too_coarse(calibration),
@@ -211,8 +212,8 @@ pub struct BoardReceptor {
 }
 
 impl BoardReceptor {
-    /// Builds the receptor from the bytes of a record; `None` if the bytes are not such a record, or have a rate that
-    /// [`fixed_record`] does not write.
+    /// Builds the receptor from the bytes of a record; `None` if the bytes are not such a record, or have a rate
+    /// estimator that [`fixed_record`] does not write.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         rated_receptor(bytes).or_else(|| {
             let observer: FixedObserver = record::load(bytes).ok()?;
@@ -253,7 +254,7 @@ fn surface_receptor<const WINDOW: usize, const DEGREE: usize>(
     Some(BoardReceptor { adc_bits: fixed.adc_bits(), running })
 }
 
-/// Any receptor over codes, as a trait object.
+/// A receptor of any type that takes converter codes, as a trait object.
 trait Running: fmt::Debug {
     fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld>;
     fn reset(&mut self);

@@ -1,4 +1,4 @@
-//! Several gauges in `float`.
+//! C code in `float` for several gauges.
 
 use stretch_sleeve::{ArrayCalibration, ArrayGainNumbers, ArrayNumbers, ArrayReceptor, ShiftWatch};
 
@@ -7,7 +7,8 @@ use crate::{
     part::Part,
 };
 
-/// The constants and the step of several gauges that share a recorder.
+/// Returns the constants and the step (the C code for one sample) of several gauges that share a
+/// recorder.
 pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> Part {
     let receptor = ArrayReceptor::<f32, N>::new(calibration);
     let numbers = receptor.numbers();
@@ -50,7 +51,8 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
 fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let of = &numbers.of[..numbers.channels];
     let states = 1 + numbers.relaxations;
-    // no count of repeated samples reaches this number
+    // a limit of 0 means that repeated samples are not checked; no count of them reaches the
+    // greatest integer
     let still = |samples: u16| if samples == 0 { i32::MAX } else { i32::from(samples) };
     let (parents, extends): (Vec<u8>, Vec<u8>) =
         numbers.products[..numbers.terms].iter().copied().unzip();
@@ -74,7 +76,8 @@ fn watched<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32
         .array("float", "per_slip", &each(of, |c| c.per_slip));
 }
 
-/// Writes the gains of all channels together, of all channels but one, and of each channel alone.
+/// Writes the gains for all channels together, for all channels but one, and for each channel
+/// alone.
 fn gains<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let (count, terms) = (numbers.channels, numbers.terms);
     let rows = |gains: &ArrayGainNumbers<f32, N>| {

@@ -1,4 +1,4 @@
-//! `diagnosed` and `diagnosed+rest` in `float`.
+//! C code in `float` for the models `diagnosed` and `diagnosed+rest`.
 
 use stretch_core::Calibration;
 use stretch_receptor::{
@@ -10,8 +10,8 @@ use stretch_receptor::{
 use super::observer::define_rest;
 use crate::{ExportError, constants::Constants, part::Part};
 
-/// The constants and the step of a gauge with named defects, without the defects that it does not
-/// have.
+/// Returns the constants and the step (the C code for one sample) of a gauge with named defects.
+/// The code for other defects is left out.
 pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = DiagnosedReceptor::<f32>::new(calibration)?;
     let model = receptor.model();
@@ -51,7 +51,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     })
 }
 
-/// Writes the constants of curve, filter and output.
+/// Writes the constants of the curve, the filter and the output.
 fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
     let curve = &model.curve;
     let span = model.high - model.low;
@@ -90,7 +90,8 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
                     bound: Option<Bound<f32>>| {
         let Some(Bound { at, round }) = bound else { return };
         has.extend(["knee", group, word]);
-        // the step evaluates a ceiling with the signs of input and output changed
+        // the step evaluates an upper bound like a lower one, with the signs of input and output
+        // changed
         constants.define(name, at, "a bound").define(&format!("{name}_ROUND"), round, "its knee");
     };
     knee("slack_low", "SLACK_LOW", "slack", defects.slack_low);
@@ -129,5 +130,6 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
             .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
             .define("WORN_TRAVELLED", worn.travelled, "distance travelled before");
     }
-    // The delay of a slow amplifier is part of the skew, so the live step has no poles.
+    // The delay of a slow amplifier is included in the time shift between signal and reference, so
+    // the live step has no poles for it.
 }

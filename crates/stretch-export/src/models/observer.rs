@@ -1,4 +1,4 @@
-//! `observer` and `observer+rest`, in integers and in `float`.
+//! C code for the models `observer` and `observer+rest`, in integers and in `float`.
 
 use stretch_core::{Calibration, RestLevel};
 use stretch_receptor::{
@@ -12,7 +12,7 @@ use crate::{
     part::Part,
 };
 
-/// The constants and the step of a converted observer.
+/// Returns the constants and the step (the C code for one sample) of an observer in integers.
 pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     let IntegerObserver { numbers: n, recips, recip_bits, tangents, at_rest } = observer;
     let adc_bits = u32::from(n.adc_bits.min(16));
@@ -67,10 +67,11 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     }
 }
 
-/// Least length of a secant, as a share of the distance between knots; the same as in the receptor.
+/// Least length of a secant of the curve, as a share of the distance between knots. The receptor
+/// uses the same value.
 const LEAST_RUN: f32 = 0.01;
 
-/// The constants and the step of an observer.
+/// Returns the constants and the step of an observer in `float`.
 pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = ObserverReceptor::<f32>::new(calibration)?;
     let o = receptor.model();
@@ -130,7 +131,7 @@ fn define_memory<L: Literal>(
         .array(kind, "play_weights", play_weights);
 }
 
-/// Writes the constants of the tracker of the baseline.
+/// Writes the constants with which the step tracks the baseline.
 pub(super) fn define_rest<L: Literal>(constants: &mut Constants, at_rest: L, rest: RestLevel<L>) {
     let RestLevel { level, pull, leak, average, furthest, most } = rest;
     constants

@@ -1,4 +1,5 @@
-//! `linear` and `poly13`, in integers and in `float`; `curve` in `float`.
+//! C code for the models `linear` and `poly13`, in integers and in `float`, and for `curve` in
+//! `float`.
 
 use stretch_core::{Branch, Calibration, Poly13, RateEstimator, fixed::FixedPoly13};
 use stretch_filter::{SgFilter, SgShape};
@@ -14,7 +15,7 @@ use crate::{
     part::Part,
 };
 
-/// The constants and the step of a converted calibration.
+/// Returns the constants and the step (the C code for one sample) of a calibration in integers.
 pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
     let adc_bits = u32::from((*adc_bits).min(16));
@@ -73,7 +74,7 @@ fn span(span: &Span) -> String {
     format!("{{{}, {}, {}}}", span.min.c(), span.width.c(), span.factor.c())
 }
 
-/// The surface of one branch with its ranges.
+/// Returns the C initialiser of the surface of one branch (direction of motion), with its ranges.
 fn poly13_fixed(ranged: &CodeSurface<Scaled<FixedPoly13>>) -> String {
     let Scaled { of, thousandths } = ranged.surface;
     // the coefficients are integers of 32 bits, so the casts lose nothing
@@ -85,7 +86,8 @@ fn poly13_fixed(ranged: &CodeSurface<Scaled<FixedPoly13>>) -> String {
     format!("{{{domain}, \\\n         {{{ordered}}}}}")
 }
 
-/// The constants and the step of a line, of surfaces without a term beyond poly13, or of a curve.
+/// Returns the constants and the step in `float` of a line, of surfaces without a term beyond
+/// poly13, or of a curve.
 pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportError> {
     let receptor = StretchReceptor::<f32>::new(calibration)?;
     let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.spec().rate_estimator
@@ -94,7 +96,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     };
     let [window, degree, delay] = [window, degree.into(), delay].map(usize::from);
     let shape = SgShape { window, degree, order: 1, delay };
-    // the filter that the receptor runs: see `RateFilter`
+    // the same filter as in the receptor: see `RateFilter`
     let filter = SgFilter::<f32>::new(shape, calibration.spec().sample_rate_hz);
     let filter = filter.map_err(ReceptorError::from)?;
     let model = receptor.model();
@@ -155,7 +157,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     })
 }
 
-/// The surface of one branch with its ranges.
+/// Returns the C initialiser of the surface of one branch (direction of motion), with its ranges.
 fn poly13_float(ranged: &RangedSurface<f32, Poly13<f32>>) -> String {
     let RangedSurface { signal, rate, offset, rate_offset, surface } = *ranged;
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = surface;

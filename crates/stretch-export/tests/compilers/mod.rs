@@ -1,4 +1,5 @@
-//! Compilers of C and C++, and programs around a header.
+//! C and C++ compilers, and the programs that they make from a header and a harness (a test program that calls the
+//! header).
 
 use std::{
     fs,
@@ -55,7 +56,7 @@ fn fuses() -> bool {
     false
 }
 
-/// Compiles the harness around a header. Returns the path of the program.
+/// Compiles the harness together with a header. Returns the path of the program.
 pub(crate) fn compiled(
     folder: &Path,
     harness: &str,
@@ -73,7 +74,7 @@ pub(crate) fn compiled(
     program
 }
 
-/// The compilers for an Uno: C++ as the Arduino IDE calls it, and C.
+/// Returns the compilers for an Arduino Uno: C++ as the Arduino IDE calls it, and C.
 pub(crate) fn uno() -> [Compiler; 2] {
     let uno = ["-mmcu=atmega328p", "-Os", "-DF_CPU=16000000", "-Wno-overlength-strings"];
     [

@@ -24,10 +24,11 @@ const MOST_COLUMNS: usize = 64;
 /// Longest array that is taken for a date or a time of day instead of a clock, if there is a clock that is
 /// `MUCH_LONGER` times as long.
 const DATE: usize = 3;
-/// Smallest ratio of the length of that clock to the length of the array.
+/// Smallest ratio of the length of a clock to the length of an array of `DATE` or fewer values, for which the array is
+/// a date.
 const MUCH_LONGER: usize = 10;
 
-/// One array of numbers, the last index running fastest.
+/// One array of numbers, stored so that the last index varies fastest.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Array {
     /// Path within the file, with `/` or `.` between its parts.
@@ -186,7 +187,7 @@ pub(crate) fn beside(arrays: &[Array], room: &mut Room) -> Result<(), String> {
 struct Candidate {
     /// Name of the group of arrays that the clock belongs to. It can be empty.
     of: String,
-    /// Rank of its name among the usual names of a time. 0 is the likeliest.
+    /// Rank of the array's name among the usual names of a time. 0 is the likeliest.
     rank: usize,
     rises: bool,
 }
@@ -278,8 +279,8 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
 /// Decides which of the candidates are clocks.
 fn choose(arrays: &[Array], found: &[Option<Candidate>]) -> Vec<bool> {
     let all = || arrays.iter().zip(found).filter_map(|(a, found)| Some((a, found.as_ref()?)));
-    // A candidate that does not rise is a clock by its name only. It is accepted if no candidate rises, so that the
-    // error is about it.
+    // A candidate that does not rise is a clock by its name only. It is accepted only if no candidate rises, so that
+    // the error names this array.
     let one_rises = all().any(|(_, found)| found.rises);
     let longest = all().filter(|(_, c)| c.rises).map(|(a, _)| a.values.len()).max().unwrap_or(0);
     let is_clock = |array: &Array, own: &Candidate| {
@@ -304,8 +305,8 @@ fn parts(path: &str) -> (&str, &str) {
     path.rsplit_once(['/', '.']).unwrap_or(("", path))
 }
 
-/// Returns the index of the clock that has the length of the array and the nearest name. Returns `None` if no clock
-/// fits, or if two clocks are equally near and have different times.
+/// Returns the index of the clock that has the length of the array and the best-matching name. Returns `None` if no
+/// clock fits, or if two clocks match equally well and have different times.
 fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     let fits = clocks.iter().enumerate().filter_map(|(i, clock)| {
         array.layout(clock.array.values.len())?;
@@ -339,7 +340,8 @@ fn nearness(name: &str, of: &str) -> usize {
     }
 }
 
-/// Puts arrays without a clock on a clock with the rate that the option or else a scalar in the file gives.
+/// Gives a clock of constant rate to arrays that have no clock. The rate comes from the option, or else from a scalar
+/// in the file.
 fn counted(
     file: &str,
     others: Vec<Array>,

@@ -5,8 +5,8 @@ use crate::{
     clock::{Steps, order, spread, unit},
 };
 
-/// Number of first stamps that are searched for a coarse clock. A clock is coarse if the resolution of its stamps (its
-/// tick) is not much shorter than the sample period.
+/// Number of stamps at the beginning of a stream from which a coarse clock is recognised. A clock is coarse if the
+/// resolution of its stamps (its tick) is not much shorter than the sample period.
 const LOOKED_AT: usize = 64;
 
 /// The clock of a stream.
@@ -19,8 +19,8 @@ pub(crate) struct LiveClock {
     is_assumed: bool,
     /// Sample rate, if samples are counted instead of reading a time.
     rate_hz: Option<f64>,
-    /// Expected sample rate, Hz. It places the samples that share the first stamp, shows the unit of the first step,
-    /// and evens out a coarse clock.
+    /// Expected sample rate, Hz. It gives times to the samples that share the first stamp, shows the unit of the first
+    /// step, and spaces the samples of a coarse clock evenly.
     usual_hz: Option<f64>,
     /// Latest time given to a sample that has the first stamp, in counts.
     first_end: f64,
@@ -58,7 +58,7 @@ impl LiveClock {
         Self { per_second, rate_hz, usual_hz: options.untimed_hz, ..Self::default() }
     }
 
-    /// Counts a row that is lost.
+    /// Counts a lost row as a sample.
     pub(crate) fn skip(&mut self) {
         self.samples += 1;
     }
@@ -165,8 +165,8 @@ impl LiveClock {
         self.coarse.map(|tick| (self.even + period).clamp(stamp, stamp + tick))
     }
 
-    /// Returns the earliest time, in counts, after the samples of the first stamp. Those samples extend beyond the next
-    /// stamp if the expected rate is too low.
+    /// Returns the earliest time, in counts, that comes after all samples with the first stamp. The times of those
+    /// samples extend beyond the next stamp if the expected rate is too low.
     fn after_first(&mut self, tick: f64) -> f64 {
         self.first_end += 1e-6 * tick;
         self.first_end

@@ -21,8 +21,8 @@ use crate::{
 
 /// Smallest time, s, that is taken for seconds since 1970. It is about three years, and no recorder runs that long.
 pub(crate) const EPOCH_S: f64 = 1e8;
-/// Longest step, in sample periods, that is not a gap and that a clock may make where it rolls over. Three lost
-/// samples, as many as a live receptor bridges, are a step of four periods.
+/// Longest step, in sample periods, that does not count as a gap and is accepted where a clock rolls over. Three lost
+/// samples, as many as a live receptor bridges, make a step of four periods.
 pub(crate) const BRIDGED: f64 = 4.5;
 
 /// A column of time as it was recorded.

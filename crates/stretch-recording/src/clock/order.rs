@@ -8,16 +8,16 @@ const BITS: [i32; 4] = [16, 24, 31, 32];
 const PERIODS_S: [f64; 4] = [3600.0, 43_200.0, 86_400.0, 604_800.0];
 /// Shortest period of a counter, in steps.
 const SHORTEST: f64 = 3.0;
-/// A counter whose period is more than `LONG` steps may lose samples where it rolls over. With a shorter period, a step
-/// back can look like a roll-over by chance. The step across the roll-over must therefore match the others within the
-/// share `SAME`.
+/// Period of a counter, in steps, above which samples may be lost where it rolls over. With a shorter period, a step
+/// back can look like a roll-over by chance. The step across the roll-over may then differ from the usual step by at
+/// most the share `SAME`.
 const LONG: f64 = 100.0;
 const SAME: f64 = 0.02;
 /// Longest step across a roll-over, as a share of the period, if both stamps lie within the range of the counter. More
 /// samples may be lost there than `BRIDGED` allows.
 const END: f64 = 0.01;
-/// Shortest gap after the stamps of a clock that was not set yet, in lengths of the recording after the gap, and in
-/// steps. Both must be exceeded.
+/// Shortest gap between the stamps from before a clock was set and the later stamps: as a multiple of the duration
+/// after the gap, and as a multiple of the usual step. Both must be exceeded.
 const UNSET: (f64, f64) = (10.0, 1e6);
 
 /// Returns the periods, in counts, of clocks with `per_second` counts per second. They include counters of ms, us or ns

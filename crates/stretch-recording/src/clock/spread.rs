@@ -7,9 +7,9 @@ const ONE_IN: usize = 20;
 /// A clock without repeated stamps is coarse if at least one step in this many is not the usual number of ticks. Fewer
 /// such steps may be lost samples, even if they are regular.
 const OTHER_ONE_IN: usize = 5;
-/// Smallest number of such steps on a coarse clock.
+/// Smallest number of steps with an unusual number of ticks from which on a clock is coarse.
 const FEWEST: usize = 8;
-/// Largest median step of a coarse clock, in shortest steps.
+/// Largest ratio of the median step to the shortest step on a coarse clock.
 const MOST_TICKS: f64 = 3.5;
 /// Largest difference between a step and a whole number of ticks, in ticks. Recorded steps are rounded: 15.6 ms are
 /// written as 15 or 16.
@@ -17,7 +17,7 @@ const WHOLE: f64 = 0.15;
 /// Allowed range of the deviations of stamps from an even clock, in ticks, in addition to the one tick of the coarse
 /// resolution.
 const ROUNDING: f64 = 0.02;
-/// The same allowance for stamps that repeat. It is larger because their ticks have jitter.
+/// The value that replaces `ROUNDING` for stamps that repeat. It is larger because their ticks have jitter.
 const JITTERED: f64 = 1.0;
 /// Longest step of a coarse clock without a gap, in ticks.
 const GAP: f64 = 3.5;
@@ -75,7 +75,7 @@ pub(super) fn rounded(value: f64, more: i32) -> f64 {
     if rounded.is_finite() { rounded } else { value }
 }
 
-/// Returns the tick of a coarse clock without repeated stamps, on which steps are different whole numbers of ticks.
+/// Returns the tick of a coarse clock without repeated stamps. Its steps are different whole numbers of ticks.
 pub(super) fn tick_of(counts: &[f64], steps: Steps) -> Option<f64> {
     if steps.repeated > 0 {
         return None;
@@ -154,8 +154,8 @@ fn offsets(part: &[f64], step: f64) -> (f64, f64) {
 }
 
 /// Spreads each run of samples with the same stamp up to the next stamp. Returns the samples for which there is no
-/// time. On a clock that is not coarse, these are the repeats in a run that is too short for its samples at the usual
-/// step.
+/// time. On a clock that is not coarse, these are repeated stamps for whose samples the time up to the next stamp is
+/// too short at the usual step.
 fn spread_runs(counts: &mut [f64], steps: Steps, is_coarse: bool) -> Vec<usize> {
     let (mut left_out, mut begin) = (Vec::new(), 0);
     while begin < counts.len() {

@@ -17,8 +17,8 @@ use crate::room::Room;
 const PIECE: usize = 1 << 16;
 /// Longest list whose numbers become channels.
 const LONGEST: usize = 64;
-/// Memory for each number of a list while it is read, bytes. It covers the number twice, its two levels and the
-/// beginning of its list, in vectors that grow to twice their length.
+/// Memory, in bytes, that each number of a list takes while it is read. It covers two copies of the number, its two
+/// Parquet levels and the index at which its list begins, in vectors that may have grown to twice their length.
 const LISTED: u64 = 48;
 
 /// Numbers of a column as they are read.

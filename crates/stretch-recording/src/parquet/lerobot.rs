@@ -10,7 +10,7 @@ use crate::grid::Track;
 
 /// Column with the number of the episode of each row.
 const EPISODE: &str = "episode_index";
-/// The longest description that is read, bytes.
+/// Largest size of a description that is read, bytes.
 const LONGEST: u64 = 16 << 20;
 
 /// Renames list items as the description of the data set names them: `action.0` becomes `action.elbow.pos`. The items

@@ -16,9 +16,10 @@ const NAMED: usize = 5;
 #[derive(Debug, Default)]
 pub(crate) struct BadRows {
     rows: Vec<u64>,
-    /// The first of them, and what is wrong with it.
+    /// The first bad row, and what is wrong with it.
     first: Option<(u64, RecordingError)>,
-    /// Lines with a wrong number of fields after the last good row, and number of good rows then.
+    /// Number of lines with a wrong number of fields after the last good row, and (in `good`) the
+    /// number of good rows up to there.
     footer: usize,
     good: usize,
     is_strict: bool,

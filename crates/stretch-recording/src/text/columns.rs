@@ -13,7 +13,7 @@ use crate::{
 
 /// Names of the channels that the project's format of trial files defines.
 pub(crate) const KNOWN: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
-/// Number of fields with words, above which a column may be text.
+/// Number of fields with words instead of numbers, above which a column may be text.
 const MOST_HOLES: usize = 16;
 
 /// Columns that are filled row by row.
@@ -25,7 +25,7 @@ pub(crate) struct Columns {
     kept: Vec<Kept>,
     /// Whether columns are kept that were not requested.
     keeps_all: bool,
-    /// Samples in which a field is not a number.
+    /// Holes: samples in which a field is not a finite number.
     holes: Vec<usize>,
 }
 
@@ -34,7 +34,7 @@ struct Kept {
     column: usize,
     values: Vec<f64>,
     holes: usize,
-    /// Number of holes that are neither blank nor a number that is not finite.
+    /// Number of holes that contain words: the field is neither blank nor a number such as NaN.
     words: usize,
     /// Error of the first field that is not a number.
     first: Option<RecordingError>,

@@ -11,8 +11,8 @@ use crate::{
     text::row::{Fault, Field, Role, RowFault, field, is_finite, number, numbers},
 };
 
-/// Number of characters of the longest integer time that is read as floating point. The project writes no longer ones;
-/// nanosecond clocks do.
+/// Number of characters of the longest integer time that is read as a floating-point number. The times that the project
+/// writes are not longer, but those of nanosecond clocks are.
 const EXACT_DIGITS: usize = 17;
 /// Separator that represents runs of blanks and tabs.
 pub(crate) const BLANKS: u8 = b' ';
@@ -32,9 +32,9 @@ enum Clock {
     /// No time has been read yet.
     Open,
     Number,
-    /// Dates or times of day; the first of them, ns.
+    /// Dates or times of day. The value is the first of them, in ns.
     Stamps(Option<i128>),
-    /// Integers that an `f64` cannot represent exactly; the first of them.
+    /// Integers that an `f64` cannot represent exactly. The value is the first of them.
     Counts(Option<i128>),
 }
 
@@ -54,8 +54,8 @@ pub(crate) struct Dialect {
 }
 
 impl Dialect {
-    /// Creates the dialect of the rows below a header. `time` is the index of the time column. The first `rows` may
-    /// show the order of day and month.
+    /// Creates the dialect of the rows below a header. `time` is the index of the time column. The first rows, in
+    /// `rows`, may show the order of day and month.
     pub(crate) fn new(
         header: &Header,
         time: Option<usize>,
@@ -86,7 +86,8 @@ impl Dialect {
         if let Clock::Stamps(first) = self.clock { first } else { None }
     }
 
-    /// Returns the first time if times are integers that an `f64` cannot represent exactly. The time counts from it.
+    /// Returns the first time if times are integers that an `f64` cannot represent exactly. All times are counted from
+    /// it.
     pub(crate) fn first_count(&self) -> Option<i128> {
         if let Clock::Counts(first) = self.clock { first } else { None }
     }
@@ -231,7 +232,7 @@ pub(crate) fn is_comment(line: &[u8]) -> bool {
     }
 }
 
-/// A comment without its mark.
+/// Returns a comment without its comment mark.
 pub(crate) fn uncommented(line: &[u8]) -> &[u8] {
     let is_mark = |b: &u8| matches!(b, b'#' | b'%' | b'/' | b' ' | b'\t');
     &line[line.iter().take_while(|b| is_mark(b)).count()..]
@@ -294,7 +295,8 @@ pub(crate) fn is_value(cell: &[u8], delimiter: u8) -> bool {
     is_finite(cell) || with_commas() || looks_like_stamp(&text(cell))
 }
 
-/// Parses an integer that may be long. It is limited so that the difference of two does not overflow.
+/// Parses an integer that may be long. Its size is limited so that the difference of two such integers does not
+/// overflow.
 fn whole(cell: &[u8]) -> Option<i128> {
     text(cell).parse().ok().filter(|n: &i128| n.unsigned_abs() < 1 << 100)
 }

@@ -20,8 +20,8 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// Returns the names of columns from the cells of a header line. The second column `X` becomes `X.1`, with a note.
-    /// The first becomes `X.0` if the options ask for that name.
+    /// Returns the names of columns from the cells of a header line. A second column with the name `X` becomes `X.1`,
+    /// with a note. The first becomes `X.0` if the options ask for that name.
     ///
     /// # Errors
     /// A name contains a control character, or two columns have the same requested name.

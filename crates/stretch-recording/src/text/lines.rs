@@ -18,7 +18,7 @@ pub(crate) struct Lines<R> {
 }
 
 impl<R: Read> Lines<R> {
-    /// Lines of `file` of `limit` bytes at most.
+    /// Creates a splitter for `file` that accepts lines of at most `limit` bytes.
     pub(crate) fn new(reader: R, file: &str, limit: usize) -> Self {
         let reader = BufReader::with_capacity(BUFFER_BYTES, reader);
         Self { reader, file: file.to_owned(), line: Vec::new(), row: 0, limit, is_cut: false }

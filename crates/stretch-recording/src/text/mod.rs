@@ -40,7 +40,8 @@ pub(crate) fn read(
         table.take(row, line)?;
         if table.columns.len() % 4096 == 0 {
             let numbers = table.columns.len().saturating_mul(table.header.names.len());
-            // As numbers, text takes at most four times its length. Packed text has no such limit.
+            // The numbers in a text take at most four times as much memory as the text. A packed
+            // text can need any multiple of its size.
             let (mut room, format) = match packed {
                 Some(packed) => (Room::beside(packed.get()), "gzip"),
                 None => (Room::of_text(), "text"),
@@ -67,7 +68,7 @@ struct Table<'a> {
     rate_hz: Option<f64>,
     comments: usize,
     bad: BadRows,
-    /// Number of bad rows that are samples. They take time if samples are counted.
+    /// Number of bad rows that are samples. If the time is the sample count, they are counted too.
     lost: usize,
     notes: Vec<String>,
 }

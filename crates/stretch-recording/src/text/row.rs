@@ -28,11 +28,11 @@ pub(crate) enum RowFault {
 /// Use of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// Must be a finite number.
+    /// Each field must be a finite number.
     Needed,
-    /// Optional: becomes NaN if it is not a finite number.
+    /// The column is optional: a field that is not a finite number becomes NaN.
     Welcome,
-    /// Not read: always NaN.
+    /// The column is not read: its values are NaN.
     Skipped,
 }
 

@@ -24,10 +24,10 @@ use crate::{
 /// If a stream has no time and the options give a sample rate, the time is counted in samples. Malformed rows are
 /// included in the count.
 ///
-/// A row whose time goes back is also an error, but the clock continues from there: a restarted logger costs one row
-/// only. A time that does not advance is an error only if neither the step of the clock nor an expected rate is known;
-/// otherwise such samples are spread over the step. A caller that keeps state over the rows should reset it if
-/// [`RecordingError::is_time`] returns true.
+/// A row whose time goes back is also an error, but the clock continues from there, so that only one row is lost when a
+/// logger restarts. A time that does not advance is an error only if neither the step of the clock nor an expected rate
+/// is known; otherwise such samples are spread over the step. A caller that keeps a state from row to row should reset
+/// it if [`RecordingError::is_time`] returns true.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, RowReader};
@@ -71,7 +71,7 @@ pub struct Row<'a> {
     pub row: u64,
     /// Seconds.
     pub time_s: f64,
-    /// The required columns, in the order in which they were required; finite.
+    /// Values of the required columns, in the order in which they were required. All are finite.
     pub values: &'a [f64],
 }
 

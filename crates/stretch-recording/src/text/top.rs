@@ -18,11 +18,11 @@ use crate::{
 
 /// Largest number of lines that are searched for the table.
 const MOST_AHEAD: usize = 256;
-/// Number of rows below names with a time after which no other table is searched for.
+/// Number of rows of numbers below a line of names with a time, after which no other table is searched for.
 const SURE: usize = 64;
 /// Number of rows of a live stream after which the search for names with a time ends.
 const LIVE_ROWS: usize = 8;
-/// Largest number of rows of numbers between a block of rows and the line of its names.
+/// Largest number of rows of numbers between a [`Block`] and the line of its names.
 const ROWS_BETWEEN: usize = 3;
 /// Largest number of names without a column at the end of a header line.
 const MOST_OPTIONAL: usize = 4;
@@ -101,7 +101,7 @@ struct Block {
     delimiter: u8,
     /// Number of cells in a row.
     cells: usize,
-    /// Number of cells in the first row up to the last one that is not empty.
+    /// Number of cells in the first row, without empty cells at its end.
     filled: usize,
     /// Index of the line of the first row.
     start: usize,
@@ -256,7 +256,8 @@ impl Finder<'_> {
         self.blocks.push(block);
     }
 
-    /// Closes the blocks for which the newest line has other names, so that it is not a bad row of their table.
+    /// Closes the blocks for which the newest line has other names. That line begins another table, so it is not a bad
+    /// row of theirs.
     fn close(&mut self) {
         let Some((line, above)) = self.lines.split_last() else { return };
         for block in self.blocks.iter_mut().filter(|block| !block.is_closed) {
@@ -348,7 +349,7 @@ impl Finder<'_> {
                 (lines[names.line].row, names.cells.clone(), names.units.map(|at| &lines[at]))
             }
             (None, None) => match self.options.required() {
-                // Single numbers are the column that is required.
+                // Rows of one number are the values of the only required column.
                 [only] if block.cells == 1 => (0, vec![only.clone()], None),
                 _ => return Err(self.no_header(file, &block, is_whole)),
             },
@@ -385,7 +386,7 @@ impl Finder<'_> {
         Ok(Top { header, ahead, stated_hz, notes })
     }
 
-    /// Returns a table of which no row can be read, below a line of names with a time.
+    /// Returns a table without any readable row, if there is a line of names with a time.
     fn without_rows(&self) -> Option<Block> {
         let named = |(start, line): (usize, &Line)| {
             let by = |delimiter| {
@@ -483,9 +484,9 @@ fn is_number(cell: &[u8]) -> bool {
     is_value(cell, BLANKS) || fast_float2::parse::<f64, _>(cell).is_ok()
 }
 
-/// Splits a line of names for a block. It must have at least as many names as the first row has filled cells. It may
-/// have up to `MOST_OPTIONAL` names more than a row has cells, unless blanks separate the columns. Returns `None` for
-/// any other number.
+/// Splits a line into names for a block. The line must have at least as many names as the first row has filled cells.
+/// It may have up to `MOST_OPTIONAL` names more than a row has cells, unless blanks separate the columns. Returns
+/// `None` for any other number.
 fn name_cells(line: &[u8], block: &Block) -> Option<Vec<String>> {
     let split = cells(line, block.delimiter)?;
     let mut names: Vec<String> = Vec::new();

@@ -35,7 +35,8 @@ pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
         let rows = rows(&path)?;
         let cut = boundary(&rows);
         for (session, rows) in [(first, &rows[..cut]), (second, &rows[cut..])] {
-            // The shortest useful session: half a minute that is not judged, and a minute of reference.
+            // The shortest useful session is a minute from which the reference may be taken, and half a minute that is
+            // judged.
             if rows.len() < 9000 {
                 continue;
             }

@@ -44,15 +44,15 @@ pub(crate) struct Asked {
     pub(crate) leave_sensor: bool,
 }
 
-/// The priors without one wearer: one of all channels, if there are several and none is left out, and one of each
-/// channel.
+/// Priors that are learnt without one wearer: one for all channels, if there are several and none is left out, and one
+/// for each channel alone.
 pub(crate) struct Priors {
     pub(crate) all: Option<Prior>,
     each: Vec<Prior>,
 }
 
-/// Makes a prior from all sessions except those that are refused, such as those of a sensor that falls when it rises
-/// elsewhere.
+/// Makes a prior from all sessions except those that are refused, such as those of a sensor whose signal falls where
+/// that of other sessions rises.
 fn of_accepted(
     mut sessions: Vec<Session>,
     make: impl Fn(&[Session]) -> Result<Prior, SleeveError>,
@@ -68,7 +68,7 @@ fn of_accepted(
 }
 
 impl Judge {
-    /// Creates the judge from the sums of the sessions. Refused sessions are printed and left out.
+    /// Creates the judge, and sums up the sessions for the priors. Refused sessions are printed and left out.
     pub(crate) fn new(mut set: Set, used_s: f64, asked: Asked) -> Self {
         let mut sessions = Vec::new();
         let (signals, reference) = (set.signals.clone(), set.reference.clone());

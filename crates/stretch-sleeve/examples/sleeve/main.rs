@@ -12,10 +12,10 @@
 //! github.com/msstate-athlete-engineering/soft-sensors-research (commit 5f9b7fd3). The project contains none of these
 //! data.
 //!
-//! Every prior is learnt, with its covariances, without the wearer on which it is judged. "next session" then adds the
-//! other sessions of the wearer. All errors are root mean squares over the samples after the part from which the
-//! reference is taken: 60 s of sleeves, 20 s of knees, 10 s of ankles. The session's own calibration is judged by
-//! cross-validation.
+//! Every prior is learnt, with its covariances, without the wearer on which it is judged. For the case "next session",
+//! the other sessions of the wearer are then added to the prior. All errors are root mean squares over the samples
+//! after the part from which the reference is taken: 60 s for sleeves, 20 s for knees, 10 s for ankles. The session's
+//! own calibration is judged by cross-validation.
 //!
 //! `--auto` also judges the automatic choice of a model. `--leave sensor` judges each sensor with priors from all other
 //! sensors. `--faults` judges only lost channels. `--zero` tests whether single gauges detect that they were put on

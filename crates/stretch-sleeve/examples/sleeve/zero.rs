@@ -12,7 +12,7 @@ const LARGE: [f64; 5] = [0.0, 1.5, 3.0, 6.0, f64::INFINITY];
 /// Shift that is added to the second half of a session, in the reference's unit.
 const SHIFT: f64 = 8.0;
 
-/// Result of a gauge that was calibrated in one session and applied to another one.
+/// Result of a gauge whose calibration from one session was applied to another session.
 struct Case {
     told: bool,
     /// Median of the reported values, if any.
@@ -32,7 +32,7 @@ struct Counts {
     gauges: usize,
     silent: usize,
     hours: f64,
-    /// Alarms without and with a followed zero.
+    /// Number of alarms, without and with a followed zero.
     alarms: [usize; 2],
     cases: Vec<Case>,
 }

@@ -2,8 +2,8 @@
 //! terms.
 //!
 //! The states of a channel `x` are those of a [`HistoryMap`](stretch_core::HistoryMap) with the
-//! time constants of [`BANK`]. The terms of a channel are its products of states; a constant comes
-//! before all of them. A polynomial of a shifted and scaled state is a polynomial of the same
+//! time constants of [`BANK`]. The terms of a channel are products of its states. The first term of
+//! a bank is a constant. A polynomial of a shifted and scaled state is a polynomial of the same
 //! degree of the state itself. Therefore the rows of any two banks span the same functions, and
 //! [`Bank::row_matrix_of`] is the matrix between them.
 
@@ -101,7 +101,8 @@ fn moved(mine: &[Interval], theirs: &[Interval]) -> DMatrix<f64> {
             let mut list = lists[k].clone();
             list.push(state);
             list.sort_unstable();
-            // Every divisor of a term is a term as well, so the place exists.
+            // If some factors of a term are removed, the rest is a term as well, so the place
+            // exists.
             if let Some(&place) = places.get(&list) {
                 out[(term, place)] += factor * weight;
             }

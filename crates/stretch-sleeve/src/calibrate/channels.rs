@@ -131,7 +131,7 @@ impl Channels {
         Ok(())
     }
 
-    /// Returns each stretch with the number of samples in the previous ones.
+    /// Returns each stretch with the number of samples in all previous stretches.
     pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &Stretch)> {
         let mut before = 0;
         self.stretches.iter().map(move |stretch| {
@@ -151,7 +151,7 @@ impl Channels {
         self.stretches.iter().flat_map(|s| s.reference.iter().copied())
     }
 
-    /// Returns the bank over the ranges of the states in these data.
+    /// Returns the bank (set of terms) whose states are scaled by their ranges in these data.
     pub(crate) fn bank(&self) -> Bank {
         let channels = self.stretches.first().map_or(0, |s| s.signals.len());
         let domain = |k: usize| BANK.domain(self.stretches.iter().map(move |s| &s.states[k]));

@@ -72,7 +72,7 @@ impl LiveGauge {
         self.receptor.step(time_s, corrected)
     }
 
-    /// Returns the result for the zero from the movement that ended with the last sample. Returns `None` during a
+    /// Returns the result about the gauge's zero, if a movement ended with the last sample. Returns `None` during a
     /// movement, and if the calibration has no turning points of movements.
     pub fn zero(&self) -> Option<Zero<f64>> {
         self.zero
@@ -90,7 +90,7 @@ impl LiveGauge {
     }
 }
 
-/// A trial's readings, and the zero that its movements show.
+/// The readings of a trial, and the deviations of the gauge's zero that the movements show.
 #[derive(Debug, Clone)]
 pub struct AppliedGauge {
     /// Readings, and the faults of the time stamps.

@@ -63,7 +63,7 @@ impl Linear {
         }
     }
 
-    /// Returns the coefficients of a calibration that was made over the domains of this model; `None` for any other
+    /// Returns the coefficients of a calibration whose states have the domains of this model; `None` for any other
     /// calibration.
     pub(crate) fn weights_of(&self, record: &SleeveCalibration) -> Option<Vec<f64>> {
         let is_near = |a: &[f64], b: &[f64]| {

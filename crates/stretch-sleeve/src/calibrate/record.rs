@@ -13,7 +13,7 @@ use stretch_data::files::{read_whole, rewrites, write_whole};
 use crate::{ArrayCalibration, GaugeCalibration, MAX_CHANNELS, Turns};
 
 /// Buffer size for the largest calibration of several gauges in postcard. For the loss of each of
-/// sixteen gauges, it has fifteen gains for each remaining gauge.
+/// sixteen gauges, that calibration has fifteen gains for each remaining gauge.
 const POSTCARD_BYTES: usize = 1 << 16;
 
 /// Ending of the name of a postcard file that contains more than a calibration.
@@ -21,9 +21,10 @@ const SLEEVE_ENDING: &str = ".sleeve.postcard";
 
 /// A calibration of one gauge or of several.
 ///
-/// In JSON, that of one gauge is a calibration with the additional field `turns`, which readers of
-/// a calibration skip. In postcard, it is the calibration alone, for a board that does not watch
-/// the zero, unless the file name ends in `.sleeve.postcard`.
+/// The JSON file of one gauge contains a calibration and the additional field `turns` (turning
+/// points), which programs that read only a calibration skip. The postcard file contains the
+/// calibration without the turning points, for a board that does not watch the zero. It contains
+/// them if the file name ends in `.sleeve.postcard`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SleeveCalibration {
     /// Calibration of one gauge.

@@ -13,7 +13,7 @@ use crate::{GaugeCalibration, TurnFinder, Turns};
 
 use super::channels::{Levels, independent, levels};
 
-/// False alarms per hour, as many as for a shifted gauge of several.
+/// Rate of false alarms per hour, the same as that with which one of several gauges is reported as shifted.
 const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
 /// Smallest span of a movement, as a share of the signal's range without the lowest and highest 5 % of the samples.
 const LEAST_SPAN: f64 = 1.0 / 3.0;
@@ -48,7 +48,7 @@ pub fn calibrate_gauge(
     Ok(GaugeCalibration::new(calibration, turns)?)
 }
 
-/// Finds the turning points in signals, each of which is a stretch without a gap. Returns `None` if there are too few
+/// Finds the turning points in signals. Each signal is a stretch without a gap. Returns `None` if there are too few
 /// movements.
 pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns> {
     let finder = TurnFinder::new(LEAST_SPAN * middle_span(signals)?);
@@ -97,9 +97,9 @@ fn middle_span(signals: &[&[f64]]) -> Option<f64> {
     (low < high).then(|| (high - low) as f64 / PARTS as f64 * (max - min))
 }
 
-/// Returns the statistics of the levels of movements in stretches, which were recorded in `hours`, and their mean ends.
-/// Signals are multiplied by the sign of the polarity. The fields `least_span` and `reference_per_signal` are still
-/// zero.
+/// Returns the statistics of the levels of movements, and the mean low and high end. Each list in `movements` comes
+/// from one stretch without gaps, and all were recorded in `hours`. Signals are multiplied by the sign of the polarity.
+/// The fields `least_span` and `reference_per_signal` are still zero.
 fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [f64; 2])> {
     let all: Vec<(f64, f64)> = movements.iter().flatten().copied().collect();
     let (low, high, high_share) = weighted(&all)?;
@@ -136,8 +136,8 @@ fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [
     Some((learnt, [low, high]))
 }
 
-/// Returns the mean low and high ends, and the weight of the high end with which levels scatter least. It is `(v -
-/// c)/(v + w - 2 c)` for the variances `v` and `w` of low and high ends and their covariance `c`.
+/// Returns the mean low and high ends, and the weight of the high end with which levels scatter least. The weight is
+/// `(v - c)/(v + w - 2 c)` for the variances `v` and `w` of low and high ends and their covariance `c`.
 fn weighted(all: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     let n = all.len() as f64;
     if n < LEAST_MOVEMENTS {
@@ -180,8 +180,8 @@ fn tail(sequences: &[Vec<f64>], mean: f64, share: f64) -> f64 {
 }
 
 /// Returns the variance of the median of five levels divided by that of one level, if neighbours have the correlation
-/// `alike`. The ratio grows with the correlation as that of the mean does, by `1 + 2 sum (1 - k/5) alike^k`, and is at
-/// most 1.
+/// `alike`. The ratio grows with the correlation as the variance of the mean of five levels does, by the factor
+/// `1 + 2 sum (1 - k/5) alike^k`, and is at most 1.
 fn median_variance(alike: f64) -> f64 {
     let mut power = 1.0;
     let mut factor = 1.0;

@@ -2,7 +2,8 @@
 
 use stretch_core::Real;
 
-/// Number of ticks in the window of a [`Jump`].
+/// Number of values from which a [`Jump`] is computed. One value is taken at each tick, about every
+/// 10 ms.
 pub const JUMP_SAMPLES: u8 = 8;
 const HALF: usize = JUMP_SAMPLES as usize / 2;
 

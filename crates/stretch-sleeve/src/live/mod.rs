@@ -25,13 +25,13 @@ fn is_usable<T: Real>(sample: T) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ArrayLoss {
-    /// Its samples are missing.
+    /// The channel's samples are missing.
     Missing,
-    /// Its samples are impossible: it is cut off, or at the end of the converter.
+    /// The channel's samples are impossible: it is cut off, or at the end of the converter.
     Outside,
-    /// It repeats one value while others change: it sticks, or it is at the end of its converter.
+    /// The channel repeats one value while others change: it is stuck, or at the end of its converter.
     Still,
-    /// It jumped away from what the other channels predict: it slipped, or it is loose.
+    /// The channel jumped away from what the other channels predict: it slipped, or it is loose.
     Slipped,
 }
 

@@ -15,14 +15,13 @@ use super::{
 /// A receptor of up to `N` gauges that share a recorder.
 ///
 /// For each sample:
-/// 1. A channel is lost for good if it is missing for more than [`MAX_BRIDGED`] samples, if it
-///    leaves its possible range, or if it repeats one value ([`Repeats`]) while another channel
-///    changes. If all channels repeat, the recorder repeats and no channel is lost. A channel is
-///    also lost if its difference from what the others predict jumps ([`Jump`]) by more than
-///    `largest_jump`. A slip changes the differences of neighbouring channels as well, so the
-///    channel whose slip explains most of all jumps is excluded. If only two channels move together,
-///    it cannot be determined which one slipped. Once a channel is lost, the remaining ones are no
-///    longer compared. [`ArrayMemory::readmit`] takes a channel back.
+/// 1. A channel is lost, until [`ArrayMemory::readmit`] takes it back, if it is missing for more than [`MAX_BRIDGED`]
+///    samples, if it leaves its possible range, or if it repeats one value ([`Repeats`]) while another channel changes.
+///    If all channels repeat, the recorder repeats and no channel is lost. A channel is also lost if its difference
+///    from what the others predict jumps ([`Jump`]) by more than `largest_jump`. A slip changes the differences of
+///    neighbouring channels as well, so the channel whose slip explains most of all jumps is excluded. If only two
+///    channels move together, it cannot be determined which one slipped. Once a channel is lost, the remaining ones are
+///    no longer compared.
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best
 ///    single channel.
@@ -53,7 +52,7 @@ pub struct ArrayMemory<T, const N: usize> {
     lost: [Option<ArrayLoss>; N],
     /// Number of consecutive samples for which no channel in use had a value.
     silent: u8,
-    /// Number of ticks in which the channels were compared.
+    /// Number of ticks (about every 10 ms) in which the channels were compared.
     warmed: u8,
     /// Number of samples since the last tick.
     tick: u16,
@@ -112,7 +111,7 @@ impl<T: Real> ChannelMemory<T> {
 }
 
 impl<T: Real> ChannelMemory<T> {
-    /// Updates the low-passes with a sample, which is the last one again if a sample is missing.
+    /// Updates the low-passes with a sample. If a sample is missing, `x` is the last one again.
     #[inline(always)]
     fn pass(&mut self, x: T, shares: &[T]) {
         if self.last.is_nan() {

@@ -89,14 +89,16 @@ impl<T: Real> TurnFinder<T> {
 ///
 /// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). At the end of each movement `off`
 /// is reported: the median of the last five levels minus the level in the calibration. The zero has shifted if `off`
-/// exceeds `limit`, or if the running mean of the levels' deviations exceeds `mean_limit`. The calibration states the
-/// rate of false alarms. A shift beyond the first limit needs three movements to be found, one beyond the second ten to
-/// thirty. The shift is reported until both values are within half of their limits.
+/// exceeds `limit`, or if the running mean of the levels' deviations exceeds `mean_limit`, in either direction. The
+/// calibration states the rate of false alarms. A shift beyond `limit` is found after three movements, a shift beyond
+/// `mean_limit` after ten to thirty. The shift is reported until both values, and a followed zero, are within half of
+/// their limits.
 ///
 /// A followed zero `z` is the state of a scalar Kalman filter with its steady gain `k`: `z += k clip(y - level - z)`.
-/// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit. A shift is reported
-/// if `off - z` exceeds the limit. It is also reported if `z` is at the limit, because the calibration has not seen
-/// larger shifts. A zero that has shifted by more than a limit is not followed.
+/// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit. The deviations in the
+/// running mean are then those from `level + z`, and a shift is reported if `off - z` exceeds the limit. A shift is
+/// also reported if `z` is at the limit, because the calibration has not seen larger shifts. A zero that has shifted by
+/// more than a limit is not followed.
 ///
 /// This assumes that movements return to the ends that they had in the calibration. A movement that does not looks like
 /// a shift. Without movements nothing is reported.
@@ -268,7 +270,8 @@ impl<T: Real> ZeroWatch<T> {
         })
     }
 
-    /// Returns the end of the first of the last movements whose level deviates by at least half as much as the median.
+    /// Returns the end of the earliest of the last five movements whose level deviates by at least half as much as the
+    /// median.
     fn first(&self, memory: &ZeroMemory<T>, off: T) -> u32 {
         let half = T::from_f64(0.5) * off;
         let is_off = |level: &T| (*level - self.level - half) * off >= T::zero();

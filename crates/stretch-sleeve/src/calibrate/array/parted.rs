@@ -1,4 +1,4 @@
-//! Cross-validation on rows in parts, each of which is left out in turn.
+//! Cross-validation: the rows are divided into parts, and each part is left out in turn.
 
 use nalgebra::DVector;
 use serde::Serialize;
@@ -40,7 +40,8 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// Returns the part of a sample. `at` is its index among the samples of all stretches.
+    /// Returns the part of a sample. `at` is its index among the samples of all stretches (pieces
+    /// without gaps).
     pub(crate) fn of(&self, trial: usize, at: usize) -> usize {
         if self.by_trial { trial } else { at * self.count / self.total }
     }
@@ -92,7 +93,8 @@ pub(crate) fn parted(
     Some(Parted { terms, whole, others, places, parts })
 }
 
-/// Returns the factor of all parts but one, without the neighbouring ends of its neighbours.
+/// Returns the factor of all rows except those of the part `left` and those of the adjoining ends
+/// of its neighbours.
 fn without(factors: &[[LinearFactor; 3]], left: usize) -> Option<LinearFactor> {
     let pieces = factors.iter().enumerate().flat_map(|(part, [first, middle, last])| {
         let mut own = Vec::new();
@@ -187,7 +189,7 @@ pub struct Carried {
     pub signal: String,
     /// Root mean square error of this channel alone.
     pub rmse_alone: Option<f64>,
-    /// Root mean square error of all others.
+    /// Root mean square error of all other channels together.
     pub rmse_without: Option<f64>,
     /// Share by which this channel reduces the mean squared error of the others; negative if it
     /// increases that error.

@@ -46,7 +46,7 @@ pub(crate) fn shifts(
     let gain = linear.zero_and_gain().1;
     let bank = Bank::new(linear.domains.clone());
     let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-    // For each channel: the means of blocks, stretch by stretch.
+    // For each channel: the means of blocks, for one stretch (piece without a gap) after another.
     let mut blocks: Vec<Vec<Vec<f64>>> = vec![Vec::new(); count];
     for (before, stretch) in channels.placed() {
         let samples: Vec<usize> = stretch.warmed_up().step_by(samples_a_value as usize).collect();
@@ -116,8 +116,8 @@ mod tests {
 
     use super::limit;
 
-    /// Simulates how often a further block exceeds the limits from `blocks` blocks, whose
-    /// neighbours have the correlation `alike`.
+    /// Simulates how often a further block exceeds the limits from `blocks` blocks. Neighbouring
+    /// blocks have the correlation `alike`.
     fn exceeds(blocks: usize, share: f64, alike: f64) -> f64 {
         let mut random = Random::new(30);
         let draws = 20_000;

@@ -33,7 +33,7 @@ const MARGIN: f64 = 0.5;
 /// Ridge penalty of the regression on the other channels, as a share of their power.
 const RIDGE: f64 = 1e-3;
 
-/// Returns a channel of a model with its limits. `channels` are the fitted data, if there are any.
+/// Returns a channel of a model with its limits. `channels` are the fitted data; `None` if there are no such data.
 pub(crate) fn watched(
     linear: &Linear,
     channels: Option<&Channels>,
@@ -142,13 +142,12 @@ const MOST_STILL_S: f64 = 1.0;
 /// The longest observed runs of equal samples, from which the number of equal samples that indicates a stuck channel is
 /// derived.
 ///
-/// Samples of a working channel repeat by chance if noise is less than a step of the converter. Of
-/// `n` samples, each a repetition with probability `q`, the longest run of repetitions is about `ln
-/// n / ln(1/q)` (Erdos and Renyi 1970; Schilling, The College Mathematics Journal 21 (1990) 196). A
-/// run that occurs once in `m` samples is therefore `ln m / ln n` times as long as the longest of
-/// `n`, which varies by about one. Repetitions count while another channel changes, because if all
-/// channels repeat, the recorder repeats. A count that also decreases, as that of [`Repeats`] does,
-/// is about as rare.
+/// Samples of a working channel repeat by chance if noise is less than a step of the converter. Of `n` samples, each a
+/// repetition with probability `q`, the longest run of repetitions is about `ln n / ln(1/q)` (Erdos and Renyi 1970;
+/// Schilling, The College Mathematics Journal 21 (1990) 196). A run that occurs once in `m` samples is therefore
+/// `ln m / ln n` times as long as the longest of `n`, which varies by about one. Repetitions count while another
+/// channel changes, because if all channels repeat, the recorder repeats. The count of [`Repeats`] also decreases, and
+/// reaches such a limit about as rarely.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Still {
     /// For each channel the largest number of equal samples in a row, 1 if none repeats.

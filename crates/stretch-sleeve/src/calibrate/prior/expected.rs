@@ -76,8 +76,8 @@ pub(crate) fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64)
     (prior + own * weight) / (1.0 + weight)
 }
 
-/// Returns the table of expected errors. `left` holds the prior without each session. `gram` is `X'X/n` of all
-/// sessions, and `unit` is the size of one unit of the normalised target in the reference's unit.
+/// Returns the table of expected errors. For each session, `left` holds the priors that were learnt without it. `gram`
+/// is `X'X/n` of all sessions, and `unit` is the size of one unit of the normalised target in the reference's unit.
 pub(crate) fn expected(
     parts: &[Vec<Leaf>],
     left: &[[Option<Normal>; 2]],
@@ -122,8 +122,8 @@ fn judged(
         let Some(posterior) = seen else { continue };
         let error = rest.squares_at(&posterior.mean) / rest.count;
         squares += error;
-        // The predicted variance is computed as an update with these seconds does, because the ratio multiplies that
-        // variance.
+        // The predicted variance is computed in the same way as in an update with these seconds of reference, because
+        // an update multiplies its variance by the ratio.
         let count: f64 = parts[..used].iter().map(|part| part.count).sum();
         let sum = parts[..used].iter().fold(gram * 0.0, |sum, part| sum + &part.gram);
         let gram = mixed_gram(gram, &(sum / count.max(1.0)), count);
@@ -133,7 +133,7 @@ fn judged(
     ((count > 0.0).then(|| squares / count), ratios)
 }
 
-/// Returns the distribution of the coefficients after the rows of a part.
+/// Returns the distribution of the coefficients after an update with the rows of a part.
 fn after(normal: &Normal, part: &Leaf, noise: f64) -> Option<Normal> {
     let precision = inverse(&normal.covariance)?;
     let covariance = inverse(&(&precision + &part.gram / noise))?;

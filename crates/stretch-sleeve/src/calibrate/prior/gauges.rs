@@ -11,8 +11,8 @@ use crate::{
 
 use super::learnt::Prior;
 
-/// Gauges count as exchanged or reversed if this halves the distance of their signals from those of the sessions. The
-/// squared distance is then a quarter.
+/// Greatest ratio of squared distances at which gauges count as exchanged or reversed. The distance of their signals
+/// from those of the sessions is then halved if the signals are exchanged or reversed.
 const NEARER: f64 = 0.25;
 
 /// Mean and covariance of the signals of several gauges.

@@ -1,7 +1,7 @@
 //! Landmarks of a movement that can be found without a reference: its two ends, and its rest.
 //!
-//! The low and the high end are the 5 % of the samples in which the reference, or its substitute,
-//! is smallest and largest. The rest is the 10 % in which the signals move least.
+//! The low and the high end are the 5 % of the samples in which the reference, or an estimate of
+//! it, is smallest and largest. The rest is the 10 % in which the signals move least.
 
 use serde::{Deserialize, Serialize};
 use stretch_core::Interval;
@@ -32,7 +32,7 @@ pub(crate) fn at_landmarks(channels: &Channels) -> [f64; LANDMARKS] {
     sets.map(|set| set.iter().map(reference).sum::<f64>() / f64::max(set.len() as f64, 1.0))
 }
 
-/// Returns the samples at each landmark. `level` is the reference or its substitute.
+/// Returns the samples at each landmark. `level` is the reference or an estimate of it.
 pub(crate) fn landmarks(
     channels: &Channels,
     level: impl Fn(&Place) -> f64,
@@ -90,7 +90,7 @@ pub(crate) struct Landmark {
     pub(crate) sessions: usize,
 }
 
-/// A session's path and its landmarks.
+/// The path of a session, and its mean reference at each landmark.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Landmarks {
@@ -98,9 +98,10 @@ pub(crate) struct Landmarks {
     pub(crate) at: [f64; LANDMARKS],
 }
 
-/// Returns a landmark over the sessions that share the longest beginning with a path. Its variance
-/// is `sd^2 = v (1 + 1/n)` for `n` such sessions, where `v` is the pooled variance of all groups of
-/// sessions that share equally many steps.
+/// Returns the mean and the spread of a landmark over those sessions whose paths have the most
+/// first steps in common with the given path. Its variance is `sd^2 = v (1 + 1/n)` for `n` such
+/// sessions, where `v` is the pooled variance of all groups of sessions that share equally many
+/// steps.
 pub(crate) fn expected(
     sessions: &[Landmarks],
     path: &[String],

@@ -33,8 +33,9 @@ const LEAST_SESSIONS: usize = 3;
 ///
 /// The model is linear in its coefficients. For each channel it has a cubic of the signal. For each of four time
 /// constants it has the change of the channel over that time, and this change multiplied by the signal and by its
-/// square. All terms are defined over the prior's own domains. Sessions vary around their wearer, and wearers vary
-/// around the population, with as many levels as the paths of the sessions have. Each level has its own covariance.
+/// square. All terms are defined over the prior's own domains. The coefficients of sessions vary around those of their
+/// wearer, and wearers vary around the population. There are as many levels as the paths of the sessions have steps.
+/// Each level has its own covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 // Error messages about a file use this name.
 #[serde(deny_unknown_fields, expecting = "struct Record")]
@@ -155,9 +156,9 @@ impl Prior {
         })
     }
 
-    /// Returns a prior with the same covariances and with the knowledge of these sessions about their wearers and the
-    /// population. This is for sessions after the prior was learnt. The sessions from which it was learnt count only if
-    /// they are given again.
+    /// Returns a prior with the same covariances, in which the means for wearers and for the population come from these
+    /// sessions. It serves to add sessions that were recorded after the prior was learnt. The sessions from which it
+    /// was learnt count only if they are given again.
     ///
     /// # Errors
     /// As [`Prior::learn`].
@@ -178,7 +179,7 @@ impl Prior {
         Ok(Self { known, landmarks, sessions: sessions.len(), ..self.clone() })
     }
 
-    /// The unit of the reference.
+    /// Returns the unit of the reference.
     pub fn unit(&self) -> String {
         unit_of(&self.reference)
     }
@@ -240,7 +241,7 @@ fn normalised_landmarks(sessions: &[Session], (target, range): (Target, Range)) 
     sessions.iter().map(one).collect()
 }
 
-/// Returns the sums over all parts.
+/// Returns the sums over all parts of a session.
 pub(crate) fn whole(parts: &[Leaf]) -> Leaf {
     let mut all = parts[0].clone();
     for part in &parts[1..] {
@@ -259,7 +260,8 @@ fn filled(session: &Session, depth: usize) -> Vec<String> {
     path
 }
 
-/// Removes levels with a node for every session, and all levels below, because a covariance cannot be learnt from them.
+/// Removes the levels of the tree that have a separate node for every session, and all levels below, because a
+/// covariance cannot be learnt from them.
 fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let depth = paths.first().map_or(0, Vec::len);
     let distinct = |level: usize| {
@@ -357,7 +359,7 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     })
 }
 
-/// Returns the first signal that has another position in another list.
+/// Returns the first signal whose position in the list `others` is different.
 pub(crate) fn elsewhere<'a>(signals: &'a [String], others: &[String]) -> Option<&'a str> {
     let differs = |(place, name): &(usize, &String)| {
         others.iter().position(|other| other == *name).is_some_and(|other| other != *place)

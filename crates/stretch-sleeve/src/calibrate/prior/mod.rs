@@ -2,9 +2,9 @@
 //!
 //! A [`Session`] holds the sums of a session with a reference. A [`Prior`] is learnt from sessions.
 //! It contains the mean and covariance of the coefficients of one linear model with a memory, for
-//! each known sensor and wearer and for unknown ones. [`Prior::update`] adds ten seconds to a
-//! minute of reference, or none at all. [`Prior::renew`] adds a session without a reference, by the
-//! ends and rests of its movement.
+//! each known sensor and wearer and for unknown ones. [`Prior::update`] makes a calibration from a
+//! prior and ten seconds to a minute of reference, or from the prior alone. [`Prior::renew`] makes
+//! one from a prior and a session without a reference, by the ends and rests of its movement.
 
 mod expected;
 mod gauges;

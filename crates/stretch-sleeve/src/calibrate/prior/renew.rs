@@ -42,8 +42,8 @@ pub struct RenewOptions {
     pub path: Vec<String>,
     /// Columns of the signals in the prior's order; empty for the names in the prior.
     pub signals: Vec<String>,
-    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None` for the prior's
-    /// knowledge of the path.
+    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None` to start from the
+    /// prior's knowledge of the path.
     pub calibration: Option<SleeveCalibration>,
     /// Date of the calibration as free text, which is stored with it.
     pub date: String,
@@ -88,22 +88,22 @@ pub struct RenewSummary {
 pub struct Assumed {
     /// Name of the landmark: low end, high end or rest.
     pub landmark: String,
-    /// The reference there, in its unit.
+    /// The assumed reference at the landmark, in its unit.
     pub reference: f64,
-    /// Standard deviation over sessions, in the same unit.
+    /// Standard deviation of this value over sessions, in the same unit.
     pub sd: f64,
     /// Number of sessions from which the value was computed.
     pub sessions: usize,
-    /// The estimate before the renewal.
+    /// The mean estimate at the landmark before the renewal.
     pub before: f64,
-    /// The estimate after the renewal.
+    /// The mean estimate at the landmark after the renewal.
     pub after: f64,
 }
 
 /// Mean rows of terms at the landmarks.
 type Rows = [DVector<f64>; LANDMARKS];
 
-/// The coefficients after the landmarks of a session, with the mean rows and the squared distance.
+/// The coefficients after an update with the landmarks of a session, with the mean rows and the squared distance.
 struct OnLandmarks {
     after: Normal,
     rows: Rows,
@@ -174,13 +174,14 @@ impl Prior {
                       instead"
                 .into(),
         })?;
-        // Both the earlier and the new session differ from their wearer by the variance of a session.
+        // Both the earlier and the new session differ from the mean of their wearer, each with the variance of a
+        // session.
         let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);
         Ok((Normal { mean: DVector::from_vec(weights), covariance }, known))
     }
 
-    /// Returns the coefficients after the landmarks. The landmarks are found with the coefficients before, and once
-    /// more with the result.
+    /// Returns the coefficients after an update with the landmarks. The landmarks are found with the coefficients
+    /// before the update, and once more with its result.
     fn onto_landmarks(
         &self,
         channels: &Channels,
@@ -196,7 +197,7 @@ impl Prior {
         Some(OnLandmarks { after, rows, distance })
     }
 
-    /// Returns the mean rows at the landmarks that these coefficients give.
+    /// Returns the mean rows at the landmarks that are found with these coefficients.
     fn rows(&self, bank: &Bank, channels: &Channels, weights: &DVector<f64>) -> Rows {
         let mut row = rows_of(bank, channels);
         let levels: HashMap<Place, f64> =
@@ -307,7 +308,8 @@ fn rows_of<'a>(bank: &'a Bank, channels: &'a Channels) -> impl FnMut(&Place) -> 
     }
 }
 
-/// Returns the coefficients after the landmarks, and the squared distance of the landmarks from the expected values.
+/// Returns the coefficients after an update with the landmarks, and the squared distance of the landmarks from the
+/// expected values.
 fn moved(normal: &Normal, rows: &Rows, values: &[Landmark], noise: f64) -> Option<(Normal, f64)> {
     let x = DMatrix::from_fn(LANDMARKS, normal.mean.len(), |i, j| rows[i][j]);
     let off = DVector::from_fn(LANDMARKS, |i, _| values[i].mean) - &x * &normal.mean;

@@ -1,4 +1,4 @@
-//! A session with a reference, stored as sums. A prior is learnt from sessions.
+//! A session with a reference, stored as sums over its samples. A prior is learnt from sessions.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};

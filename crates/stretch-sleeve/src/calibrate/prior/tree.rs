@@ -1,12 +1,12 @@
 //! Coefficients that vary along a tree of sensors, their wearers, and activities.
 //!
-//! The coefficients of a node are those of its parent plus a deviation, `w = w_parent + v`, `v ~ N(0, S_level)`. Those
-//! of the root have a flat prior. A leaf is a session with rows `y = X w + e`, `e ~ N(0, s^2)`. Each row has the weight
-//! 1/`n`, where `n` is the number of rows within which errors are correlated. For given covariances, message passing up
-//! and down the tree gives the exact posterior of each node (Pearl 1988, chapter 7). The covariances maximise a
-//! posterior whose prior is inverse Wishart, with the diagonal of the estimate itself as scale. They are found by
-//! expectation and maximisation (Dempster, Laird and Rubin 1977; Gelman et al., Bayesian Data Analysis, 3rd ed.,
-//! section 15.4).
+//! The coefficients of a node are those of its parent plus a deviation, `w = w_parent + v`, `v ~ N(0, S_level)`. The
+//! coefficients of the root have a flat prior. A leaf is a session with rows `y = X w + e`, `e ~ N(0, s^2)`. Each row
+//! has the weight 1/`n`, where `n` is the number of rows within which errors are correlated. For given covariances,
+//! message passing up and down the tree gives the exact posterior of each node (Pearl 1988, chapter 7). The covariances
+//! maximise a posterior whose prior is inverse Wishart, with the diagonal of the estimate itself as scale. They are
+//! found by expectation and maximisation (Dempster, Laird and Rubin 1977; Gelman et al., Bayesian Data Analysis, 3rd
+//! ed., section 15.4).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ const FIRST_NOISE: f64 = 0.01;
 /// Number of steps of expectation and maximisation.
 const STEPS: usize = 25;
 
-/// The sums of a session, in which each row has the weight 1/`n` (see above).
+/// The sums of a session, in which each row has the weight 1/`n` (see the description of this module).
 #[derive(Debug, Clone)]
 pub(crate) struct Leaf {
     /// `X'X`, `X'y`, `y'y`, count.
@@ -246,7 +246,8 @@ impl<'a> Tree<'a> {
         Some(Spread { levels, noise: (squares / f64::max(count, 1.0)).max(LEAST) })
     }
 
-    /// Returns the posterior of every inner node with its path. The first is that of the root, whose path is empty.
+    /// Returns the posterior of every inner node with its path. The first is the posterior of the root, whose path is
+    /// empty.
     pub(crate) fn known(&self, spread: &Spread) -> Option<Vec<Known>> {
         let passed = self.pass(spread)?;
         let known = |(path, Normal { mean, covariance })| Known { path, mean, covariance };

@@ -74,8 +74,8 @@ pub struct UpdateSummary {
 }
 
 impl Prior {
-    /// Adds a reference of ten seconds to a minute to the prior, by Bayesian least squares. Without
-    /// trials the result is the prior.
+    /// Makes a calibration from the prior and a reference of ten seconds to a minute, by Bayesian least squares.
+    /// Without trials, the calibration comes from the prior alone.
     ///
     /// Let `S = L L'`, and let `s^2` be the variance of a sample. The prior `N(m, S)` of the coefficients is written as
     /// rows `s L^-1` with values `s L^-1 m`, which come before the rows of the data. All rows are reduced to one

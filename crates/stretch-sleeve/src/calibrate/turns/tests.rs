@@ -73,7 +73,7 @@ fn student(random: &mut Random) -> f64 {
     random.noise() / (squares / 3.0).sqrt()
 }
 
-/// Learns turning points from movements with 0.02 V per millimetre; `None` if the movements are too similar.
+/// Learns turning points from movements with 0.02 V per millimetre; `None` if there are too few independent movements.
 fn learn(scatter: Scatter, movements: usize, seed: u64) -> Option<Turns> {
     let mut own = Movements::new(scatter, seed);
     let volts = |(low, high): (f64, f64)| (0.02 * low, 0.02 * high);
@@ -109,10 +109,10 @@ fn alarms(told: &[Option<Zero<f64>>]) -> usize {
     usize::from(shifted[0]) + shifted.windows(2).filter(|pair| !pair[0] && pair[1]).count()
 }
 
-/// Returns the false alarms per hour, over calibrations from `movements` movements of which each is tested in two
-/// hours, and the number of calibrations without limits.
+/// Returns the false alarms per hour, and the number of calibrations without limits. Each calibration is made from
+/// `movements` movements and tested in two hours.
 ///
-/// The zero drifts by the share `drift` of the limit per hour.
+/// Per hour, the zero drifts by the share `drift` of the limit.
 fn false_alarms(scatter: Scatter, movements: usize, drift: f64, follow: bool) -> (f64, usize) {
     let (draws, hours) = (300, 2.0);
     let (mut alarmed, mut silent) = (0, 0);

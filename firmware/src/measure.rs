@@ -96,8 +96,8 @@ pub fn load<'a, T: serde::Deserialize<'a>>(record: &'a [u8]) -> T {
 /// Generates the `main` of a program that replays the trial through a design, once for each model
 /// and its calibration. The samples are converter codes, or volts in `f32`.
 ///
-/// `codes, Design, Estimate, |record| design` or `volts, Design, |calibration| design`,
-/// then `"model" from "record"`.
+/// The arguments are `codes, Design, Estimate, |record| design` or
+/// `volts, Design, |calibration| design`, followed by `"model" from "record"` for each model.
 #[macro_export]
 macro_rules! program {
     (volts, $design:ty, $make:expr, $($model:literal from $record:literal),+ $(,)?) => {

@@ -299,7 +299,7 @@ impl ZeroWatch {
         }
     }
 
-    /// Takes the state of the zero after a movement has ended, at a time.
+    /// Handles the state of the zero at the end of a movement, at `time_s`.
     fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
             let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
@@ -322,7 +322,8 @@ impl ZeroWatch {
     /// shifts.
     fn end(&self) {
         let Some(turns) = self.turns else {
-            // A load cell need not move.
+            // A calibration that needs only the signal, such as that of a load cell, may lack
+            // movements.
             if self.needs_signal_only {
                 return;
             }

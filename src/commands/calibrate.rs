@@ -181,7 +181,7 @@ impl FromStr for Rate {
     }
 }
 
-/// What a shell completes after `--model`; it takes further degrees of a surface.
+/// The values that a shell completes after `--model`. The option also accepts surfaces of other degrees.
 const MODELS: [&str; 10] = [
     "auto",
     "linear",

@@ -14,7 +14,7 @@ use crate::table::{maybe, number, table, table_text};
 /// model.
 const SQUARED_EXCESS: &str = "MSE above best";
 
-/// Columns of the kinds of trial.
+/// Indices of the columns that hold the errors on one kind of trial each.
 const KINDS: RangeInclusive<usize> = 2..=4;
 
 /// Prints the models that `auto` compared. Columns without values are left out.
@@ -89,7 +89,8 @@ fn instructions(row: &ModelRow) -> String {
     }
 }
 
-/// Prints the tables of a calibration. With `-v`, prints everything that the paper lists.
+/// Prints the tables of a calibration. With `-v`, prints everything that the paper of the published
+/// method lists.
 pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     print_fits(calibrated, ranking)?;
     if is_verbose() {

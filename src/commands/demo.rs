@@ -131,8 +131,8 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job, String)>
     Ok((sessions, job, result))
 }
 
-/// Simulates the paper's session on the demonstration rig, writes it as a data set, and reads it
-/// back.
+/// Simulates the session of the published method ("the paper") on the demonstration rig, writes it
+/// as a data set, and reads it back.
 fn simulated(folder: &Path) -> anyhow::Result<Sessions> {
     let rig = demo_preset()?;
     let settings = RunSettings { seed: SEED, ..RunSettings::default() };

@@ -254,8 +254,7 @@ pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
     }
 }
 
-/// Writes all files or none, and then prints. In this order the messages about written files are
-/// true.
+/// Writes all files or none, and then prints, so that the messages about written files are true.
 fn conclude(
     args: &Args,
     (examined, by_trial): (&Examined, Option<&ByTrial>),

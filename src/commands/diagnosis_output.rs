@@ -115,7 +115,7 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    // If simulator and recording agree, one slice in twenty still stands out by chance.
+    // If simulator and recording agree, one slice in twenty still deviates by chance.
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     if agrees && !diagnosis.is_faint() {
         return;
@@ -154,8 +154,8 @@ fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     if is_verbose {
         put_table(out, &candidate_numbers_table(&shown, &diagnosis.stabilities));
     }
-    // The named effects form one set. Only effects outside it are rivals, each of which may replace
-    // one of them.
+    // The named effects form one set. Only effects outside the set are rivals; each rival may
+    // replace one of the named effects.
     let Diagnosis { named, ambiguous, .. } = diagnosis;
     let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();
     match (named.as_slice(), rivals.as_slice()) {

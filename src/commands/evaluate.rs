@@ -63,7 +63,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     args.json.answer(&evaluation, || print(&evaluation))
 }
 
-/// Prints the paper's table of errors for some trials.
+/// Prints the errors on some trials in the table of the published method ("the paper").
 pub(super) fn print_errors(
     title: &str,
     methods: &[MethodErrors],
@@ -73,7 +73,7 @@ pub(super) fn print_errors(
     say(table_text(&method_table(title, methods, &names, unit)))
 }
 
-/// Prints the paper's table for each trial, and for all trials together.
+/// Prints that table for each trial, and for all trials together.
 pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
     let unit = &evaluation.unit;
     let name = |i: usize| evaluation.pooled[i].method.clone();

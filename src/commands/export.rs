@@ -132,7 +132,7 @@ fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
     say(format!("{}: {kind}, {seal:08x}, {state}", path.display()))
 }
 
-/// Stages the header, or the library around it, among the outputs of the command.
+/// Adds the header, or the Arduino library that contains it, to the outputs of the command.
 fn stage(
     outputs: &mut Outputs,
     out: &Path,

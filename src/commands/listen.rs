@@ -195,8 +195,8 @@ impl Samples {
     fn sample(&mut self, event: Event) -> Option<Sample> {
         let frame = event.frame()?;
         if !matches!(event, Event::Frame(_)) {
-            // The board has seen samples that did not arrive here, or has restarted. Both agree
-            // again once the window of the rate filter is filled.
+            // The board has seen samples that did not arrive here, or has restarted. The estimates
+            // of board and computer agree again once the window of the rate filter is filled.
             self.twin.reset();
         }
         let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64());
@@ -241,7 +241,7 @@ impl Samples {
     }
 }
 
-/// Data of a calibration file about the stream, and its receptor.
+/// The parts of a calibration file that concern the stream, and the receptor of the calibration.
 pub(super) struct Twin {
     /// Column of the signal.
     pub signal: String,

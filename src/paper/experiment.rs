@@ -1,5 +1,5 @@
-//! The paper's experiment, simulated: calibration, application and evaluation with the published
-//! method and with ours.
+//! Simulates the experiment of the published method ("the paper"): calibration, application and
+//! evaluation with the published method and with ours.
 
 use serde_json::{Value, json};
 use stretch_calibrate::{

@@ -1,4 +1,4 @@
-//! The HTML page of the paper's experiment.
+//! The HTML page of the experiment of the published method ("the paper").
 
 use plotters::prelude::*;
 use stretch_report::kit::{Area, Axes, Drawn, Figure, FigureSize, Ink, Page, plot, stroke};

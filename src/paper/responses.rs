@@ -1,5 +1,5 @@
-//! Studies that the paper proposes: the error as a function of the gap between two pulses, and the
-//! frequency response of the sensor.
+//! Studies that the paper of the published method proposes: the error as a function of the gap
+//! between two pulses, and the frequency response of the sensor.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ const TRIAL_S: f64 = 30.0;
 /// Errors on a trial in which all pulse pairs have the same gap.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct GapPoint {
-    /// From the end of the first pulse to the start of the second, in seconds.
+    /// Time from the end of the first pulse to the start of the second, in seconds.
     pub(crate) gap_s: f64,
     /// RMSE of raw, linear and non-linear with the published method, in millimetres.
     pub(crate) published_rmse_mm: [f64; 3],

@@ -1,4 +1,5 @@
-//! Comparison with the paper's published figures: tables and sentences, for a terminal and a page.
+//! Comparison with the figures of the published method ("the paper"): tables and sentences, for a
+//! terminal and a page.
 
 use stretch_calibrate::{Evaluation, FitReport};
 use stretch_report::{Table, number};
@@ -27,13 +28,15 @@ pub(super) struct PublishedFigures {
     pub(super) linear: PublishedFit,
     /// Slope and intercept of the linear fit.
     pub(super) line: (f64, f64),
-    /// poly13 on inflations: next lower order, chosen, next higher.
+    /// Fits to inflations: with the next lower order than poly13, with poly13, and with the next
+    /// higher order.
     inflation: [PublishedFit; 3],
-    /// poly13 on deflations: next lower order, chosen, next higher.
+    /// Fits to deflations: with the next lower order than poly13, with poly13, and with the next
+    /// higher order.
     deflation: [PublishedFit; 3],
-    /// Raw, linear and non-linear on arbitrary actuation.
+    /// Errors of the raw signal, the linear and the non-linear calibration on arbitrary actuation.
     arbitrary: [PublishedErrors; 3],
-    /// Raw, linear and non-linear on pulses.
+    /// Errors of the raw signal, the linear and the non-linear calibration on pulses.
     pulses: [PublishedErrors; 3],
 }
 

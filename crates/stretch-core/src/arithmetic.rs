@@ -6,7 +6,7 @@ use crate::Real;
 
 /// Advances a first-order lag by one sample: returns `z + share (x - z)`.
 ///
-/// With `share` from [`lag_share`] the result is exact for an input that holds its new value `x` over the sample.
+/// With `share` from [`lag_share`] the result is exact for an input that is constant at `x` during the sample period.
 ///
 /// ```
 /// use stretch_core::arithmetic::{lag, lag_share};
@@ -21,7 +21,7 @@ pub fn lag<T: Real>(before: T, x: T, share: T) -> T {
 }
 
 /// Returns the share of the remaining distance that a lag of time constant `tau_s` covers in `step_s`:
-/// `1 - exp(-step_s/tau_s)`. Exact for an input that is constant over the step.
+/// `1 - exp(-step_s/tau_s)`. The share is exact for an input that is constant over the step.
 ///
 /// It uses `libm`, so a computer and a microcontroller give the same bits.
 ///
@@ -33,8 +33,8 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
     -libm::expm1(-step_s / tau_s)
 }
 
-/// Returns the weights of the lag's state `z`, of the previous input and of the new input that give the new `z`. They
-/// are exact for an input that is a straight line over the step.
+/// Returns three weights: of the lag's state `z`, of the previous input, and of the new input. Their weighted sum is
+/// the new `z`. It is exact for an input that is a straight line over the step.
 ///
 /// ```text
 /// z_new = w[0] z + w[1] x_before + w[2] x_now,   w[0] = exp(-step_s/tau_s)
@@ -53,7 +53,7 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
 pub fn lag_weights(step_s: f64, tau_s: f64) -> [f64; 3] {
     let a = step_s / tau_s;
     let gone = lag_share(step_s, tau_s);
-    // mean of the decay over the step; for small steps a series, because the differences below would cancel
+    // mean of the decay over the step; small steps need a series, because the differences below would cancel
     let mean = if a < 1e-4 { 1.0 - a * (0.5 - a / 6.0) } else { gone / a };
     [1.0 - gone, mean - (1.0 - gone), 1.0 - mean]
 }

@@ -8,7 +8,7 @@ use core::ops::Neg;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Branch {
-    /// The target rises: the muscle fills and shortens, or the joint flexes.
+    /// The target rises: a pneumatic muscle fills and shortens, or a joint flexes.
     #[default]
     Inflation,
     /// The target falls.
@@ -16,9 +16,9 @@ pub enum Branch {
 }
 
 impl Branch {
-    /// Returns the branch for a rate of the target, given the branch before. The branch changes
-    /// only if the rate leaves the dead band (`|rate| > dead_band`). NaN keeps the branch.
-    /// Works on floats and integers.
+    /// Returns the branch for a rate of the target, given the previous branch. The branch changes
+    /// only if the rate leaves the dead band (`|rate| > dead_band`). NaN keeps the branch. The
+    /// function works on floats and integers.
     ///
     /// ```
     /// use stretch_core::Branch;

@@ -78,8 +78,8 @@ impl Target {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum RateSource {
-    /// The rate of the reference, as published (paper section 2.5). The rates of reference and signal are each
-    /// normalised by their own range.
+    /// The rate of the reference, as in the published method (section 2.5 of the paper). The rates of reference and
+    /// signal are each normalised by their own range.
     Strain,
     /// The rate of the signal, from the same estimator that runs live.
     #[default]
@@ -120,11 +120,12 @@ impl From<Schema> for u32 {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct CalibrationSpec {
-    /// First field of every file, so that a newer schema is refused before the rest is read.
+    /// The schema number. It is the first field of every file, so that a newer schema is refused before the rest is
+    /// read.
     pub schema: Schema,
     /// Name of the column with the signal, such as `bridge_v`.
     pub signal: Label,
-    /// Name of the column with the reference, such as `length_mm`. The estimate has its unit.
+    /// Name of the column with the reference, such as `length_mm`. The estimate has the same unit.
     pub reference: Label,
     /// Sample rate for which the rate estimator was designed, in hertz.
     pub sample_rate_hz: SampleRate,
@@ -223,7 +224,7 @@ impl Calibration {
     }
 }
 
-/// Checks the sizes of all numbers that do not belong to the model alone.
+/// Checks the magnitudes of the numbers outside the model, and those of the model after folding (see `folded`).
 fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     let hz = spec.sample_rate_hz.hz();
     DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;
@@ -232,7 +233,7 @@ fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     }
     range(["signal_range", "span of signal_range"], &spec.signal_range)?;
     range(["target_range", "span of target_range"], &spec.target_range)?;
-    // at most the largest signal per sample period; zero, or large enough to divide by
+    // the dead band may be 0; otherwise it must be large enough to divide by, and at most the fastest possible rate
     let band = spec.dead_band;
     let fits = band == 0.0 || (LEAST * LEAST..=MOST * RATES_HZ.end()).contains(&band);
     DesignError::check("dead_band", band, fits)?;

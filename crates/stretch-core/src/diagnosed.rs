@@ -8,7 +8,7 @@ use crate::{
     sizes::{MOST, apart, extent, size},
 };
 
-/// Strain of the gauge by a pressure p: `u + c x (1 + bend (1 - x))`, `x = p/scale`, where u is the drive.
+/// Strain that a pressure p adds to the gauge: the drive u becomes `u + c x (1 + bend (1 - x))`, with `x = p/scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -21,11 +21,12 @@ pub struct Crosstalk {
     pub scale: f64,
 }
 
-/// A soft bound on the drive: `floor + (d + sqrt(d^2 + 4 (w ln 2)^2))/2`, `d = u - floor`. A ceiling is its mirror
-/// image.
+/// A soft lower bound on the drive u: the output is `floor + (d + sqrt(d^2 + 4 (w ln 2)^2))/2`, with `d = u - floor`
+/// and the width w. An upper bound (ceiling) is the mirror image.
 ///
-/// For a drive at the bound the output lies `w ln 2` inside, as for the soft knee `w ln(1 + exp(d/w))` of
-/// `stretch-effects`. This form needs only a square root, whereas `ln` and `exp` would take space on a microcontroller.
+/// If the drive equals the bound, the output is inside the bound by `w ln 2`, as for the soft knee `w ln(1 + exp(d/w))`
+/// of `stretch-effects`. This form needs only a square root, whereas `ln` and `exp` would take space on a
+/// microcontroller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -36,7 +37,8 @@ pub struct Knee {
     pub width: f64,
 }
 
-/// Hysteresis by three plays: `u - share mean of (u - play(u, r))`. With a share of 1 it describes a slipping sleeve.
+/// Hysteresis by three plays of half-width r: the drive u becomes `u - share * mean(u - play(u, r))`. With a share of 1
+/// it describes a slipping sleeve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -47,7 +49,7 @@ pub struct Plays {
     pub radii: [f64; 3],
 }
 
-/// Relaxation by three lags: `u + share (u - mean of lag(u, tau))`.
+/// Relaxation by three lags: the drive u becomes `u + share * (u - mean(lag(u, tau)))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -58,7 +60,8 @@ pub struct Fading {
     pub taus_s: [f64; 3],
 }
 
-/// A response that weakens with use: `(u - zero)(1 - m x/(n + x)) + zero`, where x is the total travel of the drive u.
+/// A response that weakens with use: the drive u becomes `(u - zero)(1 - m x/(n + x)) + zero`, where x is the total
+/// travel of u (the sum of all its movements).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -132,7 +135,8 @@ pub struct DiagnosedMap {
     pub agility: f64,
     /// Time constant with which the predicted rate decays, s.
     pub steady_s: f64,
-    /// Factor on the filter's own standard deviation: the RMS of the fit's errors, each divided by that deviation.
+    /// Factor by which the filter's own standard deviation is multiplied: the RMS of the fit's errors, each divided by
+    /// that deviation.
     pub spread: f64,
     /// Range of the normalised targets in the fit.
     pub estimate_domain: Interval,

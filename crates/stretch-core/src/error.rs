@@ -7,7 +7,7 @@ use core::fmt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DesignError {
-    /// A number is not finite or outside what its field allows.
+    /// A number is not finite, or is outside the allowed range of its field.
     OutOfRange {
         /// The field, with its unit.
         field: &'static str,

@@ -44,9 +44,9 @@ pub struct BranchSurface {
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 #[non_exhaustive]
 pub enum Model {
-    /// One line for both directions (paper section 3.1).
+    /// One line for both directions (section 3.1 of the paper with the published method).
     Linear(LinearMap),
-    /// One surface per branch (paper section 3.2).
+    /// One surface per branch (section 3.2 of that paper).
     Surfaces {
         /// For a rising target.
         inflation: BranchSurface,

@@ -19,7 +19,7 @@ use crate::{
 ///   than 1e5 samples lose a digit or two, and dependent terms may not be detected.
 ///
 /// Rate, voltage and value may have any units. In `f32` keep them near 1. Large samples, whose powers would overflow,
-/// are refused. Powers of tiny numbers underflow, and the fit is refused.
+/// are refused. If powers of tiny numbers underflow, the fit is refused.
 ///
 /// ```
 /// use stretch_core::Degree;
@@ -233,8 +233,8 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         self.factor.merge(&other.factor())
     }
 
-    /// Replaces the factor by another one, and returns the factor of all samples so far. One block can thus serve many
-    /// logs, for each of which only the factor is kept.
+    /// Replaces the factor by another one, and returns the factor of all samples so far. One accumulator can thus
+    /// process many logs, and only the factor of each log is kept.
     ///
     /// # Errors
     /// [`FitError::MissingTerm`] if the degrees differ; nothing changes then.

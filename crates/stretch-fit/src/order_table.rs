@@ -150,7 +150,7 @@ impl<T: Real> OrderTable<T> {
         let mut judged: [Pooled<T>; MOST] = Default::default();
         let mut differences = [[Difference::new(); MOST]; MOST];
         leave_out(trials, &mut |trial, others| {
-            // one merge of the others serves every order
+            // the merged factor of the other trials is computed once and used for every order
             let held =
                 orders.map(|degree| degree.map(|degree| judge(trials, trial, others, degree)));
             for (i, held_out) in held.iter().enumerate() {

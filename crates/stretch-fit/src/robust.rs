@@ -61,9 +61,9 @@ pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
 /// **Bisquare**, as documented for MATLAB's `fit(..., 'Robust', 'Bisquare')`: residuals are divided
 /// by `sqrt(1 - h)`, with `h` the leverage in the plain least-squares fit. `s` is the median of the
 /// largest `n - p + 1` absolute adjusted residuals divided by 0.6745. With `u = e/(4.685 s)` a
-/// sample has the weight `(1 - u^2)^2`, or 0 if `|u| >= 1`. Sigma is the robust sigma of DuMouchel
-/// and O'Brien (1989), but at least its quadratic mean with the plain RMSE, in which they have the
-/// weights `n` and `p^2`.
+/// sample has the weight `(1 - u^2)^2`, or 0 if `|u| >= 1`. Sigma is the larger of two values: the
+/// robust sigma of DuMouchel and O'Brien (1989), and, with the plain RMSE,
+/// `sqrt((n sigma_robust^2 + p^2 RMSE^2)/(n + p^2))`.
 ///
 /// **Least absolute residuals**: the weight of a sample is proportional to `1/max(|e|, d)`, with
 /// `d` a millionth of the current robust scale. Sigma is the distribution-free
@@ -126,7 +126,7 @@ where
         }
         Loss::LeastAbsolute => T::one(),
     };
-    // Lower limit on the scale, because a perfect fit has none: a millionth of the values' standard
+    // A perfect fit has a scale of 0, so the scale is at least a millionth of the values' standard
     // deviation.
     let spread = (ols.sst / T::from_f64((n - 1) as f64)).sqrt();
     let tiny = T::from_f64(1e-6) * if spread > T::zero() { spread } else { T::one() };

@@ -55,13 +55,13 @@ pub struct AgreementSpec<T> {
     pub count: u64,
     /// Number of refused pairs.
     pub skipped: u64,
-    /// Of the error: mean, sum of squared deviations, and sum of magnitudes, each followed by its
-    /// rounding error; then the largest magnitude.
+    /// Statistics of the error: mean, sum of squared deviations, and sum of magnitudes, each
+    /// followed by its rounding error; then the largest magnitude.
     pub errors: [T; 7],
-    /// Of the truth: mean and sum of squared deviations, each followed by its rounding error; then
-    /// minimum and maximum.
+    /// Statistics of the truth: mean and sum of squared deviations, each followed by its rounding
+    /// error; then minimum and maximum.
     pub truth: [T; 6],
-    /// The same for the estimate.
+    /// The same statistics of the estimate.
     pub estimate: [T; 6],
     /// Sum of the products of both deviations, and its rounding error.
     pub products: [T; 2],

@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-/// A tail probability P, in the form that is accurate.
+/// A tail probability P, stored as ln P or as 1 - P, whichever is more accurate.
 pub(crate) enum Tail {
     /// ln P.
     Ln(f64),

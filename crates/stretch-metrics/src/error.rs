@@ -25,7 +25,7 @@ pub enum MetricsError {
         /// Its index.
         index: usize,
     },
-    /// A constant signal, by whose spread nothing can be divided.
+    /// A signal is constant, so its spread is zero and cannot be a divisor.
     Constant {
         /// Name of the signal: `truth`, `estimate` or `difference`.
         signal: &'static str,

@@ -1,5 +1,6 @@
-//! The same observer twice: from volts in `f32`, and from converter codes in integers as a board without a floating-point unit computes it.
-//! The integer form is stored as a record and loaded again, as from an EEPROM. A sinusoidal voltage drives both.
+//! Runs the same observer in two forms: from volts in `f32`, and from converter codes in integers, as on a board
+//! without a floating-point unit. The integer form is stored as a record and loaded again, as from an EEPROM. A
+//! sinusoidal voltage drives both forms.
 //!
 //! ```text
 //! cargo run --release -p stretch-receptor --example volts_and_codes

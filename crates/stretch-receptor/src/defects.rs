@@ -160,7 +160,8 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
-    /// Returns the distance of a play behind u: u - play(at, u, radius), computed without the two ends of the play.
+    /// Returns u - play(at, u, radius), the distance by which the play is behind u, without computing the two ends of
+    /// the play.
     #[inline(always)]
     fn apart(&self, i: usize, at: T, u: T) -> T {
         let (behind, radius) = (u - at, self.radii[i]);
@@ -199,8 +200,8 @@ impl<T: Real> Played<T> {
 
 impl<T: Real> Relaxing<T> {
     fn new(fading: Fading, period_s: f64) -> Self {
-        // the lag z' = a z + b x + c x' is p + c x' with p = a z + b x; p holds the past in one number, and its update
-        // is p' = a p + (a c + b) x'
+        // the lag z' = a z + b x + c x' equals p + c x' with p = a z + b x; the single number p holds the past, and its
+        // update is p' = a p + (a c + b) x'
         let exact = fading.taus_s.map(|tau| lag_weights(period_s, tau));
         let now: f64 = exact.iter().map(|w| w[2]).sum();
         let each = -fading.share / 3.0;

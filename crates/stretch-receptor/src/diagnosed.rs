@@ -39,10 +39,10 @@ const BEYOND: f64 = 0.003;
 ///    position of the sleeve, and the muscle is taken to be ahead of the sleeve in the direction of the last certain
 ///    movement.
 ///
-/// The motion therefore determines the target while a play, a clipped end or a delay hides it. [`Reading::sd`] is the
-/// standard deviation of the estimate. A skew (delay of the signal) is compensated by prediction, so that the estimate
-/// is that of the present. There is an estimate from the first sample on. If the map has a crosstalk, set the pressure
-/// with [`ReceptorMemory::set_pressure`] before a sample.
+/// While a play, a clipped end or a delay hides the target, the predicted motion therefore determines the estimate.
+/// [`Reading::sd`] is the standard deviation of the estimate. A skew (delay of the signal) is compensated by
+/// prediction, so that the estimate is that of the present. There is an estimate from the first sample on. If the map
+/// has a crosstalk, set the pressure with [`ReceptorMemory::set_pressure`] before a sample.
 ///
 /// ```
 /// use stretch_core::{Design, Stage, Volts};

@@ -6,8 +6,8 @@ use stretch_core::{
     RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
 };
 
-/// The paper's published surfaces (section 3.2) as a calibration, for an 180 mm muscle and a bridge that rises from
-/// 1.24 V by 1 V over the stroke.
+/// The surfaces of the published method ("the paper", section 3.2) as a calibration, for an 180 mm muscle and a bridge
+/// that rises from 1.24 V by 1 V over the stroke.
 ///
 /// The calibration is for examples and tests. The paper prints no ranges, so the ranges here are plausible, not
 /// published.

@@ -7,7 +7,7 @@ pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
 /// Number of slopes of the curve for which gains are computed, evenly spaced in ratio from the flattest to the steepest
 /// slope. Twice and eight times as many gave the same errors.
 pub(crate) const SLOPES: usize = 12;
-/// Most doublings; `n` doublings give the filter after `2^n` samples.
+/// Largest number of doublings. After `n` doublings the covariance is that after `2^n` samples.
 const DOUBLINGS: usize = 30;
 /// The doubling ends when the covariance changes by less than this share.
 const SETTLED: f64 = 1e-12;

@@ -25,12 +25,12 @@ const LEAST_RUN: f64 = 0.01;
 ///
 /// A sample corrects every state by a gain times the innovation (signal minus predicted signal). The gain is the
 /// stationary gain of a Kalman filter for the slope of the curve, from a table that is computed with the receptor. A
-/// covariance recursion costs twenty times as much and errs more, because the slope changes faster than a covariance
-/// can follow. The slope is the greater of the tangent at the prediction and of the secant to the drive at which the
-/// curve has the signal, so that a flat end of the curve does not move the estimate far.
+/// covariance recursion costs twenty times as much and has larger errors, because the slope changes faster than a
+/// covariance can follow. The slope is the greater of two: the tangent at the prediction, and the secant to the drive
+/// at which the curve has the signal. A flat end of the curve therefore does not move the estimate far.
 ///
-/// The tracker of the baseline compares the signal with the one that a target at rest would give now, memory included.
-/// Therefore an undershoot after a fast release is not taken for drift.
+/// The tracker of the baseline compares the signal with the one that a target at rest would give now, including the
+/// effect of memory. Therefore an undershoot after a fast release is not taken for drift.
 pub type ObserverReceptor<T> = Front<Observer<T>>;
 
 /// The model of an [`ObserverReceptor`].

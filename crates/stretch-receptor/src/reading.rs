@@ -10,9 +10,9 @@ use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
 pub struct Reading<T = f64> {
     /// The estimated reference, in the unit of the reference (millimetres of a muscle, degrees of a joint).
     pub estimate: T,
-    /// Rate of the estimate, in that unit per second. For a line or a surface: the local slope of the calibration times
-    /// the rate of the signal, and 0 while a model that needs no rate has seen too few samples for one. Other models
-    /// estimate the rate themselves.
+    /// Rate of the estimate, in the reference's unit per second. A line or a surface gives the local slope of the
+    /// calibration times the rate of the signal; if its estimate needs no rate, this is 0 until there are enough
+    /// samples for a rate. Other models estimate the rate themselves.
     pub rate: T,
     /// The branch that was evaluated.
     pub branch: Branch,

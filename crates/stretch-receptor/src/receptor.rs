@@ -10,23 +10,22 @@ use crate::{
     map::{Map, Point},
 };
 
-/// A stretch receptor: a line or two surfaces, folded, with the rate estimator they
-/// were fitted for.
+/// A stretch receptor: a line or two surfaces, folded, with the rate estimator for which they were fitted.
 ///
 /// For each sample, in volts (or the unit of the calibration's signal):
-/// 1. the rate of the signal, by the estimator `R`;
-/// 2. the branch, from the sign of that rate outside the dead band;
+/// 1. the estimator `R` gives the rate of the signal;
+/// 2. outside the dead band, the sign of that rate gives the branch;
 /// 3. inputs outside the calibrated domain are clamped, and [`Reading::domain`] shows this;
 /// 4. the branch's surface gives the estimate in the reference's unit. The slope of the surface times the rate of the
 ///    signal gives the estimate's rate. This derivative leaves out the surface's dependence on the rate, which would
 ///    need the second derivative of a noisy signal.
 ///
-/// **Warm-up**: a calibration that [needs the signal only](stretch_core::Model::needs_signal_only), a line or one curve
-/// for both branches, answers from the first sample on. The rate of such a reading is 0 until the rate estimator has
-/// seen enough samples.
+/// **Warm-up**: a calibration that [needs the signal only](stretch_core::Model::needs_signal_only) (a line, or one
+/// curve for both branches) answers from the first sample on. The rate of such a reading is 0 until the rate estimator
+/// has seen enough samples.
 ///
-/// **Missing samples, branch**: see [`Front`]. A short gap is bridged by the last sample, extrapolated at the last
-/// rate, so that one lost sample costs one reading and not a warm-up.
+/// **Missing samples and the branch** are handled as in every [`Front`]. A short gap is bridged by the last sample,
+/// extrapolated at the last rate, so that one lost sample costs one reading and not a warm-up.
 ///
 /// **Reset**: start from a fresh [`Design::memory`]; the `reset` of a [`Runner`](stretch_core::Runner) does this.
 ///
@@ -48,7 +47,7 @@ use crate::{
 /// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 ///
-/// Source: paper sections 2.5 and 3.4. Cost: see the crate's front page.
+/// Source: sections 2.5 and 3.4 of the paper with the published method. Cost: see the crate's front page.
 pub type StretchReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R>>;
 
 /// The model of a [`StretchReceptor`].

@@ -116,8 +116,8 @@ fn ramp(code: i32, slope: f64, bend: f64) -> Vec<i32> {
     (0..=10).rev().map(at).collect()
 }
 
-/// Ramps from rest to beyond the rates that the example's surfaces saw (8 V/s is
-/// 99 codes a sample), and steps that no muscle makes.
+/// Slopes of ramps, in codes per sample: from rest to beyond the rates to which the example's
+/// surfaces were fitted (8 V/s is 99 codes per sample), and steps that are faster than any muscle.
 const SLOPES: [f64; 23] = [
     0.0, 0.05, -0.05, 0.2, -0.2, 0.3, -0.3, 1.0, -1.0, 4.0, -4.0, 13.0, -13.0, 35.0, -35.0, 60.0,
     -60.0, 90.0, -90.0, 130.0, -130.0, 400.0, -400.0,
@@ -178,7 +178,7 @@ fn calibration() -> impl Strategy<Value = Calibration> {
         |(calibration, up, down, rest_length)| {
             let mut spec = calibration.into_spec();
             spec.rate_estimator = RateEstimator::SAVGOL_11_2;
-            // thousandths suit millimetres and degrees
+            // a resolution of a thousandth is fine enough for references in millimetres or degrees
             spec.target = Target::Contraction { rest_length };
             if let Model::Surfaces { inflation, deflation } = &mut spec.model {
                 (inflation.surface, deflation.surface) = (up, down);

@@ -135,10 +135,11 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
     ((squares / count).sqrt(), (apart / count).sqrt())
 }
 
-/// A gauge without defects errs by 0.002 of the stroke with this noise. Defects that hide nothing are inverted about as
-/// well. A play or a delay costs as much as it hides: after a reversal, a slip of 0.02 causes an error until the sleeve
-/// is seen to turn, and a skew is predicted over. The filter's standard deviation leaves out errors in the memory of
-/// its defects. A fit measures their share ([`DiagnosedMap::spread`]), which is 1 here.
+/// With this noise, the estimate of a gauge without defects has an error of 0.002 of the stroke. Defects that hide no
+/// motion are inverted about as well. A play or a delay adds about as much error as the motion that it hides: after a
+/// reversal, a slip of 0.02 causes an error until the filter detects that the sleeve has turned, and a skew must be
+/// bridged by prediction. The filter's standard deviation leaves out errors in the memory of its defects. A fit
+/// measures the share of these errors ([`DiagnosedMap::spread`]), which is 1 here.
 #[test]
 fn every_defect_is_inverted() {
     let knee = |at| Some(Knee { at, width: 0.01 });

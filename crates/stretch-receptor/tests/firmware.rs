@@ -254,7 +254,7 @@ fn the_golden_checksums_are_these() {
     for (model, checksum) in golden {
         writeln!(text, "model={model} checksum={checksum}").unwrap();
     }
-    // the last line comes from the same test of stretch-sleeve
+    // the line of the model `gauges` comes from the corresponding test of stretch-sleeve
     let found = fs::read_to_string(folder().join("golden.txt")).unwrap();
     found.lines().filter(|line| line.starts_with("model=gauges ")).for_each(|line| {
         writeln!(text, "{line}").unwrap();

@@ -30,10 +30,10 @@ fn both(
     codes.iter().map(step).collect()
 }
 
-/// Where a slope lies between two gains, rounding may choose the neighbouring gain. The estimates then differ for a
-/// moment and meet again. If a gauge remembers for seconds, the difference lasts as long: one random calibration in
-/// some thousands has more than a tenth of its answers apart. Here at most two of 256 do, the same ones on every
-/// machine.
+/// If a slope lies between two gains, rounding may choose the neighbouring gain. The estimates then differ for a moment
+/// and converge again. If a gauge remembers for seconds, the difference lasts as long: for one random calibration in
+/// some thousands, more than a tenth of the answers differ. Of the 256 calibrations in this test at most two do so, the
+/// same ones on every machine.
 #[test]
 fn integers_answer_as_floats_do() {
     let mut runner = TestRunner::deterministic();

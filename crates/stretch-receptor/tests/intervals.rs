@@ -186,7 +186,7 @@ const FURTHEST: i32 = 8 << TARGET_BITS;
 const FASTEST: i32 = 1 << TARGET_BITS;
 const MOST_DRIVE: i32 = 1 << 30;
 
-/// `part(x, share)`, whose product and sum must fit 64 bits; shares are 0 .. 1.
+/// Returns `part(x, share)` for shares in 0 .. 1, and proves that its product and its sum fit 64 bits.
 fn part(x: Between, share: i32) -> Proof {
     let product = (x * just(share)).fits(64, "share")?;
     Ok((product + just(1i128 << (SHARE_BITS - 1))).fits(64, "share, rounded")? >> SHARE_BITS)
@@ -396,7 +396,7 @@ proptest! {
     }
 }
 
-/// A proof that cannot fail proves nothing.
+/// Checks that the proof fails for numbers that the checks would refuse; a proof that cannot fail would prove nothing.
 #[test]
 fn numbers_beyond_the_checks_are_not_proved() {
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();

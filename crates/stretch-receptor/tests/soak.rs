@@ -1,5 +1,5 @@
-//! Long streams with the faults of sensors, cables and converters: no estimate drifts, readings do not end, and no
-//! memory grows.
+//! Long streams with the faults of sensors, cables and converters: no estimate drifts, readings continue, and no memory
+//! grows.
 
 use std::fmt::Debug;
 

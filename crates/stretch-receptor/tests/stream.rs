@@ -16,7 +16,7 @@ fn receptor() -> Runner<StretchReceptor<f64>> {
     Runner::new(StretchReceptor::new(&example_calibration()).unwrap())
 }
 
-/// The pipeline as the paper describes it, without folding.
+/// The pipeline as described in the paper of the published method, without folding.
 fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> (f64, bool) {
     let signal = calibration.spec().signal_range;
     let (normalised, inside) = match &calibration.spec().model {

@@ -62,7 +62,7 @@ const LETTERS: usize = 48;
 /// Height of each further line of a label, in pixels.
 const LINE: f64 = 17.0;
 
-/// A label in lines that a phone can hold, broken between words.
+/// Returns a label split between words into lines that fit a phone's screen.
 fn label_lines(label: &str) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
     for word in label.split(' ') {

@@ -41,7 +41,8 @@ impl<'a> BranchView<'a> {
             Branch::Inflation => inflation,
             Branch::Deflation => deflation,
         };
-        // for a fit on the rate of the reference, the common axis is the normalised rate
+        // if a fit used the rate of the reference, samples and surface share only the normalised
+        // rate as an axis
         let rate_scale =
             (calibration.spec().rate_source == RateSource::Voltage).then_some(surface.rate_range);
         let (signal, reference) = (&calibration.spec().signal, &calibration.spec().reference);

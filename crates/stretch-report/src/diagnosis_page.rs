@@ -73,7 +73,7 @@ fn left_over(page: &mut Page, subject: &Subject<'_>) {
     let Some(shown) = shown(subject, stage) else { return };
     let channel = &subject.simulator.stages()[stage].channel;
     page.figure(
-        // the residual shows more than two curves that nearly coincide
+        // a plot of the residual shows more than a plot of two curves that nearly coincide
         &trace_figures(subject, stage, &shown).1,
         &format!(
             "What is left of {channel} in {}, the eight seconds with the largest gap: within two multiples of the noise it is noise.",
@@ -312,7 +312,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
             "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
         ),
     ]);
-    // effects of one set belong together, so only an effect outside the set is a rival
+    // effects of one set are reported together, so only an effect outside the named set is an alternative
     let rivals: Vec<String> =
         d.ambiguous.iter().filter(|name| !d.named.contains(name)).cloned().collect();
     if !rivals.is_empty() && !d.named.is_empty() {

@@ -1,4 +1,4 @@
-//! The tables of a diagnosis's report.
+//! The tables of a diagnosis's report. The *gap* is the difference between simulator and recording.
 
 use stretch_data::listed;
 use stretch_gap::{
@@ -109,7 +109,7 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
     (!d.parameters.is_empty()).then_some(table)
 }
 
-/// A table of the cost of the gap: errors of calibrations trained on measured trials and in the simulator.
+/// A table of the cost of the gap: errors of calibrations that were trained on measured and on simulated trials.
 pub fn transfer_table(transfer: &Transfer) -> Table {
     let rows = [(LINE, transfer.linear), (SURFACE, transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
@@ -224,8 +224,9 @@ const ALIKE: f64 = 0.05;
 const LINE: &str = "linear";
 const SURFACE: &str = "non-linear";
 
-/// Explains the cost of the effect for a calibration where its table does not: either the cost is too small to matter
-/// to any calibration, or a calibration errs more with the better simulator. `None` if the table needs no explanation.
+/// Explains the cost of the effect for a calibration if the table alone does not: either the cost is too small to
+/// matter to any calibration, or a calibration has larger errors with the better simulator. `None` if the table needs
+/// no explanation.
 pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     let kinds = [(LINE, &transfer.linear), (SURFACE, &transfer.poly13)];
     let gain = |e: &TransferError| e.sim - e.sim_with_effect;

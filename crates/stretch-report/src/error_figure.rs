@@ -113,7 +113,7 @@ pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figu
         .legend(legend)
 }
 
-/// Places and errors of each method over all trials.
+/// Returns, for each method, the abscissa and the error of each sample of all trials.
 fn points(evaluation: &Evaluation, methods: usize, against: Against) -> Vec<Vec<(f64, f64)>> {
     let mut all = vec![Vec::new(); methods];
     for trial in &evaluation.trials {

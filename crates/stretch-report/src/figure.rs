@@ -221,20 +221,20 @@ pub(crate) fn lines_figure(
     })
 }
 
-/// Text in an ink, aligned at `h` and `v`.
+/// Returns the style of a text in an ink, aligned at `h` and `v`.
 pub fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", TEXT_PX * STEPS).into_font());
     style.color = ink.color().to_backend_color();
     style.pos(Pos::new(h, v))
 }
 
-/// A line of `pixels` in width.
+/// Returns the style of a line that is `pixels` wide.
 pub fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
     let stroke_width = px(pixels).unsigned_abs();
     ShapeStyle { color: color.into(), filled: false, stroke_width }
 }
 
-/// A dot's style.
+/// Returns the style of a dot.
 pub fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
     ShapeStyle { color: ink.faint(opacity), filled: true, stroke_width: 0 }
 }

@@ -1,5 +1,5 @@
-//! The summary of a diagnosis for the first ten seconds of reading: the change, its probability, its gain, and the
-//! next step.
+//! The summary of a diagnosis for the first ten seconds of reading: the change, its probability, the improvement that
+//! it brings, and the next step.
 
 use stretch_data::listed;
 use stretch_gap::{Answer, Diagnosis, Gross, VerdictKind};
@@ -18,7 +18,7 @@ pub(crate) fn headline(subject: &Subject<'_>) -> String {
         Some(Answer::Missing { .. }) => {
             format!("{}The simulator lacks {}.", d.preface(), to_add(&d.named, &d.tied))
         }
-        // a probability holds only among the candidates, and its condition is added
+        // a probability holds only among the candidates, so the text adds this condition
         _ => d.in_sentences(&|p| format!("{} {GIVEN}", percent(p))).replace(" %", "\u{a0}%"),
     }
 }
@@ -159,7 +159,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Returns a sentence on the gain of a calibration if its error falls by more than a tenth, otherwise nothing.
+/// Returns a sentence on the improvement of a calibration if its error falls by more than a tenth, otherwise nothing.
 fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {

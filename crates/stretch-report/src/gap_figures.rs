@@ -19,7 +19,7 @@ use super::{
 const WINDOW_S: f64 = 8.0;
 /// Most dots of a panel.
 const DOTS: usize = 900;
-/// Samples on each side in the difference for a rate.
+/// Number of samples on each side of a sample in the difference that gives its rate.
 const REACH: usize = 10;
 
 /// Colour of the re-tuned simulator.

@@ -109,7 +109,7 @@ mod tests {
         (0..SAMPLES).map(|i| wave(i) + step(i)).collect()
     }
 
-    /// Angle of a joint of first order; the second joint has play behind it.
+    /// Returns a recording of two joints with a first-order response; the second joint has play behind it.
     fn recorded(trial: usize) -> SessionTrial {
         let mut channels = Vec::new();
         for joint in 0..2 {

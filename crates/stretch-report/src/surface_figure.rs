@@ -162,8 +162,8 @@ impl Cube<'_> {
     }
 }
 
-/// Evaluates `say` for each cell with the number of lit cells among the cell and its neighbours, and the number of
-/// these cells.
+/// Evaluates `say` for each cell. Its two arguments are the number of lit (true) cells among the cell and its
+/// neighbours, and the total number of these cells.
 fn near(cells: &[bool], say: impl Fn(usize, usize) -> bool) -> Vec<bool> {
     let reach = |i: usize| i.saturating_sub(1)..(i + 2).min(CELLS);
     let around = |c: usize| {

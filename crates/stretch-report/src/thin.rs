@@ -52,7 +52,7 @@ pub(crate) fn curve(
         .collect()
 }
 
-/// The ends of a run and, of each slot, its extremes in the order of time.
+/// Returns the two ends of a run and the extremes of each slot, in the order of time.
 fn peaks(run: &[(f64, f64)], slot: impl Fn(f64) -> usize) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     let mut push = |point: (f64, f64)| {

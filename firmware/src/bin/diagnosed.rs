@@ -1,4 +1,4 @@
-//! Volts to millimetres with a model of diagnosed effects and a filter, in `f32`.
+//! Converts volts to millimetres in `f32`, with a model of diagnosed effects that a filter inverts.
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! Volts of four gauges to the angle of a joint, in `f32`. It measures the cost of a channel and of
-//! its monitoring.
+//! Converts volts of four gauges to the angle of a joint, in `f32`. The program measures the cost
+//! of a channel and of its monitoring.
 #![no_std]
 #![no_main]
 

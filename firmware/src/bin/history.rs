@@ -1,4 +1,4 @@
-//! Volts to millimetres with polynomials of the signal's history, in `f32`.
+//! Converts volts to millimetres with polynomials of the signal's history, in `f32`.
 #![no_std]
 #![no_main]
 

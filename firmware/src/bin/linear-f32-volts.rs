@@ -1,4 +1,4 @@
-//! Volts to millimetres with a line, all in `f32`: the direct implementation.
+//! Converts volts to millimetres with a line, all in `f32`: the direct implementation.
 #![no_std]
 #![no_main]
 

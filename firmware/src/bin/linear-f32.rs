@@ -1,4 +1,5 @@
-//! Converter codes to millimetres with a line. The rate is computed in integers, the rest in `f32`.
+//! Converts converter codes to millimetres with a line. The rate is computed in integers, the rest
+//! in `f32`.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Converter codes to micrometres with a line, in fixed point.
+//! Converts converter codes to micrometres with a line, in fixed point.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! Converter codes to micrometres with the gauge's forward model and a filter, in integers.
+//! Converts converter codes to micrometres in integers, with the gauge's forward model that a
+//! filter inverts.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres with the gauge's forward model and a filter, in `f32`.
+//! Converts volts to millimetres in `f32`, with the gauge's forward model that a filter inverts.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres in `f32`, with the rate from a low-pass filtered difference.
+//! Converts volts to millimetres in `f32`, with the rate from a low-pass filtered difference.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres in `f32`, with the rate from an alpha-beta tracker.
+//! Converts volts to millimetres in `f32`, with the rate from an alpha-beta tracker.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Volts to millimetres in `f32`, with the rate computed in integers.
+//! Converts volts to millimetres in `f32`, with the rate computed in integers.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! Volts to millimetres with the paper's surfaces, all in `f32`: the direct implementation.
+//! Converts volts to millimetres with the surfaces of the published method, all in `f32`: the
+//! direct implementation.
 #![no_std]
 #![no_main]
 

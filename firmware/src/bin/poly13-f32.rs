@@ -1,5 +1,5 @@
-//! Converter codes to millimetres with the paper's surfaces. The rate is computed in integers, the
-//! rest in `f32`.
+//! Converts converter codes to millimetres with the surfaces of the published method. The rate is
+//! computed in integers, the rest in `f32`.
 #![no_std]
 #![no_main]
 

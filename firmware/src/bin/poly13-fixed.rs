@@ -1,4 +1,5 @@
-//! Converter codes to micrometres with the paper's surfaces, in fixed point.
+//! Converts converter codes to micrometres with the surfaces of the published method, in fixed
+//! point.
 #![no_std]
 #![no_main]
 

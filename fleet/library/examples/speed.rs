@@ -8,8 +8,8 @@
 //! target/release/examples/speed states FOLDER 10000 365     # sensors, states of each
 //! ```
 //!
-//! Each line is a query: threads, seconds (the shortest of seven), nanoseconds per row by the clock
-//! and summed over all threads, and the peak memory of the process so far.
+//! Each printed line describes a query: its name, the threads, the seconds (the shortest of seven), nanoseconds per row
+//! by the clock and summed over all threads, the number of groups, and the peak memory of the process so far.
 
 use std::{fs, path::Path, sync::Arc, time::Instant};
 

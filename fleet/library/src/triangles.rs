@@ -185,8 +185,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
         Ok(())
     }
 
-    /// Takes stored states, each with its group index; a null is no state. An unusable state makes
-    /// its group a refusal with an error text.
+    /// Takes stored states, each with its group index; a null value means that there is no state.
+    /// An unusable state makes its group a refusal with an error text.
     pub(crate) fn states<'a>(
         &mut self,
         states: impl Iterator<Item = Option<&'a [u8]>>,

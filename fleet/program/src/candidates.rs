@@ -37,8 +37,8 @@ fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
 }
 
 /// Returns for each file the reason why it is a byte-identical copy of another one, or `None` if it
-/// is not. Of several identical files, the one at the place where the lake already has it counts,
-/// otherwise the first of the list.
+/// is not. Of several identical files, one is the original: the one at the place where the lake
+/// already has it, otherwise the first of the list.
 pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<String>> {
     let in_lake: HashMap<&str, &LakeFile> =
         there.iter().map(|file| (file.footer.digest.as_str(), file)).collect();

@@ -18,7 +18,8 @@ const LEAST_DAYS: usize = 4;
 pub(crate) struct Compared {
     /// Root mean square change of the fit over the rows of both months, in units of the reference.
     pub change: f64,
-    /// Design effect: number of rows with the weight of one independent row.
+    /// Design effect: number of correlated rows that carry as much information as one independent
+    /// row.
     pub design_effect: f64,
     /// F statistic. `freedom` holds its two degrees of freedom.
     pub f: f64,
@@ -32,14 +33,14 @@ pub(crate) struct Compared {
 /// Let `u_d` be the score vector of a day at the fit to both months, `U` the sum of the scores over
 /// the first month, and `H` the first month's share of the information. Then
 /// `Q = U^T (H (1 - H))^-1 U` is the improvement of two fits over one. If residuals were white, `Q`
-/// would have a chi-square distribution. They are not, because rows of a day share its temperature,
-/// its donning and its slow motion. Therefore days are treated as independent, but rows are not.
-/// The scatter of the `u_d` about their month's mean gives the covariance of `U`, and the
-/// eigenvalues of `K = (H (1 - H))^-1 Cov(U)` are its design effects. `Q` over their sum is
-/// compared with an F distribution. Its degrees of freedom are `(tr K)^2 / tr K^2`, and that number
-/// times the number of days minus two (Rao and Scott 1984, doi 10.1214/aos/1176346391, second
-/// order; Thomas and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of both branches are tested as
-/// one model, each in units of its residual.
+/// would have a chi-square distribution. They are not, because all rows of a day have the same
+/// temperature, the same donning of the sleeve and the same slow motion. Therefore days are treated
+/// as independent, but rows are not. The scatter of the `u_d` about their month's mean gives the
+/// covariance of `U`, and the eigenvalues of `K = (H (1 - H))^-1 Cov(U)` are its design effects.
+/// `Q` divided by their sum is compared with an F distribution. The first number of degrees of
+/// freedom is `(tr K)^2 / tr K^2`; the second is the first times the number of days minus two (Rao
+/// and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas and Rao, J. Am. Stat. Assoc.
+/// 82, 1987). The surfaces of both branches are tested as one model, each in units of its residual.
 pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String> {
     for (which, days) in [("first", first), ("second", second)] {
         if days.len() < LEAST_DAYS {

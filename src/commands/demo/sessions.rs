@@ -41,9 +41,9 @@ pub(super) struct Sessions {
 }
 
 impl Sessions {
-    /// Reads a folder with a `dataset.toml`; a folder of CSV files, in which files that differ only
-    /// in a final `_1`, `_2`, ... form a group; one such group by its name; or one file with
-    /// several sessions.
+    /// Reads one of four kinds of input: a folder with a `dataset.toml`; a folder of CSV files, in
+    /// which files that differ only in a final `_1`, `_2`, ... form a group; one such group by its
+    /// name; or one file with several sessions.
     ///
     /// # Errors
     /// Files that cannot be read; no session to test on; a reference or signal that has to be
@@ -92,8 +92,8 @@ impl Sessions {
         Ok(Self { name, reference: reference.to_owned(), signals, fit, test, notes, folder })
     }
 
-    /// Returns the trials to which the paper's calibrations are fitted: its ramps, or all trials if
-    /// there are no ramps.
+    /// Returns the trials to which the calibrations of the published method are fitted: the ramps,
+    /// or all trials if there are no ramps.
     pub(super) fn ramps(&self) -> Vec<Trial> {
         let is_ramp = |kind: TrialKind| matches!(kind, TrialKind::Inflation | TrialKind::Deflation);
         let any = self.fit.iter().any(|(kind, _)| is_ramp(*kind));

@@ -13,7 +13,8 @@ use std::{
 pub(crate) enum Heard {
     Bytes(Vec<u8>),
     Connected,
-    /// With the reason. The port is reopened until the user stops listening.
+    /// The port has disconnected, for the given reason. It is reopened until the user stops
+    /// listening.
     Disconnected(String),
     /// The end of a stream that cannot reconnect: a pipe or a file.
     Ended,

@@ -16,9 +16,9 @@ use super::Twin;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub time_s: f64,
-    /// In the unit of the signal; `None` for a sample that the board did not get.
+    /// The signal, in its unit; `None` for a sample that the board did not get.
     pub signal: Option<f64>,
-    /// In the unit of the reference; `None` if the board withholds the estimate.
+    /// The estimate, in the unit of the reference; `None` if the board withholds it.
     pub estimate: Option<f64>,
     pub frame: Frame,
 }
@@ -109,8 +109,8 @@ impl TrialFile {
         let written = self.file.write_all(&self.line);
         match written {
             Ok(()) => self.whole += self.line.len() as u64,
-            // A full disk may have taken a part of the line, which is cut off again. The first
-            // error is reported, not one of the truncation.
+            // A full disk may have accepted a part of the line, which is then cut off. The first
+            // error is reported, not an error of the truncation.
             Err(_) => drop(self.file.set_len(self.whole)),
         }
         written

@@ -174,7 +174,8 @@ fn nothing() -> Said {
     Said("nothing has been calculated yet".to_owned())
 }
 
-/// Returns the sample data for new users, the paper's session simulated, as a list of files.
+/// Returns sample data for new users as a list of files: a simulated session of the published
+/// method ("the paper").
 ///
 /// # Errors
 /// Never in a correct build.

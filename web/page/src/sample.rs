@@ -1,5 +1,5 @@
-//! Sample data: the paper's session on a rig with the paper's effects, as written by
-//! `stretch simulate --rig paper`.
+//! Sample data: a simulated session of the published method ("the paper") on a rig with effects as
+//! large as in the paper, as written by `stretch simulate --rig paper`.
 
 use serde::Serialize;
 use stretch_data::DataSet;

@@ -9,9 +9,8 @@
 pub(super) struct Accumulator(pub(super) u64);
 
 impl Accumulator {
-    /// Starts at `c` plus a half minus 2^-32. With a whole half, the compiler would emit a
-    /// rounding multiplication (SMMLAR) on cores that have one, and that instruction drops the
-    /// fraction.
+    /// Starts at `c` plus a half minus 2^-32. With exactly one half, the compiler would emit a rounding multiplication
+    /// (SMMLAR) on cores that have one, and that instruction drops the fraction.
     #[inline(always)]
     pub(super) fn new(c: i32) -> Self {
         Self::from_parts(c, (1 << 31) - 1)

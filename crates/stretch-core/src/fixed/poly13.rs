@@ -33,7 +33,7 @@ pub struct FixedPoly13 {
     ordered: [i32; 7],
 }
 
-/// The field that errors name.
+/// Name of the field in errors.
 const FIELD: &str = "fixed.surface";
 
 impl FixedPoly13 {

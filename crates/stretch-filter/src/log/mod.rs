@@ -2,7 +2,7 @@
 //!
 //! | time stamps | use |
 //! | --- | --- |
-//! | even | [`SgFilter::over_log`](crate::SgFilter::over_log), or [`central_difference`] as the paper did |
+//! | even | [`SgFilter::over_log`](crate::SgFilter::over_log), or [`central_difference`] as in the published method |
 //! | uneven | [`local_polynomial`]: a fit at the actual times |
 //! | uneven, and an even grid is needed | [`resample`] first, at no finer a grid than the log has |
 //!

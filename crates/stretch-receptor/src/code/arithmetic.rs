@@ -23,8 +23,8 @@ pub(super) mod sealed {
             surfaces: &CodeMap<Self::Line, Self::Surface>,
             rate_rounding: f64,
         ) -> Option<f64>;
-        /// Returns the line in the form that a step evaluates. Floats multiply the factor of the span into the
-        /// coefficients.
+        /// Returns the line in the form that a step evaluates. Floating-point arithmetic multiplies the factor of the
+        /// span into the coefficients.
         fn line_over(line: Self::Line, signal: &Span) -> Self::Line;
         fn surface_over(surface: Self::Surface, signal: &Span, rate: &Span) -> Self::Surface;
         /// Evaluates a line at a signal inside its span.

@@ -1,14 +1,14 @@
 //! Receptors for boards: converter codes in, estimates out.
 //!
 //! A converter gives integers, and a Savitzky-Golay rate of integers is an integer. No
-//! floating-point number is needed before the surface, and for window shapes in common use nothing
-//! is rounded before it. [`CodeReceptor`] handles branch, domain, warm-up and missing samples like
-//! [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface
+//! floating-point number is needed before the surface is evaluated, and for window shapes in common
+//! use nothing is rounded before it. [`CodeReceptor`] handles branch, domain, warm-up and missing
+//! samples like [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface
 //!
-//! - in 32-bit fixed point ([`FixedReceptor`]): thousandths of the reference's
-//!   unit, about 100 instructions on any Cortex-M; or
-//! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)): six products and six
-//!   sums, the reference's unit.
+//! - in 32-bit fixed point ([`FixedReceptor`]), with the estimate in thousandths of the reference's
+//!   unit. This takes about 100 instructions on any Cortex-M; or
+//! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)), with the estimate in the reference's unit.
+//!   This takes six products and six sums.
 //!
 //! [`FixedObserver`] is the integer receptor for the observer, a model with memory.
 //!

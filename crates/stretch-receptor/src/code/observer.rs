@@ -23,9 +23,8 @@ const MOST_DRIVE: i32 = 1 << 30;
 /// Least length of a secant of the curve, as a share of the distance between knots.
 const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 
-/// An [`ObserverReceptor`](crate::ObserverReceptor) for converter codes, in
-/// 32-bit integers: the same filter with the same table of gains, codes in,
-/// thousandths of the reference's unit out (micrometres for millimetres).
+/// An [`ObserverReceptor`](crate::ObserverReceptor) in 32-bit integers: the same filter with the same table of gains.
+/// It takes converter codes and gives thousandths of the reference's unit (micrometres for millimetres).
 ///
 /// [`FixedObserver::new`] converts a calibration once, on a computer. With the feature `serde` the observer serialises
 /// to about 400 bytes. No step can overflow: numbers whose sums could overflow are refused, and states are clamped to
@@ -182,7 +181,7 @@ impl IntegerObserver {
         let mut place = usize::from(self.tangents[segment]);
         let (run, change) = ((to - from).abs(), (held - predicted).abs());
         if run > LEAST_RUN {
-            // compares the secant's slope, change/run, with each end without a division
+            // compares the secant's slope, change/run, with each limit in `ends` without a division
             let change = i64::from(change) << PLACE_BITS;
             while place < SLOPES - 1
                 && change >= i64::from(self.numbers.ends[place]) * i64::from(run)

@@ -1,4 +1,4 @@
-//! The program `stretch-fleet`, for lakes of trials.
+//! The program `stretch-fleet`, for lakes of trials: folders of Parquet files, one per trial.
 
 use std::process::ExitCode;
 

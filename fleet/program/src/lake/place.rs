@@ -105,7 +105,7 @@ impl std::fmt::Display for Place {
 }
 
 /// Registers the lake's trials as the table `trials`, with site, rig, sensor and date from its
-/// folders; unfit files are left out.
+/// folders. Unfit files, which no query can read together with the others, are left out.
 ///
 /// # Errors
 /// An unfit file in a folder whose name a query cannot distinguish from others.
